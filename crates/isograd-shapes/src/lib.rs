@@ -1,0 +1,1 @@
+//! Parametric bodies whose points, normals, volumes and (where known) distances are exact.

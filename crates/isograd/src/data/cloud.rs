@@ -1,0 +1,178 @@
+//! Samples of a surface.
+
+use crate::{Real, vector};
+
+/// A named value per sample, with a fixed number of components (a surface velocity has 3).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Attribute<T> {
+    /// Its name, as files and reports show it.
+    pub name: String,
+    /// Number of components per sample, at least 1.
+    pub components: usize,
+    /// `(N, components)`, row by row.
+    pub values: Vec<T>,
+}
+
+/// Samples of a surface: `(N, 3)` points, and, where known, normals and attributes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointCloud<T> {
+    points: Vec<[T; 3]>,
+    normals: Option<Vec<[T; 3]>>,
+    attributes: Vec<Attribute<T>>,
+}
+
+/// Why a cloud was refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PointCloudError {
+    /// A coordinate is NaN or infinite.
+    #[error("point {index} is not finite: ({x}, {y}, {z}); remove it or mend it")]
+    NotFinite {
+        /// Index of the point, from 0.
+        index: usize,
+        /// First coordinate.
+        x: f64,
+        /// Second coordinate.
+        y: f64,
+        /// Third coordinate.
+        z: f64,
+    },
+    /// The normals do not match the points.
+    #[error("{normals} normals for {points} points; give one normal a point, or none at all")]
+    NormalCount {
+        /// Number of points.
+        points: usize,
+        /// Number of normals.
+        normals: usize,
+    },
+    /// A component of a normal is NaN or infinite.
+    #[error("the normal of point {index} is not finite; remove the point or mend the normal")]
+    NormalNotFinite {
+        /// Index of the point, from 0.
+        index: usize,
+    },
+    /// An attribute does not match the points.
+    #[error("attribute '{name}' has {values} values, not {components} for each of {points} points")]
+    AttributeCount {
+        /// Name of the attribute.
+        name: String,
+        /// Number of values.
+        values: usize,
+        /// Components per point.
+        components: usize,
+        /// Number of points.
+        points: usize,
+    },
+    /// More points than 32-bit indices can name.
+    #[error("{points} points are more than the {max} that one cloud may hold; thin the cloud")]
+    TooMany {
+        /// Number of points.
+        points: usize,
+        /// The limit.
+        max: usize,
+    },
+}
+
+impl<T: Real> PointCloud<T> {
+    /// A cloud of `(N, 3)` finite points, in the user's unit. `N` may be 0: how many a method needs is
+    /// the method's own error.
+    ///
+    /// # Errors
+    /// [`PointCloudError::NotFinite`] names the first bad point.
+    pub fn new(points: Vec<[T; 3]>) -> Result<Self, PointCloudError> {
+        const MAX: usize = u32::MAX as usize - 1;
+        if points.len() > MAX {
+            return Err(PointCloudError::TooMany {
+                points: points.len(),
+                max: MAX,
+            });
+        }
+        if let Some(index) = points.iter().position(|&p| !vector::is_finite(p)) {
+            let [x, y, z] = vector::to_f64(points[index]);
+            return Err(PointCloudError::NotFinite { index, x, y, z });
+        }
+        Ok(Self {
+            points,
+            normals: None,
+            attributes: Vec::new(),
+        })
+    }
+
+    /// The same cloud with a normal for each point (any length but zero; outward where the method
+    /// trusts them).
+    ///
+    /// # Errors
+    /// A wrong count, or a normal that is not finite.
+    pub fn with_normals(mut self, normals: Vec<[T; 3]>) -> Result<Self, PointCloudError> {
+        if normals.len() != self.points.len() {
+            return Err(PointCloudError::NormalCount {
+                points: self.points.len(),
+                normals: normals.len(),
+            });
+        }
+        if let Some(index) = normals.iter().position(|&n| !vector::is_finite(n)) {
+            return Err(PointCloudError::NormalNotFinite { index });
+        }
+        self.normals = Some(normals);
+        Ok(self)
+    }
+
+    /// The same cloud with one more attribute.
+    ///
+    /// # Errors
+    /// A number of values other than `N · components`.
+    pub fn with_attribute(mut self, attribute: Attribute<T>) -> Result<Self, PointCloudError> {
+        let expected = self.points.len().checked_mul(attribute.components);
+        if attribute.components == 0 || expected != Some(attribute.values.len()) {
+            return Err(PointCloudError::AttributeCount {
+                name: attribute.name,
+                values: attribute.values.len(),
+                components: attribute.components,
+                points: self.points.len(),
+            });
+        }
+        self.attributes.push(attribute);
+        Ok(self)
+    }
+
+    /// `(N, 3)` points.
+    pub fn points(&self) -> &[[T; 3]] {
+        &self.points
+    }
+
+    /// `(N, 3)` normals, where the cloud has them.
+    pub fn normals(&self) -> Option<&[[T; 3]]> {
+        self.normals.as_deref()
+    }
+
+    /// The attributes, in the order in which they were added.
+    pub fn attributes(&self) -> &[Attribute<T>] {
+        &self.attributes
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Whether there is no point.
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// Low and high corner of the axis-aligned bounding box; `None` for an empty cloud.
+    pub fn bounds(&self) -> Option<([T; 3], [T; 3])> {
+        bounds(&self.points)
+    }
+}
+
+/// Low and high corner of the axis-aligned box around `points`; `None` if there are none.
+pub(crate) fn bounds<T: Real>(points: &[[T; 3]]) -> Option<([T; 3], [T; 3])> {
+    let (&first, rest) = points.split_first()?;
+    Some(rest.iter().fold((first, first), |(mut low, mut high), p| {
+        for a in 0..3 {
+            low[a] = low[a].min(p[a]);
+            high[a] = high[a].max(p[a]);
+        }
+        (low, high)
+    }))
+}

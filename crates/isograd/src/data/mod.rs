@@ -1,0 +1,11 @@
+//! Plain data with checked constructors: what goes into the stages and what comes out.
+
+mod cloud;
+mod field;
+mod grid;
+mod mesh;
+
+pub use cloud::{Attribute, PointCloud, PointCloudError};
+pub use field::{Field, FieldError};
+pub use grid::{Grid, GridError, Resolution};
+pub use mesh::{LatticeEdge, Mesh, MeshError};

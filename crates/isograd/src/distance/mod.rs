@@ -1,0 +1,1 @@
+//! The distance stage.

@@ -1,0 +1,1 @@
+//! The orient stage.

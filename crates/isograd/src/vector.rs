@@ -1,0 +1,83 @@
+//! Vectors of three components: small pure functions, the same lines for every stage.
+
+use num_traits::Float;
+
+/// A point or a direction, `(x, y, z)`.
+pub type Vector<T> = [T; 3];
+
+/// `a + b`.
+#[inline(always)]
+pub fn add<T: Float>(a: [T; 3], b: [T; 3]) -> [T; 3] {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+/// `a − b`.
+#[inline(always)]
+pub fn sub<T: Float>(a: [T; 3], b: [T; 3]) -> [T; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// `s a`.
+#[inline(always)]
+pub fn scale<T: Float>(a: [T; 3], s: T) -> [T; 3] {
+    [a[0] * s, a[1] * s, a[2] * s]
+}
+
+/// `a · b`.
+#[inline(always)]
+pub fn dot<T: Float>(a: [T; 3], b: [T; 3]) -> T {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// `a × b`.
+#[inline(always)]
+pub fn cross<T: Float>(a: [T; 3], b: [T; 3]) -> [T; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// `|a|²`.
+#[inline(always)]
+pub fn norm_squared<T: Float>(a: [T; 3]) -> T {
+    dot(a, a)
+}
+
+/// `|a|`.
+#[inline(always)]
+pub fn norm<T: Float>(a: [T; 3]) -> T {
+    dot(a, a).sqrt()
+}
+
+/// `a / |a|`, or `None` where the length is zero or not finite.
+#[inline(always)]
+pub fn normalized<T: Float>(a: [T; 3]) -> Option<[T; 3]> {
+    // Scaled by the largest component first, so that tiny and huge vectors neither underflow nor overflow.
+    let largest = a[0].abs().max(a[1].abs()).max(a[2].abs());
+    if !(largest > T::zero()) || !largest.is_finite() {
+        return None;
+    }
+    let b = [a[0] / largest, a[1] / largest, a[2] / largest];
+    let length = norm(b);
+    Some([b[0] / length, b[1] / length, b[2] / length])
+}
+
+/// Whether all three components are finite.
+#[inline(always)]
+pub fn is_finite<T: Float>(a: [T; 3]) -> bool {
+    a[0].is_finite() && a[1].is_finite() && a[2].is_finite()
+}
+
+/// The same vector in double precision (exact).
+#[inline(always)]
+pub fn to_f64<T: crate::Real>(a: [T; 3]) -> [f64; 3] {
+    [a[0].f64(), a[1].f64(), a[2].f64()]
+}
+
+/// The nearest vector of type `T`.
+#[inline(always)]
+pub fn of_f64<T: crate::Real>(a: [f64; 3]) -> [T; 3] {
+    [T::of(a[0]), T::of(a[1]), T::of(a[2])]
+}
