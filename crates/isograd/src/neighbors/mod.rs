@@ -1,1 +1,29 @@
-//! The neighbors stage.
+//! Which samples are close to which: a service shared by the stages.
+//!
+//! # Map
+//! Points `(N, 3)` → a radius `R_i` per point and the neighbourhoods `N_i = {j : |x_j − x_i| ≤ R_i}`,
+//! each of which contains `i`. The radius is common to all points (given, or chosen so that a sample
+//! has about 24 neighbours), and grows where fewer than 8 samples are within it:
+//! `R_i = max(R, 1.05 · distance to the 8th neighbour)`, counting `i` itself. With 10:1 density a
+//! common radius would leave one or two. A sample whose neighbours do not have it as theirs is marked as
+//! isolated.
+//!
+//! # Residual
+//! [`Neighborhoods`] is its own residual: the tree and the radii.
+//!
+//! # Pullback
+//! None: neighbourhoods are sets, and the radii are held constant by every pullback that uses them.
+//!
+//! # Not differentiable
+//! A sample that enters or leaves a neighbourhood, and the choice of the radius. `j ∈ N_i` and
+//! `i ∈ N_j` are the same where both radii are the common one, not where one has grown.
+
+mod candidates;
+mod cell_index;
+mod radius;
+#[cfg(test)]
+pub(crate) mod tests;
+
+pub(crate) use candidates::{Candidates, LANES, Lanes};
+pub use cell_index::CellIndex;
+pub use radius::{Error, Neighborhoods, Radius, forward};

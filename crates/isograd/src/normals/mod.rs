@@ -1,1 +1,91 @@
-//! The normals stage.
+//! The axis of the surface at every sample: distance-weighted principal components (D-PCA).
+//!
+//! # Map
+//! Points `(N, 3)` and their neighbourhoods `N_i` → unit vectors `(N, 3)` along the surface normal,
+//! after the paper's section on normal estimation. With `d_j = x_j − x_i`, `r_j = |d_j|` and
+//! `w_j = 1/(r_j + ε)`,
+//! `W = Σ w_j`, `m = Σ w_j d_j / W`, `C = Σ w_j d_j d_jᵀ / W − m mᵀ`,
+//! and the normal `n = v₁` is the eigenvector of `C` for its smallest eigenvalue, `λ₁ ≤ λ₂ ≤ λ₃`. All is
+//! relative to `x_i`, so a cloud far from the origin loses nothing. The sign of `n` is arbitrary, but
+//! always the same: its component of largest magnitude is positive. Orientation is the next stage.
+//!
+//! `ε = R_i/5`. The paper asks for a small constant; but a tiny one gives the sample itself nearly all of
+//! the weight, so that its own noise tilts the plane. Mean error of the axes in degrees, uniform random
+//! samples of a torus (24 neighbours) with noise along all axes, and the faces and edges of a cube:
+//!
+//! | `ε/R_i` | 10⁻⁶ | 10⁻³ | 0.01 | 0.1 | 0.3 | 1 | 10 |
+//! |---|---|---|---|---|---|---|---|
+//! | torus, no noise | 1.92 | 1.90 | 1.77 | 1.56 | 1.54 | 1.55 | 1.58 |
+//! | torus, noise 0.05 R | 3.2 | 3.2 | 2.9 | 2.5 | 2.5 | 2.5 | 2.5 |
+//! | torus, noise 0.2 R | 17.3 | 17.0 | 15.4 | 11.1 | 10.0 | 9.6 | 9.4 |
+//! | cube, no noise | 5.99 | 5.94 | 5.63 | 5.19 | 5.19 | 5.27 | 5.38 |
+//!
+//! The paper takes the vectors from a singular value decomposition of the weighted offsets instead, to
+//! keep digits and gradients. Here `C` is formed relative to `x_i`, where its rounding tilts the axis by
+//! a few units of rounding of the number type; it is solved in double precision, and the pullback is
+//! written out, with its own guard.
+//!
+//! # Residual
+//! [`Residual`]: per point `n`, `m`, `W`, the eigenvalues and the two tangents `v₂`, `v₃`.
+//!
+//! # Pullback
+//! Given `n̄`, the cotangent of the normal (its part along `n` drops out):
+//! ```text
+//! g   = Σ_{k=2,3} v_k (v_k·n̄) / (λ₁ − λ_k)
+//! B   = (g nᵀ + n gᵀ)/2
+//! d̄_j = (2 w_j/W) B (d_j − m) − (w_j²/W) [(d_j − m)ᵀ B (d_j − m) − ⟨B, C⟩] d_j/r_j   (0 where r_j = 0)
+//! x̄_j += d̄_j,   x̄_i −= Σ_j d̄_j
+//! ```
+//! `⟨B, C⟩ = gᵀ C n = 0`, because `C n = λ₁ n` and `g` is normal to `n`. Both terms are gathered: over
+//! `N_i`, and over all `i` with `j ∈ N_i`.
+//!
+//! # Not differentiable
+//! The neighbourhoods and radii (held constant, `ε` with them), and the sign. Where `λ₂ − λ₁` is at most
+//! `10⁻³ λ₃` (a line, an isolated point, a corner as thick as it is wide) the axis itself is ill defined:
+//! such a plane is marked [`Plane::guarded`], and the pullback bounds `1/(λ₁ − λ_k)` there.
+
+mod eigen;
+mod forward;
+#[cfg(test)]
+mod tests;
+
+pub use forward::forward;
+
+/// The local plane of one sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Plane<T> {
+    /// `m`: weighted centroid of the neighbourhood relative to the sample, in the unit of the points.
+    pub centroid: [T; 3],
+    /// `W`: sum of the weights, in one over the unit of the points.
+    pub weight: T,
+    /// `λ₁ ≤ λ₂ ≤ λ₃` of the weighted covariance, in the unit of the points squared; not negative.
+    pub eigenvalues: [T; 3],
+    /// `v₂` and `v₃`: unit vectors that make a right-handed basis with the normal before them.
+    pub tangents: [[T; 3]; 2],
+    /// Whether the gap `λ₂ − λ₁` is too small, relative to `λ₃`, for the normal to mean anything.
+    pub guarded: bool,
+}
+
+/// The axes, and what their pullback needs; all `(N,)` in input order.
+#[derive(Clone, Debug, Default)]
+pub struct Residual<T> {
+    /// Unit normals, each with its component of largest magnitude positive.
+    pub normals: Vec<[T; 3]>,
+    /// The plane round each point.
+    pub planes: Vec<Plane<T>>,
+    /// Both in the order of the cells: scratch.
+    sorted: Vec<([T; 3], Plane<T>)>,
+}
+
+impl<T> Residual<T> {
+    /// Number of points whose normal is ill defined.
+    pub fn guarded(&self) -> usize {
+        self.planes.iter().filter(|plane| plane.guarded).count()
+    }
+
+    /// Forgets all points, for a cloud whose normals are given; keeps the memory.
+    pub fn clear(&mut self) {
+        self.normals.clear();
+        self.planes.clear();
+    }
+}

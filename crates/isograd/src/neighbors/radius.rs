@@ -1,0 +1,342 @@
+//! The radius of every point's neighbourhood.
+
+use rayon::prelude::*;
+
+use super::candidates::{Candidates, LANES, Lanes};
+use super::cell_index::CellIndex;
+use crate::{Real, vector};
+
+/// Fewest points that can bound a volume.
+const FEWEST_POINTS: usize = 4;
+
+/// Fewest samples in a neighbourhood, its centre included: a plane through fewer is mostly chance.
+const FEWEST_NEIGHBORS: usize = 8;
+
+/// By how much a grown radius passes the neighbour that it has to reach, so that this one gets some of
+/// a weight that falls to 0 at the radius.
+const GROWTH_MARGIN: f64 = 1.05;
+
+/// Samples that the automatic radius holds at the median, the centre included.
+const AUTO_NEIGHBORS: usize = 24;
+
+/// Points that are asked for the automatic radius.
+const AUTO_SAMPLES: usize = 1024;
+
+/// Share of a neighbourhood whose own radius must reach back to the sample, or the sample is isolated.
+const SMALLEST_MUTUAL_SHARE: f64 = 0.125;
+
+/// How large a neighbourhood is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Radius {
+    /// The median, over a fixed choice of points, of the distance to the 24th sample: half the points
+    /// have more neighbours than that, half fewer.
+    #[default]
+    Auto,
+    /// This length, in the unit of the points.
+    Fixed(f64),
+}
+
+/// Why there are no neighbourhoods.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// Too few points to bound a volume.
+    #[error(
+        "{points} points cannot bound a volume; give at least {FEWEST_POINTS}, and hundreds for a useful surface"
+    )]
+    TooFew {
+        /// Number of points.
+        points: usize,
+    },
+    /// A coordinate is NaN or infinite.
+    #[error("point {index} is not finite; remove it or mend it")]
+    NotFinite {
+        /// Index of the first such point, from 0.
+        index: usize,
+    },
+    /// The radius given is not a positive number.
+    #[error(
+        "a neighbourhood radius of {radius} cannot be used; give a positive length in the unit of the points, or leave it automatic"
+    )]
+    Radius {
+        /// The radius.
+        radius: f64,
+    },
+    /// Every point is the same.
+    #[error("all {points} points are equal; check that the right columns were read as coordinates")]
+    AllEqual {
+        /// Number of points.
+        points: usize,
+    },
+    /// Squares of distances would overflow or vanish.
+    #[error(
+        "the cloud extends over {extent:e}, whose square {type_name} cannot hold; use a unit in which it is nearer to 1, or f64"
+    )]
+    Extent {
+        /// Longest side of the cloud's box.
+        extent: f64,
+        /// The number type of the points.
+        type_name: &'static str,
+    },
+}
+
+/// The neighbourhood of every point of a cloud, and the index that finds its members.
+#[derive(Clone, Debug, Default)]
+pub struct Neighborhoods<T> {
+    /// The points, sorted into cells.
+    pub index: CellIndex<T>,
+    /// `R`: the radius of every point that has enough neighbours within it.
+    pub common_radius: T,
+    /// `(N,)` the radius `R_i` of each point, in input order; at least [`Self::common_radius`].
+    pub radius: Vec<T>,
+    /// `(N,)` number of samples within `R_i`, the point itself included, in input order.
+    pub count: Vec<u32>,
+    /// `(N,)` whether the sample is an outlier: its radius has grown so far that fewer than 1 in 8 of the
+    /// samples within it have it within their own. Samples of a sparse part of a surface have each
+    /// other; outliers have only samples that are closer to one another. A clump of outliers is not told
+    /// from a sparse surface.
+    pub isolated: Vec<bool>,
+    /// See [`Self::spacing`].
+    spacing: T,
+    /// Radius and count in sorted order: scratch.
+    sorted: Vec<(T, u32)>,
+    /// Input index → sorted position.
+    position: Vec<u32>,
+}
+
+impl<T: Real> Neighborhoods<T> {
+    /// Typical distance between neighbouring samples, in the unit of the points: the side of the square
+    /// that one sample has to itself on the surface, at the median, `√(π/24)` of the automatic radius.
+    pub fn spacing(&self) -> T {
+        self.spacing
+    }
+
+    /// Number of points whose radius has grown beyond the common one.
+    pub fn grown(&self) -> usize {
+        self.radius
+            .iter()
+            .filter(|&&r| r > self.common_radius)
+            .count()
+    }
+
+    /// Input index → sorted position in [`Self::index`].
+    pub(crate) fn position(&self) -> &[u32] {
+        &self.position
+    }
+
+    /// Fills `out`, which has a place for each point in sorted order, in parallel:
+    /// `fill(point, R_i, candidates)`, where the candidates hold all of `N_i`.
+    pub(crate) fn for_each_neighborhood<U: Send>(
+        &self,
+        out: &mut [U],
+        fill: &(impl Fn([T; 3], T, &Candidates<T>) -> U + Sync),
+    ) {
+        let index = &self.index;
+        let radius_at = |position: usize| self.radius[index.order()[position] as usize];
+        index.for_each_cell(self.common_radius, out, &|cell, candidates, out| {
+            let mut own = None;
+            for (position, out) in cell.zip(out) {
+                let (point, radius) = (index.point(position), radius_at(position));
+                *out = if radius <= self.common_radius {
+                    fill(point, radius, candidates)
+                } else {
+                    let own = own.get_or_insert_with(Candidates::default);
+                    index.candidates(point, point, radius, own);
+                    fill(point, radius, own)
+                };
+            }
+        });
+    }
+}
+
+/// Finds the neighbourhood of every one of the `(N, 3)` points, into `out` (whose memory is used again).
+///
+/// # Errors
+/// Fewer than 4 points, a point that is not finite, all points equal, a radius that is not positive, or
+/// an extent whose square the number type cannot hold.
+pub fn forward<T: Real>(
+    points: &[[T; 3]],
+    radius: Radius,
+    out: &mut Neighborhoods<T>,
+) -> Result<(), Error> {
+    check(points)?;
+    out.index.rebuild(points);
+    check_extent(&out.index)?;
+    let automatic = automatic_radius(&out.index);
+    out.spacing =
+        automatic * T::of((std::f64::consts::PI / AUTO_NEIGHBORS.min(points.len()) as f64).sqrt());
+    out.common_radius = match radius {
+        Radius::Auto => automatic.max(smallest_radius()),
+        Radius::Fixed(radius) => fixed_radius(radius)?,
+    };
+    grow(out);
+    find_isolated(out);
+    Ok(())
+}
+
+fn check<T: Real>(points: &[[T; 3]]) -> Result<(), Error> {
+    if points.len() < FEWEST_POINTS {
+        return Err(Error::TooFew {
+            points: points.len(),
+        });
+    }
+    match points.iter().position(|&p| !vector::is_finite(p)) {
+        Some(index) => Err(Error::NotFinite { index }),
+        None => Ok(()),
+    }
+}
+
+fn check_extent<T: Real>(index: &CellIndex<T>) -> Result<(), Error> {
+    let (low, high) = index.bounds();
+    let extent = (0..3)
+        .map(|a| high[a].f64() - low[a].f64())
+        .fold(0.0, f64::max);
+    if extent == 0.0 {
+        return Err(Error::AllEqual {
+            points: index.len(),
+        });
+    }
+    // A millionth of the extent must still have a square, and a hundred extents too.
+    let square_root = |x: T| x.f64().sqrt();
+    if extent < 1e6 * square_root(T::min_positive_value())
+        || extent > 1e-2 * square_root(T::max_value())
+    {
+        return Err(Error::Extent {
+            extent,
+            type_name: T::NAME,
+        });
+    }
+    Ok(())
+}
+
+fn fixed_radius<T: Real>(radius: f64) -> Result<T, Error> {
+    let rounded = T::of(radius);
+    if rounded >= smallest_radius() && (rounded * rounded).is_finite() {
+        Ok(rounded)
+    } else {
+        Err(Error::Radius { radius })
+    }
+}
+
+/// The least radius whose square, and one over it, the number type can hold.
+fn smallest_radius<T: Real>() -> T {
+    T::of(8.0) * T::min_positive_value().sqrt()
+}
+
+/// Median, over a fixed stride of points, of the distance to the 24th sample. Points on which 24 samples
+/// lie have no say; where there are only such, the samples are spread evenly over the extent instead.
+fn automatic_radius<T: Real>(index: &CellIndex<T>) -> T {
+    let n = index.len();
+    let stride = n.div_ceil(AUTO_SAMPLES);
+    let mut distances: Vec<T> = (0..n.div_ceil(stride))
+        .into_par_iter()
+        .map_init(Vec::new, |nearest, sample| {
+            index.nearest(index.point(sample * stride), AUTO_NEIGHBORS, nearest);
+            nearest.last().map_or(T::zero(), |&(_, d2)| d2.sqrt())
+        })
+        .filter(|&distance| distance > T::zero())
+        .collect();
+    if distances.is_empty() {
+        let (low, high) = index.bounds();
+        return vector::norm(vector::sub(high, low)) / T::of_usize(n).sqrt();
+    }
+    let middle = distances.len() / 2;
+    *distances
+        .select_nth_unstable_by(middle, |a, b| a.f64().total_cmp(&b.f64()))
+        .1
+}
+
+/// Writes radius and count of every point: the common radius where it holds enough samples.
+fn grow<T: Real>(out: &mut Neighborhoods<T>) {
+    let n = out.index.len();
+    let (index, common) = (&out.index, out.common_radius);
+    out.sorted.clear();
+    out.sorted.resize(n, (common, 0));
+    let arch = pulp::Arch::new();
+    index.for_each_cell(common, &mut out.sorted, &|cell, candidates, out| {
+        for (position, out) in cell.zip(out) {
+            let point = index.point(position);
+            let count = crate::simd::dispatch(
+                arch,
+                #[inline(always)]
+                || count_within(point, common, candidates),
+            );
+            *out = if count as usize >= FEWEST_NEIGHBORS.min(n) {
+                (common, count)
+            } else {
+                grown(index, point, common)
+            };
+        }
+    });
+    out.position.clear();
+    out.position.resize(n, 0);
+    for (position, &i) in (0u32..).zip(index.order()) {
+        out.position[i as usize] = position;
+    }
+    let sorted = |&position: &u32| out.sorted[position as usize];
+    out.radius.clear();
+    out.radius.extend(out.position.iter().map(|p| sorted(p).0));
+    out.count.clear();
+    out.count.extend(out.position.iter().map(|p| sorted(p).1));
+}
+
+/// The radius that reaches the 8th sample with a margin, and the count within it.
+fn grown<T: Real>(index: &CellIndex<T>, point: [T; 3], common: T) -> (T, u32) {
+    let mut nearest = Vec::with_capacity(FEWEST_NEIGHBORS);
+    index.nearest(point, FEWEST_NEIGHBORS, &mut nearest);
+    let reach = nearest.last().map_or(T::zero(), |&(_, d2)| d2.sqrt());
+    let radius = common.max(T::of(GROWTH_MARGIN) * reach);
+    let mut count = 0;
+    index.for_each_within(point, radius, |_, _| count += 1);
+    (radius, count)
+}
+
+/// Marks the samples that are not neighbours of their neighbours.
+fn find_isolated<T: Real>(out: &mut Neighborhoods<T>) {
+    let (index, position, radius) = (&out.index, &out.position, &out.radius);
+    let common = out.common_radius;
+    let isolated = |i: usize| {
+        let grown = radius[i] > common;
+        grown && mutual_share(index, radius, i, position[i] as usize) < SMALLEST_MUTUAL_SHARE
+    };
+    let samples = (0..radius.len()).into_par_iter();
+    samples.map(isolated).collect_into_vec(&mut out.isolated);
+}
+
+/// Share of the neighbours of sample `i` that have `i` among theirs.
+fn mutual_share<T: Real>(index: &CellIndex<T>, radius: &[T], i: usize, position: usize) -> f64 {
+    let (mut all, mut mutual) = (0u32, 0u32);
+    index.for_each_within(index.point(position), radius[i], |j, d2| {
+        if j != i {
+            all += 1;
+            mutual += u32::from(d2 <= radius[j] * radius[j]);
+        }
+    });
+    f64::from(mutual) / f64::from(all.max(1))
+}
+
+#[inline(always)]
+fn count_within<T: Real>(center: [T; 3], radius: T, candidates: &Candidates<T>) -> u32 {
+    let mut count = [0u32; LANES];
+    candidates.for_each_lanes(
+        radius,
+        #[inline(always)]
+        |lanes| {
+            let d2 = distances_squared(center, lanes);
+            for l in 0..LANES {
+                count[l] += u32::from(d2[l] <= lanes.limit[l]);
+            }
+        },
+    );
+    count.iter().sum()
+}
+
+/// `|x_j − center|²` for each lane, rounded as in every query of the index.
+#[inline(always)]
+fn distances_squared<T: Real>(center: [T; 3], lanes: &Lanes<T>) -> [T; LANES] {
+    let mut d2 = [T::zero(); LANES];
+    for l in 0..LANES {
+        let d = [0, 1, 2].map(|a| lanes.point[a][l] - center[a]);
+        d2[l] = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    }
+    d2
+}
