@@ -1,0 +1,278 @@
+//! Evidence for the sign of an axis: which of its two sides is closer to the open air.
+//!
+//! Every sample is drawn on a grid as a disc in its tangent plane, as wide as the samples round it are
+//! apart: so thin bodies keep their inside, and sparse sampling leaves no holes. Regions of free cells
+//! that the discs close off are matter; cells of the open region count as air by the share of the sky
+//! that they see. So a body with a hole in its sampling, which a flood alone would call all air, still
+//! has a darker and a brighter side.
+
+use rayon::prelude::*;
+
+use super::flood::{self, Regions};
+use super::sky::Sky;
+use crate::parallel::CHUNK;
+use crate::vector;
+
+/// Free cells on each side of a body.
+const MARGIN: f64 = 3.0;
+
+/// Planes of the grid drawn by one task, and the largest radius of a disc in cells: what one task draws
+/// comes from its own samples and those of the tasks beside it.
+const SLAB: usize = 8;
+
+/// Smallest radius of a disc in cells.
+const SMALLEST_DISC: f32 = 0.9;
+
+/// Radius of a disc over the reach of its sample.
+const DISC: f32 = 1.5;
+
+/// Air that sees nothing of the sky counts this much; air that sees all of it counts 1.
+const DARK_AIR: f32 = 0.2;
+
+/// Samples along a ray to the nearest free cell, [`STEP`] cells apart.
+const STEPS: usize = 8;
+const STEP: f32 = 0.5;
+const FIRST: f32 = 0.75;
+
+/// A cubic grid round a part of the cloud, in user coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lattice {
+    lower: [f64; 3],
+    cell: f64,
+    shape: [usize; 3],
+}
+
+impl Lattice {
+    /// A grid over the box from `low` to `high` with cells of the given size; larger cells where there
+    /// would be more than `budget` of them.
+    pub(super) fn new(low: [f64; 3], high: [f64; 3], cell: f64, budget: usize) -> Self {
+        let count = |cell: f64, a: usize| ((high[a] - low[a]) / cell).ceil() + 2.0 * MARGIN;
+        let mut cell = cell;
+        while count(cell, 0) * count(cell, 1) * count(cell, 2) > budget as f64 {
+            cell *= 1.1;
+        }
+        Self {
+            lower: low.map(|x| x - MARGIN * cell),
+            cell,
+            shape: [0, 1, 2].map(|a| count(cell, a) as usize),
+        }
+    }
+
+    /// Position in cells, kept inside the grid.
+    fn place(&self, point: [f64; 3]) -> [f32; 3] {
+        [0, 1, 2].map(|a| {
+            let x = ((point[a] - self.lower[a]) / self.cell) as f32;
+            x.clamp(0.5, self.shape[a] as f32 - 0.5)
+        })
+    }
+
+    fn size(&self) -> usize {
+        self.shape.iter().product()
+    }
+}
+
+/// A sample on the grid; lengths in cells.
+#[derive(Clone, Copy, Debug, Default)]
+struct Disc {
+    center: [f32; 3],
+    axis: [f32; 3],
+    radius: f32,
+    /// Half its thickness: the least that no path through cell faces gets through.
+    half: f32,
+}
+
+/// What is seen along one ray.
+#[derive(Clone, Copy, Debug)]
+struct Sight {
+    /// The free cell that the ray meets first, and after how many steps.
+    cell: usize,
+    region: u32,
+    steps: usize,
+}
+
+/// The grid of occupied cells, its regions and its sky: scratch that is used again.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Fill {
+    discs: Vec<Disc>,
+    by_slab: Vec<Vec<u32>>,
+    occupied: Vec<u8>,
+    regions: Regions,
+    sky: Sky,
+    walls: Vec<(u32, u32)>,
+    sides: Vec<i8>,
+    /// `(members,)` the evidence, in −1..1: positive where the axis points into the air.
+    pub evidence: Vec<f32>,
+}
+
+impl Fill {
+    /// Evidence for each member: `sample(m)` returns its position, axis and reach in user units.
+    pub(super) fn run(
+        &mut self,
+        lattice: &Lattice,
+        members: usize,
+        sample: impl Fn(usize) -> ([f64; 3], [f32; 3], f64) + Sync,
+    ) {
+        self.discs.resize(members, Disc::default());
+        self.discs.par_iter_mut().enumerate().for_each(|(m, disc)| {
+            let (point, axis, reach) = sample(m);
+            *disc = Disc::new(lattice.place(point), axis, (reach / lattice.cell) as f32);
+        });
+        self.draw(lattice);
+        let (occupied, shape) = (&self.occupied, lattice.shape);
+        let (regions, sky) = (&mut self.regions, &mut self.sky);
+        rayon::join(
+            || regions.find(occupied, shape),
+            || sky.look(occupied, shape),
+        );
+        self.tell_sides(lattice);
+        self.look_both_ways(lattice);
+    }
+
+    /// Marks the cells that the discs cover.
+    fn draw(&mut self, lattice: &Lattice) {
+        let [nx, ny, nz] = lattice.shape;
+        self.by_slab
+            .resize(nx.div_ceil(SLAB).max(self.by_slab.len()), Vec::new());
+        self.by_slab.iter_mut().for_each(Vec::clear);
+        for (m, disc) in (0u32..).zip(&self.discs) {
+            self.by_slab[disc.center[0] as usize / SLAB].push(m);
+        }
+        self.occupied.clear();
+        self.occupied.resize(lattice.size(), 0);
+        let (discs, by_slab) = (&self.discs, &self.by_slab);
+        let slabs = self.occupied.par_chunks_mut(SLAB * ny * nz);
+        slabs.enumerate().for_each(|(slab, cells)| {
+            let nearby = slab.saturating_sub(1)..(slab + 2).min(by_slab.len());
+            for &m in by_slab[nearby].iter().flatten() {
+                discs[m as usize].draw(slab * SLAB, [ny, nz], cells);
+            }
+        });
+    }
+
+    /// Air or matter, for each region.
+    fn tell_sides(&mut self, lattice: &Lattice) {
+        let mut walls = std::mem::take(&mut self.walls);
+        walls.clear();
+        let this = &*self;
+        walls.par_extend(this.discs.par_iter().filter_map(|disc| {
+            let front = this.first_free(lattice, disc.center, disc.axis)?;
+            let back = this.first_free(lattice, disc.center, disc.axis.map(|a| -a))?;
+            (front.region != back.region).then_some((front.region, back.region))
+        }));
+        flood::sides(self.regions.len, &mut walls, &mut self.sides);
+        self.walls = walls;
+    }
+
+    /// The evidence of each disc: light on one side less light on the other, over a cone of directions.
+    fn look_both_ways(&mut self, lattice: &Lattice) {
+        let mut evidence = std::mem::take(&mut self.evidence);
+        evidence.resize(self.discs.len(), 0.0);
+        let this = &*self;
+        let chunks = evidence
+            .par_chunks_mut(CHUNK)
+            .zip(this.discs.par_chunks(CHUNK));
+        chunks.for_each(|(evidence, discs)| {
+            for (evidence, disc) in evidence.iter_mut().zip(discs) {
+                *evidence = this.contrast(lattice, disc);
+            }
+        });
+        self.evidence = evidence;
+    }
+
+    fn contrast(&self, lattice: &Lattice, disc: &Disc) -> f32 {
+        let light = |direction: [f32; 3]| {
+            self.first_free(lattice, disc.center, direction)
+                .map_or(0.0, |sight| self.light(&sight))
+        };
+        let pair = |direction: [f32; 3]| light(direction) - light(direction.map(|d| -d));
+        let [t, b] = tangents(disc.axis);
+        let mut sum = 2.0 * pair(disc.axis);
+        for tangent in [t, b] {
+            sum += pair(vector::add(disc.axis, tangent));
+            sum += pair(vector::sub(disc.axis, tangent));
+        }
+        sum / 12.0
+    }
+
+    /// Light in the cell that a ray meets: −1 in matter, up to 1 in the open air, less for a longer way.
+    fn light(&self, sight: &Sight) -> f32 {
+        let value = match self.sides[sight.region as usize] {
+            // Region 0 is the open air; other air is a cavity, which sees no sky.
+            1 if sight.region == 0 => DARK_AIR + (1.0 - DARK_AIR) * self.sky.seen(sight.cell),
+            side => f32::from(side),
+        };
+        value * (1.0 - 0.5 * sight.steps as f32 / STEPS as f32)
+    }
+
+    fn first_free(&self, lattice: &Lattice, from: [f32; 3], direction: [f32; 3]) -> Option<Sight> {
+        let [nx, ny, nz] = lattice.shape;
+        for steps in 0..STEPS {
+            let at = vector::add(from, vector::scale(direction, FIRST + STEP * steps as f32));
+            let [x, y, z] = at.map(|x| x.max(0.0) as usize);
+            let (x, y, z) = (x.min(nx - 1), y.min(ny - 1), z.min(nz - 1));
+            let cell = (x * ny + y) * nz + z;
+            if self.occupied[cell] == 0 {
+                let region = self.regions.at(x * ny + y, z)?;
+                return Some(Sight {
+                    cell,
+                    region,
+                    steps,
+                });
+            }
+        }
+        None
+    }
+}
+
+impl Disc {
+    fn new(center: [f32; 3], axis: [f32; 3], reach: f32) -> Self {
+        Self {
+            center,
+            axis,
+            radius: (DISC * reach).clamp(SMALLEST_DISC, SLAB as f32 - 0.5),
+            half: 0.5 * (axis[0].abs() + axis[1].abs() + axis[2].abs()),
+        }
+    }
+
+    /// Marks the cells whose centre is in the disc, and the cell of its own centre, in the planes from
+    /// `first_plane` on that `cells` holds.
+    fn draw(&self, first_plane: usize, [ny, nz]: [usize; 2], cells: &mut [u8]) {
+        let planes = first_plane..first_plane + cells.len() / (ny * nz);
+        let own = self.center.map(|c| c as usize);
+        if planes.contains(&own[0]) {
+            cells[((own[0] - first_plane) * ny + own[1]) * nz + own[2]] = 1;
+        }
+        let span = |a: usize, low: usize, high: usize| {
+            let first = (self.center[a] - self.radius).max(0.0) as usize;
+            let last = (self.center[a] + self.radius) as usize + 1;
+            first.max(low)..last.min(high)
+        };
+        for x in span(0, planes.start, planes.end) {
+            for y in span(1, 0, ny) {
+                let row = ((x - first_plane) * ny + y) * nz;
+                for z in span(2, 0, nz) {
+                    if self.covers([x, y, z]) {
+                        cells[row + z] = 1;
+                    }
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn covers(&self, cell: [usize; 3]) -> bool {
+        let d = [0, 1, 2].map(|a| cell[a] as f32 + 0.5 - self.center[a]);
+        let height = vector::dot(d, self.axis);
+        height.abs() <= self.half
+            && vector::norm_squared(d) - height * height <= self.radius * self.radius
+    }
+}
+
+/// Two unit vectors at right angles to a unit axis and to each other.
+fn tangents(axis: [f32; 3]) -> [[f32; 3]; 2] {
+    let least = (1..3).fold(0, |k, a| if axis[a].abs() < axis[k].abs() { a } else { k });
+    let mut unit = [0.0; 3];
+    unit[least] = 1.0;
+    let t = vector::normalized(vector::cross(axis, unit)).unwrap_or([0.0; 3]);
+    [t, vector::cross(axis, t)]
+}

@@ -1,0 +1,195 @@
+//! The neighbour graph: who is next to whom, and how the signs of two neighbours hang together.
+
+use rayon::prelude::*;
+
+use crate::neighbors::Neighborhoods;
+use crate::parallel::CHUNK;
+use crate::{Real, vector};
+
+/// Neighbours of a point in the graph.
+pub(super) const NEIGHBORS: usize = 16;
+
+/// The reach of a sample is its distance to this neighbour: the first ring round it.
+const RING: usize = 6;
+
+/// A sample reaches at most this many times as far as its neighbours do at the median: an outlier
+/// stands for no more surface than the samples that are nearest to it.
+const REACH_GROWTH: f32 = 1.5;
+
+/// Offsets shorter than this share of the reach have no direction to speak of.
+const BLUNT: f32 = 0.22;
+
+/// Couplings are raised to this odd power: a half-hearted one, as between a sample of one sheet and one
+/// slantwise across on the other, is mostly wrong, and must not count for half.
+const TRUST: i32 = 5;
+
+/// Neighbours, axes and couplings, all in the sorted order of the neighbour index; lengths are in
+/// sample spacings of the whole cloud, so that single precision serves any unit.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Graph {
+    /// The nearest other samples, nearest first; where there are too few, the point itself.
+    pub near: Vec<[u32; NEIGHBORS]>,
+    /// Offset to each of them.
+    pub offset: Vec<[[f32; 3]; NEIGHBORS]>,
+    /// How far the surface patch extends that this sample stands for.
+    pub reach: Vec<f32>,
+    /// The normal axis; its sign is arbitrary.
+    pub axis: Vec<[f32; 3]>,
+    /// In −1..1: above 0 where the two axes should have the sign they have, relative to each other.
+    pub coupling: Vec<[f32; NEIGHBORS]>,
+    /// Scratch: distance to the last sample of the ring.
+    ring: Vec<f32>,
+    /// Scratch: typical distance of the nearest samples from the tangent plane.
+    thickness: Vec<f32>,
+}
+
+impl Graph {
+    pub(super) fn build<T: Real>(&mut self, axes: &[[T; 3]], neighborhoods: &Neighborhoods<T>) {
+        let n = neighborhoods.index.len();
+        self.axis.clear();
+        let order = neighborhoods.index.order();
+        self.axis.extend(order.iter().map(|&i| {
+            let axis = vector::normalized(vector::to_f64(axes[i as usize]));
+            axis.unwrap_or([0.0; 3]).map(|a| a as f32)
+        }));
+        self.near.resize(n, [0; NEIGHBORS]);
+        self.offset.resize(n, [[0.0; 3]; NEIGHBORS]);
+        self.coupling.resize(n, [0.0; NEIGHBORS]);
+        for lengths in [&mut self.reach, &mut self.ring, &mut self.thickness] {
+            lengths.resize(n, 0.0);
+        }
+        self.find_neighbors(neighborhoods);
+        self.measure();
+        self.couple();
+    }
+
+    fn find_neighbors<T: Real>(&mut self, neighborhoods: &Neighborhoods<T>) {
+        let (index, position) = (&neighborhoods.index, neighborhoods.position());
+        let unit = 1.0 / neighborhoods.spacing().f64();
+        let near = self.near.par_chunks_mut(CHUNK);
+        let offset = self.offset.par_chunks_mut(CHUNK);
+        near.zip(offset)
+            .enumerate()
+            .for_each_init(Vec::new, |nearest, (chunk, (near, offset))| {
+                for (k, (near, offset)) in near.iter_mut().zip(offset).enumerate() {
+                    let own = chunk * CHUNK + k;
+                    let point = index.point(own);
+                    index.nearest(point, NEIGHBORS + 1, nearest);
+                    *near = [own as u32; NEIGHBORS];
+                    *offset = [[0.0; 3]; NEIGHBORS];
+                    let others = nearest.iter().map(|&(i, _)| position[i as usize]);
+                    for (slot, other) in others
+                        .filter(|&q| q as usize != own)
+                        .take(NEIGHBORS)
+                        .enumerate()
+                    {
+                        near[slot] = other;
+                        let d = vector::sub(index.point(other as usize), point);
+                        offset[slot] = d.map(|x| (x.f64() * unit) as f32);
+                    }
+                }
+            });
+    }
+
+    /// Reach and thickness of every point.
+    fn measure(&mut self) {
+        let (offset, axis) = (&self.offset, &self.axis);
+        self.ring.par_iter_mut().enumerate().for_each(|(p, ring)| {
+            *ring = vector::norm(offset[p][RING - 1]);
+        });
+        self.thickness
+            .par_iter_mut()
+            .enumerate()
+            .for_each(|(p, thickness)| {
+                let mut height = [0.0; NEIGHBORS / 2];
+                for (height, &d) in height.iter_mut().zip(&offset[p]) {
+                    *height = vector::dot(d, axis[p]).abs();
+                }
+                *thickness = median(&mut height);
+            });
+        let (ring, near) = (&self.ring, &self.near);
+        self.reach
+            .par_iter_mut()
+            .enumerate()
+            .for_each(|(p, reach)| {
+                let mut around = [0.0; RING];
+                for (around, &q) in around.iter_mut().zip(&near[p]) {
+                    *around = ring[q as usize];
+                }
+                *reach = ring[p].min(REACH_GROWTH * median(&mut around));
+            });
+    }
+
+    fn couple(&mut self) {
+        let Self {
+            near,
+            offset,
+            reach,
+            axis,
+            thickness,
+            coupling,
+            ..
+        } = self;
+        coupling
+            .par_iter_mut()
+            .enumerate()
+            .for_each(|(p, coupling)| {
+                let blunt = (BLUNT * reach[p]).powi(2);
+                for (slot, coupling) in coupling.iter_mut().enumerate() {
+                    let q = near[p][slot] as usize;
+                    let blur = blunt + thickness[p] * thickness[q];
+                    *coupling = if q == p {
+                        0.0
+                    } else {
+                        coupled(axis[p], axis[q], offset[p][slot], blur).powi(TRUST)
+                    };
+                }
+            });
+    }
+
+    /// Evidence for the sign of each axis from a second sheet close by: the samples of the other side of
+    /// a thin body lie behind this one. Positive where the axis points away from them.
+    pub(super) fn sheet_evidence(&self, p: usize) -> f32 {
+        let (mut signed, mut total) = (0.0, 0.0);
+        for (slot, &d) in self.offset[p].iter().enumerate() {
+            let length = vector::norm(d);
+            if length > 0.0 {
+                let parallel =
+                    vector::dot(self.axis[p], self.axis[self.near[p][slot] as usize]).powi(4);
+                let across = (vector::dot(d, self.axis[p]) / length).powi(3) * parallel;
+                signed += across;
+                total += across.abs();
+            }
+        }
+        if total > 0.0 {
+            -signed * signed.abs() / (total * NEIGHBORS as f32)
+        } else {
+            0.0
+        }
+    }
+}
+
+/// How the signs of two neighbouring axes `a` and `b` hang together, `d` apart: `a` is reflected at the
+/// plane half-way between the two samples and compared with `b`. Along a sheet that is `a·b`; round an
+/// edge it turns with the surface; and two sheets that face each other, whether matter or air is
+/// between them, have opposite outward normals. `blur` (a squared length) takes the reflection back
+/// where `d` is too short to tell.
+///
+/// Source: the reflected transfer of H. Xie, K. McDonnell, H. Qin, "Surface reconstruction of noisy
+/// and defective data sets" (2004).
+#[inline(always)]
+fn coupled(a: [f32; 3], b: [f32; 3], d: [f32; 3], blur: f32) -> f32 {
+    let length = vector::norm_squared(d) + blur;
+    let turned = if length > 0.0 {
+        2.0 * vector::dot(a, d) * vector::dot(b, d) / length
+    } else {
+        0.0
+    };
+    (vector::dot(a, b) - turned).clamp(-1.0, 1.0)
+}
+
+/// The upper median.
+fn median(values: &mut [f32]) -> f32 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f32::total_cmp).1
+}

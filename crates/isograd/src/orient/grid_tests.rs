@@ -1,0 +1,166 @@
+//! The grid's parts against plain versions.
+
+use std::collections::BTreeMap;
+
+use super::flood::{Regions, sides};
+use super::settle::contract;
+use super::shapes::Random;
+use super::sky::Sky;
+
+fn random_cells(shape: [usize; 3], share: f64, seed: u64) -> Vec<u8> {
+    let mut random = Random(seed);
+    (0..shape.iter().product())
+        .map(|_| u8::from(random.unit() < share))
+        .collect()
+}
+
+fn cells([nx, ny, nz]: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
+    (0..nx * ny * nz).map(move |c| [c / (ny * nz), c / nz % ny, c % nz])
+}
+
+/// The cell `step` away, or `None` outside the grid.
+fn neighbor(cell: [usize; 3], step: [i64; 3], shape: [usize; 3]) -> Option<[usize; 3]> {
+    let at = [0, 1, 2].map(|a| cell[a] as i64 + step[a]);
+    let inside = (0..3).all(|a| (0..shape[a] as i64).contains(&at[a]));
+    inside.then(|| at.map(|x| x as usize))
+}
+
+#[test]
+fn the_sky_is_what_rays_see() {
+    let mut sky = Sky::default();
+    for (shape, share) in [
+        ([5, 7, 9], 0.1),
+        ([9, 4, 6], 0.4),
+        ([1, 1, 3], 0.3),
+        ([6, 6, 1], 0.2),
+    ] {
+        let occupied = random_cells(shape, share, 21);
+        let at = |[x, y, z]: [usize; 3]| (x * shape[1] + y) * shape[2] + z;
+        sky.look(&occupied, shape);
+        for cell in cells(shape) {
+            let escapes = |step: [i64; 3]| {
+                let mut place = Some(cell);
+                while let Some(here) = place {
+                    if occupied[at(here)] != 0 {
+                        return false;
+                    }
+                    place = neighbor(here, step, shape);
+                }
+                true
+            };
+            let steps = (0..27).map(|k| [k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1]);
+            let seen = steps.filter(|&s| s != [0; 3] && escapes(s)).count();
+            assert_eq!(
+                sky.seen(at(cell)),
+                seen as f32 / 26.0,
+                "{cell:?} of {shape:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn regions_are_those_of_a_plain_flood() {
+    let mut regions = Regions::default();
+    for (seed, shape) in [(3, [6, 7, 8]), (4, [8, 3, 5]), (5, [4, 9, 9])] {
+        let mut occupied = random_cells(shape, 0.55, seed);
+        occupied[0] = 0;
+        regions.find(&occupied, shape);
+        let at = |[x, y, z]: [usize; 3]| (x * shape[1] + y) * shape[2] + z;
+        let mut plain = vec![u32::MAX; occupied.len()];
+        let mut count = 0;
+        for start in cells(shape) {
+            if occupied[at(start)] != 0 || plain[at(start)] != u32::MAX {
+                continue;
+            }
+            let mut open = vec![start];
+            while let Some(cell) = open.pop() {
+                if occupied[at(cell)] != 0 || plain[at(cell)] != u32::MAX {
+                    continue;
+                }
+                plain[at(cell)] = count;
+                for a in 0..3 {
+                    for direction in [-1, 1] {
+                        let mut step = [0; 3];
+                        step[a] = direction;
+                        open.extend(neighbor(cell, step, shape));
+                    }
+                }
+            }
+            count += 1;
+        }
+        // Both number regions in the order of their first cell.
+        assert_eq!(regions.len, count as usize);
+        for cell in cells(shape) {
+            let expected = (occupied[at(cell)] == 0).then_some(plain[at(cell)]);
+            assert_eq!(
+                regions.at(cell[0] * shape[1] + cell[1], cell[2]),
+                expected,
+                "{cell:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn air_and_matter_alternate_across_the_stronger_walls() {
+    // Air 0, shell 1, its cavity 2, a ball in the cavity 3; region 4 touches nothing; a leaky few
+    // samples see the cavity straight from outside.
+    let mut walls = [
+        vec![(0, 1); 50],
+        vec![(2, 1); 30],
+        vec![(2, 3); 10],
+        vec![(0, 2); 3],
+    ]
+    .concat();
+    let mut found = Vec::new();
+    sides(5, &mut walls, &mut found);
+    assert_eq!(found, [1, -1, 1, -1, 0]);
+}
+
+#[test]
+fn ties_that_agree_are_all_kept() {
+    let mut random = Random(31);
+    let n = 40u32;
+    let signs: Vec<f64> = (0..=n)
+        .map(|_| if random.unit() < 0.5 { -1.0 } else { 1.0 })
+        .collect();
+    let mut ties = vec![BTreeMap::new(); n as usize + 1];
+    for a in 0..=n {
+        for b in a + 1..=n {
+            // A path through all nodes, and some chords.
+            if b == a + 1 || random.unit() < 0.1 {
+                let weight = signs[a as usize] * signs[b as usize] * (0.1 + random.unit());
+                ties[a as usize].insert(b, weight);
+                ties[b as usize].insert(a, weight);
+            }
+        }
+    }
+    let outcome = contract(ties);
+    for (k, &(cluster, sign)) in outcome.iter().enumerate() {
+        assert_eq!(cluster, outcome[0].0);
+        assert_eq!(f64::from(sign * outcome[0].1), signs[k] * signs[0]);
+    }
+}
+
+#[test]
+fn many_weak_ties_outweigh_a_strong_one() {
+    // 0 and 1 are strongly opposed; 2, 3 and 4 tie them together, each of them to both, more strongly
+    // on the sum once they have gone to one of the two.
+    let mut ties = vec![BTreeMap::new(); 5];
+    let mut tie = |a: usize, b: usize, weight: f64| {
+        ties[a].insert(b as u32, weight);
+        ties[b].insert(a as u32, weight);
+    };
+    tie(0, 1, -2.0);
+    for k in 2..5 {
+        tie(0, k, 3.0);
+        tie(1, k, 1.5);
+    }
+    let outcome = contract(ties);
+    assert!(
+        outcome
+            .iter()
+            .all(|&node| node.1 == outcome[0].1 && node.0 == outcome[0].0)
+    );
+}

@@ -1,0 +1,204 @@
+//! Parts of the cloud that get a grid of their own.
+
+use super::flood::root;
+use super::graph::Graph;
+use crate::vector;
+
+/// Two neighbours belong together where they are at most this many reaches apart.
+const LINK: f32 = 8.0;
+
+/// Neighbours that are asked.
+const ASKED: usize = 8;
+
+/// Fewer samples than this are no body; they get no grid, and mark none.
+const SMALLEST: u32 = 8;
+
+/// With more separate parts than this, all share one grid.
+const MOST: usize = 256;
+
+/// By how much of its longest side a box grows before it is compared with others.
+const NEAR: f64 = 0.1;
+
+/// The mark of a point without a group.
+const NONE: u32 = u32::MAX;
+
+/// Parts of the cloud whose boxes are apart: so one that is far away doesn't make the grid of another
+/// coarse. Parts whose boxes meet, as a body inside the cavity of another, share one.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Groups {
+    parent: Vec<u32>,
+    size: Vec<u32>,
+    /// The part of each point, or [`NONE`].
+    part: Vec<u32>,
+    /// Points in order of their group.
+    members: Vec<u32>,
+    /// One box for each group, and where its members end.
+    pub bounds: Vec<Bounds>,
+    ends: Vec<usize>,
+}
+
+/// A box, in user coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Bounds {
+    pub low: [f64; 3],
+    pub high: [f64; 3],
+}
+
+impl Bounds {
+    fn of(point: [f64; 3]) -> Self {
+        Self {
+            low: point,
+            high: point,
+        }
+    }
+
+    fn extend(&mut self, other: Self) {
+        for a in 0..3 {
+            self.low[a] = self.low[a].min(other.low[a]);
+            self.high[a] = self.high[a].max(other.high[a]);
+        }
+    }
+
+    fn longest(&self) -> f64 {
+        (0..3)
+            .map(|a| self.high[a] - self.low[a])
+            .fold(0.0, f64::max)
+    }
+
+    fn is_near(&self, other: &Self) -> bool {
+        let gap = NEAR * self.longest().max(other.longest());
+        (0..3).all(|a| self.low[a] - gap <= other.high[a] && other.low[a] - gap <= self.high[a])
+    }
+}
+
+impl Groups {
+    pub(super) fn members(&self, group: usize) -> &[u32] {
+        let start = if group == 0 { 0 } else { self.ends[group - 1] };
+        &self.members[start..self.ends[group]]
+    }
+
+    /// `point` returns the position of a point in user units.
+    pub(super) fn find(&mut self, graph: &Graph, point: impl Fn(usize) -> [f64; 3]) {
+        self.link(graph);
+        let mut parts: Vec<Bounds> = Vec::new();
+        self.part.clear();
+        for p in 0..self.parent.len() {
+            let root = self.parent[p] as usize;
+            // A root comes before all others of its part.
+            if root != p {
+                self.part.push(self.part[root]);
+            } else if self.size[p] < SMALLEST {
+                self.part.push(NONE);
+            } else {
+                self.part.push(parts.len() as u32);
+                parts.push(Bounds::of(point(p)));
+            }
+            if let Some(bounds) = parts.get_mut(self.part[p] as usize) {
+                bounds.extend(Bounds::of(point(p)));
+            }
+        }
+        let group = merge(&mut parts);
+        self.bounds = parts;
+        self.sort_members(&group);
+    }
+
+    fn link(&mut self, graph: &Graph) {
+        let n = graph.near.len();
+        self.parent.clear();
+        self.parent.extend(0..n as u32);
+        for p in 0..n {
+            for (&q, &d) in graph.near[p].iter().zip(&graph.offset[p]).take(ASKED) {
+                let limit = LINK * graph.reach[p].max(graph.reach[q as usize]);
+                if vector::norm(d) <= limit {
+                    let (a, b) = (root(&mut self.parent, p as u32), root(&mut self.parent, q));
+                    self.parent[a.max(b) as usize] = a.min(b);
+                }
+            }
+        }
+        self.size.clear();
+        self.size.resize(n, 0);
+        for p in 0..n as u32 {
+            let r = root(&mut self.parent, p);
+            self.parent[p as usize] = r;
+            self.size[r as usize] += 1;
+        }
+    }
+
+    /// Sorts the points by the group of their part, in order within each.
+    fn sort_members(&mut self, group: &[u32]) {
+        self.ends.clear();
+        self.ends.resize(self.bounds.len() + 1, 0);
+        let grouped = |(p, &part): (u32, &u32)| group.get(part as usize).map(|&g| (g as usize, p));
+        for (g, _) in (0..).zip(&self.part).filter_map(grouped) {
+            self.ends[g + 1] += 1;
+        }
+        for g in 0..self.bounds.len() {
+            self.ends[g + 1] += self.ends[g];
+        }
+        self.members.clear();
+        self.members.resize(self.ends[self.bounds.len()], 0);
+        // Each start moves on to the end of its group.
+        for (g, p) in (0..).zip(&self.part).filter_map(grouped) {
+            self.members[self.ends[g]] = p;
+            self.ends[g] += 1;
+        }
+    }
+}
+
+/// Merges boxes that are near each other, until none are, and returns the place of each former box.
+fn merge(boxes: &mut Vec<Bounds>) -> Vec<u32> {
+    if boxes.len() > MOST {
+        let parts = boxes.len();
+        let others = boxes.split_off(1);
+        others.into_iter().for_each(|other| boxes[0].extend(other));
+        return vec![0; parts];
+    }
+    let mut owner: Vec<usize> = (0..boxes.len()).collect();
+    let mut changed = true;
+    while changed {
+        changed = false;
+        for a in 0..boxes.len() {
+            for b in a + 1..boxes.len() {
+                let apart = owner[a] == a && owner[b] == b;
+                if apart && boxes[a].is_near(&boxes[b]) {
+                    let other = boxes[b];
+                    boxes[a].extend(other);
+                    owner.iter_mut().filter(|o| **o == b).for_each(|o| *o = a);
+                    changed = true;
+                }
+            }
+        }
+    }
+    let kept: Vec<usize> = (0..boxes.len()).filter(|&k| owner[k] == k).collect();
+    let place = |o: &usize| kept.partition_point(|k| k < o) as u32;
+    let places = owner.iter().map(place).collect();
+    *boxes = kept.iter().map(|&k| boxes[k]).collect();
+    places
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Bounds, merge};
+
+    #[test]
+    fn boxes_that_come_near_by_merging_are_merged_too() {
+        let cube = |x: f64| Bounds {
+            low: [x, 0.0, 0.0],
+            high: [x + 1.0, 1.0, 1.0],
+        };
+        // The second is near the fourth only once that has reached the first.
+        let mut boxes = vec![cube(0.0), cube(9.0), cube(1.05), cube(2.1), cube(3.4)];
+        assert_eq!(merge(&mut boxes), [0, 1, 0, 0, 0]);
+        assert_eq!(boxes[0].high, [4.4, 1.0, 1.0]);
+        assert_eq!(boxes[1], cube(9.0));
+    }
+
+    #[test]
+    fn a_crowd_of_parts_shares_one_box() {
+        let far = |k: i32| Bounds::of([f64::from(k) * 100.0; 3]);
+        let mut boxes: Vec<Bounds> = (0..300).map(far).collect();
+        assert!(merge(&mut boxes).iter().all(|&group| group == 0));
+        assert_eq!(boxes.len(), 1);
+        assert_eq!(boxes[0].high, [29_900.0; 3]);
+    }
+}

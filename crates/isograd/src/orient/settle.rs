@@ -1,0 +1,266 @@
+//! From beliefs to signs: domains that agree within themselves, and conflicts between them.
+
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
+
+use super::graph::Graph;
+use crate::vector;
+
+/// Neighbours whose coupling is at least this strong belong to one domain if their beliefs agree.
+const STRONG: f32 = 0.5;
+
+/// A belief below this says nothing.
+const SILENT: f32 = 1e-4;
+
+/// Turns beliefs into one sign for each point; all in sorted order.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Settle {
+    /// `+1` where the axis points outward, `−1` where it points inward.
+    pub sign: Vec<f32>,
+    domains: Domains,
+    /// The domain of each point.
+    domain: Vec<u32>,
+    /// Strong couplings of silent points.
+    silent: Vec<(f32, u32, u32)>,
+}
+
+/// Union-find in which every point knows its sign relative to its root.
+#[derive(Clone, Debug, Default)]
+struct Domains {
+    parent: Vec<u32>,
+    /// Sign relative to the parent.
+    relative: Vec<f32>,
+    /// Whether the domain of this root holds a belief.
+    believes: Vec<bool>,
+}
+
+impl Domains {
+    fn reset(&mut self, belief: &[f32]) {
+        self.parent.clear();
+        self.parent.extend(0..belief.len() as u32);
+        self.relative.clear();
+        self.relative.resize(belief.len(), 1.0);
+        self.believes.clear();
+        self.believes
+            .extend(belief.iter().map(|b| b.abs() >= SILENT));
+    }
+
+    /// Root of `p`, and the sign of `p` relative to it.
+    fn root(&mut self, mut p: u32) -> (u32, f32) {
+        let mut sign = 1.0;
+        while self.parent[p as usize] != p {
+            let up = self.parent[p as usize] as usize;
+            self.relative[p as usize] *= self.relative[up];
+            self.parent[p as usize] = self.parent[up];
+            sign *= self.relative[p as usize];
+            p = self.parent[p as usize];
+        }
+        (p, sign)
+    }
+
+    /// Joins two domains so that the signs of `p` and `q` have the given product.
+    fn join(&mut self, (a, sign_a): (u32, f32), (b, sign_b): (u32, f32), product: f32) {
+        if a != b {
+            let (low, high) = (a.min(b) as usize, a.max(b) as usize);
+            self.parent[high] = low as u32;
+            self.relative[high] = sign_a * sign_b * product;
+            self.believes[low] |= self.believes[high];
+        }
+    }
+}
+
+impl Settle {
+    /// Domains of neighbours that agree are first oriented as a whole, the strongest tie first: to the
+    /// evidence, or to the domain next to them. So a part whose evidence is weak follows the neighbours
+    /// on which it borders, however large it is. What is tied to no evidence at all turns its axes away
+    /// from its centroid.
+    pub(super) fn run(
+        &mut self,
+        graph: &Graph,
+        evidence: &[f32],
+        belief: &[f32],
+        point: impl Fn(usize) -> [f64; 3],
+    ) {
+        self.domains.reset(belief);
+        self.join_agreeing(graph, belief);
+        self.join_silent(graph, belief);
+        let domains = self.number_domains();
+        let outcome = contract(self.ties(graph, evidence, domains));
+        self.apply(&outcome);
+        self.turn_from_centroids(graph, &outcome, point);
+    }
+
+    fn join_agreeing(&mut self, graph: &Graph, belief: &[f32]) {
+        for p in 0..belief.len() {
+            for (&q, &coupling) in graph.near[p].iter().zip(&graph.coupling[p]) {
+                let (mine, other) = (belief[p], belief[q as usize]);
+                let heard = mine.abs() >= SILENT && other.abs() >= SILENT;
+                let product = mine.signum() * other.signum();
+                if heard && coupling * product >= STRONG {
+                    let (a, b) = (self.domains.root(p as u32), self.domains.root(q));
+                    self.domains.join(a, b, product);
+                }
+            }
+        }
+    }
+
+    /// Points that the evidence has not reached follow their strongest couplings, strongest first.
+    fn join_silent(&mut self, graph: &Graph, belief: &[f32]) {
+        self.silent.clear();
+        for p in 0..belief.len() {
+            for (&q, &coupling) in graph.near[p].iter().zip(&graph.coupling[p]) {
+                let heard = belief[p].abs() >= SILENT && belief[q as usize].abs() >= SILENT;
+                if !heard && coupling.abs() >= STRONG {
+                    self.silent.push((coupling, p as u32, q));
+                }
+            }
+        }
+        self.silent.sort_unstable_by(|a, b| {
+            let stronger = b.0.abs().total_cmp(&a.0.abs());
+            stronger.then((a.1, a.2).cmp(&(b.1, b.2)))
+        });
+        for &(coupling, p, q) in &self.silent {
+            let (a, b) = (self.domains.root(p), self.domains.root(q));
+            // Silent points must not become a bridge between domains that have a mind of their own.
+            if !(self.domains.believes[a.0 as usize] && self.domains.believes[b.0 as usize]) {
+                self.domains.join(a, b, coupling.signum());
+            }
+        }
+    }
+
+    /// Numbers the domains 0, 1, … and takes each point's sign relative to the root of its domain.
+    fn number_domains(&mut self) -> usize {
+        let mut count = 0;
+        self.domain.clear();
+        self.sign.clear();
+        for p in 0..self.domains.parent.len() as u32 {
+            let (root, sign) = self.domains.root(p);
+            // A root comes before all others of its domain.
+            let number = if root == p {
+                count
+            } else {
+                self.domain[root as usize]
+            };
+            count += u32::from(root == p);
+            self.domain.push(number);
+            self.sign.push(sign);
+        }
+        count as usize
+    }
+
+    /// Sums of couplings between domains, and of evidence for each of them (the tie to node `domains`).
+    fn ties(&self, graph: &Graph, evidence: &[f32], domains: usize) -> Vec<BTreeMap<u32, f64>> {
+        let ground = domains as u32;
+        let mut ties = vec![BTreeMap::new(); domains + 1];
+        let mut tie = |a: u32, b: u32, weight: f32| {
+            if a != b && weight != 0.0 {
+                *ties[a as usize].entry(b).or_insert(0.0) += f64::from(weight);
+                *ties[b as usize].entry(a).or_insert(0.0) += f64::from(weight);
+            }
+        };
+        let mut own = vec![0.0; domains];
+        for p in 0..evidence.len() {
+            let a = self.domain[p];
+            own[a as usize] += self.sign[p] * evidence[p] * evidence[p].abs();
+            for (&q, &coupling) in graph.near[p].iter().zip(&graph.coupling[p]) {
+                tie(
+                    a,
+                    self.domain[q as usize],
+                    coupling * self.sign[p] * self.sign[q as usize],
+                );
+            }
+        }
+        for (a, &own) in (0u32..).zip(&own) {
+            tie(a, ground, own);
+        }
+        ties
+    }
+
+    fn apply(&mut self, outcome: &[(u32, f32)]) {
+        let ground = outcome[outcome.len() - 1].1;
+        for (sign, &domain) in self.sign.iter_mut().zip(&self.domain) {
+            *sign *= outcome[domain as usize].1 * ground;
+        }
+    }
+
+    /// The rule for clusters without evidence: on the sum, axes point away from the centroid.
+    fn turn_from_centroids(
+        &mut self,
+        graph: &Graph,
+        outcome: &[(u32, f32)],
+        point: impl Fn(usize) -> [f64; 3],
+    ) {
+        let ground = outcome[outcome.len() - 1].0;
+        let mut lost: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for (p, &domain) in self.domain.iter().enumerate() {
+            let cluster = outcome[domain as usize].0;
+            if cluster != ground {
+                lost.entry(cluster).or_default().push(p);
+            }
+        }
+        for members in lost.values() {
+            let total = members
+                .iter()
+                .fold([0.0; 3], |sum, &p| vector::add(sum, point(p)));
+            let centroid = vector::scale(total, 1.0 / members.len() as f64);
+            let outward = |&p: &usize| {
+                let axis = vector::to_f64(graph.axis[p]);
+                f64::from(self.sign[p]) * vector::dot(axis, vector::sub(point(p), centroid))
+            };
+            if members.iter().map(outward).sum::<f64>() < 0.0 {
+                members.iter().for_each(|&p| self.sign[p] = -self.sign[p]);
+            }
+        }
+    }
+}
+
+/// Contracts the tie of the largest magnitude again and again, adding up ties that become parallel;
+/// returns for each node the cluster it ends in, and its sign there.
+///
+/// Source: greedy additive edge contraction, M. Keuper et al., "Efficient decomposition of image and
+/// mesh graphs by lifted multicuts" (2015), here with signs in place of cuts.
+pub(super) fn contract(mut ties: Vec<BTreeMap<u32, f64>>) -> Vec<(u32, f32)> {
+    let mut parent: Vec<(u32, f32)> = (0..ties.len() as u32).map(|a| (a, 1.0)).collect();
+    // Magnitudes are positive, so their bits are ordered as they are.
+    let entry = |a: u32, b: u32, w: f64| (w.abs().to_bits(), Reverse((a.min(b), a.max(b))));
+    let mut queue = BinaryHeap::new();
+    for (a, tied) in (0u32..).zip(&ties) {
+        queue.extend(tied.range(a + 1..).map(|(&b, &w)| entry(a, b, w)));
+    }
+    while let Some((magnitude, Reverse((a, b)))) = queue.pop() {
+        let Some(&weight) = ties[a as usize].get(&b) else {
+            continue;
+        };
+        if weight.abs().to_bits() != magnitude || weight == 0.0 {
+            continue;
+        }
+        // The smaller one moves, so that every tie moves at most log N times.
+        let larger = ties[a as usize].len() >= ties[b as usize].len();
+        let (stays, goes) = if larger { (a, b) } else { (b, a) };
+        let sign = if weight > 0.0 { 1.0 } else { -1.0 };
+        parent[goes as usize] = (stays, sign);
+        let moved = std::mem::take(&mut ties[goes as usize]);
+        ties[stays as usize].remove(&goes);
+        for (&other, &w) in moved.iter().filter(|&(&other, _)| other != stays) {
+            ties[other as usize].remove(&goes);
+            let sum = ties[stays as usize].entry(other).or_insert(0.0);
+            *sum += f64::from(sign) * w;
+            let sum = *sum;
+            ties[other as usize].insert(stays, sum);
+            queue.push(entry(stays, other, sum));
+        }
+    }
+    (0..parent.len() as u32)
+        .map(|a| resolve(&parent, a))
+        .collect()
+}
+
+/// The end of the chain from `a`, and the product of the signs along it.
+fn resolve(parent: &[(u32, f32)], mut a: u32) -> (u32, f32) {
+    let mut sign = 1.0;
+    while parent[a as usize].0 != a {
+        sign *= parent[a as usize].1;
+        a = parent[a as usize].0;
+    }
+    (a, sign)
+}
