@@ -1,1 +1,131 @@
-//! The poisson stage.
+//! The Poisson equation, solved directly by cosine transforms.
+//!
+//! # Map
+//! `b → χ`, both one value per cell of a grid of `(nx, ny, nz)` cells, in index space (cell size 1, no
+//! unit). Trilinear elements at the cell centres with even reflection at the walls (homogeneous
+//! Neumann) give, per axis, with `θ_k = πk/n`,
+//!
+//! - stiffness `K = tridiag(−1, 2, −1)`, end rows `(1, −1)`, eigenvalues `2 − 2 cos θ_k`;
+//! - mass `M = tridiag(1, 4, 1)/6`, end rows `(5, 1)/6`, eigenvalues `(2 + cos θ_k)/3`;
+//!
+//! both diagonal in the DCT-II. The matrix is the constant `A = K⊗M⊗M + M⊗K⊗M + M⊗M⊗K`: the paper's
+//! `A` (eq. `linear_system`) on a uniform grid, in index coordinates. Then
+//!
+//! `χ = IDCT( G/λ · DCT(b) )`, `λ_k = K_x M_y M_z + M_x K_y M_z + M_x M_y K_z`,
+//!
+//! with the constant mode set to 0: the mean of `b` is ignored, and `χ` has mean 0. `G = exp(−½(σθ)²)` per
+//! axis is a Gaussian smoothing of `χ` by `σ` cells; `σ = 0` is the plain equation `Aχ = b − mean(b)`.
+//! No iteration, no tolerance: the relative residual is a few units of rounding.
+//!
+//! # Residual
+//! None: the map is linear and constant. The plan and `σ` are all that the pullback needs.
+//!
+//! # Pullback
+//! `b̄ = IDCT( G/λ · DCT(χ̄) )`: the operator is symmetric, so the pullback is [`Plan::solve`] itself,
+//! applied to `χ̄` with the same `σ` (the paper's adjoint solve).
+//!
+//! # Not differentiable
+//! Nothing: the map is linear. `σ` is held constant.
+//!
+//! # Reproducibility
+//! The same bits for any number of threads. The Fourier transforms (`rustfft`) are chosen by the
+//! instruction set at run time, so two kinds of processor may differ in the last bits.
+//!
+//! Reference for the transform of a reordered line: J. Makhoul, *A fast cosine transform in one and two
+//! dimensions*, IEEE Trans. ASSP 28 (1980).
+
+mod axis;
+mod passes;
+mod scratch;
+#[cfg(test)]
+mod tests;
+
+use axis::Axis;
+use pulp::Arch;
+use rustfft::FftPlanner;
+
+use crate::Real;
+pub use scratch::Scratch;
+
+/// Why an equation was not solved.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// The field is not the one that the plan was made for.
+    #[error(
+        "a field of {values} values for a plan of {shape:?} cells; make a plan for the field's own grid"
+    )]
+    Length {
+        /// Number of values given.
+        values: usize,
+        /// Cells of the plan.
+        shape: [usize; 3],
+    },
+    /// The smoothing is negative or not finite.
+    #[error("the smoothing is {smoothing} cells; it must be finite and 0 or more")]
+    Smoothing {
+        /// What was given.
+        smoothing: f64,
+    },
+}
+
+/// Everything about a grid's Poisson equation that does not depend on its right-hand side: the Fourier
+/// plans and the eigenvalues per axis. Made once, used for every solve; shared freely between threads.
+pub struct Plan<T: Real> {
+    shape: [usize; 3],
+    axes: [Axis<T>; 3],
+    arch: Arch,
+}
+
+impl<T: Real> Plan<T> {
+    /// A plan for grids of `(nx, ny, nz)` cells, of any size, primes included. Memory and time grow with
+    /// `nx + ny + nz` only.
+    pub fn new(shape: [usize; 3]) -> Self {
+        let mut planner = FftPlanner::new();
+        Self {
+            shape,
+            axes: shape.map(|n| Axis::new(n, &mut planner)),
+            arch: Arch::new(),
+        }
+    }
+
+    /// Number of cells along each axis, `(nx, ny, nz)`.
+    pub fn shape(&self) -> [usize; 3] {
+        self.shape
+    }
+
+    /// Solves in place: `field` holds `b` and then `χ`, `(nx, ny, nz)` in C order, in index space.
+    /// `smoothing` is `σ` in cells, 0 for none. A value that is not finite spreads to all others.
+    ///
+    /// A second call with the same `scratch` allocates nothing that grows with the field's volume.
+    ///
+    /// # Errors
+    /// A field of another size than the plan, or a smoothing that is negative or not finite. The field is
+    /// then left as it was.
+    pub fn solve(
+        &self,
+        field: &mut [T],
+        smoothing: f64,
+        scratch: &mut Scratch<T>,
+    ) -> Result<(), Error> {
+        let cells = self.shape.iter().map(|&n| n as u128).product::<u128>();
+        if field.len() as u128 != cells {
+            return Err(Error::Length {
+                values: field.len(),
+                shape: self.shape,
+            });
+        }
+        if !(smoothing >= 0.0) || !smoothing.is_finite() {
+            return Err(Error::Smoothing { smoothing });
+        }
+        if field.is_empty() {
+            return Ok(());
+        }
+        for axis in 0..3 {
+            self.axes[axis].gaussian(smoothing, &mut scratch.gaussian[axis]);
+        }
+        self.forward_planes(field, scratch);
+        self.filter_columns(field, scratch);
+        self.inverse_planes(field, scratch);
+        Ok(())
+    }
+}

@@ -1,0 +1,44 @@
+//! Buffers that a solve uses and the next one uses again.
+
+use std::sync::{Mutex, PoisonError};
+
+use rustfft::num_complex::Complex;
+
+use crate::Real;
+
+/// Buffers of a solve, a few lines of the grid for each thread. Reused by the next call.
+#[derive(Default)]
+pub struct Scratch<T> {
+    /// `G` at every frequency, per axis.
+    pub(super) gaussian: [Vec<T>; 3],
+    idle: Mutex<Vec<Lines<T>>>,
+}
+
+/// The buffers of one thread.
+#[derive(Default)]
+pub(super) struct Lines<T> {
+    /// Complex lines, one after the other; each holds two real lines of the grid.
+    pub(super) lines: Vec<Complex<T>>,
+    /// What two real lines are multiplied by.
+    pub(super) gains: Vec<Complex<T>>,
+    /// What the Fourier transform asks for.
+    pub(super) fft: Vec<Complex<T>>,
+}
+
+impl<T: Real> Scratch<T> {
+    /// Runs `f` with buffers that no other thread uses meanwhile.
+    pub(super) fn with_lines(&self, f: impl FnOnce(&mut Lines<T>)) {
+        let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut lines = idle().pop().unwrap_or_default();
+        f(&mut lines);
+        idle().push(lines);
+    }
+}
+
+/// The first `count` places of `buffer`, which grows where it is too short.
+pub(super) fn first<T: Real>(buffer: &mut Vec<Complex<T>>, count: usize) -> &mut [Complex<T>] {
+    if buffer.len() < count {
+        buffer.resize(count, Complex::default());
+    }
+    &mut buffer[..count]
+}

@@ -1,0 +1,24 @@
+//! Loops compiled for the instruction set that the processor has.
+
+use pulp::{Arch, Simd, WithSimd};
+
+/// Runs `f` compiled with the widest instruction set that `arch` found. `f` and what it calls in its
+/// loops are to be `#[inline(always)]`: a function that stands alone is compiled for the oldest set.
+///
+/// `pulp` takes closures too, but as `FnOnce`, and the compiler calls most closures through a shim of that
+/// trait which it need not inline: such a loop may end up in baseline code without a word.
+#[inline(always)]
+pub(crate) fn dispatch<R>(arch: Arch, f: impl FnMut() -> R) -> R {
+    arch.dispatch(Inline(f))
+}
+
+struct Inline<F>(F);
+
+impl<R, F: FnMut() -> R> WithSimd for Inline<F> {
+    type Output = R;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, _: S) -> R {
+        (self.0)()
+    }
+}

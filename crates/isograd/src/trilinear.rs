@@ -1,0 +1,180 @@
+//! Trilinear interpolation of a field between its cell centres: value and gradient at a point.
+//!
+//! Within half a cell of a wall, and outside the grid, the field goes on as a constant across the wall
+//! (its even reflection): the value is that of the nearest point between the cell centres, and the
+//! gradient has no component across the wall. The gradient jumps at the planes through cell centres.
+
+use crate::{Field, Grid, Real};
+
+/// The eight cells round a point and where the point is between them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cube<T> {
+    /// Place in memory of the lowest of the eight cells.
+    base: usize,
+    strides: [usize; 3],
+    /// Distance from its centre, per axis, in cells: 0 to 1.
+    fraction: [T; 3],
+    /// Whether the point is between cell centres, per axis.
+    between: [bool; 3],
+}
+
+impl<T: Real> Cube<T> {
+    /// The cube round the point of index coordinates `x`.
+    #[inline(always)]
+    pub(crate) fn new(grid: &Grid<T>, x: [T; 3]) -> Self {
+        let (shape, strides) = (grid.shape(), grid.strides());
+        let mut cube = Self {
+            base: 0,
+            strides,
+            fraction: [T::zero(); 3],
+            between: [true; 3],
+        };
+        for axis in 0..3 {
+            let last = shape[axis] - 1;
+            let (u, between) = clamp(x[axis] - T::of(0.5), T::of_usize(last));
+            let cell = u.to_usize().unwrap_or(0).min(last - 1);
+            cube.base += cell * strides[axis];
+            cube.fraction[axis] = u - T::of_usize(cell);
+            cube.between[axis] = between;
+        }
+        cube
+    }
+
+    /// Places in memory of the eight cells; the last axis varies fastest.
+    #[inline(always)]
+    pub(crate) fn cells(&self) -> [usize; 8] {
+        let [x, y, z] = self.strides;
+        std::array::from_fn(|c| self.base + (c >> 2) * x + (c >> 1 & 1) * y + (c & 1) * z)
+    }
+
+    /// The value at the point.
+    #[inline(always)]
+    pub(crate) fn value(&self, values: &[T]) -> T {
+        let [x, y, z] = self.fraction;
+        let v = self.cells().map(|c| values[c]);
+        let edge = |e: usize| lerp(v[2 * e], v[2 * e + 1], z);
+        lerp(lerp(edge(0), edge(1), y), lerp(edge(2), edge(3), y), x)
+    }
+
+    /// The value at the point, and the gradient in values per cell.
+    #[inline(always)]
+    pub(crate) fn value_and_gradient(&self, values: &[T]) -> (T, [T; 3]) {
+        let [x, y, z] = self.fraction;
+        let v = self.cells().map(|c| values[c]);
+        let edge: [T; 4] = std::array::from_fn(|e| lerp(v[2 * e], v[2 * e + 1], z));
+        let slope: [T; 4] = std::array::from_fn(|e| v[2 * e + 1] - v[2 * e]);
+        let (low, high) = (lerp(edge[0], edge[1], y), lerp(edge[2], edge[3], y));
+        let gradient = [
+            high - low,
+            lerp(edge[1] - edge[0], edge[3] - edge[2], x),
+            lerp(lerp(slope[0], slope[1], y), lerp(slope[2], slope[3], y), x),
+        ];
+        let across = |a: usize| {
+            if self.between[a] {
+                gradient[a]
+            } else {
+                T::zero()
+            }
+        };
+        (lerp(low, high, x), std::array::from_fn(across))
+    }
+}
+
+impl<T: Real> Field<T> {
+    /// The value at a point of the user's coordinates, trilinear between cell centres and constant across
+    /// the walls. NaN for a point that is not a number.
+    pub fn interpolate(&self, point: [T; 3]) -> T {
+        let grid = self.grid();
+        Cube::new(grid, grid.to_index(point)).value(self.values())
+    }
+
+    /// The value at a point of the user's coordinates, as [`Self::interpolate`], and its gradient there, in
+    /// values per unit length. The gradient jumps at the planes through cell centres, and has no component
+    /// across a wall that is less than half a cell away.
+    pub fn interpolate_with_gradient(&self, point: [T; 3]) -> (T, [T; 3]) {
+        let grid = self.grid();
+        let cube = Cube::new(grid, grid.to_index(point));
+        let (value, gradient) = cube.value_and_gradient(self.values());
+        (value, gradient.map(|g| g / grid.spacing()))
+    }
+}
+
+#[inline(always)]
+fn lerp<T: Real>(a: T, b: T, t: T) -> T {
+    a + (b - a) * t
+}
+
+/// `u` limited to `0..=max`, and whether it was there already. NaN stays NaN.
+#[inline(always)]
+fn clamp<T: Real>(u: T, max: T) -> (T, bool) {
+    if u < T::zero() {
+        (T::zero(), false)
+    } else if u > max {
+        (max, false)
+    } else {
+        (u, true)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `1 + 2x − 3y + z/2 + xy − 2yz + xz + xyz` and its gradient.
+    fn trilinear([x, y, z]: [f64; 3]) -> (f64, [f64; 3]) {
+        (
+            1.0 + 2.0 * x - 3.0 * y + 0.5 * z + x * y - 2.0 * y * z + x * z + x * y * z,
+            [
+                2.0 + y + z + y * z,
+                -3.0 + x - 2.0 * z + x * z,
+                0.5 - 2.0 * y + x + x * y,
+            ],
+        )
+    }
+
+    fn sampled() -> Field<f64> {
+        let grid = Grid::new([-0.3, 0.2, 1.0], 0.25, [4, 7, 2]).expect("valid");
+        let values = (0..grid.cells())
+            .map(|i| trilinear(grid.center(grid.cell(i))).0)
+            .collect();
+        Field::new(grid, values).expect("sizes match")
+    }
+
+    #[test]
+    fn trilinear_functions_are_reproduced_with_their_gradient() {
+        let field = sampled();
+        for i in 0..200 {
+            let t = |a: f64| (f64::from(i) * a).fract();
+            // Anywhere between the first and the last cell centre.
+            let x = [0.5 + 3.0 * t(0.618), 0.5 + 6.0 * t(0.414), 0.5 + t(0.732)];
+            let point = field.grid().from_index(x);
+            let (value, gradient) = field.interpolate_with_gradient(point);
+            let (expected, slope) = trilinear(point);
+            // Rounding of numbers below 20.
+            assert!((value - expected).abs() < 1e-13);
+            assert_eq!(value, field.interpolate(point));
+            for a in 0..3 {
+                assert!((gradient[a] - slope[a]).abs() < 1e-12, "{x:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn field_is_constant_across_the_walls() {
+        let field = sampled();
+        let corner = field.at([3, 6, 1]);
+        for out in [0.0, 0.1, 1e30, f64::INFINITY] {
+            let point = [0.575 + out, 1.825 + out, 1.375 + out];
+            let (value, gradient) = field.interpolate_with_gradient(point);
+            assert!((value - corner).abs() < 1e-12);
+            assert!(out == 0.0 || gradient == [0.0; 3], "{gradient:?}");
+        }
+        let low = field.interpolate([f64::NEG_INFINITY, -1e30, 0.0]);
+        assert_eq!(low, field.at([0, 0, 0]));
+    }
+
+    #[test]
+    fn point_that_is_not_a_number_has_no_value() {
+        assert!(sampled().interpolate([0.0, f64::NAN, 1.2]).is_nan());
+    }
+}
