@@ -1,1 +1,114 @@
-//! The isosurface stage.
+//! The isosurface stage: marching cubes on the lattice of cell centres.
+//!
+//! # Map
+//! `(χ, c) → mesh`. A cell with `χ < c` is inside; a value exactly at the level is outside. Each lattice
+//! edge `(p, q)` from a cell centre to the next one along an axis whose ends differ carries one vertex,
+//! `y = (1−η) p + η q` with `η = (c − χ_p)/(χ_q − χ_p)`. The triangles of a cube depend on the signs of
+//! its eight corners alone. On a face with two inside corners on a diagonal those two are kept apart,
+//! whichever side the face is looked at from, so neighbouring cubes fit: away from the walls every edge
+//! belongs to exactly two triangles, with opposite directions, and the triangles round a vertex form one
+//! ring. Faces are counter-clockwise seen from the side where `χ ≥ c`.
+//!
+//! Vertices are stored in the order of their [`LatticeEdge`](crate::LatticeEdge), faces in the order of
+//! their cube. A triangle may have no area: where a corner lies exactly at the level, the vertices round
+//! it coincide.
+//!
+//! The lattice ends at the outermost cell centres. Where inside cells reach them the surface is left
+//! **open**: a cap would need vertices that lie on no lattice edge, and moving the wall is the real
+//! remedy. [`Report::walls`] says where.
+//!
+//! # Residual
+//! Nothing beyond `χ`, `c` and [`Mesh::edges`](crate::Mesh::edges): `η` is two loads and a division.
+//!
+//! # Pullback
+//! With `ȳ` the cotangent of a vertex and `s = ȳ·(q − p)`:
+//! `χ̄_p −= s (1−η)/(χ_q−χ_p)`, `χ̄_q −= s η/(χ_q−χ_p)`, `c̄ += s/(χ_q−χ_p)`. The difference is never zero,
+//! since the ends of a crossed edge differ, but it may be so small that its reciprocal overflows: the
+//! gradient is to be bounded there. Each vertex adds to two cells only.
+//!
+//! # Not differentiable
+//! The signs, hence the list of faces. When a value passes the level, vertices appear or vanish at that
+//! cell centre; positions stay continuous.
+//!
+//! # Source
+//! Lorensen and Cline, *Marching cubes*, SIGGRAPH 1987; the rule for faces is that of Montani, Scateni and
+//! Scopigno, *A modified look-up table for implicit disambiguation of marching cubes*, 1994. The table is
+//! computed, not copied.
+
+pub mod iso_value;
+mod march;
+pub mod measure;
+mod signs;
+mod tables;
+#[cfg(test)]
+mod tests;
+
+pub use march::{Scratch, crossing, forward};
+pub use measure::Measures;
+
+/// What the stage has to say about a surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Report {
+    /// Whether inside cells lie at a wall of the grid. The surface is open there (or, where all of the
+    /// outermost cells are inside, it is turned inside out).
+    pub touches_wall: bool,
+    /// At which walls: `walls[axis][0]` at the low end of the axis, `walls[axis][1]` at the high one.
+    pub walls: [[bool; 2]; 3],
+    /// Number of cells with `χ < c`.
+    pub inside: usize,
+}
+
+/// Why there is no surface.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// The level is NaN or infinite.
+    #[error(
+        "the level is {level}; it must be finite: look for bad numbers in the stage that made it"
+    )]
+    Level {
+        /// What was given.
+        level: f64,
+    },
+    /// A value is NaN or infinite.
+    #[error(
+        "the field is {value} at cell {cell:?}; every value must be finite: scale the input down or use f64 if it overflowed"
+    )]
+    NotFinite {
+        /// The first such cell, in memory order.
+        cell: [usize; 3],
+        /// Its value.
+        value: f64,
+    },
+    /// No cell is inside.
+    #[error(
+        "no cell is below the level {level} (values run from {min} to {max}), so there is no surface; use smaller cells if the body is thinner than a few of them, and check that the normals point outward"
+    )]
+    NothingInside {
+        /// The level.
+        level: f64,
+        /// Least value of the field.
+        min: f64,
+        /// Greatest value of the field.
+        max: f64,
+    },
+    /// No cell is outside.
+    #[error(
+        "every cell is below the level {level} (values run from {min} to {max}), so there is no surface; check that the normals point outward and that the grid is larger than the body"
+    )]
+    NothingOutside {
+        /// The level.
+        level: f64,
+        /// Least value of the field.
+        min: f64,
+        /// Greatest value of the field.
+        max: f64,
+    },
+    /// More vertices than 32-bit indices can name.
+    #[error(
+        "the surface has {vertices} vertices, more than 32-bit indices can name; use a coarser grid, or smooth the field if it is noise"
+    )]
+    TooManyVertices {
+        /// Number of vertices.
+        vertices: usize,
+    },
+}

@@ -1,0 +1,334 @@
+//! The triangles of one cube, for each of its 256 sign patterns.
+//!
+//! Computed from two rules. *Loops*: on each of the six faces, every run of inside corners is cut off by
+//! one segment; the segments of all faces join end to end into closed loops of crossed edges. *Diagonals*:
+//! a loop is triangulated without a diagonal between two vertices of the same face, for the cube beyond
+//! that face might choose the same one and four triangles would meet there. Every loop has such a
+//! triangulation (a test goes through all of them); the one with the shortest diagonals is taken.
+//!
+//! Corner `4·dx + 2·dy + dz` lies at `(dx, dy, dz)`. Edge `4·axis + 2·u + v` runs along `axis` from the
+//! corner whose other two coordinates, in the order x, y, z, are `(u, v)`.
+
+use std::sync::LazyLock;
+
+/// Triangles of all cases, one after the other, each three edges of the cube.
+pub(super) struct Table {
+    start: [u16; 257],
+    triangles: Vec<[u8; 3]>,
+}
+
+/// The one table.
+pub(super) static TABLE: LazyLock<Table> = LazyLock::new(Table::build);
+
+impl Table {
+    /// Triangles of the cube whose corner `c` is inside where bit `c` of `case` is set.
+    #[inline(always)]
+    pub(super) fn triangles(&self, case: u8) -> &[[u8; 3]] {
+        let case = case as usize;
+        &self.triangles[self.start[case] as usize..self.start[case + 1] as usize]
+    }
+
+    /// How many triangles the cube has.
+    #[inline(always)]
+    pub(super) fn count(&self, case: u8) -> usize {
+        (self.start[case as usize + 1] - self.start[case as usize]) as usize
+    }
+
+    fn build() -> Self {
+        let mut table = Self {
+            start: [0; 257],
+            triangles: Vec::new(),
+        };
+        for case in 0..=255u8 {
+            for cycle in loops(case) {
+                table
+                    .triangles
+                    .extend(triangulate(&cycle).unwrap_or_default());
+            }
+            table.start[case as usize + 1] = table.triangles.len() as u16;
+        }
+        table
+    }
+}
+
+/// Weight of each axis in the number of a corner.
+const BIT: [u8; 3] = [4, 2, 1];
+
+/// The edge between two neighbouring corners.
+fn edge(a: u8, b: u8) -> u8 {
+    let low = a & b;
+    match a ^ b {
+        4 => low & 3,
+        2 => 4 + ((low >> 1) & 2 | low & 1),
+        _ => 8 + (low >> 1),
+    }
+}
+
+/// The four corners of each face, counter-clockwise seen from outside the cube.
+fn faces() -> [[u8; 4]; 6] {
+    std::array::from_fn(|f| {
+        let (axis, high) = (f / 2, f % 2 == 1);
+        let (u, v) = (BIT[(axis + 1) % 3], BIT[(axis + 2) % 3]);
+        if high {
+            [0, u, u | v, v].map(|c| c | BIT[axis])
+        } else {
+            [0, v, u | v, u]
+        }
+    })
+}
+
+/// The loops of crossed edges of a case, each counter-clockwise seen from outside the surface.
+pub(super) fn loops(case: u8) -> Vec<Vec<u8>> {
+    let mut next = successors(case);
+    let mut all = Vec::new();
+    for start in 0..12 {
+        let mut cycle = Vec::new();
+        let mut e = start;
+        while let Some(after) = next[e as usize].take() {
+            cycle.push(e);
+            e = after;
+        }
+        if !cycle.is_empty() {
+            all.push(cycle);
+        }
+    }
+    all
+}
+
+/// For each crossed edge the next one of its loop. A face is walked round its corners; each run of inside
+/// corners gives the segment from the edge where the walk enters it to the edge where the walk leaves.
+fn successors(case: u8) -> [Option<u8>; 12] {
+    let inside = |corner: u8| case >> corner & 1 == 1;
+    let mut next = [None; 12];
+    for corners in faces() {
+        for i in 0..4 {
+            let (before, first) = (corners[(i + 3) % 4], corners[i]);
+            if inside(before) || !inside(first) {
+                continue;
+            }
+            let mut last = i;
+            while inside(corners[(last + 1) % 4]) {
+                last += 1;
+            }
+            let leaves = edge(corners[last % 4], corners[(last + 1) % 4]);
+            next[edge(before, first) as usize] = Some(leaves);
+        }
+    }
+    next
+}
+
+/// Whether two edges lie on one face of the cube.
+pub(super) fn share_face(a: u8, b: u8) -> bool {
+    let corners_of = |e: u8, face: &[u8; 4]| (0..4).any(|i| edge(face[i], face[(i + 1) % 4]) == e);
+    faces().iter().any(|f| corners_of(a, f) && corners_of(b, f))
+}
+
+/// Triangles of a loop, none with a diagonal within a face of the cube; `None` if there is no such set.
+pub(super) fn triangulate(cycle: &[u8]) -> Option<Vec<[u8; 3]>> {
+    let mut triangles = Vec::new();
+    cover(cycle, 0, cycle.len() - 1, &mut triangles)?;
+    Some(triangles)
+}
+
+/// Cuts the part of a loop between its vertices `i` and `j` into triangles, with the least sum of squared
+/// diagonals (the vertices taken at the middle of their edges), and returns that sum. Every choice is
+/// tried: a loop has seven vertices at most.
+fn cover(cycle: &[u8], i: usize, j: usize, triangles: &mut Vec<[u8; 3]>) -> Option<u32> {
+    if j == i + 1 {
+        return Some(0);
+    }
+    let whole = i == 0 && j + 1 == cycle.len();
+    if !whole && share_face(cycle[i], cycle[j]) {
+        return None;
+    }
+    let mut best: Option<(u32, Vec<[u8; 3]>)> = None;
+    for k in i + 1..j {
+        let mut part = vec![[cycle[i], cycle[k], cycle[j]]];
+        let Some(left) = cover(cycle, i, k, &mut part) else {
+            continue;
+        };
+        let Some(right) = cover(cycle, k, j, &mut part) else {
+            continue;
+        };
+        if best.as_ref().is_none_or(|(least, _)| left + right < *least) {
+            best = Some((left + right, part));
+        }
+    }
+    let (sum, part) = best?;
+    triangles.extend(part);
+    let own = if whole {
+        0
+    } else {
+        distance_squared(cycle[i], cycle[j])
+    };
+    Some(sum + own)
+}
+
+/// Squared distance between the middles of two edges, in half edge lengths.
+fn distance_squared(a: u8, b: u8) -> u32 {
+    let (a, b) = (middle(a), middle(b));
+    (0..3).map(|d| a[d].abs_diff(b[d]).pow(2)).sum()
+}
+
+/// Middle of an edge, in half edge lengths.
+fn middle(e: u8) -> [u32; 3] {
+    let (u, v) = (2 * u32::from(e >> 1 & 1), 2 * u32::from(e & 1));
+    match e / 4 {
+        0 => [1, u, v],
+        1 => [u, 1, v],
+        _ => [u, v, 1],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The two corners of an edge, from the definition in words.
+    fn corners(e: u8) -> [u8; 2] {
+        let m = middle(e);
+        let at = |along: u32| {
+            (0..3)
+                .map(|d| {
+                    if m[d] == 1 {
+                        along as u8 * BIT[d]
+                    } else {
+                        m[d] as u8 / 2 * BIT[d]
+                    }
+                })
+                .sum()
+        };
+        [at(0), at(1)]
+    }
+
+    fn crossed(case: u8) -> Vec<u8> {
+        (0..12)
+            .filter(|&e| corners(e).iter().filter(|&&c| case >> c & 1 == 1).count() == 1)
+            .collect()
+    }
+
+    #[test]
+    fn edges_are_numbered_as_documented() {
+        for e in 0..12 {
+            let [a, b] = corners(e);
+            assert_eq!((edge(a, b), edge(b, a)), (e, e));
+        }
+    }
+
+    #[test]
+    fn loops_pass_every_crossed_edge_once_and_no_other() {
+        for case in 0..=255 {
+            let mut passed: Vec<u8> = loops(case).concat();
+            passed.sort();
+            assert_eq!(passed, crossed(case), "case {case:08b}");
+        }
+    }
+
+    #[test]
+    fn every_loop_has_a_triangulation_without_diagonals_in_faces() {
+        let mut longest = 0;
+        for case in 0..=255 {
+            for cycle in loops(case) {
+                longest = longest.max(cycle.len());
+                let triangles = triangulate(&cycle)
+                    .unwrap_or_else(|| panic!("case {case:08b}: none for {cycle:?}"));
+                assert_eq!(triangles.len(), cycle.len() - 2);
+                let neighbours = |a, b| {
+                    (0..cycle.len()).any(|i| [cycle[i], cycle[(i + 1) % cycle.len()]] == [a, b])
+                };
+                for t in triangles {
+                    for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+                        let diagonal = !neighbours(a, b) && !neighbours(b, a);
+                        assert!(
+                            !diagonal || !share_face(a, b),
+                            "case {case:08b}: {a}-{b} in {cycle:?}"
+                        );
+                    }
+                }
+            }
+        }
+        assert_eq!(longest, 7);
+    }
+
+    /// Directed edges of the triangles of a case that no other triangle of the case uses the other way.
+    fn rim(case: u8) -> Vec<(u8, u8)> {
+        let directed: Vec<(u8, u8)> = TABLE
+            .triangles(case)
+            .iter()
+            .flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])])
+            .collect();
+        let mut rim: Vec<_> = directed
+            .iter()
+            .copied()
+            .filter(|&(a, b)| !directed.contains(&(b, a)))
+            .collect();
+        rim.sort();
+        let count = rim.len();
+        rim.dedup();
+        assert_eq!(
+            rim.len(),
+            count,
+            "case {case:08b}: an edge used twice in one direction"
+        );
+        rim
+    }
+
+    #[test]
+    fn neighbouring_cubes_meet_along_the_same_segments_in_opposite_directions() {
+        let faces = faces();
+        for axis in 0..3 {
+            let on_face = |e: u8, high: bool| {
+                let m = middle(e);
+                m[axis] == if high { 2 } else { 0 }
+            };
+            // The edge on the low face that lies opposite an edge on the high one.
+            let across = |e: u8| {
+                (0..12)
+                    .find(|&f| {
+                        on_face(f, false)
+                            && (0..3).all(|d| d == axis || middle(f)[d] == middle(e)[d])
+                    })
+                    .expect("there is one")
+            };
+            for a in 0..=255u8 {
+                for b in 0..=255u8 {
+                    let meets = faces[2 * axis + 1]
+                        .iter()
+                        .all(|&c| a >> c & 1 == b >> (c & !BIT[axis]) & 1);
+                    if !meets {
+                        continue;
+                    }
+                    let mut high: Vec<_> = rim(a)
+                        .into_iter()
+                        .filter(|&(p, q)| on_face(p, true) && on_face(q, true))
+                        .map(|(p, q)| (across(q), across(p)))
+                        .collect();
+                    let low: Vec<_> = rim(b)
+                        .into_iter()
+                        .filter(|&(p, q)| on_face(p, false) && on_face(q, false))
+                        .collect();
+                    high.sort();
+                    assert_eq!(high, low, "axis {axis}: {a:08b} beside {b:08b}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn one_inside_corner_is_cut_off_by_one_triangle_that_faces_away_from_it() {
+        for c in 0..8u8 {
+            let triangles = TABLE.triangles(1 << c);
+            assert_eq!(triangles.len(), 1);
+            let p = triangles[0].map(|e| middle(e).map(f64::from));
+            let normal = crate::vector::cross(
+                crate::vector::sub(p[1], p[0]),
+                crate::vector::sub(p[2], p[0]),
+            );
+            let corner = [c >> 2 & 1, c >> 1 & 1, c & 1].map(|x| 2.0 * f64::from(x));
+            assert!(
+                crate::vector::dot(normal, crate::vector::sub(corner, p[0])) < 0.0,
+                "corner {c}"
+            );
+        }
+    }
+}
