@@ -1,1 +1,63 @@
-//! The distance stage.
+//! Signed distance to a triangle mesh: at every cell centre of a grid, and at any point.
+//!
+//! # Map
+//! Mesh and signs → `φ(q) = σ(q) · min_y |q − y|` over all points `y` of the mesh, in the user's unit, negative
+//! inside. [`lattice::forward`] fills a grid: the distance is exact, faces, edges and corners alike, and the
+//! sign is that of `χ − c` at the same cell, so it cannot disagree with the field that made the mesh.
+//! [`Query`] answers at any point, with the gradient and the closest point; where no lattice gives the sign, it
+//! is that of the angle-weighted pseudonormal of the closest feature (J. A. Bærentzen and H. Aanæs, *Signed
+//! distance computation using the angle weighted pseudonormal*, IEEE TVCG 11, 2005).
+//!
+//! # Residual
+//! The closest face of every cell or point. The barycentric weights `β` of the closest point follow from it by
+//! [`triangle::closest_point`].
+//!
+//! # Pullback
+//! By the envelope theorem, with `β` held constant: `ȳ_k += −β_k φ̄ ∇φ` for the corners `y_k` of the closest face,
+//! `q̄ += φ̄ ∇φ` for the point, with `∇φ = σ (q − y)/|q − y|`, or the normal of the face at distance 0.
+//!
+//! # Not differentiable
+//! On the medial axis, where the closest point jumps, and on the mesh itself at its edges and corners. The sign
+//! is discrete.
+
+mod bvh;
+pub mod extend;
+mod lanes;
+pub mod lattice;
+mod pseudonormals;
+mod query;
+pub mod triangle;
+
+#[cfg(test)]
+mod tests;
+
+pub use lattice::{Band, NO_TRIANGLE, Scratch};
+pub use query::{Hit, Query};
+
+/// Why the distance stage refused its input.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// There is no triangle to be near to.
+    #[error(
+        "the mesh has no triangle, so there is no distance to it; check that the surface crosses the grid"
+    )]
+    Empty,
+    /// Squares of such lengths leave the range of double precision.
+    #[error(
+        "coordinates up to {magnitude:e} and an extent of {extent:e} cannot be squared in f64; use another unit of length"
+    )]
+    Range {
+        /// The largest absolute coordinate.
+        magnitude: f64,
+        /// The longest side of the bounding box.
+        extent: f64,
+    },
+    /// The width of the band is not a positive number.
+    #[error(
+        "a band of {cells} cells on either side has no width; give a positive number of cells, or ask for the full field"
+    )]
+    Band {
+        /// The width asked for, in cells.
+        cells: f64,
+    },
+}

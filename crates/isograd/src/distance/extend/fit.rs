@@ -1,0 +1,100 @@
+//! The linear fit at one vertex: small pure functions in double precision.
+
+use crate::vector::{add, dot, norm_squared, scale, sub};
+
+/// Share of the trace of `C` below which a direction counts as noise.
+pub(super) const NOISE: f64 = 1e-5;
+
+/// How soon the slope fades with the distance of a vertex from its samples: half of it is gone, in the
+/// mean direction, where `|m|² = 16 tr C · √(1/3)`.
+pub(super) const FADING: f64 = 1.0 / 256.0;
+
+/// The fit at one vertex; see the head of [`extend`](super).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Fit {
+    /// `R_v`, in the unit of the points.
+    pub radius: f64,
+    /// `W`, in the unit of the areas.
+    pub weight: f64,
+    /// `m`: the weighted mean of the samples, seen from the vertex, in the unit of the points.
+    pub mean: [f64; 3],
+    /// `s`, in 1 over the unit of the points.
+    pub tilt: [f64; 3],
+}
+
+/// A sample within the radius of a vertex.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Neighbor {
+    /// Its index.
+    pub sample: u32,
+    /// `d_j / R_v`.
+    pub offset: [f64; 3],
+    /// `w_j`, and once the fit is made `p_j`.
+    pub weight: f64,
+    /// `p_j t_j − p_j`, once the fit is made.
+    pub correction: f64,
+}
+
+/// `(1 − r²)²` inside the unit ball, else 0.
+#[inline(always)]
+pub(super) fn kernel(squared: f64) -> f64 {
+    let s = (1.0 - squared).max(0.0);
+    s * s
+}
+
+/// Fits a linear function to the samples round a vertex, and writes the weight of each.
+pub(super) fn fit(radius: f64, neighbors: &mut [Neighbor]) -> Fit {
+    let (mut weight, mut mean) = (0.0, [0.0; 3]);
+    for n in &*neighbors {
+        weight += n.weight;
+        mean = add(mean, scale(n.offset, n.weight));
+    }
+    let mean = scale(mean, 1.0 / weight);
+    let mut covariance = [0.0; 6];
+    for n in &mut *neighbors {
+        n.weight /= weight;
+        n.offset = sub(n.offset, mean);
+        let [x, y, z] = n.offset;
+        let products = [x * x, y * y, z * z, y * z, x * z, x * y];
+        for k in 0..6 {
+            covariance[k] += n.weight * products[k];
+        }
+    }
+    let tilt = tilt(covariance, mean);
+    for n in neighbors {
+        n.correction = -n.weight * dot(tilt, n.offset);
+    }
+    Fit {
+        radius,
+        weight,
+        mean: scale(mean, radius),
+        tilt: scale(tilt, 1.0 / radius),
+    }
+}
+
+/// `s = (C + ε I)⁻¹ m`, `C` given as `xx, yy, zz, yz, xz, xy`; 0 where all samples coincide.
+fn tilt(mut c: [f64; 6], m: [f64; 3]) -> [f64; 3] {
+    let trace = c[0] + c[1] + c[2];
+    let distance = norm_squared(m) / trace;
+    let ridge = trace * (NOISE + FADING * distance * distance);
+    if !(ridge > 0.0) || !ridge.is_finite() {
+        return [0.0; 3];
+    }
+    for k in 0..3 {
+        c[k] += ridge;
+    }
+    solve(c, m)
+}
+
+/// Solves `A x = b` for a symmetric positive definite `A`, by its Cholesky factors.
+fn solve([xx, yy, zz, yz, xz, xy]: [f64; 6], b: [f64; 3]) -> [f64; 3] {
+    let (l10, l20) = (xy / xx, xz / xx);
+    let d1 = yy - l10 * xy;
+    let l21 = (yz - l20 * xy) / d1;
+    let d2 = zz - l20 * xz - l21 * l21 * d1;
+    let b1 = b[1] - l10 * b[0];
+    let b2 = b[2] - l20 * b[0] - l21 * b1;
+    let z = b2 / d2;
+    let y = b1 / d1 - l21 * z;
+    [b[0] / xx - l10 * y - l20 * z, y, z]
+}

@@ -1,0 +1,313 @@
+//! The loops over vertices and cells.
+
+use rayon::prelude::*;
+
+use super::fit::{self, Fit, Neighbor};
+use super::{Error, Extension, NO_TRIANGLE, Residual, Samples, Surface};
+use crate::data::Attribute;
+use crate::distance::triangle;
+use crate::neighbors::CellIndex;
+use crate::parallel::{self, CHUNK};
+use crate::vector::{scale, sub, to_f64};
+use crate::{Grid, Mesh, Real};
+
+/// Samples that have to be well within the radius of a vertex, so that a plane of values fits them.
+const ENOUGH: usize = 6;
+
+/// A radius reaches this many times beyond the last of them.
+const REACH: f64 = 1.5;
+
+/// A radius that has grown holds no more samples than this, so that the time does not grow with the square
+/// of a hole.
+const MOST: usize = 64;
+
+/// By how much it passes the last of these, so that the weights are not all 0 where all are equally far.
+const MARGIN: f64 = 1.05;
+
+/// `a₀` over the mean area.
+const SMALLEST_AREA: f64 = 1e-6;
+
+/// Cells in one chunk of a loop over the grid.
+const CELLS: usize = 1 << 16;
+
+/// Memory that a second call of the same size uses again.
+#[derive(Clone, Debug, Default)]
+pub struct Scratch {
+    /// Cells of the band in each chunk of the grid.
+    counts: Vec<usize>,
+}
+
+/// Extends an attribute of the samples to the vertices of the surface and to the cells with
+/// `|φ| ≤ band_cells · h` that have a closest face. Values have the unit of the attribute.
+///
+/// # Errors
+/// As [`Error`] lists; the outputs are then not to be used.
+pub fn forward<T: Real>(
+    samples: Samples<'_, T>,
+    attribute: &Attribute<T>,
+    surface: Surface<'_, T>,
+    band_cells: f64,
+    scratch: &mut Scratch,
+    residual: &mut Residual<T>,
+    out: &mut Extension<T>,
+) -> Result<(), Error> {
+    check_samples(samples, attribute)?;
+    let grid = surface.phi.grid();
+    if !(band_cells > 0.0) || !band_cells.is_finite() {
+        return Err(Error::Band { cells: band_cells });
+    }
+    if surface.closest.len() != grid.cells() {
+        return Err(Error::Closest {
+            entries: surface.closest.len(),
+            cells: grid.cells(),
+        });
+    }
+    let reach = T::of(band_cells * grid.spacing().f64());
+    find_band(surface, reach, &mut scratch.counts, &mut out.cells);
+    check_faces(surface, &out.cells)?;
+    out.components = attribute.components;
+    out.shape = grid.shape();
+    extend_to_vertices(
+        samples,
+        attribute,
+        surface.mesh,
+        residual,
+        &mut out.vertices,
+    );
+    extend_to_cells(surface, &mut residual.barycentric, out);
+    Ok(())
+}
+
+fn check_samples<T: Real>(samples: Samples<'_, T>, attribute: &Attribute<T>) -> Result<(), Error> {
+    let (count, areas) = (samples.neighborhoods.index.len(), samples.areas);
+    let (values, components) = (&attribute.values, attribute.components);
+    let expected = count.checked_mul(components);
+    if areas.len() != count || expected != Some(values.len()) || values.is_empty() {
+        return Err(Error::Samples {
+            samples: count,
+            areas: areas.len(),
+            values: values.len(),
+            components,
+        });
+    }
+    if let Some(k) = values.par_iter().position_first(|v| !v.is_finite()) {
+        return Err(Error::NotFinite {
+            sample: k / components,
+        });
+    }
+    let bad = |area: &T| !(*area >= T::zero()) || !area.is_finite();
+    match areas.par_iter().position_first(bad) {
+        Some(sample) => Err(Error::Area {
+            sample,
+            area: areas[sample].f64(),
+        }),
+        None => Ok(()),
+    }
+}
+
+fn check_faces<T: Real>(surface: Surface<'_, T>, cells: &[u32]) -> Result<(), Error> {
+    let face = |&cell: &u32| surface.closest[cell as usize];
+    let missing = |face: &u32| *face as usize >= surface.mesh.faces().len();
+    match cells.par_iter().map(face).find_first(missing) {
+        Some(face) => Err(Error::Face { face }),
+        None => Ok(()),
+    }
+}
+
+/// Lists the cells of the band in ascending order: a count per chunk, then every chunk into its own place.
+fn find_band<T: Real>(
+    surface: Surface<'_, T>,
+    reach: T,
+    counts: &mut Vec<usize>,
+    cells: &mut Vec<u32>,
+) {
+    let (phi, closest) = (surface.phi.values(), surface.closest);
+    let inside = |&i: &usize| phi[i].abs() <= reach && closest[i] != NO_TRIANGLE;
+    let chunk = |k: usize| k * CELLS..phi.len().min((k + 1) * CELLS);
+    let chunks = (0..phi.len().div_ceil(CELLS)).into_par_iter();
+    chunks
+        .map(|k| chunk(k).filter(inside).count())
+        .collect_into_vec(counts);
+    // Every place is written below.
+    cells.resize(counts.iter().sum(), 0);
+    let mut rest = &mut cells[..];
+    let mut parts = Vec::with_capacity(counts.len());
+    for &count in &*counts {
+        let (part, after) = rest.split_at_mut(count);
+        parts.push(part);
+        rest = after;
+    }
+    parts.into_par_iter().enumerate().for_each(|(k, part)| {
+        for (place, cell) in part.iter_mut().zip(chunk(k).filter(inside)) {
+            *place = cell as u32;
+        }
+    });
+}
+
+/// What one thread needs for one vertex after the other.
+#[derive(Default)]
+struct Workspace<T> {
+    neighbors: Vec<Neighbor>,
+    nearest: Vec<(u32, T)>,
+}
+
+fn extend_to_vertices<T: Real>(
+    samples: Samples<'_, T>,
+    attribute: &Attribute<T>,
+    mesh: &Mesh<T>,
+    residual: &mut Residual<T>,
+    values: &mut Vec<T>,
+) {
+    let components = attribute.components;
+    let mean = parallel::sum_array(samples.areas.len(), |i| [samples.areas[i].f64()])[0]
+        / samples.areas.len() as f64;
+    residual.smallest_area = if mean > 0.0 {
+        SMALLEST_AREA * mean
+    } else {
+        1.0
+    };
+    let smallest_area = residual.smallest_area;
+    residual.fits.resize(mesh.vertices().len(), Fit::default());
+    values.resize(mesh.vertices().len() * components, T::zero());
+    let outputs = residual
+        .fits
+        .par_chunks_mut(CHUNK)
+        .zip(values.par_chunks_mut(CHUNK * components));
+    mesh.vertices()
+        .par_chunks(CHUNK)
+        .zip(outputs)
+        .for_each_init(
+            Workspace::default,
+            |workspace, (vertices, (fits, values))| {
+                let values = values.chunks_exact_mut(components);
+                for ((&vertex, fit), value) in vertices.iter().zip(fits).zip(values) {
+                    let radius = gather(samples, smallest_area, vertex, workspace);
+                    *fit = fit::fit(radius, &mut workspace.neighbors);
+                    evaluate(&workspace.neighbors, attribute, value);
+                }
+            },
+        );
+}
+
+/// Collects the samples round a vertex with their weights `w_j`, and returns the radius.
+fn gather<T: Real>(
+    samples: Samples<'_, T>,
+    smallest_area: f64,
+    vertex: [T; 3],
+    workspace: &mut Workspace<T>,
+) -> f64 {
+    let Workspace { neighbors, nearest } = workspace;
+    let Samples {
+        neighborhoods,
+        areas,
+    } = samples;
+    let (index, position) = (&neighborhoods.index, neighborhoods.position());
+    let y = to_f64(vertex);
+    let mut collect = |radius: T| {
+        let radius = radius.f64();
+        neighbors.clear();
+        let mut enough = 0;
+        index.for_each_within(vertex, T::of(radius), |j, _| {
+            let x = to_f64(index.point(position[j] as usize));
+            let offset = scale(sub(x, y), 1.0 / radius);
+            let squared = crate::vector::norm_squared(offset);
+            enough += usize::from(squared <= 1.0 / (REACH * REACH));
+            neighbors.push(Neighbor {
+                sample: j as u32,
+                offset,
+                weight: (areas[j].f64() + smallest_area) * fit::kernel(squared),
+                correction: 0.0,
+            });
+        });
+        enough
+    };
+    let common = neighborhoods.common_radius;
+    if collect(common) >= ENOUGH.min(index.len()) {
+        return common.f64();
+    }
+    let radius = grown_radius(index, vertex, common, nearest);
+    collect(radius);
+    radius.f64()
+}
+
+/// `max(R, min(1.5 r₆, 1.05 r₆₄))`.
+fn grown_radius<T: Real>(
+    index: &CellIndex<T>,
+    vertex: [T; 3],
+    common: T,
+    nearest: &mut Vec<(u32, T)>,
+) -> T {
+    index.nearest(vertex, MOST, nearest);
+    let distance = |k: usize| {
+        let last = nearest.len().saturating_sub(1);
+        nearest
+            .get(last.min(k - 1))
+            .map_or(T::zero(), |&(_, d2)| d2.sqrt())
+    };
+    let reach = T::of(REACH) * distance(ENOUGH);
+    common.max(reach.min(T::of(MARGIN) * distance(MOST)))
+}
+
+/// `Σ_j p_j t_j v_j`, as the mean and a correction to it, so that constants are exact.
+fn evaluate<T: Real>(neighbors: &[Neighbor], attribute: &Attribute<T>, value: &mut [T]) {
+    for (c, value) in value.iter_mut().enumerate() {
+        let at =
+            |n: &Neighbor| attribute.values[n.sample as usize * attribute.components + c].f64();
+        let mean: f64 = neighbors.iter().map(|n| n.weight * at(n)).sum();
+        let rise: f64 = neighbors
+            .iter()
+            .map(|n| n.correction * (at(n) - mean))
+            .sum();
+        *value = T::of(mean + rise);
+    }
+}
+
+fn extend_to_cells<T: Real>(
+    surface: Surface<'_, T>,
+    barycentric: &mut Vec<[T; 3]>,
+    out: &mut Extension<T>,
+) {
+    let Extension {
+        components,
+        vertices,
+        cells,
+        values,
+        ..
+    } = out;
+    let (components, grid) = (*components, surface.phi.grid());
+    barycentric.resize(cells.len(), [T::zero(); 3]);
+    values.resize(cells.len() * components, T::zero());
+    let outputs = barycentric
+        .par_chunks_mut(CHUNK)
+        .zip(values.par_chunks_mut(CHUNK * components));
+    cells
+        .par_chunks(CHUNK)
+        .zip(outputs)
+        .for_each(|(cells, (barycentric, values))| {
+            let outputs = barycentric
+                .iter_mut()
+                .zip(values.chunks_exact_mut(components));
+            for (&cell, (weights, value)) in cells.iter().zip(outputs) {
+                let face = surface.closest[cell as usize] as usize;
+                *weights = closest_weights(grid, cell as usize, surface.mesh, face);
+                blend(vertices, surface.mesh.faces()[face], *weights, value);
+            }
+        });
+}
+
+/// Barycentric coordinates of the point of a face that is closest to a cell's centre.
+fn closest_weights<T: Real>(grid: &Grid<T>, cell: usize, mesh: &Mesh<T>, face: usize) -> [T; 3] {
+    let center = grid.center_f64(grid.cell(cell));
+    let closest = triangle::closest_point(center, mesh.corners(face).map(to_f64));
+    closest.barycentric.map(T::of)
+}
+
+/// `Σ_k β_k u_k` at a face, as differences from one corner, so that constants are exact.
+pub(super) fn blend<T: Real>(vertices: &[T], face: [u32; 3], barycentric: [T; 3], value: &mut [T]) {
+    let corners = face.map(|v| v as usize * value.len());
+    let [_, b, c] = barycentric.map(T::f64);
+    for (k, value) in value.iter_mut().enumerate() {
+        let [u0, u1, u2] = corners.map(|corner| vertices[corner + k].f64());
+        *value = T::of(u0 + b * (u1 - u0) + c * (u2 - u0));
+    }
+}

@@ -1,0 +1,198 @@
+//! Distance at every cell centre.
+//!
+//! The grid is cut into blocks of a fixed size, each solved on its own and in one order: so the result has the
+//! same bits for any number of threads.
+
+mod block;
+mod cull;
+mod kernels;
+mod sites;
+mod task;
+mod workspace;
+
+use pulp::Arch;
+use rayon::prelude::*;
+
+use super::Error;
+use super::bvh::Bvh;
+use crate::{Field, Grid, Mesh, Real};
+use block::{BLOCK, Block};
+use sites::Sites;
+use task::{Output, Task};
+use workspace::Pool;
+
+/// Where the distance is wanted.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Band {
+    /// At every cell.
+    #[default]
+    Full,
+    /// Within this many cells of the surface. Elsewhere `φ` is this far with the right sign, and there is no
+    /// closest triangle ([`NO_TRIANGLE`]).
+    Cells(f64),
+}
+
+/// What `closest` holds where the band does not reach.
+pub const NO_TRIANGLE: u32 = u32::MAX;
+
+/// Blocks worked on between two writes of the results: enough for any number of threads, and few enough that
+/// their memory stays small beside the field.
+const BLOCKS_PER_WAVE: usize = 512;
+
+/// Memory that a second call of the same size uses again.
+#[derive(Clone, Debug, Default)]
+pub struct Scratch<T> {
+    bvh: Bvh,
+    sites: Sites,
+    distance: Vec<T>,
+    closest: Vec<u32>,
+    workspaces: Pool,
+}
+
+impl<T> Scratch<T> {
+    /// Entries that its memory has room for.
+    #[cfg(test)]
+    pub(super) fn capacity(&self) -> usize {
+        self.bvh.capacity()
+            + self.sites.capacity()
+            + self.distance.capacity()
+            + self.closest.capacity()
+    }
+}
+
+/// Writes the signed distance from every cell centre to `mesh` into `phi`, `(nx, ny, nz)`, in the user's unit,
+/// and the closest face of each cell into `closest`, the residual.
+///
+/// The distance is exact: computed in double precision from [`Grid::center_f64`] to the vertices as they stand,
+/// and rounded once. The sign is that of `χ − c` at the cell: negative inside, and positive at the level
+/// itself. Inside and at distance 0 it is the smallest negative number, so that the sign holds there too.
+/// `phi` is put on the grid of `chi` where it is on another.
+///
+/// # Errors
+/// [`Error::Empty`], [`Error::Range`], and [`Error::Band`].
+pub fn forward<T: Real>(
+    mesh: &Mesh<T>,
+    chi: &Field<T>,
+    c: T,
+    band: Band,
+    scratch: &mut Scratch<T>,
+    phi: &mut Field<T>,
+    closest: &mut Vec<u32>,
+) -> Result<(), Error> {
+    let grid = chi.grid();
+    let width = match band {
+        Band::Full => f64::INFINITY,
+        Band::Cells(cells) if cells > 0.0 && cells.is_finite() => cells * grid.spacing().f64(),
+        Band::Cells(cells) => return Err(Error::Band { cells }),
+    };
+    scratch.bvh.rebuild(mesh)?;
+    scratch
+        .sites
+        .rebuild(mesh, &scratch.bvh, grid.spacing().f64());
+    if phi.grid() != grid {
+        *phi = Field::zeros(*grid);
+    }
+    closest.resize(grid.cells(), NO_TRIANGLE);
+
+    let plane = grid.strides()[0];
+    let planes_per_wave = wave_planes(grid.shape());
+    let waves = phi.values_mut().chunks_mut(planes_per_wave * plane);
+    let waves = waves.zip(closest.chunks_mut(planes_per_wave * plane));
+    for (wave, (phi, closest)) in waves.enumerate() {
+        let planes = wave * planes_per_wave..wave * planes_per_wave + phi.len() / plane;
+        solve_wave(grid, mesh, planes.clone(), width, scratch);
+        let chi = &chi.values()[planes.start * plane..planes.end * plane];
+        write_wave(grid, scratch, |i| chi[i] < c, phi, closest);
+    }
+    Ok(())
+}
+
+/// Planes of cells in a wave: whole blocks.
+fn wave_planes(shape: [usize; 3]) -> usize {
+    let per_layer = shape[1].div_ceil(BLOCK) * shape[2].div_ceil(BLOCK);
+    BLOCK * BLOCKS_PER_WAVE.div_ceil(per_layer)
+}
+
+/// Distances of all blocks between two planes, block after block, into the scratch memory.
+fn solve_wave<T: Real>(
+    grid: &Grid<T>,
+    mesh: &Mesh<T>,
+    planes: std::ops::Range<usize>,
+    width: f64,
+    scratch: &mut Scratch<T>,
+) {
+    const CELLS: usize = BLOCK * BLOCK * BLOCK;
+    let shape = grid.shape();
+    let across = [shape[1].div_ceil(BLOCK), shape[2].div_ceil(BLOCK)];
+    let blocks = planes.len().div_ceil(BLOCK) * across[0] * across[1];
+    scratch.distance.resize(blocks * CELLS, T::zero());
+    scratch.closest.resize(blocks * CELLS, NO_TRIANGLE);
+    let bvh = &scratch.bvh;
+    let sites = &scratch.sites;
+    let magnitude = magnitude(grid).max(bvh.magnitude());
+    let task = Task {
+        grid,
+        mesh,
+        bvh,
+        sites,
+        width,
+        magnitude,
+        arch: Arch::new(),
+    };
+    let results = scratch.distance.par_chunks_mut(CELLS);
+    results
+        .zip(scratch.closest.par_chunks_mut(CELLS))
+        .enumerate()
+        .for_each(|(index, (distance, closest))| {
+            let (layer, rest) = (
+                index / (across[0] * across[1]),
+                index % (across[0] * across[1]),
+            );
+            let start = [
+                planes.start + layer * BLOCK,
+                rest / across[1] * BLOCK,
+                rest % across[1] * BLOCK,
+            ];
+            let block = Block::new(start, BLOCK, [planes.end, shape[1], shape[2]]);
+            let mut output = Output { distance, closest };
+            scratch
+                .workspaces
+                .with(|workspace| task.solve(&block, workspace, &mut output));
+        });
+}
+
+/// The largest absolute coordinate of a grid.
+fn magnitude<T: Real>(grid: &Grid<T>) -> f64 {
+    let corners = grid.lower().into_iter().chain(grid.upper());
+    corners.fold(0.0, |m, x| m.max(x.f64().abs()))
+}
+
+/// Brings the results of a wave into the order of the field, with their signs.
+fn write_wave<T: Real>(
+    grid: &Grid<T>,
+    scratch: &Scratch<T>,
+    inside: impl Fn(usize) -> bool + Sync,
+    phi: &mut [T],
+    closest: &mut [u32],
+) {
+    let [_, ny, nz] = grid.shape();
+    let across = [ny.div_ceil(BLOCK), nz.div_ceil(BLOCK)];
+    let rows = phi.par_chunks_mut(nz).zip(closest.par_chunks_mut(nz));
+    rows.enumerate().for_each(|(row, (phi, closest))| {
+        let (i, j) = (row / ny, row % ny);
+        let first_block = (i / BLOCK * across[0] + j / BLOCK) * across[1];
+        let runs = phi.chunks_mut(BLOCK).zip(closest.chunks_mut(BLOCK));
+        for (run, (phi, closest)) in runs.enumerate() {
+            let from = (((first_block + run) * BLOCK + i % BLOCK) * BLOCK + j % BLOCK) * BLOCK;
+            closest.copy_from_slice(&scratch.closest[from..from + closest.len()]);
+            for (k, value) in phi.iter_mut().enumerate() {
+                let d = scratch.distance[from + k];
+                *value = if inside(row * nz + run * BLOCK + k) {
+                    -d.max(T::min_positive_value())
+                } else {
+                    d
+                };
+            }
+        }
+    });
+}

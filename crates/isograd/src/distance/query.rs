@@ -1,0 +1,203 @@
+//! Distance at any point.
+
+use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+
+use super::Error;
+use super::bvh::{Bvh, Found, LANES, NOWHERE, Points, Stack, corners, morton_code};
+use super::lattice::NO_TRIANGLE;
+use super::pseudonormals::Pseudonormals;
+use super::triangle::{Closest, closest_point};
+use crate::vector::{dot, normalized, of_f64, scale, to_f64};
+use crate::{Field, Mesh, Real};
+
+/// Points that one task takes: a fixed number, so that the result does not depend on the threads.
+const PACKETS_PER_TASK: usize = 16;
+
+/// A mesh that answers how far from it a point is. Any mesh will do; the sign needs a closed one whose faces
+/// share their vertices, or a field that knows the sides.
+#[derive(Clone, Debug)]
+pub struct Query<T> {
+    mesh: Mesh<T>,
+    bvh: Bvh,
+    pseudonormals: Pseudonormals,
+}
+
+/// What a mesh says about one point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit<T> {
+    /// Signed distance, in the user's unit, negative inside.
+    pub distance: T,
+    /// Its gradient with respect to the point, of unit length: away from the closest point on the outside, and
+    /// towards it inside. At distance 0 the normal of the closest face. Zero only where that has no area.
+    pub gradient: [T; 3],
+    /// The closest point of the mesh.
+    pub point: [T; 3],
+    /// The face that it lies on; [`NO_TRIANGLE`] for a point that is not a number.
+    pub triangle: u32,
+    /// Weights of the corners of that face at the closest point.
+    pub barycentric: [T; 3],
+}
+
+impl<T: Real> Query<T> {
+    /// Makes the mesh ready for queries.
+    ///
+    /// # Errors
+    /// [`Error::Empty`] and [`Error::Range`].
+    pub fn new(mesh: Mesh<T>) -> Result<Self, Error> {
+        let mut bvh = Bvh::default();
+        bvh.rebuild(&mesh)?;
+        let pseudonormals = Pseudonormals::new(&mesh);
+        Ok(Self {
+            mesh,
+            bvh,
+            pseudonormals,
+        })
+    }
+
+    /// The mesh.
+    pub fn mesh(&self) -> &Mesh<T> {
+        &self.mesh
+    }
+
+    /// What the mesh says about each of the `(N, 3)` points, in their order.
+    ///
+    /// `signs` is a field that is negative inside, such as the distance on the lattice: where its eight values
+    /// round a point agree, they give the sign. Elsewhere, and without it, the pseudonormal of the closest
+    /// feature does, which is right for a closed mesh. Of an open mesh it tells the two sides near the surface
+    /// and means nothing near its border.
+    ///
+    /// A point that is not finite, or too far for its squared distance to be, gets NaN and no triangle.
+    pub fn query(&self, points: &[[T; 3]], signs: Option<&Field<T>>) -> Vec<Hit<T>> {
+        let nearest = self.nearest_triangles(points);
+        points
+            .par_iter()
+            .zip(nearest)
+            .map(|(&point, place)| self.hit(point, place, signs))
+            .collect()
+    }
+
+    /// Place in the tree of the triangle closest to each point. The points are taken in packets of neighbours
+    /// along a Morton curve.
+    fn nearest_triangles(&self, points: &[[T; 3]]) -> Vec<u32> {
+        let mut order: Vec<(u64, u32)> = points
+            .par_iter()
+            .enumerate()
+            .map(|(index, &p)| (morton_code(self.bvh.to_morton(to_f64(p))), index as u32))
+            .collect();
+        order.par_sort_unstable();
+        let arch = Arch::new();
+        let mut sorted = vec![NOWHERE; order.len()];
+        sorted
+            .par_chunks_mut(PACKETS_PER_TASK * LANES)
+            .zip(order.par_chunks(PACKETS_PER_TASK * LANES))
+            .for_each(|(found, order)| {
+                arch.dispatch(Packets {
+                    bvh: &self.bvh,
+                    points,
+                    order,
+                    found,
+                });
+            });
+        let mut nearest = vec![NOWHERE; order.len()];
+        for (&(_, index), place) in order.iter().zip(sorted) {
+            nearest[index as usize] = place;
+        }
+        nearest
+    }
+
+    fn hit(&self, point: [T; 3], place: u32, signs: Option<&Field<T>>) -> Hit<T> {
+        if place == NOWHERE {
+            return Hit {
+                distance: T::nan(),
+                gradient: [T::nan(); 3],
+                point: [T::nan(); 3],
+                triangle: NO_TRIANGLE,
+                barycentric: [T::nan(); 3],
+            };
+        }
+        let face = self.bvh.face(place);
+        let found = closest_point(to_f64(point), corners(&self.mesh, face));
+        let inside = signs
+            .and_then(|field| side_on_lattice(field, point))
+            .unwrap_or_else(|| self.is_inside(face, &found));
+        let sign = if inside { -1.0 } else { 1.0 };
+        Hit {
+            distance: T::of(sign * found.distance),
+            gradient: of_f64(self.gradient(face, &found, sign)),
+            point: of_f64(found.point),
+            triangle: face,
+            barycentric: of_f64(found.barycentric),
+        }
+    }
+
+    fn is_inside(&self, face: u32, found: &Closest) -> bool {
+        let normal = self.pseudonormals.of(&self.mesh, face, found.feature);
+        dot(normal, found.offset) < 0.0
+    }
+
+    fn gradient(&self, face: u32, found: &Closest, sign: f64) -> [f64; 3] {
+        match normalized(found.offset) {
+            Some(away) => scale(away, sign),
+            None => {
+                let of_face = super::triangle::unit_normal(corners(&self.mesh, face));
+                let pseudonormal =
+                    || normalized(self.pseudonormals.of(&self.mesh, face, found.feature));
+                of_face.or_else(pseudonormal).unwrap_or([0.0; 3])
+            }
+        }
+    }
+}
+
+/// Whether a point is inside, where the eight cells round it agree.
+fn side_on_lattice<T: Real>(field: &Field<T>, point: [T; 3]) -> Option<bool> {
+    let grid = field.grid();
+    let x = grid.to_index(point);
+    let mut cell = [0; 3];
+    for a in 0..3 {
+        let from_centre = x[a] - T::of(0.5);
+        if !(from_centre >= T::zero()) {
+            return None;
+        }
+        cell[a] = from_centre.to_usize().filter(|i| i + 1 < grid.shape()[a])?;
+    }
+    let inside = |corner: usize| {
+        let at = std::array::from_fn(|a| cell[a] + (corner >> a & 1));
+        field.at(at) < T::zero()
+    };
+    let first = inside(0);
+    (1..8)
+        .all(|corner| inside(corner) == first)
+        .then_some(first)
+}
+
+/// Finds the closest triangles of some packets of points.
+struct Packets<'a, T> {
+    bvh: &'a Bvh,
+    points: &'a [[T; 3]],
+    /// Morton code and index of each point.
+    order: &'a [(u64, u32)],
+    found: &'a mut [u32],
+}
+
+impl<T: Real> WithSimd for Packets<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let mut stack = Stack::new();
+        for (order, found) in self.order.chunks(LANES).zip(self.found.chunks_mut(LANES)) {
+            let mut packet: Points = [[0.0; LANES]; 3];
+            for l in 0..LANES {
+                // The last packet repeats its last point.
+                let (_, index) = order[l.min(order.len() - 1)];
+                for a in 0..3 {
+                    packet[a][l] = self.points[index as usize][a].f64();
+                }
+            }
+            let mut nearest = Found::NOTHING;
+            self.bvh.nearest(&packet, &mut nearest, &mut stack);
+            found.copy_from_slice(&nearest.triangle[..found.len()]);
+        }
+    }
+}
