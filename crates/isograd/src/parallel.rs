@@ -7,11 +7,6 @@ use rayon::prelude::*;
 /// Items in one chunk of a loop over points or vertices.
 pub(crate) const CHUNK: usize = 2048;
 
-/// `Σ_i f(i)` for `i` in `0..n`, added up in double precision in one fixed order.
-pub(crate) fn sum(n: usize, f: impl Fn(usize) -> f64 + Sync) -> f64 {
-    sum_array(n, |i| [f(i)])[0]
-}
-
 /// `Σ_i f(i)` for `i` in `0..n`, several sums at once, in one fixed order.
 pub(crate) fn sum_array<const M: usize>(
     n: usize,

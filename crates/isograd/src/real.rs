@@ -6,17 +6,13 @@ use std::iter::Sum;
 use num_traits::{Float, FloatConst, NumAssign};
 use rustfft::FftNum;
 
-mod sealed {
-    pub trait Sealed {}
-    impl Sealed for f32 {}
-    impl Sealed for f64 {}
-}
+use crate::concrete::Concrete;
 
 /// `f32` or `f64`: the type of every coordinate and every field value. What comes in goes out.
 ///
 /// Sealed: the error bounds of the stages are stated for these two alone.
 pub trait Real:
-    sealed::Sealed
+    Concrete
     + Float
     + FloatConst
     + NumAssign

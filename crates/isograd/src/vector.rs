@@ -56,7 +56,8 @@ pub fn norm<T: Float>(a: [T; 3]) -> T {
 pub fn normalized<T: Float>(a: [T; 3]) -> Option<[T; 3]> {
     // Scaled by the largest component first, so that tiny and huge vectors neither underflow nor overflow.
     let largest = a[0].abs().max(a[1].abs()).max(a[2].abs());
-    if !(largest > T::zero()) || !largest.is_finite() {
+    // The maximum skips NaN, so it can't stand for all three.
+    if !(largest > T::zero()) || !is_finite(a) {
         return None;
     }
     let b = [a[0] / largest, a[1] / largest, a[2] / largest];

@@ -5,6 +5,8 @@ mod field;
 mod grid;
 mod mesh;
 
+pub(crate) use cloud::bounds;
+
 pub use cloud::{Attribute, PointCloud, PointCloudError};
 pub use field::{Field, FieldError};
 pub use grid::{Grid, GridError, Resolution};

@@ -1,0 +1,70 @@
+//! Attributes of the samples on the reconstructed surface and round it.
+
+use super::Reconstruction;
+use crate::data::{Attribute, PointCloud};
+use crate::distance::extend::{Error, Extension, Residual, Samples, Scratch, Surface};
+use crate::{Real, distance};
+
+impl<T: Real> Reconstruction<T> {
+    /// The attribute `name` of the cloud at the vertices of the surface, and at every cell within
+    /// `band_cells` cells of the surface as it is at the closest surface point; see
+    /// [`distance::extend`](crate::distance::extend). Cells outside the band that φ was computed in are left
+    /// out.
+    ///
+    /// # Errors
+    /// [`Error::Missing`], a cloud of another size than the one reconstructed, values that are not finite, a
+    /// band without width.
+    pub fn extend(
+        &self,
+        cloud: &PointCloud<T>,
+        name: &str,
+        band_cells: f64,
+    ) -> Result<Extension<T>, Error> {
+        let attributes = cloud.attributes();
+        let attribute =
+            attributes
+                .iter()
+                .find(|a| a.name == name)
+                .ok_or_else(|| Error::Missing {
+                    name: name.into(),
+                    known: attributes.iter().map(|a| a.name.clone()).collect(),
+                })?;
+        let (mut residual, mut extension) = (Residual::default(), Extension::default());
+        let scratch = &mut Scratch::default();
+        self.extend_into(
+            attribute,
+            band_cells,
+            scratch,
+            &mut residual,
+            &mut extension,
+        )?;
+        Ok(extension)
+    }
+
+    /// The same for one value per sample that was reconstructed, in memory that is used again, with what the
+    /// pullback needs.
+    ///
+    /// # Errors
+    /// As [`extend`](Self::extend); the outputs are then not to be used.
+    pub fn extend_into(
+        &self,
+        attribute: &Attribute<T>,
+        band_cells: f64,
+        scratch: &mut Scratch,
+        residual: &mut Residual<T>,
+        extension: &mut Extension<T>,
+    ) -> Result<(), Error> {
+        let samples = Samples {
+            neighborhoods: &self.residuals.neighborhoods,
+            areas: &self.areas,
+        };
+        let surface = Surface {
+            mesh: &self.mesh,
+            phi: &self.sdf,
+            closest: &self.closest,
+        };
+        distance::extend::forward(
+            samples, attribute, surface, band_cells, scratch, residual, extension,
+        )
+    }
+}
