@@ -1,1 +1,57 @@
-//! Readers and writers of point clouds, meshes and fields.
+//! Readers and writers of point clouds, meshes and signed distance fields.
+//!
+//! ```no_run
+//! use std::path::Path;
+//!
+//! let file = isograd_io::read_geometry(Path::new("cloud.ply"))?;
+//! let cloud = file.cloud::<f32>()?;
+//! isograd_io::write_cloud(Path::new("copy.npz"), &cloud)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! | format | read as | written as |
+//! |---|---|---|
+//! | PLY (ascii, binary of both byte orders) | points, mesh | points, mesh |
+//! | XYZ, CSV, TXT | points | points |
+//! | OBJ, STL | points, mesh | mesh |
+//! | NPY | points | |
+//! | NPZ | points, field | points, field |
+//! | VTP | points, mesh | mesh |
+//! | VTI | field | field |
+//!
+//! What it guarantees:
+//! - No input makes it panic, and what it allocates is bounded by the size of the file, not by what a
+//!   header says.
+//! - Every error names the file, the line or the byte or the index, what is wrong, and what to do.
+//! - A file appears whole or not at all ([`atomic`]).
+//! - Numbers are read in double precision, exactly, and written in the type that they have; what is
+//!   written and read back has the same bits (STL aside, which is single precision).
+#![warn(missing_docs)]
+
+pub mod atomic;
+mod bytes;
+mod error;
+mod field;
+mod format;
+mod geometry;
+mod number;
+mod numpy;
+mod obj;
+mod ply;
+mod read;
+mod source;
+mod stl;
+mod text;
+mod vtk;
+mod write;
+
+pub use error::{Error, Place};
+pub use field::FieldFile;
+pub use format::Format;
+pub use geometry::Geometry;
+pub use number::Dtype;
+pub use read::{Content, parse_field, parse_geometry, read, read_field, read_geometry, read_mesh};
+pub use source::Source;
+pub use write::{
+    CLOUD_ENDINGS, FIELD_ENDINGS, MESH_ENDINGS, check_output, write_cloud, write_field, write_mesh,
+};

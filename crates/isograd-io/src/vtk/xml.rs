@@ -1,0 +1,144 @@
+//! The elements of a VTK file as a small tree; array text stays where it is.
+
+use std::ops::Range;
+
+use quick_xml::Reader;
+use quick_xml::events::{BytesStart, Event};
+
+use crate::error::{Error, Place};
+use crate::source::Source;
+
+/// VTK nests six deep; a tree much deeper is no VTK file.
+const DEEPEST: usize = 32;
+
+/// An element, its attributes and what is inside.
+#[derive(Debug, Default)]
+pub(super) struct Node {
+    pub name: String,
+    attributes: Vec<(String, String)>,
+    pub children: Vec<Node>,
+    /// The text from the opening tag to the first child or the closing tag, as bytes of the file.
+    pub text: Range<usize>,
+    /// Where the element begins.
+    pub byte: usize,
+}
+
+/// What stands in `<AppendedData>`: the bytes after the underscore.
+#[derive(Debug)]
+pub(super) struct Appended {
+    pub start: usize,
+    pub base64: bool,
+}
+
+impl Node {
+    pub fn attribute(&self, name: &str) -> Option<&str> {
+        let found = self.attributes.iter().find(|(key, _)| key == name);
+        found.map(|(_, value)| value.as_str())
+    }
+
+    pub fn child(&self, name: &str) -> Option<&Node> {
+        self.children.iter().find(|child| child.name == name)
+    }
+
+    pub fn children_named<'a>(&'a self, name: &'a str) -> impl Iterator<Item = &'a Node> {
+        self.children.iter().filter(move |child| child.name == name)
+    }
+}
+
+/// The tree of a file. Parsing stops at `<AppendedData>`, behind which raw bytes may stand.
+pub(super) fn parse(source: &Source) -> Result<(Node, Option<Appended>), Error> {
+    let mut reader = Reader::from_reader(source.bytes.as_slice());
+    reader.config_mut().check_end_names = true;
+    let mut stack = vec![Node::default()];
+    let mut appended = None;
+    loop {
+        let byte = reader.buffer_position() as usize;
+        let bad = |problem: String| source.error(Place::Byte(byte), problem);
+        let event = reader
+            .read_event()
+            .map_err(|e| bad(format!("broken XML: {e}; write the file again")))?;
+        let after = reader.buffer_position() as usize;
+        match event {
+            Event::Start(tag) if tag.name().as_ref() == "AppendedData" => {
+                appended = Some(find_appended(source, &tag, after).map_err(bad)?);
+                break;
+            }
+            Event::Start(tag) => {
+                if stack.len() > DEEPEST {
+                    return Err(bad("the XML is nested too deep for a VTK file".into()));
+                }
+                let mut node = element(&tag, byte).map_err(bad)?;
+                node.text = after..after;
+                end_text(&mut stack, byte);
+                stack.push(node);
+            }
+            Event::Empty(tag) => {
+                let node = element(&tag, byte).map_err(bad)?;
+                end_text(&mut stack, byte);
+                attach(&mut stack, node);
+            }
+            Event::End(_) => {
+                if let Some(mut node) = (stack.len() > 1).then(|| stack.pop()).flatten() {
+                    if node.children.is_empty() {
+                        node.text.end = byte.max(node.text.start);
+                    }
+                    attach(&mut stack, node);
+                }
+            }
+            Event::Eof if stack.len() > 1 => {
+                return Err(bad(
+                    "the XML ends inside an element; the file is cut short".into()
+                ));
+            }
+            Event::Eof => break,
+            _ => {}
+        }
+    }
+    // What <AppendedData> left open.
+    while stack.len() > 1 {
+        let node = stack.pop().unwrap_or_default();
+        attach(&mut stack, node);
+    }
+    Ok((stack.pop().unwrap_or_default(), appended))
+}
+
+/// The text of an element ends where its first child begins.
+fn end_text(stack: &mut [Node], byte: usize) {
+    if let Some(parent) = stack.last_mut().filter(|parent| parent.children.is_empty()) {
+        parent.text.end = byte.max(parent.text.start);
+    }
+}
+
+fn attach(stack: &mut [Node], node: Node) {
+    if let Some(parent) = stack.last_mut() {
+        parent.children.push(node);
+    }
+}
+
+fn element(tag: &BytesStart, byte: usize) -> Result<Node, String> {
+    let mut node = Node {
+        name: tag.name().as_ref().to_string(),
+        byte,
+        ..Node::default()
+    };
+    for attribute in tag.attributes() {
+        let attribute = attribute.map_err(|e| format!("broken XML: {e}; write the file again"))?;
+        node.attributes.push((
+            attribute.key.as_ref().to_string(),
+            attribute.value.into_owned(),
+        ));
+    }
+    Ok(node)
+}
+
+fn find_appended(source: &Source, tag: &BytesStart, after: usize) -> Result<Appended, String> {
+    let node = element(tag, after)?;
+    let rest = source.bytes.get(after..).unwrap_or_default();
+    let underscore = memchr::memchr(b'_', rest)
+        .filter(|&at| rest[..at].iter().all(u8::is_ascii_whitespace))
+        .ok_or("the appended data do not begin with an underscore")?;
+    Ok(Appended {
+        start: after + underscore + 1,
+        base64: node.attribute("encoding") == Some("base64"),
+    })
+}
