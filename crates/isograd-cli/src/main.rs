@@ -1,2 +1,7 @@
 //! The command line of isograd.
-fn main() {}
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    isograd_cli::run(std::env::args_os())
+}

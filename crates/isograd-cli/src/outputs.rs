@@ -1,0 +1,156 @@
+//! Which files a reconstruction writes, checked before the work begins.
+
+use std::path::{Path, PathBuf};
+
+use isograd_io::{FIELD_ENDINGS, MESH_ENDINGS, check_output};
+
+use crate::args;
+use crate::error::Error;
+
+/// What `points` may be called.
+const POINTS_ENDINGS: &[&str] = &["ply", "npz"];
+
+/// Paths of the files to write; the flag of one overrules the folder's.
+#[derive(Debug)]
+pub struct Outputs {
+    folder: Option<PathBuf>,
+    /// The surface.
+    pub mesh: Option<PathBuf>,
+    /// The field.
+    pub sdf: Option<PathBuf>,
+    /// The samples.
+    pub points: Option<PathBuf>,
+    /// The report.
+    pub report: Option<PathBuf>,
+    /// The slices.
+    pub plot: Option<PathBuf>,
+    /// The views.
+    pub picture: Option<PathBuf>,
+}
+
+impl Outputs {
+    /// The outputs that the command line asks for.
+    ///
+    /// # Errors
+    /// A name with the wrong ending, one name twice, the input's own name: the command line is wrong. A
+    /// folder that is not there: the work can't be done.
+    pub fn new(args: &args::Reconstruct) -> Result<Self, Error> {
+        let pick = |given: &Option<PathBuf>, name: &str| {
+            let in_folder = || args.output.as_ref().map(|folder| folder.join(name));
+            given.clone().or_else(in_folder)
+        };
+        let outputs = Self {
+            mesh: pick(&args.mesh, "mesh.ply"),
+            sdf: pick(&args.sdf, "sdf.vti"),
+            points: pick(&args.points, "points.ply"),
+            report: pick(&args.report, "report.json"),
+            plot: pick(&args.plot, "slices.png"),
+            picture: args.picture.clone(),
+            folder: args.output.clone(),
+        };
+        outputs.check_names(&args.cloud)?;
+        outputs.check_folders()?;
+        Ok(outputs)
+    }
+
+    fn all(&self) -> impl Iterator<Item = (&Path, &'static [&'static str])> {
+        let files: [(&Option<PathBuf>, &'static [&'static str]); 6] = [
+            (&self.mesh, MESH_ENDINGS),
+            (&self.sdf, FIELD_ENDINGS),
+            (&self.points, POINTS_ENDINGS),
+            (&self.report, &["json"]),
+            (&self.plot, &["png"]),
+            (&self.picture, &["png"]),
+        ];
+        files
+            .into_iter()
+            .filter_map(|(path, endings)| Some((path.as_deref()?, endings)))
+    }
+
+    fn check_names(&self, input: &Path) -> Result<(), Error> {
+        let mut seen: Vec<PathBuf> = Vec::new();
+        let input = same_name(input);
+        for (path, endings) in self.all() {
+            check_ending(path, endings)?;
+            let name = same_name(path);
+            if name == input {
+                return Err(Error::Usage(format!(
+                    "{} is the input; write to another file or folder",
+                    path.display()
+                )));
+            }
+            if seen.contains(&name) {
+                return Err(Error::Usage(format!(
+                    "{} is to be written twice; give each output its own name",
+                    path.display()
+                )));
+            }
+            seen.push(name);
+        }
+        Ok(())
+    }
+
+    /// A folder that `-o` names may be missing; any other must be there.
+    fn check_folders(&self) -> Result<(), Error> {
+        if let Some(folder) = &self.folder
+            && folder.exists()
+            && !folder.is_dir()
+        {
+            return Err(Error::Usage(format!(
+                "{} is a file; -o takes a folder",
+                folder.display()
+            )));
+        }
+        let missing = self.folder.as_ref().filter(|folder| !folder.exists());
+        for (path, endings) in self.all() {
+            let is_to_come = missing.is_some_and(|folder| path.parent() == Some(folder));
+            if !is_to_come {
+                check_output(path, endings)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Creates the folder of `-o`.
+    ///
+    /// # Errors
+    /// What the operating system says.
+    pub fn create_folder(&self) -> Result<(), Error> {
+        let Some(folder) = &self.folder else {
+            return Ok(());
+        };
+        std::fs::create_dir_all(folder).map_err(|source| {
+            Error::File(isograd_io::Error::Write {
+                file: folder.display().to_string(),
+                source,
+            })
+        })
+    }
+}
+
+/// Refuses a name with an ending that stands for another format, or for none.
+pub fn check_ending(path: &Path, endings: &[&str]) -> Result<(), Error> {
+    let known = |e: &str| endings.iter().any(|ending| e.eq_ignore_ascii_case(ending));
+    if path.extension().and_then(|e| e.to_str()).is_some_and(known) {
+        return Ok(());
+    }
+    Err(Error::Usage(format!(
+        "{}: the name must end in .{}",
+        path.display(),
+        endings.join(" or .")
+    )))
+}
+
+/// A path that is equal for equal files, also through links and `..`.
+fn same_name(path: &Path) -> PathBuf {
+    let resolve = |path: &Path| std::fs::canonicalize(path).ok();
+    let in_folder = || {
+        let folder = path
+            .parent()
+            .filter(|folder| !folder.as_os_str().is_empty());
+        Some(resolve(folder.unwrap_or(Path::new(".")))?.join(path.file_name()?))
+    };
+    resolve(path)
+        .or_else(in_folder)
+        .unwrap_or_else(|| path.to_path_buf())
+}

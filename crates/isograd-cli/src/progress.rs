@@ -1,0 +1,95 @@
+//! What the user sees while the work goes on: a bar on a terminal, nothing in a pipe.
+
+use std::io::{self, IsTerminal, Write};
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::args::Running;
+
+/// A line on standard output. A reader that went away (`| head`) is no reason to stop.
+pub fn to_stdout(text: &str) {
+    let _ = writeln!(io::stdout(), "{text}");
+}
+
+/// A line on standard error.
+pub fn to_stderr(text: &str) {
+    let _ = writeln!(io::stderr(), "{text}");
+}
+
+/// A bar with one step for each part of the work.
+pub struct Progress {
+    bar: ProgressBar,
+    quiet: bool,
+    verbose: bool,
+    current: Option<(String, Instant)>,
+}
+
+impl Progress {
+    /// A bar of `steps`, drawn on standard error where that is a terminal.
+    pub fn new(steps: usize, running: Running) -> Self {
+        let visible = io::stderr().is_terminal() && !running.quiet && !running.verbose;
+        let target = match visible {
+            true => ProgressDrawTarget::stderr(),
+            false => ProgressDrawTarget::hidden(),
+        };
+        let bar = ProgressBar::with_draw_target(Some(steps as u64), target);
+        let template = "{spinner} {bar:24} {pos}/{len} {msg} ({elapsed})";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style.progress_chars("=> "));
+        }
+        if visible {
+            bar.enable_steady_tick(Duration::from_millis(120));
+        }
+        Self {
+            bar,
+            quiet: running.quiet,
+            verbose: running.verbose,
+            current: None,
+        }
+    }
+
+    /// Begins the next part.
+    pub fn step(&mut self, name: &str) {
+        self.end_step();
+        self.bar.set_message(name.to_string());
+        self.current = Some((name.to_string(), Instant::now()));
+    }
+
+    fn end_step(&mut self) {
+        if let Some((name, start)) = self.current.take() {
+            self.bar.inc(1);
+            if self.verbose {
+                to_stderr(&format!(
+                    "{name:<12} {:8.3} s",
+                    start.elapsed().as_secs_f64()
+                ));
+            }
+        }
+    }
+
+    /// A warning, on standard error whatever the flags say.
+    pub fn warn(&self, text: &str) {
+        self.bar.suspend(|| to_stderr(&format!("warning: {text}")));
+    }
+
+    /// A detail that only `-v` asks for.
+    pub fn detail(&self, text: &str) {
+        if self.verbose {
+            to_stderr(text);
+        }
+    }
+
+    /// A line about what was done, on standard output unless `-q`.
+    pub fn say(&self, text: &str) {
+        if !self.quiet {
+            self.bar.suspend(|| to_stdout(text));
+        }
+    }
+
+    /// Ends the last part and takes the bar away.
+    pub fn finish(&mut self) {
+        self.end_step();
+        self.bar.finish_and_clear();
+    }
+}

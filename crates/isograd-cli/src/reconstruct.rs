@@ -1,0 +1,316 @@
+//! `isograd reconstruct`: from a file to files.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::Instant;
+
+use isograd::distance::lattice::Band;
+use isograd::neighbors::Radius;
+use isograd::{
+    Attribute, Grid, GridError, Options, PointCloud, Real, Reconstruction, Reconstructor,
+    Resolution, Stage, orient, splat,
+};
+use isograd_io::Geometry;
+
+use crate::args::{self, AutoOr, FullOr, Precision};
+use crate::error::Error;
+use crate::outputs::Outputs;
+use crate::plot;
+use crate::progress::Progress;
+use crate::report::Report;
+use crate::{memory, resample};
+
+/// Rounding of the coordinates, in cells, that single precision may add: above it the computation runs in
+/// double precision.
+const TOLERATED_ROUNDING: f64 = 1e-2;
+
+/// Runs the command.
+///
+/// # Errors
+/// See [`Error`]; then no file has been left incomplete.
+pub fn run(args: &args::Reconstruct) -> Result<(), Error> {
+    let start = Instant::now();
+    let outputs = Outputs::new(args)?;
+    // Reading, the stages, writing.
+    let mut progress = Progress::new(2 + Stage::ALL.len(), args.running);
+    progress.step("read");
+    let geometry = read(args)?;
+    progress.detail(&format!(
+        "{} points, stored as {}",
+        geometry.points.len(),
+        geometry.dtype.name()
+    ));
+    let read_seconds = start.elapsed().as_secs_f64();
+    let job = Job {
+        args,
+        outputs: &outputs,
+        start,
+        read_seconds,
+    };
+    match job.needs_double(&geometry)? {
+        Some(warning) => {
+            progress.warn(&warning);
+            job.run::<f64>(&geometry, &mut progress, Some(warning))
+        }
+        None if args.precision == Precision::F64 => job.run::<f64>(&geometry, &mut progress, None),
+        None => job.run::<f32>(&geometry, &mut progress, None),
+    }
+}
+
+fn read(args: &args::Reconstruct) -> Result<Geometry, Error> {
+    let Some(n) = args.sample else {
+        return Ok(isograd_io::read_geometry(&args.cloud)?);
+    };
+    let mesh = isograd_io::read_mesh(&args.cloud)?;
+    resample::resample(&mesh, n as usize).ok_or_else(|| {
+        Error::File(isograd_io::Error::Format {
+            file: args.cloud.display().to_string(),
+            problem: "its faces have no area; --sample can't be used".into(),
+        })
+    })
+}
+
+/// One reconstruction, apart from its number type.
+struct Job<'a> {
+    args: &'a args::Reconstruct,
+    outputs: &'a Outputs,
+    start: Instant,
+    read_seconds: f64,
+}
+
+impl Job<'_> {
+    fn file(&self) -> String {
+        match self.args.cloud.as_path() {
+            path if path == Path::new("-") => "standard input".into(),
+            path => path.display().to_string(),
+        }
+    }
+
+    fn grid_error(&self, source: GridError) -> Error {
+        Error::Grid {
+            file: self.file(),
+            source,
+        }
+    }
+
+    fn cloud<T: Real>(&self, geometry: &Geometry) -> Result<PointCloud<T>, Error> {
+        geometry.cloud().map_err(|source| Error::Cloud {
+            file: self.file(),
+            source,
+        })
+    }
+
+    /// What to say where single precision was asked for and can't hold the coordinates.
+    fn needs_double(&self, geometry: &Geometry) -> Result<Option<String>, Error> {
+        if self.args.precision == Precision::F64 {
+            return Ok(None);
+        }
+        let cloud = PointCloud::new(geometry.points.clone()).map_err(|source| Error::Cloud {
+            file: self.file(),
+            source,
+        })?;
+        let grid = self.grid(&cloud)?;
+        let corners = grid.lower().into_iter().chain(grid.upper());
+        let largest = corners.fold(0.0f64, |m, x| m.max(x.abs()));
+        let cells = largest * f64::from(f32::EPSILON) / grid.spacing();
+        Ok((cells > TOLERATED_ROUNDING).then(|| {
+            format!(
+                "coordinates reach {largest:.3e} with cells of {:.3e}, which f32 rounds to {cells:.1e} cells; computed in f64",
+                grid.spacing()
+            )
+        }))
+    }
+
+    fn grid<T: Real>(&self, cloud: &PointCloud<T>) -> Result<Grid<T>, Error> {
+        let resolution = match (self.args.spacing, self.args.resolution) {
+            (Some(h), _) => Resolution::Spacing(T::of(h)),
+            (None, n) => Resolution::Cells(n.unwrap_or(128) as usize),
+        };
+        let grid = match self.args.bounds.as_deref() {
+            Some(&[x0, y0, z0, x1, y1, z1]) => {
+                let corners = [[x0, y0, z0], [x1, y1, z1]].map(|corner| corner.map(T::of));
+                Grid::from_bounds(corners[0], corners[1], resolution)
+            }
+            _ => Grid::fit(cloud, resolution, T::of(self.args.padding.unwrap_or(0.1))),
+        };
+        grid.map_err(|source| self.grid_error(source))
+    }
+
+    fn run<T: Real>(
+        &self,
+        geometry: &Geometry,
+        progress: &mut Progress,
+        warning: Option<String>,
+    ) -> Result<(), Error> {
+        let cloud = self.cloud::<T>(geometry)?;
+        let grid = self.grid(&cloud)?;
+        memory::check(grid.shape(), std::mem::size_of::<T>())?;
+        progress.detail(&format!(
+            "grid {:?}, cells of {}",
+            grid.shape(),
+            grid.spacing()
+        ));
+        let failed = |source| Error::Reconstruct {
+            file: self.file(),
+            source,
+        };
+        let mut plan = Reconstructor::new(grid, self.options(&grid)).map_err(failed)?;
+        let mut observer = |stage: Stage| {
+            progress.step(stage.name());
+            ControlFlow::Continue(())
+        };
+        plan.reconstruct_observed(&cloud, &mut observer)
+            .map_err(failed)?;
+        let result = plan.into_reconstruction();
+        let mut report = Report::new(&self.args.cloud, &grid, result.report());
+        for warning in &report.warnings {
+            progress.warn(warning);
+        }
+        report.warnings.extend(warning);
+        progress.step("write");
+        self.write(&cloud, &result, report, progress)?;
+        progress.finish();
+        self.say(progress, &result);
+        Ok(())
+    }
+
+    fn options<T: Real>(&self, grid: &Grid<T>) -> Options {
+        let args = self.args;
+        Options {
+            radius: match args.radius {
+                AutoOr::Auto => Radius::Auto,
+                AutoOr::Value(r) => Radius::Fixed(r),
+            },
+            orientation: match args.orient {
+                args::Orient::Auto => orient::Method::Auto,
+                args::Orient::Parity => orient::Method::Parity(Default::default()),
+                args::Orient::Given => orient::Method::Given,
+            },
+            weights: match args.splat {
+                args::Splat::Bspline => splat::Weights::BSpline,
+                args::Splat::Paper => splat::Weights::Paper,
+            },
+            area_weights: args.area == args::Switch::On,
+            smoothing: args.smooth,
+            band: match args.band {
+                FullOr::Full => Band::Full,
+                FullOr::Value(h) => Band::Cells(h / grid.spacing().f64()),
+            },
+            ..Options::default()
+        }
+    }
+
+    fn write<T: Real>(
+        &self,
+        cloud: &PointCloud<T>,
+        result: &Reconstruction<T>,
+        mut report: Report,
+        progress: &Progress,
+    ) -> Result<(), Error> {
+        let begin = Instant::now();
+        let outputs = self.outputs;
+        outputs.create_folder()?;
+        let wrote = |path: &Path| progress.say(&format!("wrote {}", path.display()));
+        if let Some(path) = &outputs.mesh {
+            isograd_io::write_mesh(path, result.mesh())?;
+            wrote(path);
+        }
+        if let Some(path) = &outputs.sdf {
+            isograd_io::write_field(path, result.sdf())?;
+            wrote(path);
+        }
+        if let Some(path) = &outputs.points {
+            isograd_io::write_cloud(path, &self.oriented(cloud, result)?)?;
+            wrote(path);
+        }
+        if let Some(path) = &outputs.plot {
+            plot::write(path, &plot::slices(result.sdf()))?;
+            wrote(path);
+        }
+        if let Some(path) = &outputs.picture {
+            self.write_picture(path, &self.oriented(cloud, result)?, result)?;
+            wrote(path);
+        }
+        if let Some(path) = &outputs.report {
+            report.seconds.read = self.read_seconds;
+            report.seconds.write = begin.elapsed().as_secs_f64();
+            report.seconds.total = self.start.elapsed().as_secs_f64();
+            report.peak_memory_bytes = crate::ALLOCATOR.peak_usage();
+            isograd_io::atomic::write(path, |out| {
+                serde_json::to_writer_pretty(&mut *out, &report)?;
+                std::io::Write::write_all(out, b"\n")
+            })?;
+            wrote(path);
+        }
+        Ok(())
+    }
+
+    /// The cloud with the normals that were found and the confidence of each.
+    fn oriented<T: Real>(
+        &self,
+        cloud: &PointCloud<T>,
+        result: &Reconstruction<T>,
+    ) -> Result<PointCloud<T>, Error> {
+        let confidence = Attribute {
+            name: "confidence".into(),
+            components: 1,
+            values: result.confidence().to_vec(),
+        };
+        let kept = cloud
+            .attributes()
+            .iter()
+            .filter(|a| a.name != confidence.name);
+        let with_normals = PointCloud::new(cloud.points().to_vec())
+            .and_then(|cloud| cloud.with_normals(result.normals().to_vec()));
+        std::iter::once(&confidence)
+            .chain(kept)
+            .fold(with_normals, |cloud, attribute| {
+                cloud?.with_attribute(attribute.clone())
+            })
+            .map_err(|source| Error::Cloud {
+                file: self.file(),
+                source,
+            })
+    }
+
+    fn write_picture<T: Real>(
+        &self,
+        path: &Path,
+        cloud: &PointCloud<T>,
+        result: &Reconstruction<T>,
+    ) -> Result<(), Error> {
+        const WIDTH: usize = 1500;
+        let camera = match self.args.view.as_deref() {
+            Some(&[azimuth, elevation]) => plot::Camera { azimuth, elevation },
+            _ => plot::Camera::default(),
+        };
+        let picture = plot::overview(cloud, result.mesh(), result.sdf(), camera, WIDTH);
+        Ok(plot::write(path, &picture)?)
+    }
+
+    /// The result in a few lines.
+    fn say<T: Real>(&self, progress: &Progress, result: &Reconstruction<T>) {
+        let report = result.report();
+        let surface = &report.surface;
+        let [nx, ny, nz] = result.sdf().grid().shape();
+        progress.say(&format!(
+            "{} points, {nx} × {ny} × {nz} cells of {:.4e}, {:.2} s",
+            report.points,
+            result.sdf().grid().spacing(),
+            self.start.elapsed().as_secs_f64()
+        ));
+        progress.say(&format!(
+            "surface: {} faces, {}, {} piece{}, area {:.6}, volume {:.6}",
+            surface.faces,
+            if surface.closed {
+                "closed"
+            } else {
+                "not closed"
+            },
+            surface.components,
+            if surface.components == 1 { "" } else { "s" },
+            surface.area,
+            surface.volume
+        ));
+    }
+}

@@ -1,0 +1,254 @@
+//! `report.json`: the numbers of one reconstruction. Scripts depend on these names.
+
+use std::path::Path;
+
+use isograd::differential::Spread;
+use isograd::isosurface::measure::Measures;
+use isograd::{Grid, Real, Stage};
+use serde::Serialize;
+
+/// The whole report.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    /// Version of the program.
+    pub version: &'static str,
+    /// What was read.
+    pub input: Input,
+    /// The grid.
+    pub grid: GridReport,
+    /// The normals.
+    pub normals: Normals,
+    /// Their signs.
+    pub orientation: Orientation,
+    /// The level of the surface.
+    pub iso_value: f64,
+    /// The surface.
+    pub surface: Surface,
+    /// The field.
+    pub sdf: Sdf,
+    /// Wall-clock times.
+    pub seconds: Seconds,
+    /// The most memory that was held at once.
+    pub peak_memory_bytes: usize,
+    /// What to know before trusting the result.
+    pub warnings: Vec<String>,
+}
+
+/// What was read.
+#[derive(Debug, Serialize)]
+pub struct Input {
+    /// The file, as it was named.
+    pub path: String,
+    /// Number of points.
+    pub points: usize,
+}
+
+/// The grid, in the cloud's unit.
+#[derive(Debug, Serialize)]
+pub struct GridReport {
+    /// Cells along each axis.
+    pub shape: [usize; 3],
+    /// Position of the first value.
+    pub origin: [f64; 3],
+    /// Cell size.
+    pub spacing: f64,
+}
+
+/// The neighbourhoods and normals.
+#[derive(Debug, Serialize)]
+pub struct Normals {
+    /// Common radius.
+    pub radius: f64,
+    /// Neighbours of a point, itself included.
+    pub neighbours: Neighbours,
+    /// Points without a well-defined normal.
+    pub guarded: usize,
+}
+
+/// Neighbours of a point.
+#[derive(Debug, Serialize)]
+pub struct Neighbours {
+    /// Fewest.
+    pub min: u32,
+    /// Median.
+    pub median: u32,
+    /// Most.
+    pub max: u32,
+}
+
+/// The signs of the normals.
+#[derive(Debug, Serialize)]
+pub struct Orientation {
+    /// `auto`, `parity` or `given`.
+    pub method: &'static str,
+    /// Axes whose sign was changed.
+    pub flipped: usize,
+    /// How sure the signs are.
+    pub confidence: Confidence,
+}
+
+/// How sure the signs are, from 0 to 1.
+#[derive(Debug, Serialize)]
+pub struct Confidence {
+    /// 5th percentile.
+    pub p05: f64,
+    /// Median.
+    pub median: f64,
+}
+
+/// The surface.
+#[derive(Debug, Serialize)]
+pub struct Surface {
+    /// Number of vertices.
+    pub vertices: usize,
+    /// Number of faces.
+    pub faces: usize,
+    /// Number of pieces.
+    pub components: usize,
+    /// In unit length².
+    pub area: f64,
+    /// In unit length³.
+    pub volume: f64,
+    /// `V − E + F`.
+    pub euler: i64,
+    /// Whether each edge is in exactly two faces, consistently wound.
+    pub closed: bool,
+}
+
+/// The field.
+#[derive(Debug, Serialize)]
+pub struct Sdf {
+    /// Least value.
+    pub min: f64,
+    /// Greatest value.
+    pub max: f64,
+    /// How near `|∇φ|` is to 1.
+    pub eikonal: Eikonal,
+}
+
+/// Statistics of `|∇φ|`; `null` where there are no such cells.
+#[derive(Debug, Serialize)]
+pub struct Eikonal {
+    /// Over all cells.
+    pub all: Option<Moments>,
+    /// Over the cells with `|φ| < 3h`.
+    pub near: Option<Moments>,
+}
+
+/// Mean and percentiles.
+#[derive(Debug, Serialize)]
+pub struct Moments {
+    /// Mean.
+    pub mean: f64,
+    /// 5th percentile.
+    pub p05: f64,
+    /// 95th percentile.
+    pub p95: f64,
+}
+
+/// Wall-clock seconds; `total` runs from the start to the report.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Seconds {
+    /// Reading the cloud.
+    pub read: f64,
+    /// Neighbours, normals, area weights.
+    pub normals: f64,
+    /// Signs.
+    pub orient: f64,
+    /// Right-hand side.
+    pub splat: f64,
+    /// Solve and iso-value.
+    pub poisson: f64,
+    /// Marching cubes.
+    pub isosurface: f64,
+    /// Distances.
+    pub distance: f64,
+    /// Writing all files but the report.
+    pub write: f64,
+    /// Everything.
+    pub total: f64,
+}
+
+impl Report {
+    /// The report of a computation on `grid`; reading, writing and memory are still to be filled in.
+    pub fn new<T: Real>(path: &Path, grid: &Grid<T>, report: &isograd::Report) -> Self {
+        let [min, median, max] = report.neighbours;
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            input: Input {
+                path: path.display().to_string(),
+                points: report.points,
+            },
+            grid: GridReport {
+                shape: grid.shape(),
+                origin: grid.center_f64([0; 3]),
+                spacing: grid.spacing().f64(),
+            },
+            normals: Normals {
+                radius: report.radius,
+                neighbours: Neighbours { min, median, max },
+                guarded: report.guarded,
+            },
+            orientation: Orientation {
+                method: report.orientation,
+                flipped: report.flipped,
+                confidence: Confidence {
+                    p05: report.confidence_p05,
+                    median: report.confidence_median,
+                },
+            },
+            iso_value: report.iso_value,
+            surface: Surface::new(&report.surface),
+            sdf: Sdf {
+                min: report.sdf_min,
+                max: report.sdf_max,
+                eikonal: Eikonal {
+                    all: report.eikonal.all.as_ref().map(Moments::new),
+                    near: report.eikonal.near.as_ref().map(Moments::new),
+                },
+            },
+            seconds: Seconds::of_stages(report),
+            peak_memory_bytes: 0,
+            warnings: report.warnings.iter().map(ToString::to_string).collect(),
+        }
+    }
+}
+
+impl Surface {
+    fn new(measures: &Measures) -> Self {
+        Self {
+            vertices: measures.vertices,
+            faces: measures.faces,
+            components: measures.components,
+            area: measures.area,
+            volume: measures.volume,
+            euler: measures.euler,
+            closed: measures.closed,
+        }
+    }
+}
+
+impl Moments {
+    fn new(spread: &Spread) -> Self {
+        Self {
+            mean: spread.mean,
+            p05: spread.p05,
+            p95: spread.p95,
+        }
+    }
+}
+
+impl Seconds {
+    fn of_stages(report: &isograd::Report) -> Self {
+        let of = |stage| report.seconds.of(stage);
+        Self {
+            normals: of(Stage::Normals),
+            orient: of(Stage::Orient),
+            splat: of(Stage::Splat),
+            poisson: of(Stage::Poisson),
+            isosurface: of(Stage::Isosurface),
+            distance: of(Stage::Distance),
+            ..Self::default()
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! `isograd sample`: a parametric body as a point cloud.
+
+use isograd::Real;
+use isograd_io::CLOUD_ENDINGS;
+use isograd_shapes::{Density, Sampling, Shape, all, by_name};
+
+use crate::args::{self, Layout, Precision};
+use crate::error::Error;
+use crate::outputs::check_ending;
+use crate::progress::to_stdout;
+
+/// Runs the command.
+///
+/// # Errors
+/// See [`Error`].
+pub fn run(args: &args::Sample) -> Result<(), Error> {
+    if args.list {
+        list();
+        return Ok(());
+    }
+    match args.precision {
+        Precision::F32 => sample::<f32>(args),
+        Precision::F64 => sample::<f64>(args),
+    }
+}
+
+fn sample<T: Real>(args: &args::Sample) -> Result<(), Error> {
+    // Clap requires the three wherever there is no --list.
+    let (Some(name), Some(number), Some(output)) = (&args.shape, args.number, &args.output) else {
+        return Err(Error::Usage("give SHAPE, -n N and -o CLOUD".into()));
+    };
+    check_ending(output, CLOUD_ENDINGS)?;
+    isograd_io::check_output(output, CLOUD_ENDINGS)?;
+    let mut shape = by_name(name)?;
+    shape.set_all(
+        args.parameters
+            .iter()
+            .map(|(name, value)| (name.as_str(), *value)),
+    )?;
+    let sampling = Sampling {
+        layout: match args.layout {
+            Layout::Even => isograd_shapes::Layout::Even,
+            Layout::Random => isograd_shapes::Layout::Random,
+        },
+        density: args
+            .density
+            .map_or(Density::Uniform, |d| Density::Gradient {
+                axis: d.axis,
+                ratio: d.ratio,
+            }),
+    };
+    let samples = shape.sample::<T>(number as usize, &sampling, args.seed)?;
+    isograd_io::write_cloud(output, &samples.cloud)?;
+    if !args.running.quiet {
+        to_stdout(&format!("wrote {}", output.display()));
+    }
+    Ok(())
+}
+
+fn list() {
+    for shape in all() {
+        to_stdout(&format!("{}: {}", shape.name(), shape.summary()));
+        list_parameters(&shape);
+    }
+}
+
+fn list_parameters(shape: &Shape) {
+    for (parameter, value) in shape.parameters() {
+        let unit = match parameter.unit {
+            "" => String::new(),
+            unit => format!(" ({unit})"),
+        };
+        to_stdout(&format!(
+            "    {:<14} {:<10} {}{unit}, {} to {}",
+            parameter.name, value, parameter.meaning, parameter.min, parameter.max
+        ));
+    }
+}

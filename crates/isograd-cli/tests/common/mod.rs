@@ -1,0 +1,113 @@
+//! Runs the real binary in a folder of its own.
+#![allow(dead_code)] // each test takes what it needs
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use tempfile::TempDir;
+
+/// A folder to run in.
+pub struct Bench {
+    folder: TempDir,
+}
+
+/// What came out of a run.
+#[derive(Debug)]
+pub struct Run {
+    pub status: Option<i32>,
+    pub stdout: String,
+    pub stderr: String,
+}
+
+impl Bench {
+    pub fn new() -> Self {
+        Self {
+            folder: tempfile::tempdir().expect("temporary folder"),
+        }
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub fn write(&self, name: &str, bytes: impl AsRef<[u8]>) {
+        std::fs::write(self.path(name), bytes).expect("writes");
+    }
+
+    pub fn read(&self, name: &str) -> Vec<u8> {
+        std::fs::read(self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+
+    pub fn command(&self, line: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_isograd"));
+        command
+            .args(line.split_whitespace())
+            .current_dir(self.folder.path());
+        command.stdin(Stdio::null());
+        command
+    }
+
+    /// Runs `isograd LINE`.
+    pub fn run(&self, line: &str) -> Run {
+        Run::of(self.command(line).output().expect("the binary starts"))
+    }
+
+    /// Runs `isograd LINE` and hands it `input`.
+    pub fn run_with_input(&self, line: &str, input: &[u8]) -> Run {
+        let mut command = self.command(line);
+        command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        let mut child = command.spawn().expect("the binary starts");
+        // It may stop reading on an error: then the pipe is closed, which is its right.
+        let _ = child.stdin.take().expect("a pipe").write_all(input);
+        Run::of(child.wait_with_output().expect("it ends"))
+    }
+
+    /// Runs `isograd LINE` and expects it to succeed.
+    pub fn done(&self, line: &str) -> Run {
+        let run = self.run(line);
+        assert_eq!(run.status, Some(0), "{line}: {run:?}");
+        run
+    }
+
+    /// Every file below the folder.
+    pub fn files(&self) -> Vec<String> {
+        let mut files = Vec::new();
+        collect(self.folder.path(), self.folder.path(), &mut files);
+        files.sort();
+        files
+    }
+}
+
+impl Run {
+    fn of(output: Output) -> Self {
+        Self {
+            status: output.status.code(),
+            stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
+            stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
+        }
+    }
+
+    /// Checks the status, and that standard error says all of `parts`.
+    pub fn says(&self, status: i32, parts: &[&str]) {
+        assert_eq!(self.status, Some(status), "{self:?}");
+        for part in parts {
+            assert!(self.stderr.contains(part), "'{part}' is missing: {self:?}");
+        }
+    }
+}
+
+fn collect(root: &Path, folder: &Path, files: &mut Vec<String>) {
+    for entry in std::fs::read_dir(folder).expect("folder") {
+        let path = entry.expect("entry").path();
+        if path.is_dir() {
+            collect(root, &path, files);
+        } else {
+            let name = path.strip_prefix(root).expect("below the root");
+            files.push(name.display().to_string());
+        }
+    }
+}

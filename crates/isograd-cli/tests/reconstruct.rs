@@ -1,0 +1,284 @@
+//! `isograd reconstruct`, run as a user runs it.
+
+mod common;
+
+use common::Bench;
+use isograd_io::Dtype;
+use serde_json::Value;
+
+/// A bench with a cloud of a sphere of radius 0.5.
+fn sphere() -> Bench {
+    let bench = Bench::new();
+    bench.done("sample sphere -n 3000 -o cloud.ply");
+    bench
+}
+
+fn keys(value: &Value) -> Vec<String> {
+    let map = value
+        .as_object()
+        .unwrap_or_else(|| panic!("an object: {value}"));
+    let mut keys: Vec<String> = map.keys().cloned().collect();
+    keys.sort();
+    keys
+}
+
+fn assert_keys(value: &Value, wanted: &str) {
+    let mut wanted: Vec<String> = wanted.split(' ').map(String::from).collect();
+    wanted.sort();
+    assert_eq!(keys(value), wanted);
+}
+
+#[test]
+fn the_folder_gets_its_five_files_and_the_report_its_fields() {
+    let bench = sphere();
+    let run = bench.done("reconstruct cloud.ply -o out/new --resolution 40");
+    assert!(run.stdout.contains("wrote out/new/mesh.ply"), "{run:?}");
+    assert!(
+        run.stderr.is_empty(),
+        "no bar in a pipe, no warnings: {run:?}"
+    );
+    let names = [
+        "mesh.ply",
+        "points.ply",
+        "report.json",
+        "sdf.vti",
+        "slices.png",
+    ];
+    let mut files = names.map(|name| format!("out/new/{name}")).to_vec();
+    files.insert(0, "cloud.ply".into());
+    assert_eq!(bench.files(), files);
+    let report: Value = serde_json::from_slice(&bench.read("out/new/report.json")).expect("JSON");
+    assert_keys(
+        &report,
+        "version input grid normals orientation iso_value surface sdf seconds peak_memory_bytes warnings",
+    );
+    assert_keys(&report["input"], "path points");
+    assert_keys(&report["grid"], "shape origin spacing");
+    assert_keys(&report["normals"], "radius neighbours guarded");
+    assert_keys(&report["normals"]["neighbours"], "min median max");
+    assert_keys(&report["orientation"], "method flipped confidence");
+    assert_keys(&report["orientation"]["confidence"], "p05 median");
+    assert_keys(
+        &report["surface"],
+        "vertices faces components area volume euler closed",
+    );
+    assert_keys(&report["sdf"], "min max eikonal");
+    for part in ["all", "near"] {
+        assert_keys(&report["sdf"]["eikonal"][part], "mean p05 p95");
+    }
+    assert_keys(
+        &report["seconds"],
+        "read normals orient splat poisson isosurface distance write total",
+    );
+    assert_eq!(report["input"]["points"], 3000);
+    assert_eq!(report["grid"]["shape"][0], 40);
+    assert_eq!(report["surface"]["closed"], true);
+    assert!(report["peak_memory_bytes"].as_u64() > Some(1 << 20));
+    let volume = report["surface"]["volume"].as_f64().expect("a number");
+    let exact = std::f64::consts::PI / 6.0;
+    // 26 cells across the sphere: a part in a hundred is far above the error and far below a mistake.
+    assert!((volume / exact - 1.0).abs() < 0.01, "{volume}");
+}
+
+#[test]
+fn the_points_keep_their_order_and_their_attributes() {
+    let bench = Bench::new();
+    bench.done("sample fish -n 1500 -o cloud.npz --param amplitude=0.1");
+    bench.done("reconstruct cloud.npz --points p.npz --resolution 32 -q");
+    let before = isograd_io::read_geometry(&bench.path("cloud.npz")).expect("reads");
+    let after = isograd_io::read_geometry(&bench.path("p.npz")).expect("reads");
+    assert_eq!(after.points, before.points);
+    let names: Vec<&str> = after.attributes.iter().map(|a| a.name.as_str()).collect();
+    assert_eq!(names, ["confidence", "velocity"]);
+    assert_eq!(after.attributes[1], before.attributes[0]);
+    let normals = after.normals.expect("normals");
+    assert!(
+        normals
+            .iter()
+            .all(|&n| (isograd::vector::norm(n) - 1.0).abs() < 1e-5)
+    );
+}
+
+#[test]
+fn every_format_of_every_output_is_written() {
+    let bench = sphere();
+    for line in [
+        "--mesh m.ply --sdf s.vti --points p.ply",
+        "--mesh m.obj --sdf s.npz --points p.npz --plot a.png --picture b.png --view -30 10",
+        "--mesh m.stl --precision f64",
+        "--mesh m.vtp --report r.json",
+    ] {
+        bench.done(&format!("reconstruct cloud.ply --resolution 24 -q {line}"));
+    }
+    let faces = |name: &str| {
+        isograd_io::read_mesh(&bench.path(name))
+            .expect("reads")
+            .faces
+            .len()
+    };
+    assert!(faces("m.ply") > 100);
+    assert_eq!(faces("m.ply"), faces("m.obj"));
+    assert_eq!(faces("m.obj"), faces("m.vtp"));
+    assert!(faces("m.stl") > 100);
+    let [vti, npz] =
+        ["s.vti", "s.npz"].map(|s| isograd_io::read_field(&bench.path(s)).expect("reads"));
+    assert_eq!(vti.field.values(), npz.field.values());
+    for name in ["a.png", "b.png"] {
+        assert!(bench.read(name).starts_with(b"\x89PNG"), "{name}");
+    }
+}
+
+#[test]
+fn a_cloud_can_come_through_a_pipe() {
+    let bench = sphere();
+    let ply = bench.read("cloud.ply");
+    let line = "reconstruct - --mesh m.ply --report r.json --resolution 24";
+    assert_eq!(bench.run_with_input(line, &ply).status, Some(0));
+    let from_ply = bench.read("m.ply");
+    let geometry = isograd_io::read_geometry(&bench.path("cloud.ply")).expect("reads");
+    let text: String = geometry
+        .points
+        .iter()
+        .map(|[x, y, z]| format!("{x:?} {y:?} {z:?}\n"))
+        .collect();
+    assert_eq!(bench.run_with_input(line, text.as_bytes()).status, Some(0));
+    assert_eq!(bench.read("m.ply"), from_ply);
+    bench
+        .run_with_input(line, b"")
+        .says(1, &["standard input", "empty"]);
+    bench
+        .run_with_input(line, b"1 2 3\n4 x 6\n")
+        .says(1, &["standard input", "line 2", "'x'"]);
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bytes() {
+    let bench = sphere();
+    let outputs = |threads: usize| {
+        bench.done(&format!(
+            "reconstruct cloud.ply -o out --resolution 48 -q --threads {threads}"
+        ));
+        ["mesh.ply", "sdf.vti", "points.ply", "slices.png"].map(|f| bench.read(&format!("out/{f}")))
+    };
+    let one = outputs(1);
+    for threads in [2, 5] {
+        assert!(outputs(threads) == one, "{threads} threads");
+    }
+}
+
+#[test]
+fn the_grid_is_the_one_that_was_asked_for() {
+    let bench = sphere();
+    let grid = |line: &str| {
+        bench.done(&format!("reconstruct cloud.ply -q --sdf s.npz {line}"));
+        *isograd_io::read_field(&bench.path("s.npz"))
+            .expect("reads")
+            .field
+            .grid()
+    };
+    let fitted = grid("--spacing 0.04 --padding 0.2");
+    assert!((fitted.spacing() - 0.04).abs() < 1e-8);
+    assert!(
+        fitted.lower()[0] <= -0.69 && fitted.upper()[2] >= 0.69,
+        "{fitted:?}"
+    );
+    let given = grid("--bounds -1 -0.9 -0.8 1 0.9 0.8 --spacing 0.05");
+    assert_eq!(given.shape(), [40, 36, 32]);
+    assert!((given.lower()[1] + 0.9).abs() < 1e-6);
+    let banded = bench.done("reconstruct cloud.ply -q --sdf b.npz --resolution 32 --band 0.1");
+    assert_eq!(banded.status, Some(0));
+    let field = isograd_io::read_field(&bench.path("b.npz"))
+        .expect("reads")
+        .field;
+    let greatest = field.values().iter().fold(0.0f64, |m, v| m.max(*v));
+    assert!(greatest < 0.1 + 1e-6, "{greatest}");
+}
+
+#[test]
+fn coordinates_far_from_the_origin_are_computed_in_double_and_it_says_so() {
+    let bench = sphere();
+    let near = isograd_io::read_geometry(&bench.path("cloud.ply")).expect("reads");
+    let far: String = near
+        .points
+        .iter()
+        .map(|[x, y, z]| format!("{:?} {:?} {:?}\n", x + 1e6, y - 1e6, z + 1e6))
+        .collect();
+    bench.write("far.xyz", far);
+    let run =
+        bench.run("reconstruct far.xyz --mesh m.ply --sdf s.npz --report r.json --resolution 32");
+    run.says(0, &["computed in f64", "1.000e6"]);
+    let field = isograd_io::read_field(&bench.path("s.npz")).expect("reads");
+    assert_eq!(field.dtype, Dtype::F64);
+    let report = String::from_utf8(bench.read("r.json")).expect("text");
+    assert!(report.contains("computed in f64"));
+    let mesh = isograd_io::read_mesh(&bench.path("m.ply")).expect("reads");
+    let radius = |v: &[f64; 3]| isograd::vector::norm([v[0] - 1e6, v[1] + 1e6, v[2] - 1e6]);
+    // A tenth of a cell, which is 1.25/32.
+    assert!(mesh.points.iter().all(|v| (radius(v) - 0.5).abs() < 4e-3));
+}
+
+#[test]
+fn a_mesh_can_be_sampled_instead_of_its_vertices() {
+    let bench = sphere();
+    bench.done("reconstruct cloud.ply --mesh m.obj --resolution 24 -q");
+    bench.done("reconstruct m.obj --sample 4000 --points p.npz --resolution 24 -q --orient given");
+    let points = isograd_io::read_geometry(&bench.path("p.npz"))
+        .expect("reads")
+        .points;
+    assert_eq!(points.len(), 4000);
+    bench
+        .run("reconstruct cloud.ply --sample 10")
+        .says(1, &["cloud.ply", "no faces"]);
+}
+
+#[test]
+fn quiet_says_nothing_and_verbose_says_each_stage() {
+    let bench = sphere();
+    let quiet = bench.done("reconstruct cloud.ply --resolution 24 -q");
+    assert!(
+        quiet.stdout.is_empty() && quiet.stderr.is_empty(),
+        "{quiet:?}"
+    );
+    let verbose = bench.done("reconstruct cloud.ply --resolution 24 -v");
+    for stage in [
+        "read",
+        "normals",
+        "orient",
+        "splat",
+        "poisson",
+        "isosurface",
+        "distance",
+    ] {
+        assert!(
+            verbose.stderr.lines().any(|l| l.starts_with(stage)),
+            "{stage}: {verbose:?}"
+        );
+    }
+}
+
+#[test]
+fn warnings_are_on_standard_error_and_in_the_report() {
+    let bench = Bench::new();
+    bench.done("sample sphere -n 3000 -o a.xyz");
+    let text = String::from_utf8(bench.read("a.xyz")).expect("text");
+    // The upper half alone: open.
+    let half: String = text
+        .lines()
+        .filter(|l| {
+            !l.split_whitespace()
+                .nth(2)
+                .is_some_and(|z| z.starts_with('-'))
+        })
+        .map(|l| format!("{l}\n"))
+        .collect();
+    bench.write("half.xyz", half);
+    let run = bench.run("reconstruct half.xyz -o out --resolution 32");
+    run.says(0, &["warning: ", "open"]);
+    let report: Value = serde_json::from_slice(&bench.read("out/report.json")).expect("JSON");
+    let warnings = report["warnings"].as_array().expect("a list");
+    assert!(
+        warnings
+            .iter()
+            .any(|w| w.as_str().is_some_and(|w| w.contains("open")))
+    );
+}
