@@ -1,2 +1,77 @@
-//! The habits of the project as commands.
-fn main() {}
+//! The habits of the project as commands: `cargo xtask --help` lists them.
+
+mod bench;
+mod deny;
+mod examples;
+mod links;
+mod pages;
+mod peers;
+mod process;
+mod readme;
+mod steps;
+mod tally;
+mod test;
+mod workspace;
+
+use std::process::ExitCode;
+
+use process::Outcome;
+
+const HELP: &str = "\
+cargo xtask COMMAND
+
+Checks
+  test             everything a change must pass, cheapest first: format, links, clippy, docs,
+                   tests, doc tests, examples, and the commands and code of the README
+  lint             the first three of these
+  deny             licences, sources and advisories of every dependency (needs cargo-deny);
+                   --offline leaves the advisories out
+
+Figures and pages
+  docs             every page and picture below docs/ that a command makes: accuracy, gallery
+  accuracy         docs/accuracy.md: errors against bodies with a closed form
+  gallery          docs/images/: pictures of the clouds in examples/clouds
+  bench [ARGS]     the benchmarks, every stage and the whole; --quick for a short run,
+                   a stage's name for that stage; other arguments go to criterion
+  peers [ARGS]     docs/peers.md: isograd beside libigl, Open3D, Warp and SciPy, measured in one
+                   run (needs Python 3 and PyPI); --quick for a short run
+
+Exit status: 0 done, 1 a step failed, 2 the command line is wrong.";
+
+fn main() -> ExitCode {
+    let mut arguments = std::env::args().skip(1);
+    let command = arguments.next().unwrap_or_default();
+    let rest: Vec<String> = arguments.collect();
+    if command == "--help" || command == "-h" || command == "help" {
+        println!("{HELP}");
+        return ExitCode::SUCCESS;
+    }
+    match run(&command, &rest) {
+        Some(Ok(())) => ExitCode::SUCCESS,
+        Some(Err(failure)) => {
+            eprintln!("error: {failure}");
+            ExitCode::FAILURE
+        }
+        None => {
+            let given = [&[command], rest.as_slice()].concat().join(" ");
+            eprintln!("error: there is no command '{given}'\n\n{HELP}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// Runs a command, or returns `None` where there is none of that form.
+fn run(command: &str, rest: &[String]) -> Option<Outcome> {
+    match (command, rest) {
+        ("test", []) => Some(test::all()),
+        ("lint", []) => Some(test::lint()),
+        ("deny", []) => Some(deny::run(false)),
+        ("deny", [flag]) if flag == "--offline" => Some(deny::run(true)),
+        ("docs", []) => Some(pages::all()),
+        ("accuracy", []) => Some(pages::accuracy()),
+        ("gallery", []) => Some(pages::gallery()),
+        ("bench", _) => Some(bench::run(rest)),
+        ("peers", _) => Some(peers::run(rest)),
+        _ => None,
+    }
+}

@@ -1,0 +1,33 @@
+//! Builds every example, then runs each in an empty folder of its own.
+
+use std::fs;
+use std::process::Command;
+
+use crate::process::{self, Outcome};
+use crate::workspace::Workspace;
+
+/// Builds and runs all examples of the workspace. None of them takes arguments.
+pub fn run() -> Outcome<Vec<String>> {
+    let workspace = Workspace::load()?;
+    if workspace.examples.is_empty() {
+        return Ok(vec!["SKIPPED examples: there are none".to_owned()]);
+    }
+    process::run(&mut process::cargo(["build", "--workspace", "--examples"]))?;
+    for name in &workspace.examples {
+        println!("example {name}");
+        let folder = workspace.target.join("xtask").join("examples").join(name);
+        empty(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+        let file = format!("{name}{}", std::env::consts::EXE_SUFFIX);
+        let program = workspace.target.join("debug").join("examples").join(file);
+        process::run(Command::new(program).current_dir(&folder))?;
+    }
+    Ok(Vec::new())
+}
+
+/// Makes the folder, or empties it.
+fn empty(folder: &std::path::Path) -> std::io::Result<()> {
+    if folder.exists() {
+        fs::remove_dir_all(folder)?;
+    }
+    fs::create_dir_all(folder)
+}

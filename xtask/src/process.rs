@@ -1,0 +1,70 @@
+//! Child processes, run from the root of the repository.
+
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// Nothing, or why a command failed.
+pub type Outcome<T = ()> = Result<T, String>;
+
+/// `cargo ARGUMENTS`: the cargo that runs this program.
+pub fn cargo<'a>(arguments: impl IntoIterator<Item = &'a str>) -> Command {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let mut command = Command::new(cargo);
+    command.args(arguments).current_dir(root());
+    command
+}
+
+/// The root of the repository.
+pub fn root() -> &'static Path {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.parent().unwrap_or(here)
+}
+
+/// Runs a command to its end.
+pub fn run(command: &mut Command) -> Outcome {
+    let status = command
+        .status()
+        .map_err(|error| could_not_start(command, &error))?;
+    if status.success() {
+        return Ok(());
+    }
+    Err(format!("`{}` ended with {status}", shown(command)))
+}
+
+/// Runs a command and hands on each line of its standard output as it comes.
+pub fn run_by_line(command: &mut Command, mut line: impl FnMut(&str)) -> Outcome {
+    let mut child = command
+        .stdout(Stdio::piped())
+        .spawn()
+        .map_err(|error| could_not_start(command, &error))?;
+    if let Some(output) = child.stdout.take() {
+        // A test may print bytes that are no UTF-8: read bytes, not text.
+        for bytes in BufReader::new(output).split(b'\n') {
+            let bytes = bytes.map_err(|error| format!("`{}`: {error}", shown(command)))?;
+            line(String::from_utf8_lossy(&bytes).trim_end_matches('\r'));
+        }
+    }
+    let status = child
+        .wait()
+        .map_err(|error| format!("`{}`: {error}", shown(command)))?;
+    if status.success() {
+        return Ok(());
+    }
+    Err(format!("`{}` ended with {status}", shown(command)))
+}
+
+/// The command as a person would type it.
+fn shown(command: &Command) -> String {
+    let program = Path::new(command.get_program());
+    let name = program.file_name().unwrap_or(command.get_program());
+    std::iter::once(name)
+        .chain(command.get_args())
+        .map(|part| part.to_string_lossy())
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+fn could_not_start(command: &Command, error: &std::io::Error) -> String {
+    format!("`{}` could not be started: {error}", shown(command))
+}
