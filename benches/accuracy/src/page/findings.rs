@@ -1,0 +1,183 @@
+//! What the tables say, in a few sentences with their figures.
+
+use super::sections::order;
+use super::table::{number, pair, percent};
+use crate::Outcome;
+use crate::case::{Draw, Normals, Precision, Splat};
+use crate::measure::Measured;
+use crate::pictures::thousands;
+use crate::study::{Results, Study};
+
+/// The short answer.
+pub fn findings(study: &Study, results: &Results) -> Outcome<String> {
+    let parts = [
+        surface(study, results)?,
+        convergence(study, results)?,
+        normals(study, results)?,
+        weights(study, results)?,
+        smoothing(study, results)?,
+        thin(study, results)?,
+        precision(study, results)?,
+    ];
+    let items: Vec<String> = parts.iter().map(|part| item(part)).collect();
+    Ok(format!("## What is seen\n\n{}", items.concat()))
+}
+
+/// An item of a list, in lines of about as many letters as those of the code.
+fn item(text: &str) -> String {
+    const LETTERS: usize = 115;
+    let mut lines = vec!["-".to_string()];
+    for word in text.split_whitespace() {
+        let last = lines.len() - 1;
+        if lines[last].chars().count() + word.chars().count() >= LETTERS {
+            lines.push(format!("  {word}"));
+        } else {
+            lines[last].push(' ');
+            lines[last].push_str(word);
+        }
+    }
+    lines.push(String::new());
+    lines.join("\n")
+}
+
+fn surface(study: &Study, results: &Results) -> Outcome<String> {
+    let cells = study.middle_cells();
+    let of = |draw| results.row(&study.sampling_case(draw, Normals::Exact, 0.0, cells));
+    let floor = results.floor(study.first(), cells)?;
+    Ok(format!(
+        "**{body}, {cells} cells, exact normals**: the zero set is off by {} cells (mean / maximum) with random \
+         samples, {} with even ones, {} with 10:1 density; marching cubes of the exact φ by {}.",
+        pair(&of(Draw::Random)?.surface.vertices),
+        pair(&of(Draw::Even)?.surface.vertices),
+        pair(&of(Draw::Density10)?.surface.vertices),
+        pair(&floor.surface.vertices),
+        body = study.first(),
+    ))
+}
+
+fn convergence(study: &Study, results: &Results) -> Outcome<String> {
+    let body = study.first();
+    let (coarsest, finest) = (study.cells[0], study.cells[study.cells.len() - 1]);
+    let mean = |row: &Measured| number(row.surface.vertices.mean);
+    let growing = |cells| results.row(&study.proportional_case(body, Draw::Random, cells));
+    let mut orders = Vec::new();
+    for pair in study.cells.windows(2) {
+        orders.push(number(order(growing(pair[0])?, growing(pair[1])?)));
+    }
+    let fixed = results.row(&study.default_case(body, finest))?;
+    Ok(format!(
+        "**Order**: with as many samples per cell on every grid the mean falls from {} to {} cells between {coarsest} \
+         and {finest} cells; as a length, with orders {}. On coarse grids the splat rounds what is curved, which is of second \
+         order; on fine ones noise of samples and cells is left, of first order. {} samples are {} cells apart at \
+         {finest} cells, and leave {}: {} are better there.",
+        mean(growing(coarsest)?),
+        mean(growing(finest)?),
+        orders.join(", "),
+        thousands(study.samples),
+        number(fixed.sample_spacing),
+        mean(fixed),
+        thousands(study.proportional_samples(finest)),
+    ))
+}
+
+fn normals(study: &Study, results: &Results) -> Outcome<String> {
+    let cells = study.middle_cells();
+    let of = |normals| results.row(&study.sampling_case(Draw::Random, normals, 0.0, cells));
+    let (exact, estimated) = (of(Normals::Exact)?, of(Normals::Estimated)?);
+    let degrees = estimated
+        .normals
+        .as_ref()
+        .ok_or("normals were not estimated")?
+        .degrees
+        .mean;
+    Ok(format!(
+        "**Estimated normals** are off by {}° in the mean. The zero set is off by {} cells with them, by {} with exact \
+         ones ({}, {cells} cells, random samples).",
+        number(degrees),
+        number(estimated.surface.vertices.mean),
+        number(exact.surface.vertices.mean),
+        study.first(),
+    ))
+}
+
+fn weights(study: &Study, results: &Results) -> Outcome<String> {
+    let cells = study.middle_cells();
+    let of = |draw, splat, area| {
+        let row = results.row(&study.splat_case(draw, splat, area, cells))?;
+        Ok::<_, Box<dyn std::error::Error>>(number(row.surface.vertices.mean))
+    };
+    Ok(format!(
+        "**Area weights** are needed where the density varies: at 10:1 the mean is {} cells with them and {} without. \
+         **The quadratic B-spline** leaves {} where the paper's weights leave {} (random samples, {cells} cells).",
+        of(Draw::Density10, Splat::Bspline, true)?,
+        of(Draw::Density10, Splat::Bspline, false)?,
+        of(Draw::Random, Splat::Bspline, true)?,
+        of(Draw::Random, Splat::Paper, true)?,
+    ))
+}
+
+fn smoothing(study: &Study, results: &Results) -> Outcome<String> {
+    let (coarsest, finest) = (study.cells[0], study.cells[study.cells.len() - 1]);
+    let of = |smoothing, cells| {
+        let case = study.sampling_case(Draw::Random, Normals::Estimated, smoothing, cells);
+        let row = results.row(&case)?;
+        Ok::<_, Box<dyn std::error::Error>>(number(row.surface.vertices.mean))
+    };
+    Ok(format!(
+        "**Smoothing** by one cell averages noise and rounds what is curved: at {finest} cells, where samples are few, \
+         it turns {} into {}, at {coarsest} cells {} into {}.",
+        of(0.0, finest)?,
+        of(1.0, finest)?,
+        of(0.0, coarsest)?,
+        of(1.0, coarsest)?,
+    ))
+}
+
+/// The body whose zero set is furthest off: on this page the one with a sharp edge.
+fn thin(study: &Study, results: &Results) -> Outcome<String> {
+    let cells = study.middle_cells();
+    let mut worst = None::<(&str, &Measured)>;
+    for &body in &study.bodies {
+        let row = results.row(&study.default_case(body, cells))?;
+        if worst.is_none_or(|(_, w)| row.surface.vertices.max > w.surface.vertices.max) {
+            worst = Some((body, row));
+        }
+    }
+    let (body, row) = worst.ok_or("no body")?;
+    Ok(format!(
+        "**The largest errors** are those of the {body} ({} cells at {cells} cells, area {} %). What is thinner than \
+         about a cell is cut off, as no grid value lies inside; a sharp trailing edge always has such a part.",
+        pair(&row.surface.vertices),
+        percent(row.surface.area),
+    ))
+}
+
+fn precision(study: &Study, results: &Results) -> Outcome<String> {
+    let of = |precision| {
+        let row = results.row(&study.precision_case(precision))?;
+        Ok::<_, Box<dyn std::error::Error>>(row.surface.vertices.mean)
+    };
+    let difference = (of(Precision::F32)? - of(Precision::F64)?).abs();
+    // A rounded difference of zero says less than a bound that holds.
+    let bound = [1e-6, 1e-5, 1e-4, 1e-3]
+        .into_iter()
+        .find(|&bound| difference < bound);
+    let size = bound.map_or_else(|| number(difference), |bound| format!("less than {bound}"));
+    Ok(format!(
+        "**f32 and f64** differ by {size} cells in the mean of the zero set."
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::item;
+
+    #[test]
+    fn lines_of_an_item_are_of_moderate_length_and_lose_no_word() {
+        let text = "word ".repeat(100);
+        let item = item(&text);
+        assert!(item.lines().all(|line| line.len() <= 115));
+        assert!(item.starts_with("- word") && item.ends_with("word\n"));
+        assert_eq!(item.matches("word").count(), 100);
+    }
+}

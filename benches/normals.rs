@@ -1,0 +1,49 @@
+//! D-PCA axes and area weights over number of points, number type and threads; the neighbours are found
+//! before.
+
+mod common;
+
+use common::{for_threads, group};
+use criterion::{Criterion, criterion_group, criterion_main};
+use isograd::neighbors::{self, Neighborhoods, Radius};
+use isograd::splat::area;
+use isograd::{Real, normals};
+use isograd_benches::{POINTS, torus};
+
+fn axes<T: Real>(criterion: &mut Criterion) {
+    let mut group = group(criterion, "normals");
+    for count in POINTS {
+        let neighborhoods = neighborhoods::<T>(count);
+        let mut residual = normals::Residual::default();
+        for_threads::<T>(&mut group, count, "points", || {
+            normals::forward(&neighborhoods, &mut residual);
+        });
+    }
+}
+
+fn areas<T: Real>(criterion: &mut Criterion) {
+    let mut group = group(criterion, "areas");
+    for count in POINTS {
+        let neighborhoods = neighborhoods::<T>(count);
+        let (mut scratch, mut areas) = (area::Scratch::default(), Vec::new());
+        for_threads::<T>(&mut group, count, "points", || {
+            area::forward(&neighborhoods, &mut scratch, &mut areas);
+        });
+    }
+}
+
+fn neighborhoods<T: Real>(count: usize) -> Neighborhoods<T> {
+    let (points, _) = torus::samples(count);
+    let mut found = Neighborhoods::default();
+    neighbors::forward(&points, Radius::Auto, &mut found).expect("enough points");
+    found
+}
+
+criterion_group!(
+    benches,
+    axes::<f32>,
+    axes::<f64>,
+    areas::<f32>,
+    areas::<f64>
+);
+criterion_main!(benches);

@@ -1,0 +1,44 @@
+//! The signs of the normals over number of points, for each method, number type and threads; axes and
+//! neighbours are found before.
+
+mod common;
+
+use common::{for_threads, group};
+use criterion::{Criterion, criterion_group, criterion_main};
+use isograd::neighbors::{self, Neighborhoods, Radius};
+use isograd::orient::{self, Method};
+use isograd::{Real, normals};
+use isograd_benches::{POINTS, torus};
+
+fn sign<T: Real>(criterion: &mut Criterion) {
+    let methods = [
+        ("orient", Method::Auto),
+        ("orient-parity", Method::Parity(Default::default())),
+    ];
+    for (name, method) in methods {
+        let mut group = group(criterion, name);
+        for count in POINTS {
+            let (points, _) = torus::samples::<T>(count);
+            let mut neighborhoods = Neighborhoods::default();
+            neighbors::forward(&points, Radius::Auto, &mut neighborhoods).expect("enough points");
+            let mut axes = normals::Residual::default();
+            normals::forward(&neighborhoods, &mut axes);
+            let (mut scratch, mut out) = Default::default();
+            for_threads::<T>(&mut group, count, "points", || {
+                orient::forward(
+                    &points,
+                    &axes.normals,
+                    &neighborhoods,
+                    None,
+                    &method,
+                    &mut scratch,
+                    &mut out,
+                )
+                .expect("a closed body");
+            });
+        }
+    }
+}
+
+criterion_group!(benches, sign::<f32>, sign::<f64>);
+criterion_main!(benches);

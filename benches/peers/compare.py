@@ -1,0 +1,84 @@
+"""Times isograd beside libigl, Open3D, Warp and SciPy in one run: `cargo xtask peers`."""
+
+import argparse
+import os
+import tempfile
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+import warp as wp
+
+import distance
+import normals
+import poisson
+import report
+import whole
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def main() -> None:
+    options = arguments()
+    os.environ["IGL_NUM_THREADS"] = str(options.threads)
+    wp.config.quiet = True
+    wp.init()
+    cases = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name, builders in jobs(options).items():
+            if options.only and name not in options.only:
+                continue
+            for build in builders:
+                # The programs of one case are gone before the next begins.
+                with ExitStack() as stack:
+                    case = build(stack, options.stage_times, Path(folder))
+                    case.measure(options.repeats)
+                show(case)
+                cases.append(case)
+    report.write(cases, options.repeats, options.docs, "cargo xtask peers")
+    print(f"wrote {options.docs}/peers.md, peers.json and images/peers.png")
+
+
+def jobs(options) -> dict:
+    """Every comparison, by name; each is built when its turn comes."""
+    cells, count = (64, 10_000) if options.quick else (128, 50_000)
+    shapes = [(cells,) * 3, (2 * cells, cells, cells)]
+    threads = options.threads
+
+    def job(make, *settings):
+        return lambda *place: make(*place, *settings, threads)
+
+    return {
+        "poisson": [
+            job(poisson.case, shape, dtype)
+            for shape in shapes
+            for dtype in (np.float32, np.float64)
+        ],
+        "normals": [job(normals.case, n) for n in (count, 10 * count)],
+        "distance": [job(distance.case, cells)],
+        "whole": [job(whole.case, count, cells)],
+    }
+
+
+def show(case) -> None:
+    print("\n".join(report.table(case)), flush=True)
+
+
+def arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--stage-times", type=Path, required=True, help="the program of isograd")
+    parser.add_argument("--docs", type=Path, default=None, help="where the page goes")
+    parser.add_argument("--repeats", type=int, default=None, help="runs that count (5; quick: 2)")
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--quick", action="store_true", help="small sizes, few runs")
+    parser.add_argument("--only", nargs="*", help="poisson, normals, distance, whole")
+    options = parser.parse_args()
+    options.repeats = options.repeats or (2 if options.quick else 5)
+    # What is committed is a whole run.
+    partial = options.quick or options.only
+    options.docs = options.docs or (ROOT / "out" / "peers" if partial else ROOT / "docs")
+    return options
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,66 @@
+//! Times one stage, one run at a time, for a program that runs other libraries in between.
+//!
+//! `stage-times STAGE FOLDER TYPE THREADS` reads its input from FOLDER, prints `ready`, and then answers
+//! each line of its input: `run` with the seconds of one forward pass, `save` with `saved` once the
+//! outputs are in FOLDER. Arrays are raw little-endian files, `NAME.f32`, `.f64` or `.u32`.
+
+mod files;
+mod stages;
+
+use std::error::Error;
+use std::io::{BufRead, Write};
+use std::time::Instant;
+
+use isograd::Real;
+use isograd_benches::pool;
+
+use files::{Folder, Number};
+use stages::Stage;
+
+type Outcome<T = ()> = Result<T, Box<dyn Error>>;
+
+fn main() -> Outcome {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [stage, folder, number, threads] = arguments.as_slice() else {
+        return Err("usage: stage-times STAGE FOLDER f32|f64 THREADS".into());
+    };
+    let folder = Folder::open(folder)?;
+    let threads = threads.parse()?;
+    match number.as_str() {
+        "f32" => serve::<f32>(stage, &folder, threads),
+        "f64" => serve::<f64>(stage, &folder, threads),
+        other => Err(format!("'{other}' is neither f32 nor f64").into()),
+    }
+}
+
+/// Answers requests until the input ends.
+fn serve<T: Real + Number>(name: &str, folder: &Folder, threads: usize) -> Outcome {
+    let pool = pool(threads);
+    let mut stage =
+        pool.install(|| stages::by_name::<T>(name, folder).map_err(|e| e.to_string()))?;
+    answer("ready")?;
+    for request in std::io::stdin().lock().lines() {
+        match request?.as_str() {
+            "run" => answer(&pool.install(|| seconds(stage.as_mut()))?.to_string())?,
+            "save" => {
+                stage.save(folder)?;
+                answer("saved")?;
+            }
+            other => return Err(format!("'{other}' is no request").into()),
+        }
+    }
+    Ok(())
+}
+
+fn seconds(stage: &mut dyn Stage) -> Result<f64, String> {
+    stage.prepare();
+    let start = Instant::now();
+    stage.run()?;
+    Ok(start.elapsed().as_secs_f64())
+}
+
+fn answer(line: &str) -> Outcome {
+    let mut output = std::io::stdout().lock();
+    writeln!(output, "{line}")?;
+    Ok(output.flush()?)
+}

@@ -1,0 +1,173 @@
+//! The stages, each with its input in memory, its scratch warm, and its output kept.
+
+use isograd::neighbors::{self, Neighborhoods, Radius};
+use isograd::{
+    Field, Mesh, Options, PointCloud, Real, Reconstructor, distance, isosurface, normals, poisson,
+};
+
+use super::Outcome;
+use super::files::{Folder, Number};
+
+/// One stage with its input.
+pub trait Stage: Send {
+    /// What a run needs and must not be timed.
+    fn prepare(&mut self) {}
+    /// One forward pass.
+    fn run(&mut self) -> Result<(), String>;
+    /// Writes the output of the last run.
+    fn save(&self, folder: &Folder) -> Outcome;
+}
+
+/// Reads the input of a stage.
+pub fn by_name<T: Real + Number>(name: &str, folder: &Folder) -> Outcome<Box<dyn Stage>> {
+    Ok(match name {
+        "distance" => Box::new(Distance::<T>::open(folder)?),
+        "whole" => Box::new(Whole::<T>::open(folder)?),
+        "normals" => Box::new(Normals::<T>::open(folder)?),
+        "poisson" => Box::new(Poisson::<T>::open(folder)?),
+        _ => return Err(format!("there is no stage '{name}'").into()),
+    })
+}
+
+/// `b` → `χ`.
+struct Poisson<T: Real> {
+    b: Vec<T>,
+    field: Vec<T>,
+    plan: poisson::Plan<T>,
+    scratch: poisson::Scratch<T>,
+}
+
+impl<T: Real + Number> Poisson<T> {
+    fn open(folder: &Folder) -> Outcome<Self> {
+        let b = folder.read("b")?;
+        Ok(Self {
+            field: b.clone(),
+            b,
+            plan: poisson::Plan::new(folder.grid::<T>()?.shape()),
+            scratch: poisson::Scratch::default(),
+        })
+    }
+}
+
+impl<T: Real + Number> Stage for Poisson<T> {
+    fn prepare(&mut self) {
+        self.field.copy_from_slice(&self.b);
+    }
+
+    fn run(&mut self) -> Result<(), String> {
+        let solved = self.plan.solve(&mut self.field, 0.0, &mut self.scratch);
+        solved.map_err(|error| error.to_string())
+    }
+
+    fn save(&self, folder: &Folder) -> Outcome {
+        folder.write("chi", self.field.iter().copied())
+    }
+}
+
+/// Points and a radius → normals, the index and the radii included.
+struct Normals<T: Real> {
+    points: Vec<[T; 3]>,
+    radius: Radius,
+    neighborhoods: Neighborhoods<T>,
+    residual: normals::Residual<T>,
+}
+
+impl<T: Real + Number> Normals<T> {
+    fn open(folder: &Folder) -> Outcome<Self> {
+        Ok(Self {
+            points: folder.read_rows("points")?,
+            radius: Radius::Fixed(folder.radius()),
+            neighborhoods: Neighborhoods::default(),
+            residual: normals::Residual::default(),
+        })
+    }
+}
+
+impl<T: Real + Number> Stage for Normals<T> {
+    fn run(&mut self) -> Result<(), String> {
+        let found = neighbors::forward(&self.points, self.radius, &mut self.neighborhoods);
+        found.map_err(|error| error.to_string())?;
+        normals::forward(&self.neighborhoods, &mut self.residual);
+        Ok(())
+    }
+
+    fn save(&self, folder: &Folder) -> Outcome {
+        folder.write("normals", self.residual.normals.iter().flatten().copied())
+    }
+}
+
+/// A mesh and the field that made it → `φ`. The mesh is made before, by marching cubes at 0.
+struct Distance<T: Real> {
+    mesh: Mesh<T>,
+    chi: Field<T>,
+    phi: Field<T>,
+    closest: Vec<u32>,
+    scratch: distance::Scratch<T>,
+}
+
+impl<T: Real + Number> Distance<T> {
+    fn open(folder: &Folder) -> Outcome<Self> {
+        let chi = Field::new(folder.grid()?, folder.read("chi")?)?;
+        let mut mesh = Mesh::default();
+        isosurface::forward(&chi, T::zero(), &mut Default::default(), &mut mesh)?;
+        Ok(Self {
+            mesh,
+            phi: chi.clone(),
+            chi,
+            closest: Vec::new(),
+            scratch: distance::Scratch::default(),
+        })
+    }
+}
+
+impl<T: Real + Number> Stage for Distance<T> {
+    fn run(&mut self) -> Result<(), String> {
+        let done = distance::lattice::forward(
+            &self.mesh,
+            &self.chi,
+            T::zero(),
+            distance::Band::Full,
+            &mut self.scratch,
+            &mut self.phi,
+            &mut self.closest,
+        );
+        done.map_err(|error| error.to_string())
+    }
+
+    fn save(&self, folder: &Folder) -> Outcome {
+        folder.write("phi", self.phi.values().iter().copied())?;
+        folder.write("vertices", self.mesh.vertices().iter().flatten().copied())?;
+        folder.write("faces", self.mesh.faces().iter().flatten().copied())
+    }
+}
+
+/// Points → `φ`, by a plan with the default options; its report is made as well.
+struct Whole<T: Real> {
+    cloud: PointCloud<T>,
+    plan: Reconstructor<T>,
+    phi: Vec<T>,
+}
+
+impl<T: Real + Number> Whole<T> {
+    fn open(folder: &Folder) -> Outcome<Self> {
+        Ok(Self {
+            cloud: PointCloud::new(folder.read_rows("points")?)?,
+            plan: Reconstructor::new(folder.grid()?, Options::default())?,
+            phi: Vec::new(),
+        })
+    }
+}
+
+impl<T: Real + Number> Stage for Whole<T> {
+    fn run(&mut self) -> Result<(), String> {
+        let made = self.plan.reconstruct(&self.cloud);
+        let made = made.map_err(|error| error.to_string())?;
+        self.phi.clear();
+        self.phi.extend_from_slice(made.sdf().values());
+        Ok(())
+    }
+
+    fn save(&self, folder: &Folder) -> Outcome {
+        folder.write("phi", self.phi.iter().copied())
+    }
+}
