@@ -47,6 +47,14 @@ impl<T: Real> Cube<T> {
         std::array::from_fn(|c| self.base + (c >> 2) * x + (c >> 1 & 1) * y + (c & 1) * z)
     }
 
+    /// Weights of the eight cells, in the order of [`Self::cells`].
+    #[inline(always)]
+    pub(crate) fn weights(&self) -> [T; 8] {
+        let pair = |a: usize| [T::one() - self.fraction[a], self.fraction[a]];
+        let [x, y, z] = [0, 1, 2].map(pair);
+        std::array::from_fn(|c| x[c >> 2] * y[c >> 1 & 1] * z[c & 1])
+    }
+
     /// The value at the point.
     #[inline(always)]
     pub(crate) fn value(&self, values: &[T]) -> T {

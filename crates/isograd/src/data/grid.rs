@@ -1,6 +1,5 @@
 //! A uniform grid of cubic cells.
 
-use super::cloud::PointCloud;
 use crate::{Real, vector};
 
 /// A uniform grid of `(nx, ny, nz)` cubic cells. Values sit at cell centres.
@@ -12,6 +11,40 @@ pub struct Grid<T> {
     lower: [T; 3],
     spacing: T,
     shape: [usize; 3],
+}
+
+/// Cotangent of a grid, at fixed points: by how much a scalar changes as the grid moves or grows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GridCotangent<T> {
+    /// Of the low corner, per unit length.
+    pub lower: [T; 3],
+    /// Of the cell size, per unit length, the low corner and the number of cells being held.
+    pub spacing: T,
+}
+
+impl GridCotangent<f64> {
+    /// Takes off what a cotangent of a point (in the user's unit) is worth at fixed index coordinates: a
+    /// point that is seen from the grid as `x̂ = (x − lower)/h` has `∂x̂/∂lower = −1/h` and
+    /// `∂x̂/∂h = −x̂/h`.
+    #[inline(always)]
+    pub(crate) fn subtract_point<T: Real>(&mut self, grid: &Grid<T>, x: [T; 3], bar: [T; 3]) {
+        let (x, bar) = (vector::to_f64(grid.to_index(x)), vector::to_f64(bar));
+        self.lower = vector::sub(self.lower, bar);
+        self.spacing -= vector::dot(x, bar);
+    }
+
+    /// Adds another one.
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.lower = vector::add(self.lower, other.lower);
+        self.spacing += other.spacing;
+    }
+
+    /// Adds what a cotangent of a place of fixed index coordinates, `lower + h x̂`, is worth.
+    #[inline(always)]
+    pub(crate) fn add_place(&mut self, x: [f64; 3], bar: [f64; 3]) {
+        self.lower = vector::add(self.lower, bar);
+        self.spacing += vector::dot(x, bar);
+    }
 }
 
 /// How fine a fitted grid is.
@@ -76,6 +109,14 @@ pub enum GridError {
         /// Number of points.
         points: usize,
     },
+    /// A cotangent that does not match the cloud.
+    #[error("{entries} cotangents for {points} points; give one a point")]
+    Cotangent {
+        /// Number of cotangents.
+        entries: usize,
+        /// Number of points.
+        points: usize,
+    },
     /// Neighbouring cell centres are not distinct numbers of this type.
     #[error(
         "cells of {spacing} at coordinates up to {extent} can't be told apart in {real}; use f64, a coarser grid, or move the cloud towards the origin"
@@ -96,7 +137,7 @@ impl<T: Real> Grid<T> {
     /// Cells that a fitted grid keeps between the cloud and each wall, however small the padding.
     pub const MARGIN_CELLS: usize = 4;
 
-    const MAX_CELLS: usize = u32::MAX as usize - 1;
+    pub(super) const MAX_CELLS: usize = u32::MAX as usize - 1;
 
     /// A grid with low corner `lower`, cell size `spacing` and `shape` cells.
     ///
@@ -193,76 +234,6 @@ impl<T: Real> Grid<T> {
         )
     }
 
-    /// The grid round a cloud: its bounding box, widened on every side by `padding` times the longest
-    /// side and by at least [`Self::MARGIN_CELLS`] cells, centred. The longest side has as many cells as
-    /// asked for; the others are rounded up to a number whose Fourier transform is fast.
-    ///
-    /// # Errors
-    /// As [`Self::new`], and [`GridError::NoExtent`] where all points are equal.
-    pub fn fit(
-        cloud: &PointCloud<T>,
-        resolution: Resolution<T>,
-        padding: T,
-    ) -> Result<Self, GridError> {
-        if !(padding >= T::zero()) || !padding.is_finite() {
-            return Err(GridError::Padding {
-                padding: padding.f64(),
-            });
-        }
-        let none = GridError::NoExtent {
-            points: cloud.len(),
-        };
-        let Some((low, high)) = cloud.bounds() else {
-            return Err(none);
-        };
-        let extent: [f64; 3] = std::array::from_fn(|a| high[a].f64() - low[a].f64());
-        let longest = extent[0].max(extent[1]).max(extent[2]);
-        if !(longest > 0.0) {
-            return Err(none);
-        }
-        let margin = Self::MARGIN_CELLS as f64;
-        let spacing = match resolution {
-            Resolution::Cells(n) => {
-                let least = 2 * Self::MARGIN_CELLS + 2;
-                if n < least {
-                    return Err(GridError::TooFew {
-                        axis: 0,
-                        cells: n,
-                        min: least,
-                    });
-                }
-                let padded = longest * (1.0 + 2.0 * padding.f64()) / n as f64;
-                padded.max(longest / (n as f64 - 2.0 * margin))
-            }
-            Resolution::Spacing(h) => h.f64(),
-        };
-        if !(spacing > 0.0) || !spacing.is_finite() {
-            return Err(GridError::Spacing { spacing });
-        }
-        let pad = (padding.f64() * longest).max(margin * spacing);
-        let counts = extent.map(|e| ((e + 2.0 * pad) / spacing * (1.0 - 1e-6)).ceil());
-        if counts.iter().any(|&n| n > Self::MAX_CELLS as f64) {
-            let shape = counts.map(|n| n as usize);
-            return Err(GridError::TooMany {
-                shape,
-                max: Self::MAX_CELLS,
-            });
-        }
-        let mut shape = counts.map(|n| n as usize);
-        for axis in 0..3 {
-            if extent[axis] < longest {
-                shape[axis] = fast_length(shape[axis]);
-            } else if let Resolution::Cells(n) = resolution {
-                shape[axis] = n;
-            }
-        }
-        let lower = std::array::from_fn(|a| {
-            let centre = 0.5 * (low[a].f64() + high[a].f64());
-            T::of(centre - 0.5 * spacing * shape[a] as f64)
-        });
-        Self::new(lower, T::of(spacing), shape)
-    }
-
     /// Low corner of the grid (of cell `(0, 0, 0)`), in the user's unit.
     pub fn lower(&self) -> [T; 3] {
         self.lower
@@ -338,44 +309,10 @@ impl<T: Real> Grid<T> {
     }
 }
 
-/// The least number not below `n` with no prime factor above 7: lengths whose Fourier transform is fast.
-fn fast_length(n: usize) -> usize {
-    let smooth = |mut m: usize| {
-        for p in [2, 3, 5, 7] {
-            while m.is_multiple_of(p) {
-                m /= p;
-            }
-        }
-        m == 1
-    };
-    (n.max(1)..).find(|&m| smooth(m)).unwrap_or(n)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn cloud(points: &[[f64; 3]]) -> PointCloud<f64> {
-        PointCloud::new(points.to_vec()).expect("finite points")
-    }
-
-    #[test]
-    fn fitted_grid_has_the_resolution_asked_for_and_its_margin() {
-        let c = cloud(&[[0.0, 0.0, 0.0], [2.0, 1.0, 0.1]]);
-        for (n, padding) in [(32, 0.0), (64, 0.1), (200, 0.3)] {
-            let g = Grid::fit(&c, Resolution::Cells(n), padding).expect("fits");
-            assert_eq!(g.shape()[0], n);
-            for p in c.points() {
-                let x = g.to_index(*p);
-                for a in 0..3 {
-                    assert!(
-                        x[a] >= 3.99 && x[a] <= g.shape()[a] as f64 - 3.99,
-                        "{x:?} in {g:?}"
-                    );
-                }
-            }
-        }
-    }
+    use crate::data::PointCloud;
 
     #[test]
     fn index_and_cell_are_inverse() {
@@ -405,12 +342,5 @@ mod tests {
         assert!(bad(Grid::fit(&point, Resolution::Cells(64), 0.1)).contains("all equal"));
         let huge = Grid::from_bounds([0.0; 3], [1.0; 3], Resolution::Spacing(1e-30));
         assert!(bad(huge).contains("cells"));
-    }
-
-    #[test]
-    fn fast_lengths_have_small_factors() {
-        assert_eq!(fast_length(121), 125);
-        assert_eq!(fast_length(128), 128);
-        assert_eq!(fast_length(0), 1);
     }
 }

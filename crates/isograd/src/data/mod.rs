@@ -3,11 +3,12 @@
 mod cloud;
 mod field;
 mod grid;
+mod grid_fit;
 mod mesh;
 
 pub(crate) use cloud::bounds;
 
 pub use cloud::{Attribute, PointCloud, PointCloudError};
 pub use field::{Field, FieldError};
-pub use grid::{Grid, GridError, Resolution};
+pub use grid::{Grid, GridCotangent, GridError, Resolution};
 pub use mesh::{LatticeEdge, Mesh, MeshError};

@@ -49,6 +49,13 @@ struct Node<T> {
     least: u32,
 }
 
+/// What is looked for: points within a radius, with values that they carry, arrays in sorted order.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Search<'a, T, const M: usize> {
+    pub radius: T,
+    pub values: [&'a [T]; M],
+}
+
 /// Where a subtree stands: its node, its sorted positions, and the splits below it.
 #[derive(Clone, Copy, Debug)]
 struct Place {
@@ -136,6 +143,15 @@ fn distance_squared<T: Real>(a: [T; 3], b: [T; 3]) -> T {
 }
 
 impl<T: Real> CellIndex<T> {
+    /// Bytes of what queries need, and of work space.
+    pub(crate) fn bytes(&self) -> [usize; 2] {
+        let coordinates = self.coordinates.iter().map(|x| size_of_val(x.as_slice()));
+        let needed = coordinates.sum::<usize>()
+            + size_of_val(self.order.as_slice())
+            + size_of_val(self.nodes.as_slice());
+        [needed, size_of_val(self.entries.as_slice())]
+    }
+
     /// Sorts `points` (finite; fewer than 2³²) into cells: `O(N log N)` whatever their distribution.
     pub fn new(points: &[[T; 3]]) -> Self {
         let mut index = Self::default();
@@ -287,30 +303,32 @@ impl<T: Real> CellIndex<T> {
 
     /// Fills `out`, which has a place for each point in sorted order, cell by cell and in parallel:
     /// `fill(cell, candidates, out of that cell)`, where the candidates are all points that any point of
-    /// the cell can have within `radius`.
-    pub(crate) fn for_each_cell<U: Send>(
+    /// the cell can have within `radius`, each with its `values` (arrays in sorted order).
+    pub(crate) fn for_each_cell<const M: usize, U: Send>(
         &self,
         radius: T,
+        values: [&[T]; M],
         out: &mut [U],
-        fill: &(impl Fn(Range<usize>, &Candidates<T>, &mut [U]) + Sync),
+        fill: &(impl Fn(Range<usize>, &Candidates<T, M>, &mut [U]) + Sync),
     ) {
         debug_assert_eq!(out.len(), self.len());
         if !self.is_empty() {
-            self.cells_below(self.root(), radius, out, &mut Candidates::default(), fill);
+            let search = Search { radius, values };
+            self.cells_below(self.root(), search, out, &mut Candidates::default(), fill);
         }
     }
 
-    fn cells_below<U: Send>(
+    fn cells_below<const M: usize, U: Send>(
         &self,
         at: Place,
-        radius: T,
+        search: Search<'_, T, M>,
         out: &mut [U],
-        candidates: &mut Candidates<T>,
-        fill: &(impl Fn(Range<usize>, &Candidates<T>, &mut [U]) + Sync),
+        candidates: &mut Candidates<T, M>,
+        fill: &(impl Fn(Range<usize>, &Candidates<T, M>, &mut [U]) + Sync),
     ) {
         if at.levels == 0 {
             let Node { low, high, .. } = self.nodes[at.node];
-            self.candidates(low, high, radius, candidates);
+            self.candidates([low, high], search, candidates);
             fill(at.start..at.end, candidates, out);
             return;
         }
@@ -318,22 +336,32 @@ impl<T: Real> CellIndex<T> {
         let (left_out, right_out) = out.split_at_mut(left.end - left.start);
         if at.end - at.start > TASK {
             rayon::join(
-                || self.cells_below(left, radius, left_out, &mut Candidates::default(), fill),
-                || self.cells_below(right, radius, right_out, &mut Candidates::default(), fill),
+                || self.cells_below(left, search, left_out, &mut Candidates::default(), fill),
+                || self.cells_below(right, search, right_out, &mut Candidates::default(), fill),
             );
         } else {
-            self.cells_below(left, radius, left_out, candidates, fill);
-            self.cells_below(right, radius, right_out, candidates, fill);
+            self.cells_below(left, search, left_out, candidates, fill);
+            self.cells_below(right, search, right_out, candidates, fill);
         }
     }
 
-    /// All points within `radius` of the box from `low` to `high`, and perhaps some more.
-    pub(crate) fn candidates(&self, low: [T; 3], high: [T; 3], radius: T, out: &mut Candidates<T>) {
+    /// All points within the radius of the box from `low` to `high`, and perhaps some more.
+    pub(crate) fn candidates<const M: usize>(
+        &self,
+        [low, high]: [[T; 3]; 2],
+        search: Search<'_, T, M>,
+        out: &mut Candidates<T, M>,
+    ) {
         out.clear();
-        let limit = radius * radius;
+        let limit = search.radius * search.radius;
         self.walk(
             &mut |node| box_distance_squared(node.low, node.high, low, high) <= limit,
-            &mut |cell| out.extend([0, 1, 2].map(|a| &self.coordinates[a][cell.clone()])),
+            &mut |cell| {
+                out.extend(
+                    [0, 1, 2].map(|a| &self.coordinates[a][cell.clone()]),
+                    search.values.map(|values| &values[cell.clone()]),
+                );
+            },
         );
         out.fill_last_lanes();
     }

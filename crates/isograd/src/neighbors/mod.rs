@@ -12,7 +12,8 @@
 //! [`Neighborhoods`] is its own residual: the tree and the radii.
 //!
 //! # Pullback
-//! None: neighbourhoods are sets, and the radii are held constant by every pullback that uses them.
+//! None: neighbourhoods are sets, and the radii are held constant by every pullback that uses them. What
+//! those pullbacks share, sums over all centres that have a point as a neighbour, is in `gather.rs`.
 //!
 //! # Not differentiable
 //! A sample that enters or leaves a neighbourhood, and the choice of the radius. `j ∈ N_i` and
@@ -20,10 +21,12 @@
 
 mod candidates;
 mod cell_index;
+mod gather;
 mod radius;
 #[cfg(test)]
 pub(crate) mod tests;
 
 pub(crate) use candidates::{Candidates, LANES, Lanes};
 pub use cell_index::CellIndex;
+pub(crate) use radius::hold;
 pub use radius::{Error, Neighborhoods, Radius, forward};

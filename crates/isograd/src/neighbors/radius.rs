@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::candidates::{Candidates, LANES, Lanes};
-use super::cell_index::CellIndex;
+use super::cell_index::{CellIndex, Search};
 use crate::{Real, vector};
 
 /// Fewest points that can bound a volume.
@@ -19,6 +19,10 @@ const GROWTH_MARGIN: f64 = 1.05;
 /// Samples that the automatic radius holds at the median, the centre included.
 const AUTO_NEIGHBORS: usize = 24;
 
+/// By how much the automatic radius passes the median: else one sample would lie exactly on the radius of
+/// another, and the least motion would change their neighbourhoods.
+const AUTO_MARGIN: f64 = 1.001;
+
 /// Points that are asked for the automatic radius.
 const AUTO_SAMPLES: usize = 1024;
 
@@ -28,8 +32,8 @@ const SMALLEST_MUTUAL_SHARE: f64 = 0.125;
 /// How large a neighbourhood is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Radius {
-    /// The median, over a fixed choice of points, of the distance to the 24th sample: half the points
-    /// have more neighbours than that, half fewer.
+    /// 1.001 times the median, over a fixed choice of points, of the distance to the 24th sample: half the
+    /// points have more neighbours than that, half fewer.
     #[default]
     Auto,
     /// This length, in the unit of the points.
@@ -104,6 +108,16 @@ pub struct Neighborhoods<T> {
 }
 
 impl<T: Real> Neighborhoods<T> {
+    /// Bytes of what pullbacks need, and of work space.
+    pub(crate) fn bytes(&self) -> [usize; 2] {
+        let [tree, work] = self.index.bytes();
+        let needed = size_of_val(self.radius.as_slice())
+            + size_of_val(self.count.as_slice())
+            + size_of_val(self.isolated.as_slice())
+            + size_of_val(self.position.as_slice());
+        [tree + needed, work + size_of_val(self.sorted.as_slice())]
+    }
+
     /// Typical distance between neighbouring samples, in the unit of the points: the side of the square
     /// that one sample has to itself on the surface, at the median, `√(π/24)` of the automatic radius.
     pub fn spacing(&self) -> T {
@@ -132,7 +146,7 @@ impl<T: Real> Neighborhoods<T> {
     ) {
         let index = &self.index;
         let radius_at = |position: usize| self.radius[index.order()[position] as usize];
-        index.for_each_cell(self.common_radius, out, &|cell, candidates, out| {
+        index.for_each_cell(self.common_radius, [], out, &|cell, candidates, out| {
             let mut own = None;
             for (position, out) in cell.zip(out) {
                 let (point, radius) = (index.point(position), radius_at(position));
@@ -140,7 +154,8 @@ impl<T: Real> Neighborhoods<T> {
                     fill(point, radius, candidates)
                 } else {
                     let own = own.get_or_insert_with(Candidates::default);
-                    index.candidates(point, point, radius, own);
+                    let values = [];
+                    index.candidates([point; 2], Search { radius, values }, own);
                     fill(point, radius, own)
                 };
             }
@@ -170,6 +185,39 @@ pub fn forward<T: Real>(
     };
     grow(out);
     find_isolated(out);
+    Ok(())
+}
+
+/// The neighbourhoods of moved points with the radii of `held`, and what was isolated there: what pullbacks
+/// hold constant. Counts are those of the moved points.
+///
+/// # Errors
+/// As [`forward`], and [`Error::TooFew`] where there are fewer points than before.
+pub(crate) fn hold<T: Real>(
+    points: &[[T; 3]],
+    held: &Neighborhoods<T>,
+    out: &mut Neighborhoods<T>,
+) -> Result<(), Error> {
+    check(points)?;
+    if points.len() != held.radius.len() {
+        return Err(Error::TooFew {
+            points: points.len(),
+        });
+    }
+    out.index.rebuild(points);
+    check_extent(&out.index)?;
+    out.common_radius = held.common_radius;
+    out.spacing = held.spacing;
+    out.radius.clone_from(&held.radius);
+    out.isolated.clone_from(&held.isolated);
+    find_positions(out);
+    out.count.clear();
+    out.count.resize(points.len(), 0);
+    let (index, radius) = (&out.index, &out.radius);
+    let counts = out.count.par_iter_mut().enumerate();
+    counts.for_each(|(i, count)| {
+        index.for_each_within(points[i], radius[i], |_, _| *count += 1);
+    });
     Ok(())
 }
 
@@ -240,9 +288,8 @@ fn automatic_radius<T: Real>(index: &CellIndex<T>) -> T {
         return vector::norm(vector::sub(high, low)) / T::of_usize(n).sqrt();
     }
     let middle = distances.len() / 2;
-    *distances
-        .select_nth_unstable_by(middle, |a, b| a.f64().total_cmp(&b.f64()))
-        .1
+    let median = distances.select_nth_unstable_by(middle, |a, b| a.f64().total_cmp(&b.f64()));
+    *median.1 * T::of(AUTO_MARGIN)
 }
 
 /// Writes radius and count of every point: the common radius where it holds enough samples.
@@ -252,7 +299,7 @@ fn grow<T: Real>(out: &mut Neighborhoods<T>) {
     out.sorted.clear();
     out.sorted.resize(n, (common, 0));
     let arch = pulp::Arch::new();
-    index.for_each_cell(common, &mut out.sorted, &|cell, candidates, out| {
+    index.for_each_cell(common, [], &mut out.sorted, &|cell, candidates, out| {
         for (position, out) in cell.zip(out) {
             let point = index.point(position);
             let count = crate::simd::dispatch(
@@ -267,16 +314,20 @@ fn grow<T: Real>(out: &mut Neighborhoods<T>) {
             };
         }
     });
-    out.position.clear();
-    out.position.resize(n, 0);
-    for (position, &i) in (0u32..).zip(index.order()) {
-        out.position[i as usize] = position;
-    }
+    find_positions(out);
     let sorted = |&position: &u32| out.sorted[position as usize];
     out.radius.clear();
     out.radius.extend(out.position.iter().map(|p| sorted(p).0));
     out.count.clear();
     out.count.extend(out.position.iter().map(|p| sorted(p).1));
+}
+
+fn find_positions<T: Real>(out: &mut Neighborhoods<T>) {
+    out.position.clear();
+    out.position.resize(out.index.len(), 0);
+    for (position, &i) in (0u32..).zip(out.index.order()) {
+        out.position[i as usize] = position;
+    }
 }
 
 /// The radius that reaches the 8th sample with a margin, and the count within it.

@@ -1,0 +1,94 @@
+//! Cotangents of offsets, gathered: what the pullbacks of functions of `d_j = x_j − x_i` have in common.
+//!
+//! A point `k` gets `−Σ_j d̄_j` as the centre of its own neighbourhood, and the `d̄_k` of every other centre
+//! that has it as a neighbour. Where both have the common radius, `k` is a neighbour of `c` exactly where
+//! `c` is one of `k`, rounding included; so one walk over the points within that radius gathers both. The
+//! few centres whose radius has grown hand out what they have in a fixed order.
+
+use rayon::prelude::*;
+
+use super::candidates::Candidates;
+use super::radius::Neighborhoods;
+use crate::parallel::CHUNK;
+use crate::{Real, vector};
+
+impl<T: Real> Neighborhoods<T> {
+    /// Whether the radius of a point has grown beyond the common one.
+    #[inline(always)]
+    pub(crate) fn has_grown(&self, i: usize) -> bool {
+        self.radius[i] > self.common_radius
+    }
+
+    /// Adds to `(N, 3)` `points_bar`, in input order, what `gather(sorted position, point, candidates)`
+    /// returns for every point. The candidates hold all points within the common radius, each with its
+    /// `values`, arrays in sorted order.
+    pub(crate) fn add_gathered<const M: usize>(
+        &self,
+        values: [&[T]; M],
+        sorted: &mut Vec<[T; 3]>,
+        points_bar: &mut [[T; 3]],
+        gather: &(impl Fn(usize, [T; 3], &Candidates<T, M>) -> [T; 3] + Sync),
+    ) {
+        let index = &self.index;
+        sorted.resize(index.len(), [T::zero(); 3]);
+        index.for_each_cell(
+            self.common_radius,
+            values,
+            sorted,
+            &|cell, candidates, out| {
+                for (position, out) in cell.zip(out) {
+                    *out = gather(position, index.point(position), candidates);
+                }
+            },
+        );
+        let sorted = &*sorted;
+        points_bar
+            .par_iter_mut()
+            .zip(self.position())
+            .for_each(|(bar, &position)| *bar = vector::add(*bar, sorted[position as usize]));
+    }
+
+    /// Adds to `(N, 3)` `points_bar` what the centres whose radius has grown contribute:
+    /// `offset_bar(centre, neighbour, offset)` is `d̄_j`, not called for the centre itself.
+    pub(crate) fn add_from_grown(
+        &self,
+        points_bar: &mut [[T; 3]],
+        offset_bar: &(impl Fn(usize, usize, [T; 3]) -> [T; 3] + Sync),
+    ) {
+        let grown: Vec<usize> = (0..self.radius.len())
+            .filter(|&i| self.has_grown(i))
+            .collect();
+        // Rounds of a fixed number of centres, so that the lists stay short.
+        for round in grown.chunks(16 * CHUNK) {
+            let lists: Vec<Vec<(u32, [T; 3])>> = round
+                .par_chunks(CHUNK / 8)
+                .map(|centres| self.contributions(centres, offset_bar))
+                .collect();
+            for (j, bar) in lists.into_iter().flatten() {
+                points_bar[j as usize] = vector::add(points_bar[j as usize], bar);
+            }
+        }
+    }
+
+    fn contributions(
+        &self,
+        centres: &[usize],
+        offset_bar: &impl Fn(usize, usize, [T; 3]) -> [T; 3],
+    ) -> Vec<(u32, [T; 3])> {
+        let mut list = Vec::new();
+        for &i in centres {
+            let centre = self.index.point(self.position()[i] as usize);
+            let mut total = [T::zero(); 3];
+            self.index.for_each_within(centre, self.radius[i], |j, _| {
+                if j != i {
+                    let point = self.index.point(self.position()[j] as usize);
+                    let bar = offset_bar(i, j, vector::sub(point, centre));
+                    total = vector::sub(total, bar);
+                    list.push((j as u32, bar));
+                }
+            });
+            list.push((i as u32, total));
+        }
+        list
+    }
+}
