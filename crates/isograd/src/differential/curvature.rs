@@ -25,8 +25,8 @@ impl Default for Options {
 /// Memory of [`mean_curvature`], kept between calls: two values a cell where there is smoothing.
 #[derive(Debug, Default)]
 pub struct Scratch<T> {
-    smooth: Vec<T>,
-    other: Vec<T>,
+    pub(super) smooth: Vec<T>,
+    pub(super) other: Vec<T>,
 }
 
 /// `κ = div(∇φ/|∇φ|)` at every cell, per unit length, in memory order: the sum of the principal curvatures,
@@ -87,7 +87,7 @@ pub(super) fn curvature<T: Real>(g: [T; 3], h: [T; 6]) -> T {
 }
 
 /// Derivatives of one row. The second ones are times `h`.
-struct Buffers<T> {
+pub(super) struct Buffers<T> {
     first: [Vec<T>; 3],
     second: [Vec<T>; 6],
     /// `∂φ/∂y` on the rows that a difference along x needs.
@@ -95,7 +95,7 @@ struct Buffers<T> {
 }
 
 impl<T: Real> Buffers<T> {
-    fn new(n: usize) -> Self {
+    pub(super) fn new(n: usize) -> Self {
         Self {
             first: rows::buffers(n),
             second: rows::buffers(n),
@@ -104,18 +104,18 @@ impl<T: Real> Buffers<T> {
     }
 
     #[inline(always)]
-    fn gradient(&self, k: usize) -> [T; 3] {
+    pub(super) fn gradient(&self, k: usize) -> [T; 3] {
         [self.first[0][k], self.first[1][k], self.first[2][k]]
     }
 
     #[inline(always)]
-    fn hessian(&self, k: usize) -> [T; 6] {
+    pub(super) fn hessian(&self, k: usize) -> [T; 6] {
         let s = &self.second;
         [s[0][k], s[1][k], s[2][k], s[3][k], s[4][k], s[5][k]]
     }
 
     #[inline(always)]
-    fn fill(&mut self, rows: &Rows<T>, at: [usize; 2]) {
+    pub(super) fn fill(&mut self, rows: &Rows<T>, at: [usize; 2]) {
         rows.gradient(at, &mut self.first);
         let [xx, yy, zz, xy, xz, yz] = &mut self.second;
         rows.across(Order::Second, 0, at, xx);
@@ -134,7 +134,7 @@ impl<T: Real> Buffers<T> {
 
 /// Smooths `φ` into `scratch.smooth`: `u + ¼ δ²u` along each axis, `passes` times. At the walls the second
 /// difference is the one-sided one, so that linear functions pass unchanged and nothing is bent there.
-fn smooth<T: Real>(phi: &Field<T>, passes: usize, scratch: &mut Scratch<T>) {
+pub(super) fn smooth<T: Real>(phi: &Field<T>, passes: usize, scratch: &mut Scratch<T>) {
     let Scratch { smooth, other } = scratch;
     smooth.clear();
     smooth.extend_from_slice(phi.values());

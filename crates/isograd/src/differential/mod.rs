@@ -28,7 +28,9 @@
 //! `φ` alone.
 //!
 //! # Pullback
-//! `D_a` is the difference along axis `a` divided by `h`, `D_ab` the second one.
+//! [`gradient_pullback`], [`unit_normals_pullback`], [`mean_curvature_pullback`] and
+//! [`Differential::pullback_at_points`]. `D_a` is the difference along axis `a` divided by `h`, `D_ab` the second
+//! one.
 //! - Gradient: `φ̄ = Σ_a D_aᵀ ḡ_a`.
 //! - Normal: `ḡ = (n̄ − n (n·n̄))/|g|`, and 0 where `g = 0`.
 //! - Curvature, with `s = |g|²`: `H̄ = κ̄ (s I − g gᵀ)/s^{3/2}`,
@@ -45,15 +47,23 @@
 //! Osher and Fedkiw, *Level Set Methods and Dynamic Implicit Surfaces*, 2003, §1.4, for the curvature and
 //! its bound.
 
+mod columns;
 mod curvature;
+mod curvature_pullback;
 mod eikonal;
+mod pullback;
+#[cfg(test)]
+mod pullback_tests;
 mod rows;
 mod sample;
+mod sample_pullback;
 #[cfg(test)]
 mod tests;
 
 pub use curvature::{Options, Scratch, mean_curvature};
+pub use curvature_pullback::mean_curvature_pullback;
 pub use eikonal::{Bins, Eikonal, EikonalOptions, Spread, eikonal};
+pub use pullback::{PullbackScratch, gradient_pullback, unit_normals_pullback};
 pub use sample::{Error, Local};
 
 use pulp::Arch;
@@ -111,6 +121,7 @@ fn for_each_gradient<T: Real>(
 #[derive(Debug)]
 pub struct Differential<T> {
     grid: Grid<T>,
+    options: Options,
     gradient: Vec<[T; 3]>,
     curvature: Vec<T>,
     scratch: Scratch<T>,
@@ -121,6 +132,7 @@ impl<T: Real> Differential<T> {
     pub fn new(phi: &Field<T>, options: &Options) -> Self {
         let mut new = Self {
             grid: *phi.grid(),
+            options: *options,
             gradient: Vec::new(),
             curvature: Vec::new(),
             scratch: Scratch::default(),
@@ -132,6 +144,7 @@ impl<T: Real> Differential<T> {
     /// Of another signed distance; allocates nothing field-sized where the grid has no more cells.
     pub fn update(&mut self, phi: &Field<T>, options: &Options) {
         self.grid = *phi.grid();
+        self.options = *options;
         gradient(phi, &mut self.gradient);
         mean_curvature(phi, options, &mut self.scratch, &mut self.curvature);
     }

@@ -17,7 +17,7 @@ pub struct Local<T> {
     pub curvature: T,
 }
 
-/// Why nothing can be said at a point.
+/// Why nothing can be said at a point, or pulled back.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
     /// The point is not in the grid.
@@ -34,6 +34,19 @@ pub enum Error {
         /// High corner of the grid.
         upper: [f64; 3],
     },
+    /// An array of the pullback has the wrong length.
+    #[error("{what} has {length} entries and must have {expected}: one a cell, or one a point")]
+    Mismatch {
+        /// The array.
+        what: &'static str,
+        /// Its length.
+        length: usize,
+        /// The right length.
+        expected: usize,
+    },
+    /// The field lies on another grid than the derivatives.
+    #[error("the field is on another grid; give the one that the derivatives were taken of")]
+    Grid,
 }
 
 impl<T: Real> Differential<T> {
@@ -58,20 +71,26 @@ impl<T: Real> Differential<T> {
     /// The first point outside the grid; `out` is then empty.
     pub fn at_points(&self, points: &[[T; 3]], out: &mut Vec<Local<T>>) -> Result<(), Error> {
         out.clear();
-        let (lower, upper) = (self.grid.lower(), self.grid.upper());
-        if let Some(index) = points.iter().position(|p| !within(*p, lower, upper)) {
-            return Err(Error::Outside {
-                index,
-                point: vector::to_f64(points[index]),
-                lower: vector::to_f64(lower),
-                upper: vector::to_f64(upper),
-            });
-        }
+        check_points(&self.grid, points)?;
         points
             .par_iter()
             .map(|&p| self.at(p).unwrap_or_default())
             .collect_into_vec(out);
         Ok(())
+    }
+}
+
+/// Whether all points are in the grid.
+pub(super) fn check_points<T: Real>(grid: &Grid<T>, points: &[[T; 3]]) -> Result<(), Error> {
+    let (lower, upper) = (grid.lower(), grid.upper());
+    match points.iter().position(|p| !within(*p, lower, upper)) {
+        Some(index) => Err(Error::Outside {
+            index,
+            point: vector::to_f64(points[index]),
+            lower: vector::to_f64(lower),
+            upper: vector::to_f64(upper),
+        }),
+        None => Ok(()),
     }
 }
 
@@ -87,23 +106,66 @@ fn corners<T: Real>(grid: &Grid<T>, point: [T; 3]) -> Option<[(usize, T); 8]> {
     if !within(point, grid.lower(), grid.upper()) {
         return None;
     }
-    let mut base = [0; 3];
-    let mut fraction = [0.0; 3];
-    for a in 0..3 {
-        let x = (point[a].f64() - grid.lower()[a].f64()) / grid.spacing().f64() - 0.5;
-        base[a] = (x.max(0.0) as usize).min(grid.shape()[a] - 2);
-        fraction[a] = x - base[a] as f64;
-    }
+    let place = Place::of(grid, point);
     Some(std::array::from_fn(|c| {
-        let high = [c >> 2 & 1, c >> 1 & 1, c & 1];
-        let cell = std::array::from_fn(|a| base[a] + high[a]);
-        let weight = |a: usize| {
-            if high[a] == 1 {
-                fraction[a]
-            } else {
-                1.0 - fraction[a]
-            }
-        };
-        (grid.index(cell), T::of(weight(0) * weight(1) * weight(2)))
+        (grid.index(place.cell(c)), T::of(place.weight(c)))
     }))
+}
+
+/// Where a point of the grid is between the eight cell centres round it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// The lowest of the eight cells.
+    pub(super) base: [usize; 3],
+    /// From its centre, in cells.
+    fraction: [f64; 3],
+}
+
+impl Place {
+    #[inline(always)]
+    pub(super) fn of<T: Real>(grid: &Grid<T>, point: [T; 3]) -> Self {
+        let mut base = [0; 3];
+        let mut fraction = [0.0; 3];
+        for a in 0..3 {
+            let x = (point[a].f64() - grid.lower()[a].f64()) / grid.spacing().f64() - 0.5;
+            base[a] = (x.max(0.0) as usize).min(grid.shape()[a] - 2);
+            fraction[a] = x - base[a] as f64;
+        }
+        Self { base, fraction }
+    }
+
+    /// One of the eight cells; the last axis varies fastest.
+    #[inline(always)]
+    pub(super) fn cell(&self, corner: usize) -> [usize; 3] {
+        std::array::from_fn(|a| self.base[a] + (corner >> (2 - a) & 1))
+    }
+
+    /// Its weight along one axis.
+    #[inline(always)]
+    fn along(&self, corner: usize, a: usize) -> f64 {
+        if corner >> (2 - a) & 1 == 1 {
+            self.fraction[a]
+        } else {
+            1.0 - self.fraction[a]
+        }
+    }
+
+    /// Its trilinear weight.
+    #[inline(always)]
+    pub(super) fn weight(&self, corner: usize) -> f64 {
+        self.along(corner, 0) * self.along(corner, 1) * self.along(corner, 2)
+    }
+
+    /// Gradient of its weight, per cell.
+    #[inline(always)]
+    pub(super) fn slope(&self, corner: usize) -> [f64; 3] {
+        std::array::from_fn(|a| {
+            let sign = if corner >> (2 - a) & 1 == 1 {
+                1.0
+            } else {
+                -1.0
+            };
+            sign * self.along(corner, (a + 1) % 3) * self.along(corner, (a + 2) % 3)
+        })
+    }
 }

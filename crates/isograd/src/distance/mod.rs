@@ -13,8 +13,13 @@
 //! [`triangle::closest_point`].
 //!
 //! # Pullback
-//! By the envelope theorem, with `β` held constant: `ȳ_k += −β_k φ̄ ∇φ` for the corners `y_k` of the closest face,
-//! `q̄ += φ̄ ∇φ` for the point, with `∇φ = σ (q − y)/|q − y|`, or the normal of the face at distance 0.
+//! [`lattice::pullback`] on a grid, [`Query::pullback`] at points. By the envelope theorem, with `β` held constant: `ȳ_k += −β_k φ̄ ∇φ` for the
+//! corners `y_k` of the closest face, `q̄ += φ̄ ∇φ` for the point, with `∇φ = σ (q − y)/|q − y|`, or the normal of
+//! the face at distance 0.
+//!
+//! The closest point itself is `p = Σ β_k y_k`. With the corners of the feature that holds it, `E`, `γ` and `o` as
+//! in [`extend`] and `δ_k = p̄·(y_k − y_0)`: `q̄ += G`, `ȳ_k += β_k (p̄ − G) + γ_k o`; `G = E γ` is the part of `p̄` in
+//! the plane of the face, or along the edge.
 //!
 //! # Not differentiable
 //! On the medial axis, where the closest point jumps, and on the mesh itself at its edges and corners. The sign
@@ -26,6 +31,8 @@ mod lanes;
 pub mod lattice;
 mod pseudonormals;
 mod query;
+mod query_pullback;
+mod tangent;
 pub mod triangle;
 
 #[cfg(test)]
@@ -51,6 +58,24 @@ pub enum Error {
         magnitude: f64,
         /// The longest side of the bounding box.
         extent: f64,
+    },
+    /// What the pullback was given does not fit together.
+    #[error(
+        "{what} has {length} entries for {expected} points; give the points and hits of one query, and one cotangent a hit"
+    )]
+    Mismatch {
+        /// The array.
+        what: &'static str,
+        /// Its length.
+        length: usize,
+        /// Number of points.
+        expected: usize,
+    },
+    /// A hit on a face that is not there.
+    #[error("a hit names face {face}, which the mesh does not have; give the hits of this query")]
+    Face {
+        /// The face.
+        face: u32,
     },
     /// The width of the band is not a positive number.
     #[error(

@@ -171,6 +171,13 @@ fn side_on_lattice<T: Real>(field: &Field<T>, point: [T; 3]) -> Option<bool> {
         .then_some(first)
 }
 
+/// What is not a number is infinitely far from everything: comparisons with it would all fail, and let it into
+/// boxes that are not there.
+#[inline(always)]
+fn far_if_nan(x: f64) -> f64 {
+    if x.is_nan() { f64::INFINITY } else { x }
+}
+
 /// Finds the closest triangles of some packets of points.
 struct Packets<'a, T> {
     bvh: &'a Bvh,
@@ -192,7 +199,7 @@ impl<T: Real> WithSimd for Packets<'_, T> {
                 // The last packet repeats its last point.
                 let (_, index) = order[l.min(order.len() - 1)];
                 for a in 0..3 {
-                    packet[a][l] = self.points[index as usize][a].f64();
+                    packet[a][l] = far_if_nan(self.points[index as usize][a].f64());
                 }
             }
             let mut nearest = Found::NOTHING;

@@ -40,15 +40,12 @@ pub struct Closest {
 ///
 /// The error of the distance is a few `ε` times the way from the query to the nearest corner.
 pub fn closest_point(query: [f64; 3], corners: [[f64; 3]; 3]) -> Closest {
-    let frame = Frame::new(corners);
-    let (barycentric, feature) = frame.barycentric(query);
-    closest_from(query, corners, barycentric, feature, frame.normal)
+    Frame::new(corners).closest(query, corners)
 }
 
 /// Unit normal of a triangle by the right-hand rule; `None` where it has no area.
 pub fn unit_normal(corners: [[f64; 3]; 3]) -> Option<[f64; 3]> {
-    let frame = Frame::new(corners);
-    (frame.apex[1] > 0.0).then_some(frame.normal)
+    Frame::new(corners).unit_normal()
 }
 
 /// The offset is taken from the nearest corner, where the least is lost to cancellation.
@@ -141,6 +138,17 @@ impl Frame {
             slack: slack(base, apex),
             first,
         }
+    }
+
+    /// [`closest_point`], for the corners that the frame was made of.
+    pub(crate) fn closest(&self, query: [f64; 3], corners: [[f64; 3]; 3]) -> Closest {
+        let (barycentric, feature) = self.barycentric(query);
+        closest_from(query, corners, barycentric, feature, self.normal)
+    }
+
+    /// [`unit_normal`] of the triangle.
+    pub(crate) fn unit_normal(&self) -> Option<[f64; 3]> {
+        (self.apex[1] > 0.0).then_some(self.normal)
     }
 
     pub(crate) fn centroid(&self) -> [f64; 3] {

@@ -11,13 +11,20 @@
 //!
 //! # Pullback
 //! With `w_i` the trilinear weights at `x_i` and `s_i = c̄ a_i / Σ a`: `χ̄ += s_i w_i`, `x̄_i += s_i ∇χ(x_i)`,
-//! `ā_i += c̄ (χ(x_i) − c) / Σ a`.
+//! `ā_i += c̄ (χ(x_i) − c) / Σ a`: [`pullback`].
 //!
 //! # Not differentiable
 //! `∇χ` jumps where a sample crosses a plane through cell centres; the gradient on its side is used.
 
+use rayon::prelude::*;
+
+use crate::data::GridCotangent;
+use crate::splat::{self, SampleCotangent, Samples};
 use crate::trilinear::Cube;
-use crate::{Field, Real, parallel};
+use crate::{Field, Grid, Real, parallel, vector};
+
+/// Planes across x that one task of the pullback owns.
+const SLAB: usize = 8;
 
 /// What the pullback needs besides the inputs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -90,10 +97,77 @@ pub fn forward<T: Real>(
     Ok((c, Residual { area, value }))
 }
 
+/// Adds to `chi_bar` (in memory order) and to `out` what the cotangent `bar` of the iso-value means for the
+/// indicator, the samples and the grid. All else is as it was in [`forward`]; `order` lists the samples by
+/// plane of the grid, as the splat's [`Residual`](splat::Residual) does.
+pub fn pullback<T: Real>(
+    chi: &Field<T>,
+    samples: Samples<'_, T>,
+    residual: &Residual,
+    order: &splat::Residual,
+    bar: T,
+    chi_bar: &mut [T],
+    out: &mut SampleCotangent<T>,
+) {
+    let Samples { points, areas, .. } = samples;
+    let (grid, values) = (chi.grid(), chi.values());
+    let share = bar.f64() / residual.area;
+    let h = grid.spacing();
+    // Value at a sample, and the cotangent of its point.
+    let at = |i: usize| {
+        let (value, gradient) =
+            Cube::new(grid, grid.to_index(points[i])).value_and_gradient(values);
+        let slope = T::of(share * areas[i].f64()) / h;
+        (value, vector::scale(gradient, slope))
+    };
+    let bars = out.points.par_iter_mut().zip(&mut out.areas);
+    bars.enumerate().for_each(|(i, (point_bar, area_bar))| {
+        let (value, bar) = at(i);
+        *point_bar = vector::add(*point_bar, bar);
+        *area_bar += T::of(share * (value.f64() - residual.value));
+    });
+    let [x, y, z, spacing] = parallel::sum_array(points.len(), |i| {
+        let mut part = GridCotangent::default();
+        part.subtract_point(grid, points[i], at(i).1);
+        let [x, y, z] = part.lower;
+        [x, y, z, part.spacing]
+    });
+    out.grid.lower = vector::add(out.grid.lower, [x, y, z]);
+    out.grid.spacing += spacing;
+    spread(grid, samples, order, share, chi_bar);
+}
+
+/// Adds `share a_i` at every sample to the eight cells round it; each task owns some planes.
+fn spread<T: Real>(
+    grid: &Grid<T>,
+    Samples { points, areas, .. }: Samples<'_, T>,
+    order: &splat::Residual,
+    share: f64,
+    chi_bar: &mut [T],
+) {
+    let plane = grid.strides()[0];
+    let slabs = chi_bar.par_chunks_mut(SLAB * plane).enumerate();
+    slabs.for_each(|(task, slab)| {
+        let first = task * SLAB * plane;
+        let planes = task * SLAB..task * SLAB + slab.len() / plane;
+        // The eight cells reach one plane beyond that of the sample's own cell.
+        let near = planes.start.saturating_sub(1)..planes.end + 1;
+        for &i in order.in_planes(points, grid, near) {
+            let i = i as usize;
+            let cube = Cube::new(grid, grid.to_index(points[i]));
+            let part = T::of(share * areas[i].f64());
+            for (cell, weight) in cube.cells().into_iter().zip(cube.weights()) {
+                if let Some(value) = cell.checked_sub(first).and_then(|at| slab.get_mut(at)) {
+                    *value += part * weight;
+                }
+            }
+        }
+    });
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Grid;
 
     /// `χ = 2x − y + 3z`, which interpolation gives back exactly.
     fn linear() -> Field<f64> {

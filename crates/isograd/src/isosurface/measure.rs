@@ -49,6 +49,9 @@ pub struct Scratch {
 ///
 /// A face that names a vertex twice has two edges that close on each other and one from the vertex to
 /// itself, which counts as a boundary edge: such a mesh is not closed.
+///
+/// # Pullback
+/// [`measure_pullback`](super::measure_pullback), of area and volume; the rest are counts.
 pub fn measure<T: Real>(mesh: &Mesh<T>, scratch: &mut Scratch) -> Measures {
     let [area, volume] = integrals(mesh);
     let (vertices, components) = scratch.components(mesh);
@@ -91,7 +94,7 @@ fn integrals<T: Real>(mesh: &Mesh<T>) -> [f64; 2] {
 }
 
 /// Centre of the bounding box; the origin where there are no vertices.
-fn center<T: Real>(vertices: &[[T; 3]]) -> [f64; 3] {
+pub(super) fn center<T: Real>(vertices: &[[T; 3]]) -> [f64; 3] {
     let bounds = crate::data::bounds(vertices);
     bounds.map_or([0.0; 3], |(low, high)| {
         std::array::from_fn(|a| 0.5 * low[a].f64() + 0.5 * high[a].f64())

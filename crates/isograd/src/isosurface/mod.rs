@@ -23,8 +23,10 @@
 //! # Pullback
 //! With `ȳ` the cotangent of a vertex and `s = ȳ·(q − p)`:
 //! `χ̄_p −= s (1−η)/(χ_q−χ_p)`, `χ̄_q −= s η/(χ_q−χ_p)`, `c̄ += s/(χ_q−χ_p)`. The difference is never zero,
-//! since the ends of a crossed edge differ, but it may be so small that its reciprocal overflows: the
-//! gradient is to be bounded there. Each vertex adds to two cells only.
+//! since the ends of a crossed edge differ, but it may be so small that its reciprocal overflows: below a
+//! millionth of the range of `χ` it counts as that much. Each vertex adds to two cells only: [`pullback`].
+//!
+//! [`measure_pullback`] is where `ȳ` may come from: the gradient of area and volume.
 //!
 //! # Not differentiable
 //! The signs, hence the list of faces. When a value passes the level, vertices appear or vanish at that
@@ -38,6 +40,10 @@
 pub mod iso_value;
 mod march;
 pub mod measure;
+mod measure_pullback;
+#[cfg(test)]
+mod measure_pullback_tests;
+mod pullback;
 mod signs;
 mod tables;
 #[cfg(test)]
@@ -45,6 +51,8 @@ mod tests;
 
 pub use march::{Scratch, crossing, forward};
 pub use measure::Measures;
+pub use measure_pullback::pullback as measure_pullback;
+pub use pullback::{LevelCotangent, pullback};
 
 /// What the stage has to say about a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

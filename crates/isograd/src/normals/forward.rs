@@ -11,7 +11,7 @@ use crate::{Real, vector};
 pub(super) const EPSILON: f64 = 0.2;
 
 /// Gap `(λ₂ − λ₁)/λ₃` up to which a normal is ill defined.
-const SMALLEST_GAP: f64 = 1e-3;
+pub(super) const SMALLEST_GAP: f64 = 1e-3;
 
 /// Estimates the axis of the surface at every point; see the [module](super) for the map.
 ///

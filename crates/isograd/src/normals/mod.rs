@@ -37,7 +37,7 @@
 //! x̄_j += d̄_j,   x̄_i −= Σ_j d̄_j
 //! ```
 //! `⟨B, C⟩ = gᵀ C n = 0`, because `C n = λ₁ n` and `g` is normal to `n`. Both terms are gathered: over
-//! `N_i`, and over all `i` with `j ∈ N_i`.
+//! `N_i`, and over all `i` with `j ∈ N_i`: [`pullback`].
 //!
 //! # Not differentiable
 //! The neighbourhoods and radii (held constant, `ε` with them), and the sign. Where `λ₂ − λ₁` is at most
@@ -46,10 +46,12 @@
 
 mod eigen;
 mod forward;
+mod pullback;
 #[cfg(test)]
 mod tests;
 
 pub use forward::forward;
+pub use pullback::{Scratch, pullback};
 
 /// The local plane of one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -81,6 +83,12 @@ impl<T> Residual<T> {
     /// Number of points whose normal is ill defined.
     pub fn guarded(&self) -> usize {
         self.planes.iter().filter(|plane| plane.guarded).count()
+    }
+
+    /// Bytes of what the pullback needs, and of work space.
+    pub(crate) fn bytes(&self) -> [usize; 2] {
+        let needed = size_of_val(self.normals.as_slice()) + size_of_val(self.planes.as_slice());
+        [needed, size_of_val(self.sorted.as_slice())]
     }
 
     /// Forgets all points, for a cloud whose normals are given; keeps the memory.

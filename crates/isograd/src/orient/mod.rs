@@ -2,7 +2,7 @@
 //!
 //! # Map
 //! Axes `(N, 3)` of unit length and arbitrary sign (from [`normals`](crate::normals)), or the cloud's
-//! own normals → unit normals `(N, 3)` that point outward, with a confidence for each. Three methods:
+//! own normals → unit normals `(N, 3)` that point outward, with a confidence for each. Four methods:
 //!
 //! - [`Method::Auto`], the default, weighs evidence of four kinds. *Enclosure*: the samples are drawn on a
 //!   grid as discs in their tangent planes, and what they close off from the outside is matter (a cavity
@@ -15,6 +15,9 @@
 //!   other, the weaker tie yields. Time and memory are `O(N log N)`, wherever outliers are.
 //! - [`Method::Parity`]: the paper's method as printed (its §2.2), with its hyperparameters.
 //! - [`Method::Given`]: the cloud's own normals, trusted as they are.
+//! - [`Method::Signs`]: each axis, turned to the side of the cloud's own normal: for normals whose side is
+//!   known better than their direction (from a scanner, a coarser mesh, the step before), and for those who
+//!   need the derivative with respect to the points alone.
 //!
 //! An open surface has no outside: its signs agree with each other, and its hollow side counts as the
 //! inner one. A part without any evidence (a flat patch, a handful of points) points away from its
@@ -29,8 +32,8 @@
 //! [`Orientation::normals`] holds the sign that was chosen: the stage multiplies by it.
 //!
 //! # Pullback
-//! `s_i` is held constant: `axis̄_i = s_i n̄_i`. Given normals `g_i` are divided by their length:
-//! `ḡ_i = (n̄_i − n_i (n_i·n̄_i)) / |g_i|`.
+//! `s_i` is held constant: `axis̄_i = s_i n̄_i` ([`axes_pullback`]). Given normals `g_i` are divided by their
+//! length: `ḡ_i = (n̄_i − n_i (n_i·n̄_i)) / |g_i|` ([`given_pullback`]).
 //!
 //! # Not differentiable
 //! The signs are discrete; nothing of how they are chosen has a derivative. The confidence has none.
@@ -45,6 +48,7 @@ mod groups;
 mod parity;
 #[cfg(test)]
 mod parity_tests;
+mod pullback;
 mod settle;
 #[cfg(test)]
 mod shapes;
@@ -53,6 +57,8 @@ mod sky;
 mod tests;
 
 pub use parity::ParityOptions;
+pub(crate) use pullback::hold;
+pub use pullback::{axes_pullback, given_pullback};
 
 use crate::neighbors::Neighborhoods;
 use crate::{Real, vector};
@@ -71,6 +77,8 @@ pub enum Method {
     Parity(ParityOptions),
     /// The cloud's own normals.
     Given,
+    /// The side of the cloud's own normals.
+    Signs,
 }
 
 /// How the signs were chosen.
@@ -86,15 +94,18 @@ pub enum MethodUsed {
     },
     /// See [`Method::Given`].
     Given,
+    /// See [`Method::Signs`].
+    Signs,
 }
 
 impl MethodUsed {
-    /// `"auto"`, `"parity"` or `"given"`.
+    /// `"auto"`, `"parity"`, `"given"` or `"signs"`.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Auto => "auto",
             Self::Parity { .. } => "parity",
             Self::Given => "given",
+            Self::Signs => "signs",
         }
     }
 }
@@ -121,8 +132,9 @@ pub struct Orientation<T> {
     pub normals: Vec<[T; 3]>,
     /// `(N,)` in 0..1: how clearly the evidence round a point speaks for its sign. 1: the point and
     /// those round it lie between open air and enclosed matter; about 0.2 where a gap in the sampling
-    /// lets light in; 0: nothing speaks for it. Given normals have 1; with parity it is 1 where the
-    /// parities of the two directions differ, as they must on a closed surface, else 0.
+    /// lets light in; 0: nothing speaks for it. Given normals have 1; given sides the cosine between normal
+    /// and axis; with parity it is 1 where the parities of the two directions differ, as they must on a
+    /// closed surface, else 0.
     pub confidence: Vec<T>,
     /// Number of axes whose sign was changed.
     pub flipped: usize,
@@ -219,7 +231,7 @@ pub enum Error {
 /// number of threads.
 ///
 /// # Errors
-/// [`Method::Given`] without normals; a number of vectors that is not the number of points; a vector
+/// [`Method::Given`] or [`Method::Signs`] without normals; a number of vectors that is not the number of points; a vector
 /// that is zero or not finite; parity options out of range, or a cloud of duplicates for parity.
 pub fn forward<T: Real>(
     points: &[[T; 3]],
@@ -247,10 +259,13 @@ pub fn forward<T: Real>(
     out.normals.extend_from_slice(axes);
     out.confidence.resize(axes.len(), T::zero());
     match method {
-        Method::Parity(options) => by_parity(neighborhoods, options, scratch, out)?,
-        _ => automatically(neighborhoods, scratch, out),
+        Method::Parity(options) => by_parity(neighborhoods, options, scratch, out),
+        Method::Signs => by_given_sides(given, out),
+        Method::Auto | Method::Given => {
+            automatically(neighborhoods, scratch, out);
+            Ok(())
+        }
     }
-    Ok(())
 }
 
 fn check_count<T>(points: &[T], vectors: &[T], kind: &'static str) -> Result<(), Error> {
@@ -276,6 +291,26 @@ fn take_given<T: Real>(given: &[[T; 3]], out: &mut Orientation<T>) -> Result<(),
     }
     out.confidence.resize(given.len(), T::one());
     out.method = MethodUsed::Given;
+    out.decided.given = given.len();
+    Ok(())
+}
+
+/// Turns every axis to the side of the given normal.
+fn by_given_sides<T: Real>(
+    given: Option<&[[T; 3]]>,
+    out: &mut Orientation<T>,
+) -> Result<(), Error> {
+    let given = given.ok_or(Error::NoNormals)?;
+    check_count(&out.normals, given, "normals")?;
+    for (index, &normal) in given.iter().enumerate() {
+        let normal = vector::normalized(normal).ok_or(Error::NoDirection {
+            index,
+            kind: "the normal",
+        })?;
+        let cosine = vector::dot(out.normals[index], normal).f64();
+        out.set_sign(index, cosine < 0.0, cosine.abs().min(1.0));
+    }
+    out.method = MethodUsed::Signs;
     out.decided.given = given.len();
     Ok(())
 }

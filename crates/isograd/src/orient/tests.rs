@@ -400,6 +400,59 @@ fn given_normals_are_made_unit_and_trusted() {
 }
 
 #[test]
+fn axes_turn_to_the_side_of_given_normals_and_keep_their_direction() {
+    let (points, normals) = sphere(300, ORIGIN, 1.0, 7);
+    let neighborhoods = neighborhoods(&points);
+    let axes = axes(&neighborhoods);
+    // Wrong by up to 80 degrees, of any length, and pointing inward: their side is what counts.
+    let given: Vec<_> = (0..300)
+        .map(|i| {
+            let across = vector::cross(normals[i], [0.3, 0.5, 0.7]);
+            let off = add(normals[i], scale(across, 4.0));
+            scale(off, -((i + 1) as f64))
+        })
+        .collect();
+    let (mut scratch, mut out) = (Scratch::default(), Orientation::default());
+    let mut turn = |given: Option<&[[f64; 3]]>| {
+        let method = &Method::Signs;
+        forward(
+            &points,
+            &axes,
+            &neighborhoods,
+            given,
+            method,
+            &mut scratch,
+            &mut out,
+        )
+        .map(|()| out.clone())
+    };
+    let turned = turn(Some(&given)).unwrap();
+    let mut flipped = 0;
+    for i in 0..300 {
+        let is_flipped = turned.normals[i] != axes[i];
+        flipped += usize::from(is_flipped);
+        assert!(!is_flipped || turned.normals[i] == scale(axes[i], -1.0));
+        let cosine = dot(turned.normals[i], vector::normalized(given[i]).unwrap());
+        assert!((cosine - turned.confidence[i]).abs() < 1e-15 && cosine > 0.0);
+        assert!(dot(turned.normals[i], normals[i]) < 0.0, "inward");
+    }
+    assert_eq!((turned.flipped, turned.decided.given), (flipped, 300));
+    assert_eq!(turned.method.name(), "signs");
+    assert_eq!(turn(None).unwrap_err(), Error::NoNormals);
+    let mut broken = given.clone();
+    broken[9] = [0.0; 3];
+    let kind = "the normal";
+    assert_eq!(
+        turn(Some(&broken)).unwrap_err(),
+        Error::NoDirection { index: 9, kind }
+    );
+    assert!(matches!(
+        turn(Some(&given[1..])),
+        Err(Error::Count { vectors: 299, .. })
+    ));
+}
+
+#[test]
 fn axes_without_a_direction_are_refused() {
     let (points, mut axes) = sphere(50, ORIGIN, 1.0, 7);
     axes[3] = [0.0; 3];

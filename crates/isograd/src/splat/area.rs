@@ -17,15 +17,15 @@
 //! d̄_j = ā_i a_i² · 12/(π R_i⁴) · (1 − r_j²/R_i²) d_j
 //! x̄_j += d̄_j,   x̄_i −= Σ_j d̄_j
 //! ```
-//! `K` and its derivative are 0 at the radius, so samples enter and leave smoothly.
+//! `K` and its derivative are 0 at the radius, so samples enter and leave smoothly. [`pullback`] gathers.
 //!
 //! # Not differentiable
 //! The radii and what is isolated, which are held constant.
 
 use rayon::prelude::*;
 
-use crate::Real;
 use crate::neighbors::{Candidates, LANES, Lanes, Neighborhoods};
+use crate::{Real, vector};
 
 /// Buffers that are used again.
 #[derive(Clone, Debug, Default)]
@@ -109,6 +109,85 @@ fn kernel_terms<T: Real>(center: [T; 3], scale: T, lanes: &Lanes<T>) -> [T; LANE
         };
     }
     terms
+}
+
+/// Buffers of the pullback.
+#[derive(Clone, Debug, Default)]
+pub struct PullbackScratch<T> {
+    /// `ā_i a_i² · 12/(π R_i⁴)`, in input order and in that of the cells, 0 there for grown radii.
+    factors: Vec<T>,
+    sorted_factors: Vec<T>,
+    sorted: Vec<[T; 3]>,
+}
+
+/// Adds to the `(N, 3)` `points_bar` what the cotangents `areas_bar` `(N,)` of the areas mean for the points.
+/// `neighborhoods` and `areas` are those of [`forward`]; all in input order.
+pub fn pullback<T: Real>(
+    neighborhoods: &Neighborhoods<T>,
+    areas: &[T],
+    areas_bar: &[T],
+    scratch: &mut PullbackScratch<T>,
+    points_bar: &mut [[T; 3]],
+) {
+    let PullbackScratch {
+        factors,
+        sorted_factors,
+        sorted,
+    } = scratch;
+    let factor = |i: usize| {
+        let square = neighborhoods.radius[i] * neighborhoods.radius[i];
+        let share = areas[i] / square;
+        T::of(12.0) * T::FRAC_1_PI() * areas_bar[i] * share * share
+    };
+    let samples = (0..areas.len()).into_par_iter();
+    samples.map(factor).collect_into_vec(factors);
+    let common = |&i: &u32| match neighborhoods.has_grown(i as usize) {
+        true => T::zero(),
+        false => factors[i as usize],
+    };
+    let order = neighborhoods.index.order().par_iter();
+    order.map(common).collect_into_vec(sorted_factors);
+    let (arch, radius) = (pulp::Arch::new(), neighborhoods.common_radius);
+    let own = &*sorted_factors;
+    neighborhoods.add_gathered([own], sorted, points_bar, &|position, point, candidates| {
+        crate::simd::dispatch(
+            arch,
+            #[inline(always)]
+            || gather(point, own[position], radius, candidates),
+        )
+    });
+    let factors = &*factors;
+    neighborhoods.add_from_grown(points_bar, &|i, _, offset| {
+        let square = neighborhoods.radius[i] * neighborhoods.radius[i];
+        let rise = T::one() - vector::norm_squared(offset) / square;
+        vector::scale(offset, factors[i] * rise.max(T::zero()))
+    });
+}
+
+/// `−Σ_c (f_k + f_c)(1 − r_c²/R²) d_c`: what point `k` gets as a centre, and as a neighbour of the others.
+#[inline(always)]
+fn gather<T: Real>(center: [T; 3], own: T, radius: T, candidates: &Candidates<T, 1>) -> [T; 3] {
+    let scale = T::one() / (radius * radius);
+    let mut sums = [[T::zero(); LANES]; 3];
+    candidates.for_each_lanes(
+        radius,
+        #[inline(always)]
+        |lanes| {
+            for l in 0..LANES {
+                let [x, y, z] = [0, 1, 2].map(|a| lanes.point[a][l] - center[a]);
+                let d2 = x * x + y * y + z * z;
+                let f = if d2 <= lanes.limit[l] {
+                    (own + lanes.values[0][l]) * (T::one() - d2 * scale)
+                } else {
+                    T::zero()
+                };
+                sums[0][l] -= f * x;
+                sums[1][l] -= f * y;
+                sums[2][l] -= f * z;
+            }
+        },
+    );
+    sums.map(|sum| sum.into_iter().sum())
 }
 
 #[cfg(test)]

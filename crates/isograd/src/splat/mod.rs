@@ -17,7 +17,8 @@
 //!
 //! # Pullback
 //! `V̄_d = D_dᵀ b̄`, then a gather per sample: `n̄_i = Σ_o α V̄_o a_i/h²`, `ā_i = Σ_o α V̄_o·n_i/h²`,
-//! `x̂̄_i = Σ_o ∇α (V̄_o·n_i) a_i/h²` in index coordinates `x̂ = (x − lower)/h`.
+//! `x̂̄_i = Σ_o ∇α (V̄_o·n_i) a_i/h²` in index coordinates `x̂ = (x − lower)/h`. As in the forward map, `V̄` is
+//! never stored: [`pullback`] gathers from 5×5×5 cells of `b̄`.
 //!
 //! # Not differentiable
 //! With [`Weights::BSpline`], nothing: `b` is continuously differentiable in the points. With
@@ -26,6 +27,7 @@
 
 pub mod area;
 mod order;
+mod pullback;
 mod stencil;
 #[cfg(test)]
 mod tests;
@@ -36,6 +38,7 @@ use rayon::prelude::*;
 use crate::{Field, Grid, Real, simd, vector};
 pub use order::Scratch;
 use order::central_cell;
+pub use pullback::{PullbackScratch, SampleCotangent, pullback};
 use stencil::{REACH, Term, WIDTH};
 
 /// Planes across x that one task owns.
@@ -95,38 +98,33 @@ pub enum Error {
     },
 }
 
-/// Oriented samples, as the stage takes them.
-#[derive(Clone, Copy)]
-struct Samples<'a, T> {
-    points: &'a [[T; 3]],
-    normals: &'a [[T; 3]],
-    areas: &'a [T],
+/// Oriented samples.
+#[derive(Clone, Copy, Debug)]
+pub struct Samples<'a, T> {
+    /// `(N, 3)` points, in the user's unit.
+    pub points: &'a [[T; 3]],
+    /// `(N, 3)` outward unit normals.
+    pub normals: &'a [[T; 3]],
+    /// `(N,)` areas, in that unit squared.
+    pub areas: &'a [T],
 }
 
-/// Writes `b` on the grid of `b`, whose old values are lost: `(N, 3)` points in the user's unit, `(N, 3)`
-/// outward unit normals and `(N,)` areas in that unit squared (all 1 for no area weights: `χ` is then
-/// scaled, not changed in shape, where the samples are even).
+/// Writes `b` on the grid of `b`, whose old values are lost. Areas are all 1 for no area weights: `χ` is then
+/// scaled, not changed in shape, where the samples are even.
 ///
 /// # Errors
 /// As [`Error`] lists; `b` is then left as it was.
 pub fn forward<T: Real>(
-    points: &[[T; 3]],
-    normals: &[[T; 3]],
-    areas: &[T],
+    samples: Samples<'_, T>,
     weights: Weights,
     scratch: &mut Scratch,
     residual: &mut Residual,
     b: &mut Field<T>,
 ) -> Result<(), Error> {
-    let samples = Samples {
-        points,
-        normals,
-        areas,
-    };
     samples.check()?;
     let grid = *b.grid();
     residual.weights = weights;
-    scratch.sort(points, &grid, &mut residual.order)?;
+    scratch.sort(samples.points, &grid, &mut residual.order)?;
     let [nx, ny, nz] = grid.shape();
     let (arch, scratch, residual) = (Arch::new(), &*scratch, &*residual);
     b.values_mut()

@@ -1,8 +1,10 @@
 //! Samples in the order of the grid, so that neighbours in memory are neighbours in space.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
-use super::{Error, stencil::REACH};
+use super::{Error, Residual, stencil::REACH};
 use crate::parallel::CHUNK;
 use crate::{Grid, Real};
 
@@ -49,7 +51,7 @@ impl Scratch {
     }
 
     /// Range in the sorted order of the samples whose central cell is in planes `from..to`.
-    pub(super) fn planes(&self, from: usize, to: usize, ny: usize) -> std::ops::Range<usize> {
+    pub(super) fn planes(&self, from: usize, to: usize, ny: usize) -> Range<usize> {
         let end = |plane: usize| match plane * ny {
             0 => 0,
             rows => self.ends[rows - 1] as usize,
@@ -84,6 +86,24 @@ impl Scratch {
             }),
             None => Ok(()),
         }
+    }
+}
+
+impl Residual {
+    /// The samples whose central cell is in these planes across x, in sorted order.
+    pub(crate) fn in_planes<T: Real>(
+        &self,
+        points: &[[T; 3]],
+        grid: &Grid<T>,
+        planes: Range<usize>,
+    ) -> &[u32] {
+        let plane = |&i: &u32| {
+            let cell = central_cell(grid.shape(), grid.to_index(points[i as usize]));
+            cell.map_or(0, |[plane, _, _]| plane)
+        };
+        let start = self.order.partition_point(|i| plane(i) < planes.start);
+        let end = self.order.partition_point(|i| plane(i) < planes.end);
+        &self.order[start..end]
     }
 }
 

@@ -1,10 +1,11 @@
 //! What one sample adds to the cells round it: small pure functions.
 //!
 //! Along each axis, weights on 3 cells become 5 numbers under the mass `M` and 5 under the derivative
-//! `D`; the sample's part of `b` is made of products of those.
+//! `D`; the sample's part of `b` is made of products of those. Backwards, the same products gather.
 
 use super::Weights;
 use crate::Real;
+use crate::vector::dot;
 
 /// Cells along each axis to which one sample contributes.
 pub(super) const WIDTH: usize = 5;
@@ -69,6 +70,114 @@ pub(super) fn for_each_term<T: Real>(
     }
 }
 
+/// 5³ cells round the central cell of a sample.
+pub(super) type Block<T> = [[[T; WIDTH]; WIDTH]; WIDTH];
+
+/// What the cells round a sample hold for it, in index space.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Gathered<T> {
+    /// Cotangent of the vector that was spread.
+    pub spread: [T; 3],
+    /// Cotangent of the sample's index coordinates.
+    pub gradient: [T; 3],
+}
+
+/// The pullback of [`for_each_term`], summed over the cells: from their cotangents to those of the vector
+/// and the offset.
+#[inline(always)]
+pub(super) fn gather<T: Real>(
+    weights: Weights,
+    vector: [T; 3],
+    f: [T; 3],
+    block: &Block<T>,
+) -> Gathered<T> {
+    match weights {
+        Weights::BSpline => gather_product(
+            vector,
+            f.map(quadratic_bspline),
+            f.map(quadratic_bspline_slope),
+            block,
+        ),
+        Weights::Paper => gather_paper(vector, f, block),
+    }
+}
+
+/// `(P + extra · C)/total`, by the rule of quotients: `P` spreads by the product of hats, `C` into the
+/// central cell.
+#[inline(always)]
+fn gather_paper<T: Real>(vector: [T; 3], f: [T; 3], block: &Block<T>) -> Gathered<T> {
+    let (weights, slopes) = (f.map(hat), f.map(hat_slope));
+    let sum = |w: [T; 3]| w[0] + w[1] + w[2];
+    let (sums, sum_slopes) = (weights.map(sum), slopes.map(sum));
+    let extra = T::of(0.5) - weights[0][1] * weights[1][1] * weights[2][1];
+    let total = sums[0] * sums[1] * sums[2] + extra;
+    let centre = [T::zero(), T::one(), T::zero()];
+    let product = gather_product(vector, weights, slopes, block);
+    let central = gather_product(vector, [centre; 3], [[T::zero(); 3]; 3], block);
+    let spread: [T; 3] =
+        std::array::from_fn(|d| (product.spread[d] + extra * central.spread[d]) / total);
+    let (whole, of_centre) = (dot(vector, spread), dot(vector, central.spread));
+    let gradient = std::array::from_fn(|a| {
+        let others = |values: [T; 3]| values[(a + 1) % 3] * values[(a + 2) % 3];
+        let extra_slope = -slopes[a][1] * others(weights.map(|w| w[1]));
+        let total_slope = sum_slopes[a] * others(sums) + extra_slope;
+        (product.gradient[a] + extra_slope * of_centre - whole * total_slope) / total
+    });
+    Gathered { spread, gradient }
+}
+
+/// The same where the weights are a product, with these slopes.
+#[inline(always)]
+fn gather_product<T: Real>(
+    v: [T; 3],
+    weights: [[T; 3]; 3],
+    slopes: [[T; 3]; 3],
+    block: &Block<T>,
+) -> Gathered<T> {
+    // Under the mass and under the derivative: the weights, and their slopes in the offset.
+    let (m, s) = (weights.map(mass), weights.map(slope));
+    let (dm, ds) = (slopes.map(mass), slopes.map(slope));
+    let mut out = Gathered::default();
+    for i in 0..WIDTH {
+        // Sums over z and y, named by the factors along y and z.
+        let [mut mm, mut sm, mut ms] = [T::zero(); 3];
+        let [mut dm_m, mut ds_m, mut dm_s] = [T::zero(); 3];
+        let [mut m_dm, mut s_dm, mut m_ds] = [T::zero(); 3];
+        for j in 0..WIDTH {
+            let row = &block[i][j];
+            let (zm, zs) = (along(row, &m[2]), along(row, &s[2]));
+            let (zdm, zds) = (along(row, &dm[2]), along(row, &ds[2]));
+            mm += m[1][j] * zm;
+            sm += s[1][j] * zm;
+            ms += m[1][j] * zs;
+            dm_m += dm[1][j] * zm;
+            ds_m += ds[1][j] * zm;
+            dm_s += dm[1][j] * zs;
+            m_dm += m[1][j] * zdm;
+            s_dm += s[1][j] * zdm;
+            m_ds += m[1][j] * zds;
+        }
+        let (mi, si, dmi, dsi) = (m[0][i], s[0][i], dm[0][i], ds[0][i]);
+        out.spread[0] += si * mm;
+        out.spread[1] += mi * sm;
+        out.spread[2] += mi * ms;
+        out.gradient[0] += v[0] * dsi * mm + dmi * (v[1] * sm + v[2] * ms);
+        out.gradient[1] += v[0] * si * dm_m + mi * (v[1] * ds_m + v[2] * dm_s);
+        out.gradient[2] += v[0] * si * m_dm + mi * (v[1] * s_dm + v[2] * m_ds);
+    }
+    out
+}
+
+/// `Σ_k row_k weight_k`.
+#[inline(always)]
+fn along<T: Real>(row: &[T; WIDTH], weight: &[T; WIDTH]) -> T {
+    let mut sum = T::zero();
+    for k in 0..WIDTH {
+        sum += row[k] * weight[k];
+    }
+    sum
+}
+
 /// Weights of the quadratic B-spline on the cell below, the central cell and the cell above.
 #[inline(always)]
 pub(super) fn quadratic_bspline<T: Real>(f: T) -> [T; 3] {
@@ -81,6 +190,13 @@ pub(super) fn quadratic_bspline<T: Real>(f: T) -> [T; 3] {
     ]
 }
 
+/// Derivatives of [`quadratic_bspline`].
+#[inline(always)]
+pub(super) fn quadratic_bspline_slope<T: Real>(f: T) -> [T; 3] {
+    let half = T::of(0.5);
+    [f - half, -(f + f), half + f]
+}
+
 /// `½ max(0, 1 − |Δ|/2)` on the cell below, the central cell and the cell above (paper, eq.
 /// `alpha_product`, not normalised); `Δ` is the distance to the cell's centre in cells.
 #[inline(always)]
@@ -88,6 +204,20 @@ pub(super) fn hat<T: Real>(f: T) -> [T; 3] {
     let half = T::of(0.5);
     [-T::one(), T::zero(), T::one()]
         .map(|centre| half * (T::one() - half * (f - centre).abs()).max(T::zero()))
+}
+
+/// Derivatives of [`hat`]; 0 for the central cell at its centre, where there is none.
+#[inline(always)]
+pub(super) fn hat_slope<T: Real>(f: T) -> [T; 3] {
+    let quarter = T::of(0.25);
+    let central = if f > T::zero() {
+        -quarter
+    } else if f < T::zero() {
+        quarter
+    } else {
+        T::zero()
+    };
+    [-quarter, central, quarter]
 }
 
 /// `M u`, with `M = (1, 4, 1)/6`.

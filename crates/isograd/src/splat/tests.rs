@@ -13,10 +13,21 @@ fn unit_noise(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
+#[derive(Clone)]
 struct Cloud {
     points: Vec<[f64; 3]>,
     normals: Vec<[f64; 3]>,
     areas: Vec<f64>,
+}
+
+impl Cloud {
+    fn samples(&self) -> Samples<'_, f64> {
+        Samples {
+            points: &self.points,
+            normals: &self.normals,
+            areas: &self.areas,
+        }
+    }
 }
 
 /// Samples anywhere in the allowed part of the grid, with any vectors and areas.
@@ -42,10 +53,14 @@ fn splat<T: Real>(grid: &Grid<f64>, cloud: &Cloud, weights: Weights) -> Vec<f64>
     let areas: Vec<T> = cloud.areas.iter().map(|&a| T::of(a)).collect();
     // What was there before must not matter.
     let mut b = Field::new(grid, vec![T::of(f64::NAN); grid.cells()]).expect("sizes match");
+    let (points, normals) = (cast(&cloud.points), cast(&cloud.normals));
+    let samples = Samples {
+        points: &points,
+        normals: &normals,
+        areas: &areas,
+    };
     forward(
-        &cast(&cloud.points),
-        &cast(&cloud.normals),
-        &areas,
+        samples,
         weights,
         &mut Scratch::default(),
         &mut Residual::default(),
@@ -244,15 +259,8 @@ fn scratch_and_residual_can_be_used_again() {
     let mut b = Field::zeros(grid);
     for (count, seed) in [(300, 5), (0, 6), (40, 7)] {
         let cloud = random_cloud(&grid, count, seed);
-        let Cloud {
-            points,
-            normals,
-            areas,
-        } = &cloud;
         forward(
-            points,
-            normals,
-            areas,
+            cloud.samples(),
             Weights::Paper,
             &mut scratch,
             &mut residual,
@@ -288,25 +296,13 @@ fn bad_input_is_refused_with_its_index_and_leaves_the_field_alone() {
     let refused = |point: [f64; 3], normal: f64, area: f64, grid: &Grid<f64>| {
         let mut b = Field::zeros(*grid);
         b.values_mut().fill(7.0);
-        let (mut points, mut normals, mut areas) = (
-            good.points.clone(),
-            good.normals.clone(),
-            good.areas.clone(),
-        );
-        points[2500] = point;
-        normals[2500][1] = normal;
-        areas[2500] = area;
+        let mut cloud = good.clone();
+        cloud.points[2500] = point;
+        cloud.normals[2500][1] = normal;
+        cloud.areas[2500] = area;
         let (mut scratch, mut residual) = (Scratch::default(), Residual::default());
         let w = Weights::BSpline;
-        let error = forward(
-            &points,
-            &normals,
-            &areas,
-            w,
-            &mut scratch,
-            &mut residual,
-            &mut b,
-        );
+        let error = forward(cloud.samples(), w, &mut scratch, &mut residual, &mut b);
         assert!(b.values().iter().all(|&v| v == 7.0));
         error.expect_err("refused").to_string()
     };
@@ -324,15 +320,12 @@ fn bad_input_is_refused_with_its_index_and_leaves_the_field_alone() {
     assert!(refused([1.0; 3], 0.0, 1.0, &tiny).contains("point 0"));
     let (mut scratch, mut residual) = (Scratch::default(), Residual::default());
     let mut b = Field::zeros(grid);
-    let count = forward(
-        &[inside],
-        &[],
-        &[1.0],
-        Weights::Paper,
-        &mut scratch,
-        &mut residual,
-        &mut b,
-    );
+    let samples = Samples {
+        points: &[inside],
+        normals: &[],
+        areas: &[1.0],
+    };
+    let count = forward(samples, Weights::Paper, &mut scratch, &mut residual, &mut b);
     assert!(
         count
             .expect_err("refused")

@@ -50,17 +50,11 @@ pub(super) fn fit(radius: f64, neighbors: &mut [Neighbor]) -> Fit {
         mean = add(mean, scale(n.offset, n.weight));
     }
     let mean = scale(mean, 1.0 / weight);
-    let mut covariance = [0.0; 6];
     for n in &mut *neighbors {
         n.weight /= weight;
         n.offset = sub(n.offset, mean);
-        let [x, y, z] = n.offset;
-        let products = [x * x, y * y, z * z, y * z, x * z, x * y];
-        for k in 0..6 {
-            covariance[k] += n.weight * products[k];
-        }
     }
-    let tilt = tilt(covariance, mean);
+    let tilt = regularized(covariance(neighbors), mean, mean).unwrap_or_default();
     for n in neighbors {
         n.correction = -n.weight * dot(tilt, n.offset);
     }
@@ -72,18 +66,31 @@ pub(super) fn fit(radius: f64, neighbors: &mut [Neighbor]) -> Fit {
     }
 }
 
-/// `s = (C + ε I)⁻¹ m`, `C` given as `xx, yy, zz, yz, xz, xy`; 0 where all samples coincide.
-fn tilt(mut c: [f64; 6], m: [f64; 3]) -> [f64; 3] {
+/// `C` as `xx, yy, zz, yz, xz, xy`, of neighbours with weights `p_j` and offsets `e_j`.
+pub(super) fn covariance(neighbors: &[Neighbor]) -> [f64; 6] {
+    let mut covariance = [0.0; 6];
+    for n in neighbors {
+        let [x, y, z] = n.offset;
+        let products = [x * x, y * y, z * z, y * z, x * z, x * y];
+        for k in 0..6 {
+            covariance[k] += n.weight * products[k];
+        }
+    }
+    covariance
+}
+
+/// `(C + ε I)⁻¹ b`, with the `ε` of `C` and `m`; none where all samples coincide.
+pub(super) fn regularized(mut c: [f64; 6], m: [f64; 3], b: [f64; 3]) -> Option<[f64; 3]> {
     let trace = c[0] + c[1] + c[2];
     let distance = norm_squared(m) / trace;
     let ridge = trace * (NOISE + FADING * distance * distance);
     if !(ridge > 0.0) || !ridge.is_finite() {
-        return [0.0; 3];
+        return None;
     }
     for k in 0..3 {
         c[k] += ridge;
     }
-    solve(c, m)
+    Some(solve(c, b))
 }
 
 /// Solves `A x = b` for a symmetric positive definite `A`, by its Cholesky factors.

@@ -78,7 +78,10 @@ pub fn forward<T: Real>(
     Ok(())
 }
 
-fn check_samples<T: Real>(samples: Samples<'_, T>, attribute: &Attribute<T>) -> Result<(), Error> {
+pub(super) fn check_samples<T: Real>(
+    samples: Samples<'_, T>,
+    attribute: &Attribute<T>,
+) -> Result<(), Error> {
     let (count, areas) = (samples.neighborhoods.index.len(), samples.areas);
     let (values, components) = (&attribute.values, attribute.components);
     let expected = count.checked_mul(components);
@@ -105,7 +108,7 @@ fn check_samples<T: Real>(samples: Samples<'_, T>, attribute: &Attribute<T>) -> 
     }
 }
 
-fn check_faces<T: Real>(surface: Surface<'_, T>, cells: &[u32]) -> Result<(), Error> {
+pub(super) fn check_faces<T: Real>(surface: Surface<'_, T>, cells: &[u32]) -> Result<(), Error> {
     let face = |&cell: &u32| surface.closest[cell as usize];
     let missing = |face: &u32| *face as usize >= surface.mesh.faces().len();
     match cells.par_iter().map(face).find_first(missing) {
@@ -197,37 +200,47 @@ fn gather<T: Real>(
     workspace: &mut Workspace<T>,
 ) -> f64 {
     let Workspace { neighbors, nearest } = workspace;
-    let Samples {
-        neighborhoods,
-        areas,
-    } = samples;
-    let (index, position) = (&neighborhoods.index, neighborhoods.position());
-    let y = to_f64(vertex);
-    let mut collect = |radius: T| {
-        let radius = radius.f64();
-        neighbors.clear();
-        let mut enough = 0;
-        index.for_each_within(vertex, T::of(radius), |j, _| {
-            let x = to_f64(index.point(position[j] as usize));
-            let offset = scale(sub(x, y), 1.0 / radius);
-            let squared = crate::vector::norm_squared(offset);
-            enough += usize::from(squared <= 1.0 / (REACH * REACH));
-            neighbors.push(Neighbor {
-                sample: j as u32,
-                offset,
-                weight: (areas[j].f64() + smallest_area) * fit::kernel(squared),
-                correction: 0.0,
-            });
-        });
-        enough
-    };
-    let common = neighborhoods.common_radius;
+    let index = &samples.neighborhoods.index;
+    let common = samples.neighborhoods.common_radius;
+    let mut collect = |radius| collect(samples, smallest_area, vertex, radius, neighbors);
     if collect(common) >= ENOUGH.min(index.len()) {
         return common.f64();
     }
     let radius = grown_radius(index, vertex, common, nearest);
     collect(radius);
     radius.f64()
+}
+
+/// Collects the samples within a radius of a vertex with their weights `w_j`, in an order that depends on
+/// the samples alone. Returns how many are well within.
+pub(super) fn collect<T: Real>(
+    samples: Samples<'_, T>,
+    smallest_area: f64,
+    vertex: [T; 3],
+    radius: T,
+    neighbors: &mut Vec<Neighbor>,
+) -> usize {
+    let Samples {
+        neighborhoods,
+        areas,
+    } = samples;
+    let (index, position) = (&neighborhoods.index, neighborhoods.position());
+    let (y, reach) = (to_f64(vertex), radius.f64());
+    neighbors.clear();
+    let mut enough = 0;
+    index.for_each_within(vertex, radius, |j, _| {
+        let x = to_f64(index.point(position[j] as usize));
+        let offset = scale(sub(x, y), 1.0 / reach);
+        let squared = crate::vector::norm_squared(offset);
+        enough += usize::from(squared <= 1.0 / (REACH * REACH));
+        neighbors.push(Neighbor {
+            sample: j as u32,
+            offset,
+            weight: (areas[j].f64() + smallest_area) * fit::kernel(squared),
+            correction: 0.0,
+        });
+    });
+    enough
 }
 
 /// `max(R, min(1.5 r₆, 1.05 r₆₄))`.

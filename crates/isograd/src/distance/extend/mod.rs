@@ -32,7 +32,7 @@
 //! the pullback takes the inputs again, and [`Extension::cells`].
 //!
 //! # Pullback
-//! From cells to vertices, `ū_k += β_k ū_cell`. To the attribute, exact since the map is linear:
+//! [`pullback`]. From cells to vertices, `ū_k += β_k ū_cell`. To the attribute, exact since the map is linear:
 //! ```text
 //! v̄_j += Σ_v p_j t_j ū_v
 //! ```
@@ -53,15 +53,22 @@
 //!
 //! # Not differentiable
 //! `R_v` and `a₀` are held constant. Which cells are in the band, which triangle is closest and which of its
-//! features: values jump on the medial axis, and their slopes jump from feature to feature.
+//! features: values jump on the medial axis, and their slopes jump from feature to feature. A triangle much
+//! thinner than a cell turns without bound when a corner moves: the direction in which it is thinner than `√ε`
+//! cells (`ε` of the number type) is left out. Where all samples round a vertex coincide, the fit has no slope,
+//! and none is differentiated. [`Cotangent::guarded`] counts both.
 
 mod fit;
+mod fit_pullback;
 mod forward;
+mod pullback;
+mod shares;
 #[cfg(test)]
 mod tests;
 
 pub use fit::Fit;
 pub use forward::{Scratch, forward};
+pub use pullback::{Cotangent, pullback};
 
 use super::NO_TRIANGLE;
 use crate::neighbors::Neighborhoods;
@@ -180,6 +187,28 @@ pub enum Error {
     Face {
         /// The face.
         face: u32,
+    },
+    /// What the pullback was given does not fit together.
+    #[error(
+        "{what} has {length} entries and must have {expected}; give the inputs and outputs of one call of the forward map, and cotangents of its outputs"
+    )]
+    Mismatch {
+        /// The array.
+        what: &'static str,
+        /// Its length.
+        length: usize,
+        /// The right length.
+        expected: usize,
+    },
+    /// A cell of the band that the grid does not have.
+    #[error(
+        "the band lists cell {cell} of a grid of {cells} cells; take the extension and the grid from one call"
+    )]
+    Cell {
+        /// The cell.
+        cell: u32,
+        /// Cells of the grid.
+        cells: usize,
     },
     /// An array that is to be written has the wrong length.
     #[error("an array of {length} numbers was given for {expected}")]

@@ -6,6 +6,7 @@
 mod block;
 mod cull;
 mod kernels;
+mod pullback;
 mod sites;
 mod task;
 mod workspace;
@@ -17,6 +18,7 @@ use super::Error;
 use super::bvh::Bvh;
 use crate::{Field, Grid, Mesh, Real};
 use block::{BLOCK, Block};
+pub use pullback::{PullbackScratch, pullback};
 use sites::Sites;
 use task::{Output, Task};
 use workspace::Pool;

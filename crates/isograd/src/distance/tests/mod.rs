@@ -3,6 +3,7 @@
 mod explore;
 mod lattice;
 mod query;
+mod query_pullback;
 mod triangle;
 
 use super::triangle::{Closest, closest_point};

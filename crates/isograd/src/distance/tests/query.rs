@@ -182,6 +182,8 @@ fn points_that_are_not_numbers_hit_nothing_and_harm_no_one() {
     let mut mixed = good.clone();
     mixed.extend([
         [f64::NAN, 0.0, 0.0],
+        [f64::NAN; 3],
+        [0.0, f64::NEG_INFINITY, f64::NAN],
         [0.0, f64::INFINITY, 0.0],
         [1e200, 0.0, 0.0],
     ]);

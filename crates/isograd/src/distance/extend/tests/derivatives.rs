@@ -1,7 +1,9 @@
 //! The formulas of the pullback that the head of the stage promises, against finite differences.
 
 use super::super::fit::{self, FADING, NOISE, Neighbor};
+use super::super::fit_pullback::Adjoint;
 use super::*;
+use crate::distance::tangent::tangent;
 use crate::distance::triangle::{Feature, closest_point};
 use crate::vector::{add, dot, norm_squared, scale, sub};
 
@@ -170,6 +172,42 @@ fn printed_pullback_of_the_fit_agrees_with_finite_differences() {
     }
 }
 
+#[test]
+fn fast_pullback_of_the_fit_is_the_printed_one() {
+    for (seed, away) in [(1, 0.0), (2, 0.2), (3, 0.5), (4, 0.8), (5, 1.1)] {
+        let patch = Patch::new(seed, away);
+        let mut neighbors = patch.neighbors();
+        let mut contracted = patch.values.clone();
+        let adjoint = Adjoint::new(RADIUS, &mut neighbors, &mut contracted);
+        for (n, (point, area, value)) in neighbors.iter().zip(patch.pullback()) {
+            let j = n.sample as usize;
+            let share = adjoint.share(n, contracted[j], patch.areas[j]);
+            // The printed one solves by Cramer's rule, with a condition number of about 1e5.
+            let close =
+                |a: f64, b: f64| assert!((a - b).abs() <= 1e-9 * (1.0 + b.abs()), "{a} {b}");
+            close(share.value, value);
+            close(share.area, area);
+            for a in 0..3 {
+                close(share.offset[a] / RADIUS, point[a]);
+            }
+        }
+    }
+}
+
+#[test]
+fn samples_that_all_coincide_with_the_vertex_have_no_slope_to_differentiate() {
+    let mut patch = Patch::new(1, 0.0);
+    patch.points.fill(patch.vertex);
+    let (mut neighbors, mut contracted) = (patch.neighbors(), patch.values.clone());
+    let adjoint = Adjoint::new(RADIUS, &mut neighbors, &mut contracted);
+    assert!(adjoint.degenerate);
+    for (n, &q) in neighbors.iter().zip(&contracted) {
+        let share = adjoint.share(n, q, patch.areas[n.sample as usize]);
+        assert_eq!((share.offset, share.value), ([0.0; 3], n.weight));
+        assert!(share.area.is_finite());
+    }
+}
+
 /// Value at the point of a triangle that is closest to `q`.
 fn blended(q: [f64; 3], corners: [[f64; 3]; 3], values: [f64; 3]) -> f64 {
     dot(closest_point(q, corners).barycentric, values)
@@ -231,6 +269,14 @@ fn printed_pullback_of_the_closest_point_agrees_with_finite_differences() {
         }
         seen[closest.barycentric.iter().filter(|&&b| b > 0.0).count() - 1] += 1;
         let (q_bar, corner_bar) = blend_pullback(q, corners, u);
+        let fast = tangent(&closest, corners, u, 0.0);
+        for a in 0..3 {
+            // Rounding, times the condition of the face.
+            assert!((fast.query[a] - q_bar[a]).abs() <= 1e-11);
+            for k in 0..3 {
+                assert!((fast.corners[k][a] - corner_bar[k][a]).abs() <= 1e-11);
+            }
+        }
         for a in 0..3 {
             let moved = |t: f64| {
                 let mut q = q;

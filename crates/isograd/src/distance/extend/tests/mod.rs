@@ -3,6 +3,7 @@
 mod derivatives;
 mod oracle;
 mod properties;
+mod pullback;
 
 use super::{Error, Extension, Residual, Samples, Scratch, Surface, forward};
 use crate::data::{Attribute, Field, Grid, Mesh};

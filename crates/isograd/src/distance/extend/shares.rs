@@ -1,0 +1,211 @@
+//! What the samples get from the fits at the vertices.
+//!
+//! Every chunk of vertices adds up what it has for each sample that it sees; the samples then add up the
+//! chunks, in their order.
+
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+
+use super::fit::Neighbor;
+use super::fit_pullback::{Adjoint, Share};
+use super::forward::collect;
+use super::{Extension, Residual, Samples, Surface};
+use crate::Real;
+use crate::data::Attribute;
+use crate::gather::bounded;
+use crate::parallel::CHUNK;
+use crate::vector::{add, scale};
+
+/// All that is only read.
+#[derive(Clone, Copy)]
+pub(super) struct Inputs<'a, T> {
+    pub samples: Samples<'a, T>,
+    pub attribute: &'a Attribute<T>,
+    pub surface: Surface<'a, T>,
+    pub residual: &'a Residual<T>,
+    pub extension: &'a Extension<T>,
+    pub vertices_bar: Option<&'a [T]>,
+    pub values_bar: Option<&'a [T]>,
+}
+
+impl<T: Real> Inputs<'_, T> {
+    /// `ū_v` as it was given.
+    pub(super) fn start_bar(&self, vertex: usize, bar: &mut Vec<f64>) {
+        let components = self.attribute.components;
+        bar.clear();
+        match self.vertices_bar {
+            Some(given) => {
+                let own = &given[vertex * components..][..components];
+                bar.extend(own.iter().map(|u| u.f64()));
+            }
+            None => bar.resize(components, 0.0),
+        }
+    }
+
+    /// Adds what `ū` of a corner of the face of a cell gets: `β_k ū_cell`.
+    #[inline(always)]
+    pub(super) fn add_cell(&self, values_bar: &[T], b: usize, corner: usize, bar: &mut [f64]) {
+        let [_, y, z] = self.residual.barycentric[b].map(T::f64);
+        let weight = [1.0 - y - z, y, z][corner];
+        let of_cell = &values_bar[b * bar.len()..][..bar.len()];
+        for (bar, u) in bar.iter_mut().zip(of_cell) {
+            *bar += weight * u.f64();
+        }
+    }
+}
+
+/// What one thread needs for one chunk after the other.
+#[derive(Default)]
+pub(super) struct Workspace {
+    /// `ū_v` of the vertex at hand.
+    pub bar: Vec<f64>,
+    neighbors: Vec<Neighbor>,
+    /// `ū_v v_j` of each of them, then `q_j`.
+    contracted: Vec<f64>,
+    /// Sample → its slot in the chunk. Looked up only: its order has no part in the result.
+    slots: HashMap<u32, u32>,
+}
+
+/// What each sample gets from one chunk of vertices.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Shares {
+    /// Sample and slot, ascending.
+    order: Vec<(u32, u32)>,
+    /// By slot: 3 of the point, 1 of the area, and the components of the attribute.
+    sums: Vec<f64>,
+}
+
+/// Numbers of a slot before the attribute's.
+const FIXED: usize = 4;
+
+impl Shares {
+    pub(super) fn begin(&mut self, work: &mut Workspace) {
+        self.order.clear();
+        self.sums.clear();
+        work.slots.clear();
+    }
+
+    pub(super) fn finish(&mut self) {
+        self.order.sort_unstable();
+    }
+
+    /// Adds what the samples round a vertex get from `ū_v`, which is in `work.bar`, and returns what the vertex
+    /// itself gets.
+    pub(super) fn add_fit<T: Real>(
+        &mut self,
+        inputs: &Inputs<'_, T>,
+        vertex: usize,
+        work: &mut Workspace,
+        guarded: &mut usize,
+    ) -> [f64; 3] {
+        let Workspace {
+            bar,
+            neighbors,
+            contracted,
+            slots,
+        } = work;
+        if bar.iter().all(|u| *u == 0.0) {
+            return [0.0; 3];
+        }
+        let (samples, smallest_area) = (inputs.samples, inputs.residual.smallest_area);
+        let radius = inputs.residual.fits[vertex].radius;
+        let at = inputs.surface.mesh.vertices()[vertex];
+        collect(samples, smallest_area, at, T::of(radius), neighbors);
+        contracted.clear();
+        contracted.extend(neighbors.iter().map(|n| -> f64 {
+            let values = &inputs.attribute.values[n.sample as usize * bar.len()..];
+            bar.iter().zip(values).map(|(u, v)| u * v.f64()).sum()
+        }));
+        let adjoint = Adjoint::new(radius, neighbors, contracted);
+        *guarded += usize::from(adjoint.degenerate);
+        let mut of_vertex = [0.0; 3];
+        for (n, &q) in neighbors.iter().zip(&*contracted) {
+            let area = samples.areas[n.sample as usize].f64() + smallest_area;
+            let share = adjoint.share(n, q, area);
+            let of_point = scale(share.offset, 1.0 / radius);
+            of_vertex = add(of_vertex, scale(of_point, -1.0));
+            self.add(n.sample, of_point, share, bar, slots);
+        }
+        of_vertex
+    }
+
+    #[inline(always)]
+    fn add(
+        &mut self,
+        sample: u32,
+        of_point: [f64; 3],
+        share: Share,
+        bar: &[f64],
+        slots: &mut HashMap<u32, u32>,
+    ) {
+        let Self { order, sums } = self;
+        let stride = FIXED + bar.len();
+        let slot = *slots.entry(sample).or_insert_with(|| {
+            let slot = order.len() as u32;
+            order.push((sample, slot));
+            sums.resize(sums.len() + stride, 0.0);
+            slot
+        });
+        let sums = &mut sums[slot as usize * stride..][..stride];
+        let [x, y, z] = of_point;
+        for (sum, term) in sums.iter_mut().zip([x, y, z, share.area]) {
+            *sum += term;
+        }
+        for (sum, u) in sums[FIXED..].iter_mut().zip(bar) {
+            *sum += share.value * u;
+        }
+    }
+}
+
+/// Adds the chunks up for every sample. Overwrites the outputs, and returns how many numbers were out of range.
+pub(super) fn add_to_samples<T: Real>(
+    shares: &[Shares],
+    components: usize,
+    attribute: &mut [T],
+    points: &mut [[T; 3]],
+    areas: &mut [T],
+) -> usize {
+    let stride = FIXED + components;
+    let outputs = points
+        .par_chunks_mut(CHUNK)
+        .zip(areas.par_chunks_mut(CHUNK))
+        .zip(attribute.par_chunks_mut(CHUNK * components));
+    let chunks = outputs.enumerate();
+    chunks
+        .map_init(Vec::new, |sums, (chunk, ((points, areas), attribute))| {
+            sums.clear();
+            sums.resize(points.len() * stride, 0.0);
+            add_chunks(shares, chunk * CHUNK, stride, sums);
+            let mut guarded = 0;
+            let mut finite = |x: f64| bounded(x, &mut guarded);
+            let values = attribute.chunks_exact_mut(components);
+            for (k, (sums, values)) in sums.chunks_exact(stride).zip(values).enumerate() {
+                points[k] = [sums[0], sums[1], sums[2]].map(&mut finite);
+                areas[k] = finite(sums[3]);
+                for (value, &sum) in values.iter_mut().zip(&sums[FIXED..]) {
+                    *value = finite(sum);
+                }
+            }
+            guarded
+        })
+        .sum()
+}
+
+/// Adds up the shares of the samples from `first` on.
+fn add_chunks(shares: &[Shares], first: usize, stride: usize, sums: &mut [f64]) {
+    let end = first + sums.len() / stride;
+    for Shares { order, sums: parts } in shares {
+        let begin = order.partition_point(|&(sample, _)| (sample as usize) < first);
+        for &(sample, slot) in &order[begin..] {
+            if sample as usize >= end {
+                break;
+            }
+            let sums = &mut sums[(sample as usize - first) * stride..][..stride];
+            let part = &parts[slot as usize * stride..][..stride];
+            for (sum, part) in sums.iter_mut().zip(part) {
+                *sum += part;
+            }
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! Cotangents of the vertices to cotangents of the indicator, the level and the grid.
+
+use rayon::prelude::*;
+
+use super::crossing;
+use crate::data::{Field, GridCotangent, LatticeEdge, Mesh};
+use crate::{Real, parallel, vector};
+
+/// Planes across x that one task owns.
+const SLAB: usize = 8;
+
+/// Share of the range of `χ` that the difference along an edge counts as, where it is less: a vertex moves
+/// by no more than a million cells while the whole of `χ` passes.
+const SMALLEST_DIFFERENCE: f64 = 1e-6;
+
+/// What the vertices mean for the level and the grid.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LevelCotangent {
+    /// Cotangent of the level `c`.
+    pub level: f64,
+    /// Cotangent of the grid.
+    pub grid: GridCotangent<f64>,
+    /// Vertices on edges along which `χ` hardly changes: their derivative was bounded.
+    pub guarded: usize,
+}
+
+/// Adds to `chi_bar` (in memory order) what the cotangents `vertices_bar` `(V, 3)` of the vertices mean for
+/// the indicator, and returns what they mean for the level and the grid. `chi`, `level` and `mesh` are those
+/// of [`forward`](super::forward).
+pub fn pullback<T: Real>(
+    chi: &Field<T>,
+    level: T,
+    mesh: &Mesh<T>,
+    vertices_bar: &[[T; 3]],
+    chi_bar: &mut [T],
+) -> LevelCotangent {
+    let vertices = Vertices {
+        chi,
+        level,
+        edges: mesh.edges(),
+        bars: vertices_bar,
+        smallest: T::of(SMALLEST_DIFFERENCE) * range(chi.values()),
+    };
+    let plane = chi.grid().strides()[0];
+    let slabs = chi_bar.par_chunks_mut(SLAB * plane).enumerate();
+    slabs.for_each(|(task, slab)| vertices.add(task * SLAB * plane, plane, slab));
+    vertices.level(mesh)
+}
+
+/// Greatest value less least value.
+fn range<T: Real>(values: &[T]) -> T {
+    let none = || [T::infinity(), T::neg_infinity()];
+    let wider = |[low, high]: [T; 2], [l, h]: [T; 2]| [low.min(l), high.max(h)];
+    let [low, high] = values
+        .par_iter()
+        .fold(none, |ends, &v| wider(ends, [v, v]))
+        .reduce(none, wider);
+    high - low
+}
+
+struct Vertices<'a, T> {
+    chi: &'a Field<T>,
+    level: T,
+    edges: &'a [LatticeEdge],
+    bars: &'a [[T; 3]],
+    /// The least difference along an edge that is taken as it is.
+    smallest: T,
+}
+
+/// A vertex seen from its edge.
+struct OnEdge<T> {
+    /// The two cells.
+    cells: [usize; 2],
+    eta: T,
+    /// `s/(χ_q − χ_p)`, in which `s = ȳ·(q − p)`.
+    pull: T,
+    guarded: bool,
+}
+
+impl<T: Real> Vertices<'_, T> {
+    #[inline(always)]
+    fn on_edge(&self, vertex: usize) -> OnEdge<T> {
+        let (grid, values) = (self.chi.grid(), self.chi.values());
+        let (p, axis) = (self.edges[vertex].cell(), self.edges[vertex].axis());
+        let q = p + grid.strides()[axis];
+        let difference = values[q] - values[p];
+        let guarded = difference.abs() < self.smallest;
+        let bounded = if guarded {
+            self.smallest.copysign(difference)
+        } else {
+            difference
+        };
+        let s = self.bars[vertex][axis] * grid.spacing();
+        OnEdge {
+            cells: [p, q],
+            eta: crossing(values[p], values[q], self.level),
+            pull: s / bounded,
+            guarded: guarded && s != T::zero(),
+        }
+    }
+
+    /// Adds to the cells of `slab`, the first of which is cell `first`. Vertices are stored in the order of
+    /// their edges, and an edge reaches at most one plane ahead.
+    fn add(&self, first: usize, plane: usize, slab: &mut [T]) {
+        let near = |cell: usize| self.edges.partition_point(|edge| edge.cell() < cell);
+        for vertex in near(first.saturating_sub(plane))..near(first + slab.len()) {
+            let OnEdge {
+                cells, eta, pull, ..
+            } = self.on_edge(vertex);
+            let parts = [pull * (eta - T::one()), -pull * eta];
+            for (cell, part) in cells.into_iter().zip(parts) {
+                if let Some(value) = cell.checked_sub(first).and_then(|at| slab.get_mut(at)) {
+                    *value += part;
+                }
+            }
+        }
+    }
+
+    fn level(&self, mesh: &Mesh<T>) -> LevelCotangent {
+        let grid = self.chi.grid();
+        let [level, x, y, z, spacing, guarded] = parallel::sum_array(self.edges.len(), |vertex| {
+            let on_edge = self.on_edge(vertex);
+            let place = vector::to_f64(grid.to_index(mesh.vertices()[vertex]));
+            let mut part = GridCotangent::default();
+            part.add_place(place, vector::to_f64(self.bars[vertex]));
+            let [x, y, z] = part.lower;
+            let guarded = f64::from(u8::from(on_edge.guarded));
+            [on_edge.pull.f64(), x, y, z, part.spacing, guarded]
+        });
+        LevelCotangent {
+            level,
+            grid: GridCotangent {
+                lower: [x, y, z],
+                spacing,
+            },
+            guarded: guarded as usize,
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! Cotangents of the axes to cotangents of the points.
+//!
+//! All lengths are in units of the radius, so that nothing overflows or vanishes whatever the unit of the
+//! cloud: `d̂ = d/R`, `ŵ = wR`, `ĝ = R² g/(RW)`. The result is divided by `R` once.
+
+use rayon::prelude::*;
+
+use super::forward::{EPSILON, SMALLEST_GAP};
+use super::{Plane, Residual};
+use crate::neighbors::{Candidates, LANES, Neighborhoods};
+use crate::vector::{add, dot, norm, scale};
+use crate::{Real, vector};
+
+/// Values that each candidate carries: `ĝ/Ŵ`, `n` and `m̂`.
+const VALUES: usize = 9;
+
+/// Buffers of the pullback.
+#[derive(Clone, Debug, Default)]
+pub struct Scratch<T> {
+    /// `ĝ/Ŵ` of every point, in input order.
+    slopes: Vec<[T; 3]>,
+    /// [`VALUES`] of every point in the order of the cells; `ĝ` is 0 there where the radius has grown.
+    values: [Vec<T>; VALUES],
+    sorted: Vec<[T; 3]>,
+}
+
+/// Adds to the `(N, 3)` `points_bar` what the cotangents `normals_bar` `(N, 3)` of the axes (with the sign
+/// that [`Residual::normals`] has) mean for the points. Returns how many guarded planes met a cotangent that
+/// is not zero: their derivative was bounded.
+///
+/// `neighborhoods` and `residual` are those of [`forward`](super::forward); all in input order.
+pub fn pullback<T: Real>(
+    neighborhoods: &Neighborhoods<T>,
+    residual: &Residual<T>,
+    normals_bar: &[[T; 3]],
+    scratch: &mut Scratch<T>,
+    points_bar: &mut [[T; 3]],
+) -> usize {
+    let Scratch {
+        slopes,
+        values,
+        sorted,
+    } = scratch;
+    let slope = |i: usize| slope(&residual.planes[i], neighborhoods.radius[i], normals_bar[i]);
+    let samples = (0..normals_bar.len()).into_par_iter();
+    samples.map(slope).collect_into_vec(slopes);
+    sort_values(neighborhoods, residual, slopes, values);
+    let (arch, radius) = (pulp::Arch::new(), neighborhoods.common_radius);
+    let values = values.each_ref().map(|v| &v[..]);
+    neighborhoods.add_gathered(
+        values,
+        sorted,
+        points_bar,
+        &|position, point, candidates| {
+            let own = values.map(|v| v[position]);
+            crate::simd::dispatch(
+                arch,
+                #[inline(always)]
+                || gather(point, &own, radius, candidates),
+            )
+        },
+    );
+    let slopes = &*slopes;
+    neighborhoods.add_from_grown(points_bar, &|i, _, offset| {
+        let radius = neighborhoods.radius[i];
+        let plane = &residual.planes[i];
+        let mean = scale(plane.centroid, T::one() / radius);
+        let unit = scale(offset, T::one() / radius);
+        let bar = offset_bar(slopes[i], residual.normals[i], mean, unit, norm(unit));
+        scale(bar, T::one() / radius)
+    });
+    let guarded =
+        |(plane, bar): &(&Plane<T>, &[T; 3])| plane.guarded && bar.iter().any(|&x| x != T::zero());
+    residual
+        .planes
+        .iter()
+        .zip(normals_bar)
+        .filter(guarded)
+        .count()
+}
+
+/// `ĝ/Ŵ`; the gaps between eigenvalues count as at least [`SMALLEST_GAP`] of the largest one.
+fn slope<T: Real>(plane: &Plane<T>, radius: T, bar: [T; 3]) -> [T; 3] {
+    let radius = radius.f64();
+    let [first, .., largest] = plane.eigenvalues.map(|x| x.f64());
+    if !(largest > 0.0) {
+        return [T::zero(); 3];
+    }
+    let mut sum = [0.0; 3];
+    for (tangent, value) in plane.tangents.iter().zip(&plane.eigenvalues[1..]) {
+        let gap = (value.f64() - first).max(SMALLEST_GAP * largest);
+        let (v, bar) = (vector::to_f64(*tangent), vector::to_f64(bar));
+        sum = add(sum, scale(v, -dot(v, bar) * (radius / gap) * radius));
+    }
+    vector::of_f64(scale(sum, 1.0 / (radius * plane.weight.f64())))
+}
+
+/// Writes the values of all points, in the order of the cells.
+fn sort_values<T: Real>(
+    neighborhoods: &Neighborhoods<T>,
+    residual: &Residual<T>,
+    slopes: &[[T; 3]],
+    values: &mut [Vec<T>; VALUES],
+) {
+    let order = neighborhoods.index.order();
+    let inverse = T::one() / neighborhoods.common_radius;
+    values.par_iter_mut().enumerate().for_each(|(m, out)| {
+        let (what, axis) = (m / 3, m % 3);
+        out.clear();
+        out.extend(order.iter().map(|&i| {
+            let i = i as usize;
+            match what {
+                0 if neighborhoods.has_grown(i) => T::zero(),
+                0 => slopes[i][axis],
+                1 => residual.normals[i][axis],
+                _ => residual.planes[i].centroid[axis] * inverse,
+            }
+        }));
+    });
+}
+
+/// `d̄` in units of the radius, for an offset `d̂` of length `r̂ > 0` from the centre:
+/// `ŵ (g (n·e) + n (g·e)) − ŵ² (g·e)(n·e) d̂/r̂` with `e = d̂ − m̂` and `g` standing for `ĝ/Ŵ`.
+#[inline(always)]
+fn offset_bar<T: Real>(g: [T; 3], n: [T; 3], mean: [T; 3], d: [T; 3], r: T) -> [T; 3] {
+    let w = T::one() / (r + T::of(EPSILON));
+    let e = [d[0] - mean[0], d[1] - mean[1], d[2] - mean[2]];
+    let (ge, ne) = (dot(g, e), dot(n, e));
+    let radial = if r > T::zero() {
+        w * w * ge * ne / r
+    } else {
+        T::zero()
+    };
+    [0, 1, 2].map(
+        #[inline(always)]
+        |a| w * (g[a] * ne + n[a] * ge) - radial * d[a],
+    )
+}
+
+/// What a point gets as a neighbour of the others, less what it hands out as a centre.
+#[inline(always)]
+fn gather<T: Real>(
+    center: [T; 3],
+    own: &[T; VALUES],
+    radius: T,
+    candidates: &Candidates<T, VALUES>,
+) -> [T; 3] {
+    let inverse = T::one() / radius;
+    let parts = |v: &[T; VALUES]| [[v[0], v[1], v[2]], [v[3], v[4], v[5]], [v[6], v[7], v[8]]];
+    let [own_g, own_n, own_mean] = parts(own);
+    let mut sums = [[T::zero(); LANES]; 3];
+    candidates.for_each_lanes(
+        radius,
+        #[inline(always)]
+        |lanes| {
+            for l in 0..LANES {
+                let offset = [0, 1, 2].map(
+                    #[inline(always)]
+                    |a| lanes.point[a][l] - center[a],
+                );
+                let d2 = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
+                let d = [0, 1, 2].map(
+                    #[inline(always)]
+                    |a| offset[a] * inverse,
+                );
+                let r = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+                let back = [-d[0], -d[1], -d[2]];
+                let v = |m: usize| lanes.values[m][l];
+                let out = offset_bar(own_g, own_n, own_mean, d, r);
+                let [g, n, mean] = [[v(0), v(1), v(2)], [v(3), v(4), v(5)], [v(6), v(7), v(8)]];
+                let into = offset_bar(g, n, mean, back, r);
+                let counts = d2 <= lanes.limit[l];
+                for a in 0..3 {
+                    sums[a][l] += if counts { into[a] - out[a] } else { T::zero() };
+                }
+            }
+        },
+    );
+    sums.map(|sum| sum.into_iter().sum::<T>() * inverse)
+}

@@ -1,0 +1,106 @@
+//! Cotangents of the right-hand side to cotangents of points, normals, areas and grid: one gather a sample.
+
+use pulp::Arch;
+use rayon::prelude::*;
+
+use super::stencil::{self, Gathered, REACH, WIDTH};
+use super::{Residual, Samples, central_cell};
+use crate::data::GridCotangent;
+use crate::{Field, Real, simd, vector};
+
+/// Samples in one task.
+const TASK: usize = 512;
+
+/// Cotangents of what a splat reads, the samples in input order: the stages that read them add to these.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SampleCotangent<T> {
+    /// `(N, 3)` of the points.
+    pub points: Vec<[T; 3]>,
+    /// `(N, 3)` of the outward unit normals.
+    pub normals: Vec<[T; 3]>,
+    /// `(N,)` of the areas.
+    pub areas: Vec<T>,
+    /// Of the grid.
+    pub grid: GridCotangent<f64>,
+}
+
+/// Buffers of the pullback.
+#[derive(Clone, Debug, Default)]
+pub struct PullbackScratch<T> {
+    /// In the order of the grid.
+    sorted: Vec<Gathered<T>>,
+}
+
+/// Adds to `out` what the cotangents `b_bar` of the right-hand side mean for the samples and the grid. The
+/// samples, and `residual`, are those of [`forward`](super::forward); `b_bar` is on its grid.
+pub fn pullback<T: Real>(
+    samples: Samples<'_, T>,
+    residual: &Residual,
+    b_bar: &Field<T>,
+    scratch: &mut PullbackScratch<T>,
+    out: &mut SampleCotangent<T>,
+) {
+    let (grid, arch) = (b_bar.grid(), Arch::new());
+    scratch
+        .sorted
+        .resize(residual.order.len(), Gathered::default());
+    let tasks = scratch.sorted.par_chunks_mut(TASK);
+    tasks
+        .zip(residual.order.par_chunks(TASK))
+        .for_each(|(gathered, order)| {
+            simd::dispatch(
+                arch,
+                #[inline(always)]
+                || {
+                    for (gathered, &i) in gathered.iter_mut().zip(order) {
+                        *gathered = samples.gather(i as usize, residual, b_bar);
+                    }
+                },
+            );
+        });
+    let h = grid.spacing();
+    let Samples {
+        points,
+        normals,
+        areas,
+    } = samples;
+    for (gathered, &i) in scratch.sorted.iter().zip(&residual.order) {
+        let i = i as usize;
+        let spread = gathered.spread.map(|s| s / h / h);
+        let point = vector::scale(gathered.gradient, T::one() / h);
+        out.normals[i] = vector::add(out.normals[i], vector::scale(spread, areas[i]));
+        out.areas[i] += vector::dot(spread, normals[i]);
+        out.points[i] = vector::add(out.points[i], point);
+        out.grid.subtract_point(grid, points[i], point);
+        // The areas are divided by h².
+        out.grid.spacing -= 2.0 * (areas[i] * vector::dot(spread, normals[i]) / h).f64();
+    }
+}
+
+impl<T: Real> Samples<'_, T> {
+    /// What `b_bar` holds for sample `i`.
+    #[inline(always)]
+    fn gather(&self, i: usize, residual: &Residual, b_bar: &Field<T>) -> Gathered<T> {
+        let (grid, values) = (b_bar.grid(), b_bar.values());
+        let x = grid.to_index(self.points[i]);
+        let Some(cell) = central_cell(grid.shape(), x) else {
+            return Gathered::default();
+        };
+        let h = grid.spacing();
+        let vector = vector::scale(self.normals[i], self.areas[i] / h / h);
+        let f = std::array::from_fn(
+            #[inline(always)]
+            |a| x[a] - T::of_usize(cell[a]) - T::of(0.5),
+        );
+        let [plane, row, _] = grid.strides();
+        let corner = grid.index(cell.map(|c| c - REACH));
+        let mut block = [[[T::zero(); WIDTH]; WIDTH]; WIDTH];
+        for (p, rows) in block.iter_mut().enumerate() {
+            for (j, out) in rows.iter_mut().enumerate() {
+                let start = corner + p * plane + j * row;
+                out.copy_from_slice(&values[start..start + WIDTH]);
+            }
+        }
+        stencil::gather(residual.weights, vector, f, &block)
+    }
+}
