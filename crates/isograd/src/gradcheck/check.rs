@@ -1,0 +1,219 @@
+//! One motion: its differences, and the pullback beside them.
+
+use rayon::prelude::*;
+
+use super::functional::{Functional, parting};
+use super::{CheckError, Difference, Motion, Options, Row};
+use crate::distance::lattice::NO_TRIANGLE;
+use crate::distance::triangle::closest_point;
+use crate::splat::Weights;
+use crate::vector::{dot, norm, sub};
+use crate::{CloudCotangent, Cotangent, Error, Mesh, PointCloud, Reconstruction, Reconstructor};
+
+/// Small steps that are tried, in cells: the first one over which nothing changes that has no derivative is
+/// taken, or else the last one.
+const SMALL_STEPS: [f64; 3] = [1e-6, 1e-7, 1e-8];
+
+/// How far the closest point to a cell goes in a small step, in cells, where the cell crosses the medial axis.
+/// No vertex goes so far: those that do go a thousand times as far as the samples.
+const JUMP: f64 = 1e-2;
+
+/// What is the same for all motions.
+pub(super) struct Check<'a> {
+    cloud: &'a PointCloud<f64>,
+    base: &'a Reconstruction<f64>,
+    functional: Functional,
+    /// See [`Row::scale`].
+    scale: f64,
+    pulled: CloudCotangent<f64>,
+    plan: Reconstructor<f64>,
+}
+
+impl<'a> Check<'a> {
+    pub(super) fn new(
+        cloud: &'a PointCloud<f64>,
+        base: &'a Reconstruction<f64>,
+        plan: Reconstructor<f64>,
+    ) -> Result<Self, CheckError> {
+        let functional = Functional::new(cloud, base.sdf().grid());
+        let bar = functional.cotangent(base.sdf());
+        Ok(Self {
+            cloud,
+            base,
+            functional,
+            scale: bar.iter().map(|x| x.abs()).sum(),
+            pulled: pull(base, cloud, &bar)?,
+            plan,
+        })
+    }
+
+    pub(super) fn guarded(&self) -> usize {
+        self.pulled.guarded
+    }
+
+    pub(super) fn row(&mut self, motion: Motion, options: &Options) -> Result<Row, CheckError> {
+        let direction = motion.direction(self.cloud.points(), options.seed);
+        let mut ridges = Vec::new();
+        let [first, smaller @ ..] = SMALL_STEPS;
+        let (mut small, mut slopes) =
+            self.difference(motion, &direction, first, true, &mut ridges)?;
+        for step in smaller {
+            if !small.is_smooth() {
+                (small, slopes) = self.difference(motion, &direction, step, true, &mut ridges)?;
+            }
+        }
+        let (large, large_slopes) =
+            self.difference(motion, &direction, options.step, false, &mut ridges)?;
+        Ok(Row {
+            motion,
+            pullback: self.derivative(&direction, &ridges)?,
+            scale: self.scale,
+            small,
+            large,
+            parting: parting(self.base.sdf().grid(), &slopes, &large_slopes),
+            ridges: ridges.len(),
+        })
+    }
+
+    /// By pullback, without the cells `ridges`.
+    fn derivative(&self, direction: &[[f64; 3]], ridges: &[usize]) -> Result<f64, CheckError> {
+        let along = |bar: &[[f64; 3]]| {
+            direction
+                .iter()
+                .zip(bar)
+                .map(|(v, bar)| dot(*v, *bar))
+                .sum()
+        };
+        if ridges.is_empty() {
+            return Ok(along(&self.pulled.points));
+        }
+        let mut bar = self.functional.cotangent(self.base.sdf());
+        ridges.iter().for_each(|&cell| bar[cell] = 0.0);
+        Ok(along(&pull(self.base, self.cloud, &bar)?.points))
+    }
+
+    /// The central difference over a step in cells, and each cell's part in it, without the cells `ridges`. A
+    /// step with radii and signs held adds to these.
+    fn difference(
+        &mut self,
+        motion: Motion,
+        direction: &[[f64; 3]],
+        step: f64,
+        held: bool,
+        ridges: &mut Vec<usize>,
+    ) -> Result<(Difference, Vec<f64>), CheckError> {
+        let length = step * self.base.sdf().grid().spacing();
+        let mut side = |length: f64| {
+            let moved = moved(self.cloud, direction, length);
+            let side = self.side(&moved, held);
+            side.map_err(|source| CheckError::Reconstruct {
+                what: format!("the cloud moved by {step} cells ({})", motion.name()),
+                source,
+            })
+        };
+        let (plus, minus) = (side(length)?, side(-length)?);
+        if held {
+            ridges.extend(self.ridges(&plus, &minus));
+            ridges.sort_unstable();
+            ridges.dedup();
+        }
+        let parts = plus.parts.iter().zip(&minus.parts);
+        let mut slopes: Vec<f64> = parts.map(|(p, m)| (p - m) / (2.0 * length)).collect();
+        ridges.iter().for_each(|&cell| slopes[cell] = 0.0);
+        let normals = plus.normals.iter().zip(&minus.normals);
+        let difference = Difference {
+            step,
+            value: slopes.iter().sum(),
+            neighbourhoods: unequal(&plus.counts, &minus.counts),
+            normals: normals.filter(|(a, b)| dot(**a, **b) < 0.0).count(),
+            cells: unequal(&plus.inside, &minus.inside),
+            crossings: unequal(&plus.between, &minus.between),
+        };
+        Ok((difference, slopes))
+    }
+
+    fn side(&mut self, moved: &PointCloud<f64>, held: bool) -> Result<Side, Error> {
+        let result = match held {
+            true => self.plan.reconstruct_held(moved, self.base)?,
+            false => self.plan.reconstruct(moved)?,
+        };
+        let (grid, values) = (result.sdf().grid(), result.sdf().values());
+        let paper = result.options().weights == Weights::Paper;
+        let between = |x: f64| match paper {
+            true => (2.0 * x).floor() as i64,
+            false => (x + 0.5).floor() as i64,
+        };
+        let places = moved.points().iter().map(|&p| grid.to_index(p));
+        Ok(Side {
+            parts: self.functional.parts(result.sdf()),
+            inside: values.iter().map(|&phi| phi < 0.0).collect(),
+            between: places.map(|x| x.map(between)).collect(),
+            counts: result.neighbour_counts().to_vec(),
+            normals: result.normals().to_vec(),
+            surface: held.then(|| (result.mesh().clone(), result.closest().to_vec())),
+        })
+    }
+
+    /// Cells whose closest point jumps between the two ends of a small step.
+    fn ridges(&self, plus: &Side, minus: &Side) -> Vec<usize> {
+        let grid = self.base.sdf().grid();
+        let (Some(plus), Some(minus)) = (&plus.surface, &minus.surface) else {
+            return Vec::new();
+        };
+        let closest = |(mesh, closest): &(Mesh<f64>, Vec<u32>), cell: usize| {
+            let corners = mesh.faces()[closest[cell] as usize].map(|v| mesh.vertices()[v as usize]);
+            closest_point(grid.center(grid.cell(cell)), corners).point
+        };
+        let jumps = |&cell: &usize| {
+            let (a, b) = (plus.1[cell], minus.1[cell]);
+            a != b
+                && a != NO_TRIANGLE
+                && b != NO_TRIANGLE
+                && norm(sub(closest(plus, cell), closest(minus, cell))) > JUMP * grid.spacing()
+        };
+        (0..grid.cells()).into_par_iter().filter(jumps).collect()
+    }
+}
+
+fn pull(
+    base: &Reconstruction<f64>,
+    cloud: &PointCloud<f64>,
+    bar: &[f64],
+) -> Result<CloudCotangent<f64>, CheckError> {
+    let cotangent = Cotangent {
+        sdf: Some(bar),
+        ..Cotangent::default()
+    };
+    Ok(base.pullback(cloud, &cotangent)?)
+}
+
+/// What is kept of one end of a step.
+struct Side {
+    /// Of the functional, cell by cell.
+    parts: Vec<f64>,
+    inside: Vec<bool>,
+    /// Between which of the planes that have to do with [`Difference::crossings`] each point lies.
+    between: Vec<[i64; 3]>,
+    counts: Vec<u32>,
+    normals: Vec<[f64; 3]>,
+    /// Of small steps, the mesh and the closest face of each cell.
+    surface: Option<(Mesh<f64>, Vec<u32>)>,
+}
+
+/// Number of places in which two lists differ.
+fn unequal<E: PartialEq>(a: &[E], b: &[E]) -> usize {
+    a.iter().zip(b).filter(|(a, b)| a != b).count()
+}
+
+/// The cloud with every point moved by `length` times its direction, its normals as they are. A point that
+/// the motion would make infinite stays.
+fn moved(cloud: &PointCloud<f64>, direction: &[[f64; 3]], length: f64) -> PointCloud<f64> {
+    let points = cloud.points().iter().zip(direction);
+    let points = points.map(|(p, v)| std::array::from_fn(|a| p[a] + length * v[a]));
+    let moved = PointCloud::new(points.collect());
+    let moved = moved.and_then(|moved| match cloud.normals() {
+        Some(normals) => moved.with_normals(normals.to_vec()),
+        None => Ok(moved),
+    });
+    moved.unwrap_or_else(|_| cloud.clone())
+}
