@@ -1,11 +1,14 @@
-//! The whole, cloud to field and report, with the default options: over grid size at 50,000 points, and
-//! over number of points at 128³ cells.
+//! The whole, cloud to field and report, with the default options, and its pullback from φ: over grid size at
+//! 50,000 points, and over number of points at 128³ cells.
 
 mod common;
 
 use common::{for_threads, group};
-use criterion::{Criterion, criterion_group, criterion_main};
-use isograd::{Options, PointCloud, Real, Reconstructor};
+use criterion::measurement::WallTime;
+use criterion::{BenchmarkGroup, Criterion, criterion_group, criterion_main};
+use isograd::{
+    CloudCotangent, Cotangent, Options, PointCloud, PullbackScratch, Real, Reconstructor,
+};
 use isograd_benches::{CELLS, POINTS, torus};
 
 fn over_cells<T: Real>(criterion: &mut Criterion) {
@@ -28,6 +31,40 @@ fn over_points<T: Real>(criterion: &mut Criterion) {
     }
 }
 
+fn pullback_over_cells<T: Real>(criterion: &mut Criterion) {
+    let mut group = group(criterion, "pullback-cells");
+    for cells in CELLS {
+        pull::<T>(&mut group, cells.pow(3), "cells", setting(50_000, cells));
+    }
+}
+
+fn pullback_over_points<T: Real>(criterion: &mut Criterion) {
+    let mut group = group(criterion, "pullback-points");
+    for count in POINTS {
+        pull::<T>(&mut group, count, "points", setting(count, 128));
+    }
+}
+
+/// The pullback of `Σ φ²/2`, every cell of φ.
+fn pull<T: Real>(
+    group: &mut BenchmarkGroup<'_, WallTime>,
+    size: usize,
+    unit: &str,
+    (cloud, mut plan): (PointCloud<T>, Reconstructor<T>),
+) {
+    let result = plan.reconstruct(&cloud).expect("a torus");
+    let cotangent = Cotangent {
+        sdf: Some(result.sdf().values()),
+        ..Cotangent::default()
+    };
+    let (mut scratch, mut out) = (PullbackScratch::default(), CloudCotangent::default());
+    for_threads::<T>(group, size, unit, || {
+        result
+            .pullback_into(&cloud, &cotangent, &mut scratch, &mut out)
+            .expect("the same cloud");
+    });
+}
+
 fn setting<T: Real>(count: usize, cells: usize) -> (PointCloud<T>, Reconstructor<T>) {
     let (points, _) = torus::samples(count);
     let cloud = PointCloud::new(points).expect("finite points");
@@ -40,6 +77,10 @@ criterion_group!(
     over_cells::<f32>,
     over_cells::<f64>,
     over_points::<f32>,
-    over_points::<f64>
+    over_points::<f64>,
+    pullback_over_cells::<f32>,
+    pullback_over_cells::<f64>,
+    pullback_over_points::<f32>,
+    pullback_over_points::<f64>
 );
 criterion_main!(benches);

@@ -19,16 +19,13 @@ fn spread<T: Real>(criterion: &mut Criterion) {
             let mut b = Field::zeros(torus::grid(CELLS));
             let (mut scratch, mut residual) = Default::default();
             for_threads::<T>(&mut group, count, "points", || {
-                splat::forward(
-                    &points,
-                    &normals,
-                    &areas,
-                    weights,
-                    &mut scratch,
-                    &mut residual,
-                    &mut b,
-                )
-                .expect("samples inside the grid");
+                let samples = splat::Samples {
+                    points: &points,
+                    normals: &normals,
+                    areas: &areas,
+                };
+                splat::forward(samples, weights, &mut scratch, &mut residual, &mut b)
+                    .expect("samples inside the grid");
             });
         }
     }

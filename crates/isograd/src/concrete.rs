@@ -4,7 +4,9 @@
 //! binding would spend minutes compiling the whole pipeline again.
 
 use crate::data::PointCloud;
-use crate::pipeline::{Error, Reconstructor};
+use crate::pipeline::{
+    CloudCotangent, Cotangent, Error, PullbackError, PullbackScratch, Reconstruction, Reconstructor,
+};
 use crate::poisson;
 use crate::report::Stage;
 
@@ -23,7 +25,22 @@ pub trait Concrete: Sized {
         plan: &mut Reconstructor<Self>,
         stage: Stage,
         cloud: &PointCloud<Self>,
+        held: Option<&Reconstruction<Self>>,
     ) -> Result<(), Error>
+    where
+        Self: crate::Real;
+
+    /// [`Reconstruction::pullback_into`].
+    ///
+    /// # Errors
+    /// As that.
+    fn pull(
+        reconstruction: &Reconstruction<Self>,
+        cloud: &PointCloud<Self>,
+        cotangent: &Cotangent<'_, Self>,
+        scratch: &mut PullbackScratch<Self>,
+        out: &mut CloudCotangent<Self>,
+    ) -> Result<(), PullbackError>
     where
         Self: crate::Real;
 }
@@ -39,8 +56,19 @@ macro_rules! concrete {
                 plan: &mut Reconstructor<Self>,
                 stage: Stage,
                 cloud: &PointCloud<Self>,
+                held: Option<&Reconstruction<Self>>,
             ) -> Result<(), Error> {
-                plan.run(stage, cloud)
+                plan.run(stage, cloud, held)
+            }
+
+            fn pull(
+                reconstruction: &Reconstruction<Self>,
+                cloud: &PointCloud<Self>,
+                cotangent: &Cotangent<'_, Self>,
+                scratch: &mut PullbackScratch<Self>,
+                out: &mut CloudCotangent<Self>,
+            ) -> Result<(), PullbackError> {
+                reconstruction.pull(cloud, cotangent, scratch, out)
             }
         }
     };

@@ -1,7 +1,8 @@
-//! Point cloud in, signed distance field out, made to be differentiated.
+//! Point cloud in, signed distance field out, gradients back.
 //!
-//! One stage is one folder: a forward map and, beside it, its pullback. A pipeline is the stages in
-//! order.
+//! One stage is one folder: a forward map and, beside it, its pullback. A [`Reconstructor`] runs the stages
+//! in order, and [`Reconstruction::pullback`] their pullbacks in reverse. [`gradcheck`] compares it with
+//! finite differences.
 #![warn(missing_docs)]
 
 mod checks;
@@ -9,6 +10,8 @@ mod concrete;
 pub mod data;
 pub mod differential;
 pub mod distance;
+pub(crate) mod gather;
+pub mod gradcheck;
 pub mod isosurface;
 pub mod neighbors;
 pub mod normals;
@@ -16,6 +19,8 @@ pub mod orient;
 pub(crate) mod parallel;
 mod pipeline;
 pub mod poisson;
+#[cfg(test)]
+mod pullback_tests;
 mod real;
 mod report;
 pub(crate) mod simd;
@@ -24,10 +29,13 @@ pub(crate) mod trilinear;
 pub mod vector;
 
 pub use data::{
-    Attribute, Field, FieldError, Grid, GridError, LatticeEdge, Mesh, MeshError, PointCloud,
-    PointCloudError, Resolution,
+    Attribute, Field, FieldError, Grid, GridCotangent, GridError, LatticeEdge, Mesh, MeshError,
+    PointCloud, PointCloudError, Resolution,
 };
-pub use pipeline::{Error, Options, Reconstruction, Reconstructor};
+pub use pipeline::{
+    CloudCotangent, Cotangent, Error, ExtensionCotangent, Options, PullbackError, PullbackScratch,
+    Reconstruction, Reconstructor,
+};
 pub use real::Real;
 pub use report::{Report, Seconds, Stage, Warning};
 

@@ -54,17 +54,29 @@ impl<T: Real> Reconstruction<T> {
         residual: &mut Residual<T>,
         extension: &mut Extension<T>,
     ) -> Result<(), Error> {
-        let samples = Samples {
+        distance::extend::forward(
+            self.samples(),
+            attribute,
+            self.surface(),
+            band_cells,
+            scratch,
+            residual,
+            extension,
+        )
+    }
+
+    pub(super) fn samples(&self) -> Samples<'_, T> {
+        Samples {
             neighborhoods: &self.residuals.neighborhoods,
             areas: &self.areas,
-        };
-        let surface = Surface {
+        }
+    }
+
+    pub(super) fn surface(&self) -> Surface<'_, T> {
+        Surface {
             mesh: &self.mesh,
             phi: &self.sdf,
             closest: &self.closest,
-        };
-        distance::extend::forward(
-            samples, attribute, surface, band_cells, scratch, residual, extension,
-        )
+        }
     }
 }

@@ -1,0 +1,78 @@
+//! What to compute, and why it may fail.
+
+use crate::report::Stage;
+use crate::{distance, isosurface, neighbors, orient, poisson, splat};
+
+/// What to compute, and how. Nothing here says where or on how many threads.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Neighbourhood radius of the normals and the area weights.
+    pub radius: neighbors::Radius,
+    /// How the sign of each normal is found, or that the cloud's own normals are to be used.
+    pub orientation: orient::Method,
+    /// How a sample is spread over the cells round it.
+    pub weights: splat::Weights,
+    /// Whether each sample counts by the area of surface that it stands for.
+    pub area_weights: bool,
+    /// Width `σ` of the Gaussian smoothing of the indicator, in cells; 0 for none.
+    pub smoothing: f64,
+    /// Where φ is computed.
+    pub band: distance::Band,
+    /// Whether to measure the result and look for reasons not to trust it.
+    pub checks: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            radius: neighbors::Radius::default(),
+            orientation: orient::Method::default(),
+            weights: splat::Weights::default(),
+            area_weights: true,
+            smoothing: 0.0,
+            band: distance::Band::default(),
+            checks: true,
+        }
+    }
+}
+
+/// Why a reconstruction failed: which stage, and its own reason.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The options make no sense.
+    #[error("the smoothing is {0} cells; it must be 0 or more, and finite")]
+    Smoothing(f64),
+    /// Neighbours.
+    #[error(transparent)]
+    Neighbors(#[from] neighbors::Error),
+    /// The samples lie on a line, or are isolated points: nothing spans a surface.
+    #[error(
+        "none of the {points} points has neighbours that span a plane (the points lie on a line or are isolated), so there is no surface; check that the right columns were read as coordinates"
+    )]
+    NoPlane {
+        /// Number of points.
+        points: usize,
+    },
+    /// Orientation.
+    #[error(transparent)]
+    Orient(#[from] orient::Error),
+    /// Splat.
+    #[error(transparent)]
+    Splat(#[from] splat::Error),
+    /// Poisson.
+    #[error(transparent)]
+    Poisson(#[from] poisson::Error),
+    /// Iso-value.
+    #[error(transparent)]
+    IsoValue(#[from] isosurface::iso_value::Error),
+    /// Isosurface.
+    #[error(transparent)]
+    Isosurface(#[from] isosurface::Error),
+    /// Distance.
+    #[error(transparent)]
+    Distance(#[from] distance::Error),
+    /// The observer asked to stop.
+    #[error("stopped before the stage '{}'", .0.name())]
+    Interrupted(Stage),
+}

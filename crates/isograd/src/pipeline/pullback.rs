@@ -1,0 +1,283 @@
+//! The reverse of the pipeline: cotangents of its results → cotangents of its inputs.
+
+use super::{CloudCotangent, Cotangent, PullbackError, Reconstruction, Residuals};
+use crate::data::{Field, GridCotangent, PointCloud};
+use crate::distance::{extend, lattice};
+use crate::orient::Method;
+use crate::splat::{SampleCotangent, Samples};
+use crate::{Real, isosurface, normals, orient, poisson, splat, vector};
+
+/// Memory that pullbacks use again: a field, an index for each cell whose φ has a cotangent, and some numbers
+/// for each sample and each face.
+#[derive(Default)]
+pub struct PullbackScratch<T: Real> {
+    /// Cotangent of `χ`, then of the right-hand side.
+    field: Option<Field<T>>,
+    /// Cotangents of the vertices.
+    vertices: Vec<[T; 3]>,
+    samples: SampleCotangent<T>,
+    distance: lattice::PullbackScratch<T>,
+    extension: extend::Cotangent<T>,
+    poisson: poisson::Scratch<T>,
+    splat: splat::PullbackScratch<T>,
+    areas: splat::area::PullbackScratch<T>,
+    normals: normals::Scratch<T>,
+}
+
+impl<T: Real> Reconstruction<T> {
+    /// Pulls cotangents of any of the results back to the cloud that it was made from, and its grid: the
+    /// transpose of the derivative of the whole pipeline, stage by stage in reverse. `cloud` is the one that
+    /// was reconstructed.
+    ///
+    /// Held constant, as the stages say: neighbourhoods and their radii, signs of the normals, which cells are
+    /// inside, which face is closest. Where a derivative has no bound it is bounded, and counted in
+    /// [`CloudCotangent::guarded`]. The same bits for any number of threads.
+    ///
+    /// # Errors
+    /// As [`PullbackError`] lists.
+    pub fn pullback(
+        &self,
+        cloud: &PointCloud<T>,
+        cotangent: &Cotangent<'_, T>,
+    ) -> Result<CloudCotangent<T>, PullbackError> {
+        let mut out = CloudCotangent::default();
+        self.pullback_into(cloud, cotangent, &mut PullbackScratch::default(), &mut out)?;
+        Ok(out)
+    }
+
+    /// The same, in memory that is used again.
+    ///
+    /// # Errors
+    /// As [`pullback`](Self::pullback); `out` is then not to be used.
+    pub fn pullback_into(
+        &self,
+        cloud: &PointCloud<T>,
+        cotangent: &Cotangent<'_, T>,
+        scratch: &mut PullbackScratch<T>,
+        out: &mut CloudCotangent<T>,
+    ) -> Result<(), PullbackError> {
+        T::pull(self, cloud, cotangent, scratch, out)
+    }
+
+    /// [`Self::pullback_into`], compiled where it is called: see [`concrete`](crate::concrete).
+    pub(crate) fn pull(
+        &self,
+        cloud: &PointCloud<T>,
+        cotangent: &Cotangent<'_, T>,
+        scratch: &mut PullbackScratch<T>,
+        out: &mut CloudCotangent<T>,
+    ) -> Result<(), PullbackError> {
+        self.check_cloud(cloud)?;
+        self.check_cotangent(cotangent)?;
+        scratch.start(cotangent, cloud.len(), self.mesh.vertices().len());
+        out.guarded = 0;
+        self.pull_extensions(cotangent, scratch, out)?;
+        if cotangent.reaches_indicator() {
+            self.pull_distance(cotangent, scratch);
+            self.pull_indicator(cloud, cotangent, scratch, out)?;
+        }
+        self.pull_samples(cloud, scratch, out);
+        out.grid = GridCotangent {
+            lower: vector::of_f64(scratch.samples.grid.lower),
+            spacing: T::of(scratch.samples.grid.spacing),
+        };
+        Ok(())
+    }
+
+    /// From extended attributes to the attributes themselves, and to vertices, points, areas and grid.
+    fn pull_extensions(
+        &self,
+        cotangent: &Cotangent<'_, T>,
+        scratch: &mut PullbackScratch<T>,
+        out: &mut CloudCotangent<T>,
+    ) -> Result<(), PullbackError> {
+        out.attributes.truncate(cotangent.extensions.len());
+        out.attributes
+            .resize_with(cotangent.extensions.len(), Vec::new);
+        let PullbackScratch {
+            extension: found,
+            vertices,
+            samples,
+            ..
+        } = scratch;
+        for (of, attribute) in cotangent.extensions.iter().zip(&mut out.attributes) {
+            extend::pullback(
+                self.samples(),
+                of.attribute,
+                self.surface(),
+                of.residual,
+                of.extension,
+                of.vertices,
+                of.values,
+                found,
+            )?;
+            attribute.clone_from(&found.attribute);
+            add(vertices, &found.vertices, vector::add);
+            add(&mut samples.points, &found.points, vector::add);
+            add(&mut samples.areas, &found.areas, |a, b| a + b);
+            samples.grid.add(&GridCotangent {
+                lower: vector::to_f64(found.grid.lower),
+                spacing: found.grid.spacing.f64(),
+            });
+            out.guarded += found.guarded;
+        }
+        Ok(())
+    }
+
+    /// From φ to the vertices.
+    fn pull_distance(&self, cotangent: &Cotangent<'_, T>, scratch: &mut PullbackScratch<T>) {
+        let Some(sdf) = cotangent.sdf else { return };
+        let PullbackScratch {
+            vertices,
+            samples,
+            distance,
+            ..
+        } = scratch;
+        let grid = lattice::pullback(
+            &self.mesh,
+            &self.sdf,
+            &self.closest,
+            sdf,
+            distance,
+            vertices,
+        );
+        samples.grid.add(&grid);
+    }
+
+    /// From the vertices, the indicator and the iso-value to points, normals and areas.
+    fn pull_indicator(
+        &self,
+        cloud: &PointCloud<T>,
+        cotangent: &Cotangent<'_, T>,
+        scratch: &mut PullbackScratch<T>,
+        out: &mut CloudCotangent<T>,
+    ) -> Result<(), PullbackError> {
+        let (chi, residuals) = (&self.indicator, &self.residuals);
+        let mut field = scratch.take_field(chi, cotangent.indicator);
+        let PullbackScratch {
+            vertices, samples, ..
+        } = scratch;
+        let found = isosurface::pullback(
+            chi,
+            self.iso_value,
+            &self.mesh,
+            vertices,
+            field.values_mut(),
+        );
+        samples.grid.add(&found.grid);
+        out.guarded += found.guarded;
+        let given = Samples {
+            points: cloud.points(),
+            normals: &self.orientation.normals,
+            areas: &self.areas,
+        };
+        isosurface::iso_value::pullback(
+            chi,
+            given,
+            &residuals.iso_value,
+            &residuals.splat,
+            T::of(cotangent.iso_value.f64() + found.level),
+            field.values_mut(),
+            samples,
+        );
+        let smoothing = self.options.smoothing;
+        self.poisson
+            .solve(field.values_mut(), smoothing, &mut scratch.poisson)?;
+        splat::pullback(given, &residuals.splat, &field, &mut scratch.splat, samples);
+        scratch.field = Some(field);
+        Ok(())
+    }
+
+    /// From points, normals and areas to the points alone, or the given normals.
+    fn pull_samples(
+        &self,
+        cloud: &PointCloud<T>,
+        scratch: &mut PullbackScratch<T>,
+        out: &mut CloudCotangent<T>,
+    ) {
+        let Residuals {
+            neighborhoods,
+            normals: axes,
+            ..
+        } = &self.residuals;
+        let SampleCotangent {
+            points,
+            normals: normals_bar,
+            areas,
+            ..
+        } = &mut scratch.samples;
+        out.normals.clear();
+        match (self.options.orientation, cloud.normals()) {
+            (Method::Given, Some(given)) => {
+                orient::given_pullback(given, normals_bar);
+                out.normals.extend_from_slice(normals_bar);
+            }
+            _ => {
+                orient::axes_pullback(&self.orientation.normals, &axes.normals, normals_bar);
+                let scratch = &mut scratch.normals;
+                out.guarded += normals::pullback(neighborhoods, axes, normals_bar, scratch, points);
+            }
+        }
+        if self.options.area_weights {
+            splat::area::pullback(
+                neighborhoods,
+                &self.areas,
+                areas,
+                &mut scratch.areas,
+                points,
+            );
+        }
+        out.points.clear();
+        out.points.extend_from_slice(points);
+    }
+}
+
+impl<T: Real> PullbackScratch<T> {
+    /// Fills the sums with what is given for them.
+    fn start(&mut self, cotangent: &Cotangent<'_, T>, points: usize, vertices: usize) {
+        let samples = &mut self.samples;
+        samples.points.clear();
+        samples.points.resize(points, [T::zero(); 3]);
+        fill(
+            &mut samples.normals,
+            cotangent.normals,
+            points,
+            [T::zero(); 3],
+        );
+        fill(&mut samples.areas, cotangent.areas, points, T::zero());
+        samples.grid = GridCotangent::default();
+        fill(
+            &mut self.vertices,
+            cotangent.vertices,
+            vertices,
+            [T::zero(); 3],
+        );
+    }
+
+    /// A field on the grid of `chi` that holds what is given, or zeros, in the memory of the last one.
+    fn take_field(&mut self, chi: &Field<T>, given: Option<&[T]>) -> Field<T> {
+        let last = self.field.take().filter(|field| field.grid() == chi.grid());
+        let mut field = last.unwrap_or_else(|| Field::zeros(*chi.grid()));
+        match given {
+            Some(given) => field.values_mut().copy_from_slice(given),
+            None => field.values_mut().fill(T::zero()),
+        }
+        field
+    }
+}
+
+/// Adds `more` to `sums`, entry by entry.
+fn add<E: Copy>(sums: &mut [E], more: &[E], plus: impl Fn(E, E) -> E) {
+    for (sum, &more) in sums.iter_mut().zip(more) {
+        *sum = plus(*sum, more);
+    }
+}
+
+/// Overwrites `out` with what is given, or with `n` zeros.
+fn fill<E: Copy>(out: &mut Vec<E>, given: Option<&[E]>, n: usize, zero: E) {
+    out.clear();
+    match given {
+        Some(given) => out.extend_from_slice(given),
+        None => out.resize(n, zero),
+    }
+}

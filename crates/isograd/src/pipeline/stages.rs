@@ -1,0 +1,212 @@
+//! The stages of a plan, each from the results of those before it.
+
+use super::{Error, Reconstruction, Reconstructor};
+use crate::data::PointCloud;
+use crate::isosurface::measure;
+use crate::report::{Stage, Warning};
+use crate::{Real, checks, distance, isosurface, neighbors, normals, orient, splat};
+
+impl<T: Real> Reconstructor<T> {
+    /// One stage, compiled where it is called: see [`concrete`](crate::concrete).
+    pub(crate) fn run(
+        &mut self,
+        stage: Stage,
+        cloud: &PointCloud<T>,
+        held: Option<&Reconstruction<T>>,
+    ) -> Result<(), Error> {
+        match stage {
+            Stage::Normals => self.normals(cloud, held)?,
+            Stage::Orient => self.orient(cloud, held)?,
+            Stage::Splat => self.splat(cloud)?,
+            Stage::Poisson => self.solve(cloud)?,
+            Stage::Isosurface => self.isosurface()?,
+            Stage::Distance => self.distance()?,
+            Stage::Checks if held.is_some() => (),
+            Stage::Checks => self.check(cloud),
+        }
+        Ok(())
+    }
+
+    fn normals(
+        &mut self,
+        cloud: &PointCloud<T>,
+        held: Option<&Reconstruction<T>>,
+    ) -> Result<(), Error> {
+        let Reconstruction {
+            options,
+            areas,
+            residuals,
+            report,
+            ..
+        } = &mut self.result;
+        let neighborhoods = &mut residuals.neighborhoods;
+        match held {
+            Some(held) => {
+                neighbors::hold(cloud.points(), &held.residuals.neighborhoods, neighborhoods)?;
+            }
+            None => neighbors::forward(cloud.points(), options.radius, neighborhoods)?,
+        }
+        if options.orientation == orient::Method::Given {
+            residuals.normals.clear();
+        } else {
+            normals::forward(neighborhoods, &mut residuals.normals);
+        }
+        if options.area_weights {
+            splat::area::forward(neighborhoods, &mut self.scratch.areas, areas);
+        } else {
+            areas.clear();
+            areas.resize(cloud.len(), T::one());
+        }
+        report.radius = neighborhoods.common_radius.f64();
+        report.sample_spacing = neighborhoods.spacing().f64();
+        report.guarded = residuals.normals.guarded();
+        if report.guarded == cloud.len() {
+            return Err(Error::NoPlane {
+                points: cloud.len(),
+            });
+        }
+        Ok(())
+    }
+
+    fn orient(
+        &mut self,
+        cloud: &PointCloud<T>,
+        held: Option<&Reconstruction<T>>,
+    ) -> Result<(), Error> {
+        let Reconstruction {
+            options,
+            orientation,
+            residuals,
+            report,
+            ..
+        } = &mut self.result;
+        if let Some(held) = held.filter(|_| options.orientation != orient::Method::Given) {
+            let axes = &residuals.normals.normals;
+            orient::hold(axes, &held.orientation, orientation);
+            return Ok(());
+        }
+        orient::forward(
+            cloud.points(),
+            &residuals.normals.normals,
+            &residuals.neighborhoods,
+            cloud.normals(),
+            &options.orientation,
+            &mut self.scratch.orient,
+            orientation,
+        )?;
+        report.orientation = orientation.method.name();
+        report.flipped = orientation.flipped;
+        Ok(())
+    }
+
+    fn splat(&mut self, cloud: &PointCloud<T>) -> Result<(), Error> {
+        let Reconstruction {
+            options,
+            orientation,
+            areas,
+            indicator,
+            residuals,
+            ..
+        } = &mut self.result;
+        let samples = splat::Samples {
+            points: cloud.points(),
+            normals: &orientation.normals,
+            areas,
+        };
+        splat::forward(
+            samples,
+            options.weights,
+            &mut self.scratch.splat,
+            &mut residuals.splat,
+            indicator,
+        )?;
+        Ok(())
+    }
+
+    fn solve(&mut self, cloud: &PointCloud<T>) -> Result<(), Error> {
+        let Reconstruction {
+            options,
+            poisson,
+            areas,
+            indicator,
+            iso_value,
+            residuals,
+            report,
+            ..
+        } = &mut self.result;
+        let values = indicator.values_mut();
+        poisson.solve(values, options.smoothing, &mut self.scratch.poisson)?;
+        let (level, residual) = isosurface::iso_value::forward(indicator, cloud.points(), areas)?;
+        *iso_value = level;
+        residuals.iso_value = residual;
+        report.iso_value = level.f64();
+        Ok(())
+    }
+
+    fn isosurface(&mut self) -> Result<(), Error> {
+        let Reconstruction {
+            indicator,
+            iso_value,
+            mesh,
+            report,
+            ..
+        } = &mut self.result;
+        let found = isosurface::forward(indicator, *iso_value, &mut self.scratch.isosurface, mesh)?;
+        if found.touches_wall {
+            report.warnings.push(Warning::TouchesWall);
+        }
+        Ok(())
+    }
+
+    fn distance(&mut self) -> Result<(), Error> {
+        let Reconstruction {
+            options,
+            indicator,
+            iso_value,
+            mesh,
+            sdf,
+            closest,
+            ..
+        } = &mut self.result;
+        distance::lattice::forward(
+            mesh,
+            indicator,
+            *iso_value,
+            options.band,
+            &mut self.scratch.distance,
+            sdf,
+            closest,
+        )?;
+        Ok(())
+    }
+
+    /// Measures the result and looks for reasons not to trust it.
+    fn check(&mut self, cloud: &PointCloud<T>) {
+        if !self.result.options.checks {
+            return;
+        }
+        let Reconstruction {
+            sdf,
+            mesh,
+            orientation,
+            residuals,
+            report,
+            ..
+        } = &mut self.result;
+        report.measure_samples(&residuals.neighborhoods.count, &orientation.confidence);
+        report.measure_field(sdf);
+        report.surface = measure::measure(mesh, &mut self.scratch.measure);
+        let (points, normals) = (cloud.points(), &orientation.normals);
+        let warnings = &mut report.warnings;
+        warnings.extend(checks::thin_and_missed(points, normals, sdf));
+        warnings.extend(checks::sparse(
+            residuals.neighborhoods.spacing(),
+            sdf.grid().spacing(),
+        ));
+        warnings.extend(checks::open(points, normals, &residuals.neighborhoods));
+        warnings.extend(checks::components(report.surface.components));
+        warnings.extend(checks::doubtful_signs(&orientation.confidence));
+        warnings.extend(checks::guarded(report.guarded, points.len()));
+        warnings.extend(checks::rounded(points, sdf.grid().spacing()));
+    }
+}

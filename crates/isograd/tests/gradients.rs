@@ -1,0 +1,396 @@
+//! The pullback of the whole pipeline: every result and every input, the same bits on any number of threads,
+//! memory, and input that makes no sense. Whole bodies are in `isograd-shapes/tests/gradients.rs`.
+
+mod common;
+
+use common::{TORUS, Uniform};
+use isograd::distance::extend;
+use isograd::neighbors::Radius;
+use isograd::orient::Method;
+use isograd::splat::Weights;
+use isograd::{
+    Attribute, CloudCotangent, Cotangent, ExtensionCotangent, Grid, Options, PointCloud,
+    PullbackError, Real, Reconstruction, Reconstructor,
+};
+
+/// A motion of a point in cells over which nothing that has no derivative is likely to change.
+const STEP: f64 = 1e-7;
+
+fn grid<T: Real>() -> Grid<T> {
+    let lower = [-1.213, -1.206, -0.619].map(T::of);
+    Grid::new(lower, T::of(0.05), [48, 48, 24]).expect("a grid")
+}
+
+/// 5000 samples of a torus with normals of any length and an attribute of two components.
+fn cloud<T: Real>() -> PointCloud<T> {
+    let exact = TORUS.uniform::<f64>(5000, 2);
+    let mut random = Uniform::new(3);
+    let normals = exact.normals().expect("given").iter().map(|n| {
+        let length = 0.5 + random.next();
+        n.map(|x| T::of(length * x))
+    });
+    let normals = normals.collect();
+    let values = exact.points().iter();
+    let values = values.flat_map(|p| [p[0] * p[1], (3.0 * p[2]).sin()].map(T::of));
+    let attribute = Attribute {
+        name: "heat".into(),
+        components: 2,
+        values: values.collect(),
+    };
+    let points = exact.points().iter().map(|p| p.map(T::of)).collect();
+    PointCloud::new(points)
+        .and_then(|cloud| cloud.with_normals(normals))
+        .and_then(|cloud| cloud.with_attribute(attribute))
+        .expect("a cloud")
+}
+
+fn random<T: Real>(n: usize, seed: u64) -> Vec<T> {
+    let mut random = Uniform::new(seed);
+    (0..n).map(|_| T::of(random.next() - 0.4)).collect()
+}
+
+fn random_vectors<T: Real>(n: usize, seed: u64) -> Vec<[T; 3]> {
+    random::<T>(3 * n, seed).as_chunks().0.to_vec()
+}
+
+fn inner(a: impl IntoIterator<Item = f64>, b: impl IntoIterator<Item = f64>) -> f64 {
+    a.into_iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn flat(v: &[[f64; 3]]) -> impl Iterator<Item = f64> + '_ {
+    v.iter().flatten().copied()
+}
+
+/// Everything that a loss may depend on, and the weight of each part.
+struct Weighted<T> {
+    sdf: Vec<T>,
+    indicator: Vec<T>,
+    vertices: Vec<[T; 3]>,
+    normals: Vec<[T; 3]>,
+    areas: Vec<T>,
+    at_vertices: Vec<T>,
+    in_band: Vec<T>,
+}
+
+/// An attribute and what came of it.
+struct Extended<T> {
+    attribute: Attribute<T>,
+    extension: extend::Extension<T>,
+    residual: extend::Residual<T>,
+}
+
+impl<T: Real> Extended<T> {
+    fn new(result: &Reconstruction<T>, cloud: &PointCloud<T>) -> Self {
+        let attribute = cloud.attributes()[0].clone();
+        let (mut extension, mut residual) = Default::default();
+        let scratch = &mut Default::default();
+        result
+            .extend_into(&attribute, 3.0, scratch, &mut residual, &mut extension)
+            .expect("extended");
+        Self {
+            attribute,
+            extension,
+            residual,
+        }
+    }
+}
+
+impl<T: Real> Weighted<T> {
+    fn new(result: &Reconstruction<T>, extended: &Extended<T>) -> Self {
+        let cells = result.sdf().values().len();
+        let (vertices, samples) = (result.mesh().vertices().len(), result.areas().len());
+        Self {
+            sdf: random(cells, 11),
+            indicator: random(cells, 12),
+            vertices: random_vectors(vertices, 13),
+            normals: random_vectors(samples, 14),
+            areas: random::<T>(samples, 15)
+                .iter()
+                .map(|&x| x * T::of(1e3))
+                .collect(),
+            at_vertices: random(extended.extension.vertices.len(), 16),
+            in_band: random(extended.extension.values.len(), 17),
+        }
+    }
+
+    fn pull(
+        &self,
+        result: &Reconstruction<T>,
+        cloud: &PointCloud<T>,
+        extended: &Extended<T>,
+    ) -> CloudCotangent<T> {
+        let extensions = [ExtensionCotangent {
+            attribute: &extended.attribute,
+            extension: &extended.extension,
+            residual: &extended.residual,
+            vertices: Some(&self.at_vertices),
+            values: Some(&self.in_band),
+        }];
+        let cotangent = Cotangent {
+            sdf: Some(&self.sdf),
+            indicator: Some(&self.indicator),
+            iso_value: T::of(40.0),
+            vertices: Some(&self.vertices),
+            normals: Some(&self.normals),
+            areas: Some(&self.areas),
+            extensions: &extensions,
+        };
+        result.pullback(cloud, &cotangent).expect("a pullback")
+    }
+}
+
+impl Weighted<f64> {
+    /// All weights, in the order of [`results`].
+    fn weights(&self) -> Vec<f64> {
+        let vectors = [&self.vertices, &self.normals].map(|v| flat(v).collect());
+        let [vertices, normals]: [Vec<f64>; 2] = vectors;
+        [
+            &self.sdf[..],
+            &self.indicator,
+            &[40.0],
+            &vertices,
+            &normals,
+            &self.areas,
+            &self.at_vertices,
+            &self.in_band,
+        ]
+        .concat()
+    }
+}
+
+/// All results, one after the other.
+fn results(result: &Reconstruction<f64>, extended: &Extended<f64>) -> Vec<f64> {
+    let vectors = [result.mesh().vertices(), result.normals()].map(|v| flat(v).collect());
+    let [vertices, normals]: [Vec<f64>; 2] = vectors;
+    [
+        result.sdf().values(),
+        result.indicator().values(),
+        &[result.iso_value()],
+        &vertices,
+        &normals,
+        result.areas(),
+        &extended.extension.vertices,
+        &extended.extension.values,
+    ]
+    .concat()
+}
+
+/// Points, given normals, attribute and grid moved along a direction.
+struct Direction {
+    points: Vec<[f64; 3]>,
+    normals: Vec<[f64; 3]>,
+    values: Vec<f64>,
+    lower: [f64; 3],
+    spacing: f64,
+}
+
+impl Direction {
+    fn new(cloud: &PointCloud<f64>) -> Self {
+        let n = cloud.len();
+        Self {
+            points: random_vectors(n, 21),
+            normals: random_vectors(n, 22),
+            values: random(2 * n, 23),
+            lower: [0.3, -0.4, 0.2],
+            spacing: 0.005,
+        }
+    }
+
+    fn cloud(&self, cloud: &PointCloud<f64>, step: f64) -> PointCloud<f64> {
+        let moved = |from: &[[f64; 3]], v: &[[f64; 3]]| -> Vec<[f64; 3]> {
+            let pairs = from.iter().zip(v);
+            pairs
+                .map(|(p, v)| std::array::from_fn(|a| p[a] + step * v[a]))
+                .collect()
+        };
+        let mut attribute = cloud.attributes()[0].clone();
+        for (value, v) in attribute.values.iter_mut().zip(&self.values) {
+            *value += step * v;
+        }
+        let normals = moved(cloud.normals().expect("given"), &self.normals);
+        PointCloud::new(moved(cloud.points(), &self.points))
+            .and_then(|cloud| cloud.with_normals(normals))
+            .and_then(|cloud| cloud.with_attribute(attribute))
+            .expect("a cloud")
+    }
+
+    fn grid(&self, step: f64) -> Grid<f64> {
+        let grid = grid::<f64>();
+        let lower = std::array::from_fn(|a| grid.lower()[a] + step * self.lower[a]);
+        let spacing = grid.spacing() + step * self.spacing;
+        Grid::new(lower, spacing, grid.shape()).expect("a grid")
+    }
+
+    fn inner(&self, bar: &CloudCotangent<f64>) -> f64 {
+        inner(flat(&bar.points), flat(&self.points))
+            + inner(flat(&bar.normals), flat(&self.normals))
+            + inner(bar.attributes[0].clone(), self.values.clone())
+            + inner(bar.grid.lower, self.lower)
+            + bar.grid.spacing * self.spacing
+    }
+}
+
+#[test]
+fn all_results_are_pulled_back_to_all_inputs() {
+    // So wide that no radius grows, of a sample or round a vertex: those are held constant.
+    let radius = Radius::Fixed(0.17);
+    let estimated = Options {
+        radius,
+        ..Options::default()
+    };
+    let given = Options {
+        orientation: Method::Given,
+        ..estimated.clone()
+    };
+    let plain = Options {
+        area_weights: false,
+        weights: Weights::Paper,
+        smoothing: 0.7,
+        ..estimated.clone()
+    };
+    let signs = Options {
+        orientation: Method::Signs,
+        ..estimated.clone()
+    };
+    for options in [estimated, given, signs, plain] {
+        let cloud = cloud::<f64>();
+        let mut plan = Reconstructor::new(grid(), options.clone()).expect("options");
+        let base = plan.reconstruct(&cloud).expect("a torus").clone();
+        let extended = Extended::new(&base, &cloud);
+        let weighted = Weighted::new(&base, &extended);
+        let pulled = weighted.pull(&base, &cloud, &extended);
+        assert_eq!(pulled.guarded, 0);
+        assert_eq!(
+            pulled.normals.is_empty(),
+            options.orientation != Method::Given
+        );
+        let direction = Direction::new(&cloud);
+        let step = STEP * base.sdf().grid().spacing();
+        let [plus, minus] = [step, -step].map(|step| {
+            let moved = direction.cloud(&cloud, step);
+            let mut plan = Reconstructor::new(direction.grid(step), options.clone());
+            let plan = plan.as_mut().expect("options");
+            let result = plan.reconstruct_held(&moved, &base).expect("a torus");
+            assert_eq!(result.mesh().edges(), base.mesh().edges(), "a sign changed");
+            assert_eq!(result.neighbour_counts(), base.neighbour_counts());
+            results(result, &Extended::new(result, &moved))
+        });
+        // Subtracted before they are summed: the sums are large.
+        let differences = plus.iter().zip(&minus).map(|(p, m)| (p - m) / (2.0 * step));
+        let (pulled, difference) = (
+            direction.inner(&pulled),
+            inner(differences, weighted.weights()),
+        );
+        println!("{pulled}, {difference}, {:e}", pulled / difference - 1.0);
+        assert!((pulled / difference - 1.0).abs() < 1e-6, "{options:?}");
+    }
+}
+
+fn bits<T: Real>(values: impl IntoIterator<Item = T>) -> Vec<u64> {
+    values.into_iter().map(|v| v.f64().to_bits()).collect()
+}
+
+fn assert_same_bits<T: Real>(orientation: Method) {
+    let cloud = cloud::<T>();
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.expect("threads").install(|| {
+            let options = Options {
+                orientation,
+                ..Options::default()
+            };
+            let mut plan = Reconstructor::new(grid(), options).expect("options");
+            let result = plan.reconstruct(&cloud).expect("a torus");
+            let extended = Extended::new(result, &cloud);
+            let bar = Weighted::new(result, &extended).pull(result, &cloud, &extended);
+            [
+                bits(bar.points.into_iter().flatten()),
+                bits(bar.normals.into_iter().flatten()),
+                bits(bar.attributes.into_iter().flatten()),
+                bits(bar.grid.lower),
+                bits([bar.grid.spacing]),
+            ]
+        })
+    };
+    let one = run(1);
+    assert!(one == run(2) && one == run(5));
+}
+
+#[test]
+fn one_two_and_five_threads_give_the_same_bits() {
+    assert_same_bits::<f32>(Method::Auto);
+    assert_same_bits::<f64>(Method::Auto);
+    assert_same_bits::<f32>(Method::Given);
+    assert_same_bits::<f64>(Method::Signs);
+}
+
+#[test]
+fn single_precision_agrees_with_double_precision() {
+    fn points<T: Real>() -> Vec<f64> {
+        let cloud = cloud::<T>();
+        let mut plan = Reconstructor::new(grid(), Options::default()).expect("options");
+        let result = plan.reconstruct(&cloud).expect("a torus");
+        let phi = result.sdf().values();
+        let bar: Vec<T> = phi
+            .iter()
+            .map(|&phi| T::of((-phi.f64().abs() / 0.1).exp()))
+            .collect();
+        let cotangent = Cotangent {
+            sdf: Some(&bar),
+            ..Cotangent::default()
+        };
+        let pulled = result.pullback(&cloud, &cotangent).expect("a pullback");
+        pulled.points.iter().flatten().map(|x| x.f64()).collect()
+    }
+    let (single, double) = (points::<f32>(), points::<f64>());
+    let size = double.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let errors = single
+        .iter()
+        .zip(&double)
+        .map(|(a, b)| (a - b).abs() / size);
+    let mut errors: Vec<f64> = errors.collect();
+    errors.sort_unstable_by(f64::total_cmp);
+    // Cells on the medial axis may choose another face, and then a few points feel it.
+    assert!(
+        errors[errors.len() / 2] < 1e-4,
+        "{:e}",
+        errors[errors.len() / 2]
+    );
+    assert!(errors[errors.len() * 99 / 100] < 1e-2);
+}
+
+#[test]
+fn what_does_not_fit_is_refused_with_a_reason() {
+    let cloud = cloud::<f64>();
+    let mut plan = Reconstructor::new(grid(), Options::default()).expect("options");
+    let result = plan.reconstruct(&cloud).expect("a torus");
+    let refused = |cloud: &PointCloud<f64>, cotangent: &Cotangent<'_, f64>| -> PullbackError {
+        result.pullback(cloud, cotangent).expect_err("refused")
+    };
+    let none = Cotangent::default();
+    let other = TORUS.uniform::<f64>(5000, 9);
+    assert!(refused(&other, &none).to_string().contains("not the one"));
+    let fewer = TORUS.uniform::<f64>(10, 9);
+    assert!(
+        refused(&fewer, &none)
+            .to_string()
+            .contains("10 points, not 5000")
+    );
+    let mut bar = vec![0.0; result.sdf().values().len()];
+    let sdf = |bar: &[f64]| {
+        let cotangent = Cotangent {
+            sdf: Some(bar),
+            ..none
+        };
+        refused(&cloud, &cotangent).to_string()
+    };
+    assert!(sdf(&bar[1..]).contains("must have"));
+    bar[77] = f64::NAN;
+    assert!(
+        sdf(&bar).contains("not finite at entry 77"),
+        "{}",
+        sdf(&bar)
+    );
+    let pulled = result.pullback(&cloud, &none).expect("nothing to do");
+    assert!(pulled.points.iter().flatten().all(|&x| x == 0.0));
+}
