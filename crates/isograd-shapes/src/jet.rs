@@ -1,4 +1,4 @@
-//! A number with three derivatives: forward-mode differentiation for the surface maps.
+//! A number with a few derivatives: forward-mode differentiation for the surface maps.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -9,14 +9,18 @@ pub(crate) const V: usize = 1;
 /// Slot of the derivative with respect to one parameter of the shape.
 pub(crate) const PARAMETER: usize = 2;
 
-/// A value and its derivatives with respect to `u`, `v` and one parameter.
+/// Derivatives that one number carries: as many as fill a vector register or two.
+pub(crate) const SLOTS: usize = 4;
+
+/// A value and its derivatives with respect to `u`, `v` and one parameter, or to any other [`SLOTS`]
+/// variables: a map does not care what its derivatives stand for.
 ///
 /// Every surface map is written once, in jets. Its normals, area elements, velocities and parameter
 /// derivatives follow from the same lines, exact to rounding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Jet {
     pub value: f64,
-    pub slope: [f64; 3],
+    pub slope: [f64; SLOTS],
 }
 
 impl Jet {
@@ -24,7 +28,7 @@ impl Jet {
     pub const fn constant(value: f64) -> Self {
         Self {
             value,
-            slope: [0.0; 3],
+            slope: [0.0; SLOTS],
         }
     }
 

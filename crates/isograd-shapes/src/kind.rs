@@ -102,6 +102,28 @@ pub enum ShapeError {
         /// What was given.
         value: f64,
     },
+    /// A coordinate of a patch that the shape does not have (now).
+    #[error(
+        "coordinate {index} is on patch {patch}, and {shape} has {patches}; sample the shape again"
+    )]
+    Coordinate {
+        /// The shape.
+        shape: &'static str,
+        /// The first such coordinate.
+        index: usize,
+        /// Its patch.
+        patch: u32,
+        /// How many there are.
+        patches: usize,
+    },
+    /// Not one cotangent for each coordinate.
+    #[error("{cotangents} cotangents for {coordinates} surface coordinates; give one for each")]
+    Cotangents {
+        /// Number of cotangents.
+        cotangents: usize,
+        /// Number of coordinates.
+        coordinates: usize,
+    },
     /// Values that are good each alone, but make no body together.
     #[error("{0}")]
     Combination(String),

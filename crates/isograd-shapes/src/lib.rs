@@ -13,6 +13,11 @@
 //! // The same material points a little later: a parameter moves points along smooth paths.
 //! let width_tangent = fish.tangent("width3", &samples.coordinates)?;
 //! assert_eq!(width_tangent.len(), 2000);
+//!
+//! // And back: from a cotangent of each point to one of each parameter.
+//! let along_x = vec![[1.0f64, 0.0, 0.0]; 2000];
+//! let gradient = fish.pullback(&samples.coordinates, &along_x)?;
+//! assert_eq!(gradient.len(), fish.values().len());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
@@ -34,6 +39,7 @@
 mod bodies;
 mod jet;
 mod kind;
+mod material;
 mod measure;
 mod sampling;
 mod shape;

@@ -154,6 +154,22 @@ impl Shape {
         Ok(())
     }
 
+    /// The surface made of other numbers than the values.
+    pub(crate) fn build(&self, jets: &[Jet]) -> Result<Box<dyn Surface>, ShapeError> {
+        (self.kind.build)(jets)
+    }
+
+    /// Whether points are differentiable in the parameter at `index`; no, where there is none.
+    pub fn is_differentiable(&self, index: usize) -> bool {
+        let parameter = self.kind.parameters.get(index);
+        parameter.is_some_and(|parameter| !parameter.whole)
+    }
+
+    /// The name of the parameter that is time, for a shape that moves.
+    pub fn time_parameter(&self) -> Option<&'static str> {
+        self.kind.time.map(|index| self.kind.parameters[index].name)
+    }
+
     /// Number of patches of its surface.
     pub fn patches(&self) -> usize {
         self.surface.patches()

@@ -117,10 +117,13 @@ impl Midline {
     pub fn steepest_and_sharpest(&self) -> (f64, f64) {
         let (mut steepest, mut sharpest) = (0.0f64, 0.0f64);
         for phase in 0..24 {
+            // Constants, so that the slope in U is along the body and nothing else.
             let at = Self {
+                amplitude: Jet::constant(self.amplitude.value),
+                wave_number: Jet::constant(self.wave_number.value),
+                carangiform: Jet::constant(self.carangiform.value),
                 phase: Jet::constant(f64::from(phase) / 24.0),
                 nodes: vec![],
-                ..*self
             };
             for station in 0..=200 {
                 let [_, slope] = at.wave(Jet::variable(f64::from(station) / 200.0, U));

@@ -1,0 +1,160 @@
+//! Material points, which stay at their surface coordinates while parameters change: where they are, and
+//! the pullback of the map from parameters to points.
+
+use isograd::Real;
+use isograd::vector::of_f64;
+use rayon::prelude::*;
+
+use crate::jet::{Jet, SLOTS, values};
+use crate::kind::ShapeError;
+use crate::shape::{Shape, SurfaceCoordinate, evaluate};
+use crate::surface::Surface;
+
+/// Points in one task: a fixed number, so that sums have the same bits for any number of threads.
+const CHUNK: usize = 2048;
+
+impl Shape {
+    /// `(N, 3)` points at `(N,)` surface coordinates, in their order: the same material points whatever the
+    /// parameters are now. Computed in double precision and rounded once.
+    ///
+    /// # Errors
+    /// A coordinate on a patch that is not there.
+    pub fn points_at<T: Real>(
+        &self,
+        coordinates: &[SurfaceCoordinate],
+    ) -> Result<Vec<[T; 3]>, ShapeError> {
+        self.check_coordinates(coordinates)?;
+        let point = |c: &SurfaceCoordinate| of_f64(values(at(&*self.surface, c)));
+        Ok(coordinates.par_iter().map(point).collect())
+    }
+
+    /// `(N, 3)` outward unit normals of the same material points; zero where the map from the square to the
+    /// surface degenerates, which it does not at coordinates that were [sampled](Shape::sample) here.
+    ///
+    /// # Errors
+    /// As [`Shape::points_at`].
+    pub fn normals_at<T: Real>(
+        &self,
+        coordinates: &[SurfaceCoordinate],
+    ) -> Result<Vec<[T; 3]>, ShapeError> {
+        self.check_coordinates(coordinates)?;
+        let normal = |c: &SurfaceCoordinate| {
+            let point = evaluate(&*self.surface, c.patch as usize, c.u, c.v);
+            of_f64(point.normal().unwrap_or_default())
+        };
+        Ok(coordinates.par_iter().map(normal).collect())
+    }
+
+    /// Cotangents of all parameters, in the order of [`Shape::values`], from those of the points at fixed
+    /// surface coordinates: `p̄ = Σ_i x̄_i · ∂x_i/∂p`, in the cotangents' unit per unit of the parameter.
+    ///
+    /// Not differentiable: which samples of a union are buried, and whole-number parameters (their cotangent
+    /// is given as zero).
+    ///
+    /// # Errors
+    /// Another number of cotangents than of coordinates; a coordinate on a patch that is not there.
+    pub fn pullback<T: Real>(
+        &self,
+        coordinates: &[SurfaceCoordinate],
+        points_bar: &[[T; 3]],
+    ) -> Result<Vec<f64>, ShapeError> {
+        let all: Vec<usize> = (0..self.values().len()).collect();
+        self.pullback_of(&all, coordinates, points_bar)
+    }
+
+    /// The same for some parameters, named by their places in [`Shape::values`], in the order in which they
+    /// are named: it takes as much less time as they are fewer.
+    ///
+    /// # Errors
+    /// As [`Shape::pullback`]. Places beyond the last get zero.
+    pub fn pullback_of<T: Real>(
+        &self,
+        parameters: &[usize],
+        coordinates: &[SurfaceCoordinate],
+        points_bar: &[[T; 3]],
+    ) -> Result<Vec<f64>, ShapeError> {
+        if points_bar.len() != coordinates.len() {
+            return Err(ShapeError::Cotangents {
+                cotangents: points_bar.len(),
+                coordinates: coordinates.len(),
+            });
+        }
+        self.check_coordinates(coordinates)?;
+        let mut cotangents = vec![0.0; parameters.len()];
+        let smooth = |place: &usize| self.is_differentiable(parameters[*place]);
+        let places: Vec<usize> = (0..parameters.len()).filter(smooth).collect();
+        // One walk over the points for as many parameters as a jet carries.
+        for group in places.chunks(SLOTS) {
+            let surface = self.moving(group.iter().map(|&place| parameters[place]))?;
+            let sums = pulled_back(&*surface, coordinates, points_bar);
+            for (&place, sum) in group.iter().zip(sums) {
+                cotangents[place] = sum;
+            }
+        }
+        Ok(cotangents)
+    }
+
+    /// The surface with one parameter in each slot.
+    fn moving(
+        &self,
+        parameters: impl Iterator<Item = usize>,
+    ) -> Result<Box<dyn Surface>, ShapeError> {
+        let mut jets: Vec<Jet> = self.values().iter().map(|&x| Jet::constant(x)).collect();
+        for (slot, parameter) in parameters.enumerate() {
+            jets[parameter] = Jet::variable(self.values()[parameter], slot);
+        }
+        self.build(&jets)
+    }
+
+    fn check_coordinates(&self, coordinates: &[SurfaceCoordinate]) -> Result<(), ShapeError> {
+        let patches = self.patches();
+        match coordinates.iter().position(|c| c.patch as usize >= patches) {
+            None => Ok(()),
+            Some(index) => Err(ShapeError::Coordinate {
+                shape: self.name(),
+                index,
+                patch: coordinates[index].patch,
+                patches,
+            }),
+        }
+    }
+}
+
+/// The point at a coordinate, with the slopes that the surface's own parameters bring.
+fn at(surface: &dyn Surface, c: &SurfaceCoordinate) -> [Jet; 3] {
+    surface.map(c.patch as usize, Jet::constant(c.u), Jet::constant(c.v))
+}
+
+/// `Σ_i x̄_i · ∂x_i/∂(slot)` for every slot, in one order.
+fn pulled_back<T: Real>(
+    surface: &dyn Surface,
+    coordinates: &[SurfaceCoordinate],
+    points_bar: &[[T; 3]],
+) -> [f64; SLOTS] {
+    let add = |sums: &mut [f64; SLOTS], (c, bar): (&SurfaceCoordinate, &[T; 3])| {
+        for (x, bar) in at(surface, c).iter().zip(bar) {
+            for (sum, slope) in sums.iter_mut().zip(x.slope) {
+                *sum += bar.f64() * slope;
+            }
+        }
+    };
+    let chunks = coordinates
+        .par_chunks(CHUNK)
+        .zip(points_bar.par_chunks(CHUNK));
+    let partial: Vec<[f64; SLOTS]> = chunks
+        .map(|(coordinates, bars)| {
+            let mut sums = [0.0; SLOTS];
+            for pair in coordinates.iter().zip(bars) {
+                add(&mut sums, pair);
+            }
+            sums
+        })
+        .collect();
+    let mut total = [0.0; SLOTS];
+    for part in partial {
+        for (sum, term) in total.iter_mut().zip(part) {
+            *sum += term;
+        }
+    }
+    total
+}

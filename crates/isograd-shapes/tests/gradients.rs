@@ -1,0 +1,125 @@
+//! The pullback of the whole pipeline on bodies: against finite differences, and against closed forms.
+
+use std::f64::consts::PI;
+
+use isograd::gradcheck::{Motion, Options, gradcheck};
+use isograd::isosurface::measure_pullback;
+use isograd::{Cotangent, Grid, PointCloud, Reconstructor, Resolution};
+use isograd_shapes::{Layout, Sampling, by_name};
+
+fn cloud(name: &str, n: usize) -> PointCloud<f64> {
+    let sampling = Sampling {
+        layout: Layout::Random,
+        ..Sampling::default()
+    };
+    let shape = by_name(name).expect("a shape");
+    let samples = shape.sample::<f64>(n, &sampling, 3).expect("samples");
+    PointCloud::new(samples.cloud.points().to_vec()).expect("finite")
+}
+
+#[test]
+fn whole_pullback_is_the_transpose_of_the_derivative() {
+    for (name, points, cells) in [
+        ("torus", 5000, 48),
+        ("fish", 8000, 96),
+        ("airliner", 8000, 96),
+    ] {
+        let cloud = cloud(name, points);
+        let grid = Grid::fit(&cloud, Resolution::Cells(cells), 0.1).expect("a grid");
+        let options = Options {
+            motions: vec![
+                Motion::Noise,
+                Motion::Waves,
+                Motion::Growth,
+                Motion::Bending,
+            ],
+            ..Options::default()
+        };
+        let check = gradcheck(&cloud, grid, &options, &mut |_| ()).expect("a body");
+        for row in check.rows {
+            println!(
+                "{name}, {}: off by {:.1e} at {:e} cells; over ±½ cell {:.4}",
+                row.motion.name(),
+                row.small_ratio() - 1.0,
+                row.small.step,
+                row.large_ratio()
+            );
+            assert!(row.small.is_smooth(), "{name}: {row:?}");
+            assert!((row.small_ratio() - 1.0).abs() < 1e-6, "{name}: {row:?}");
+        }
+    }
+}
+
+/// Relative errors of `d(area)/dr = 8πr`, `d(volume)/dr = 4πr²` and mean `dφ/dr = −1` of a sphere whose centre
+/// is `shift` cells from that of the grid.
+fn sphere_errors(cells: usize, shift: [f64; 3]) -> [f64; 3] {
+    let radius = 0.5;
+    let sphere = by_name("sphere").expect("a sphere");
+    // As many samples for each cell on every grid.
+    let samples = sphere.sample::<f64>(cells * cells * 4, &Sampling::default(), 1);
+    let points = samples.expect("samples").cloud.points().to_vec();
+    let outward: Vec<[f64; 3]> = points.iter().map(|p| p.map(|x| x / radius)).collect();
+    let cloud = PointCloud::new(points).expect("finite");
+    let h = 1.25 / cells as f64;
+    let lower = shift.map(|s| h * s - 0.625);
+    let grid = Grid::new(lower, h, [cells; 3]).expect("a grid");
+    let mut plan = Reconstructor::new(grid, isograd::Options::default()).expect("options");
+    let result = plan.reconstruct(&cloud).expect("a sphere");
+    let derivative = |cotangent: &Cotangent<'_, f64>| -> f64 {
+        let pulled = result.pullback(&cloud, cotangent).expect("a pullback");
+        let pairs = pulled.points.iter().zip(&outward);
+        pairs.map(|(a, b)| isograd::vector::dot(*a, *b)).sum()
+    };
+    let of_measure = |area: f64, volume: f64| {
+        let mut vertices = Vec::new();
+        measure_pullback(result.mesh(), area, volume, &mut vertices);
+        derivative(&Cotangent {
+            vertices: Some(&vertices),
+            ..Cotangent::default()
+        })
+    };
+    let mean = vec![1.0 / grid.cells() as f64; grid.cells()];
+    let of_phi = derivative(&Cotangent {
+        sdf: Some(&mean),
+        ..Cotangent::default()
+    });
+    [
+        of_measure(1.0, 0.0) / (8.0 * PI * radius) - 1.0,
+        of_measure(0.0, 1.0) / (4.0 * PI * radius * radius) - 1.0,
+        of_phi / -1.0 - 1.0,
+    ]
+}
+
+#[test]
+fn a_growing_sphere_follows_its_closed_forms_and_converges() {
+    // Where the surface passes the cell centres makes a difference: several places.
+    let shifts = [
+        [0.0; 3],
+        [0.3, 0.1, 0.4],
+        [0.5, 0.25, 0.05],
+        [0.15, 0.35, 0.2],
+    ];
+    let mean = [32, 64, 128].map(|cells| {
+        let mut sums = [0.0f64; 3];
+        for shift in shifts {
+            let errors = sphere_errors(cells, shift);
+            println!("{cells} cells, {shift:?}: area, volume, φ off by {errors:.5?}");
+            for (sum, error) in sums.iter_mut().zip(errors) {
+                assert!(
+                    cells < 64 || error.abs() < 0.01,
+                    "{cells}, {shift:?}: {errors:?}"
+                );
+                *sum += error.abs() / shifts.len() as f64;
+            }
+        }
+        sums
+    });
+    println!("means: {mean:.5?}");
+    let [coarse, _, fine] = mean;
+    // That of the area is so small from the beginning that chance moves it.
+    assert!(mean.iter().all(|errors| errors[0] < 2e-3), "{mean:?}");
+    assert!(
+        fine[1] < 0.8 * coarse[1] && fine[2] < 0.8 * coarse[2],
+        "{mean:?}"
+    );
+}
