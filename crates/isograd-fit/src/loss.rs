@@ -1,0 +1,175 @@
+//! How far a field is from its target, and the cotangent of that.
+//!
+//! `L = (1/n) Σ_o ((φ_o − φ̃_o)/h)²` over the `n` cells of a region: the paper's Eq. `sdf_matching_loss`,
+//! `‖φ̃ − φ‖²`, in cells² and as a mean, so that its size depends neither on the grid nor on the unit.
+//! `φ̄_o = 2 (φ_o − φ̃_o)/(n h²)`.
+
+use isograd::Field;
+use rayon::prelude::*;
+
+use crate::target::TargetError;
+
+/// Cells in one task: a fixed number, so that the sum has the same bits for any number of threads.
+const CHUNK: usize = 8192;
+
+/// Which cells are compared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Region {
+    /// All: parts of a body that are closest to no cell near the target count too.
+    Full,
+    /// Those within this many cells of the target's surface; 8 by default. There every part of the surface
+    /// counts by its area. Far away one corner is closest to most cells, and a parameter that has nothing
+    /// to do with it is hard to find.
+    Band(f64),
+}
+
+impl Default for Region {
+    fn default() -> Self {
+        Self::Band(8.0)
+    }
+}
+
+/// A target and the cells on which it is to be met.
+#[derive(Clone, Debug)]
+pub struct Matching {
+    target: Vec<f64>,
+    /// `1/h`.
+    per_cell: f64,
+    /// Half the width of the region, in cells.
+    width: f64,
+    cells: usize,
+}
+
+/// How far a field is from the target.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Mismatch {
+    /// Mean of the squared difference, in cells².
+    pub loss: f64,
+    /// Mean of the difference without its sign, in cells.
+    pub mean_error: f64,
+}
+
+impl Matching {
+    /// Compares with `target` in `region`.
+    ///
+    /// # Errors
+    /// A band that holds no cell, or is not a positive number of cells.
+    pub fn new(target: &Field<f64>, region: Region) -> Result<Self, TargetError> {
+        let per_cell = 1.0 / target.grid().spacing();
+        let width = match region {
+            Region::Full => f64::INFINITY,
+            Region::Band(cells) => cells,
+        };
+        let near = |v: &&f64| (*v * per_cell).abs() <= width;
+        let cells = target.values().iter().filter(near).count();
+        if cells == 0 || !(width > 0.0) {
+            return Err(TargetError::EmptyBand { cells: width });
+        }
+        Ok(Self {
+            target: target.values().to_vec(),
+            per_cell,
+            width,
+            cells,
+        })
+    }
+
+    /// How far `phi` is from the target; writes the cotangent of the loss, per unit of φ, into `phi_bar`.
+    /// Both have one entry for each cell of the target.
+    pub fn evaluate(&self, phi: &[f64], phi_bar: &mut [f64]) -> Mismatch {
+        debug_assert!(phi.len() == self.target.len() && phi_bar.len() == phi.len());
+        let slope = 2.0 * self.per_cell / self.cells as f64;
+        let chunks = phi
+            .par_chunks(CHUNK)
+            .zip(self.target.par_chunks(CHUNK))
+            .zip(phi_bar.par_chunks_mut(CHUNK));
+        let partial: Vec<[f64; 2]> = chunks
+            .map(|((phi, target), bar)| {
+                let mut sums = [0.0; 2];
+                for ((phi, target), bar) in phi.iter().zip(target).zip(bar) {
+                    let counts = (target * self.per_cell).abs() <= self.width;
+                    let off = if counts {
+                        (phi - target) * self.per_cell
+                    } else {
+                        0.0
+                    };
+                    *bar = slope * off;
+                    sums[0] += off * off;
+                    sums[1] += off.abs();
+                }
+                sums
+            })
+            .collect();
+        let total = partial
+            .into_iter()
+            .fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+        let [loss, mean_error] = total.map(|sum| sum / self.cells as f64);
+        Mismatch { loss, mean_error }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use isograd::Grid;
+
+    use super::*;
+
+    fn field(h: f64, value: impl Fn([f64; 3]) -> f64) -> Field<f64> {
+        let grid = Grid::new([-8.0 * h; 3], h, [16, 17, 18]).expect("valid");
+        let values = (0..grid.cells()).map(|i| value(grid.center(grid.cell(i)).map(|x| x / h)));
+        let values = values.map(|v| v * h).collect();
+        Field::new(grid, values).expect("as many")
+    }
+
+    fn sphere(h: f64, radius: f64) -> Field<f64> {
+        field(h, |x| isograd::vector::norm(x) - radius)
+    }
+
+    #[test]
+    fn the_loss_has_no_unit_and_its_cotangent_is_its_derivative() {
+        for region in [Region::Full, Region::Band(1.5)] {
+            for h in [1.0, 1e-3] {
+                let matching = Matching::new(&sphere(h, 4.0), region).expect("a target");
+                let mut phi = sphere(h, 4.3).into_values();
+                let mut bar = vec![0.0; phi.len()];
+                let here = matching.evaluate(&phi, &mut bar);
+                // Every cell is 0.3 cells off.
+                assert!((here.loss - 0.09).abs() < 1e-12 && (here.mean_error - 0.3).abs() < 1e-12);
+                for cell in [0, 2345, 2500] {
+                    let mut other = vec![0.0; phi.len()];
+                    let step = 1e-4 * h;
+                    phi[cell] += step;
+                    let above = matching.evaluate(&phi, &mut other).loss;
+                    phi[cell] -= 2.0 * step;
+                    let below = matching.evaluate(&phi, &mut other).loss;
+                    phi[cell] += step;
+                    // Quadratic: a central difference is exact but for rounding, 1e-16/1e-4 of the loss.
+                    let slope = (above - below) / (2.0 * step);
+                    assert!(
+                        (slope - bar[cell]).abs() * h < 1e-11,
+                        "{slope} {}",
+                        bar[cell]
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn cells_outside_the_band_do_not_count() {
+        let matching = Matching::new(&sphere(1.0, 4.0), Region::Band(1.0)).expect("a target");
+        let mut phi = sphere(1.0, 4.0).into_values();
+        phi[0] += 100.0;
+        let mut bar = vec![1.0; phi.len()];
+        let here = matching.evaluate(&phi, &mut bar);
+        assert_eq!(here, Mismatch::default());
+        assert!(bar.iter().all(|b| *b == 0.0));
+    }
+
+    #[test]
+    fn a_band_without_cells_is_refused() {
+        for cells in [0.0, -1.0, f64::NAN] {
+            let refused = Matching::new(&sphere(1.0, 4.0), Region::Band(cells));
+            assert!(refused.expect_err("refused").to_string().contains("wider"));
+        }
+    }
+}

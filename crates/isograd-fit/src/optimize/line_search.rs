@@ -1,0 +1,135 @@
+//! A search along a direction for the strong Wolfe conditions (Nocedal and Wright 2006, algorithms 3.5 and
+//! 3.6), of a function that need not have a value everywhere.
+
+use super::{Evaluation, Function, HALVINGS, dot, is_finite, moved};
+
+/// The value must fall by this share of what the slope promises …
+const FALL: f64 = 1e-4;
+/// … and the slope to this share of what it was.
+const FLATTEN: f64 = 0.9;
+/// Growth of the step while the function still falls steeply.
+const GROWTH: f64 = 2.5;
+/// Points tried, those without a value apart.
+const TRIALS: usize = 12;
+
+/// What a search found.
+pub(super) enum Found<D, E> {
+    /// A lower point, and the function there.
+    Lower(Vec<f64>, Evaluation<D>),
+    /// No point lower than the start by what the slope promises.
+    Nothing,
+    /// No point with a value, however near.
+    Failing(E),
+}
+
+/// A point on the line.
+#[derive(Clone, Copy)]
+struct Place {
+    at: f64,
+    value: f64,
+    slope: f64,
+}
+
+/// The interval in which the conditions can be met: its low end, and its other end with the value there,
+/// where there is one.
+struct Bracket {
+    low: Place,
+    high: Option<(f64, Option<f64>)>,
+}
+
+impl Bracket {
+    /// Narrows the bracket by a place; whether it is the lowest so far, and by what the slope of `start`
+    /// promises.
+    fn take(&mut self, place: Place, start: &Place) -> bool {
+        // Strictly lower also where the promised fall is lost in rounding.
+        let falls = place.value <= start.value + FALL * place.at * start.slope;
+        let falls = falls && place.value < start.value;
+        if !falls || place.value >= self.low.value {
+            self.high = Some((place.at, Some(place.value)));
+            return false;
+        }
+        let toward = self.high.map_or(1.0, |(high, _)| high - self.low.at);
+        if place.slope * toward >= 0.0 {
+            self.high = Some((self.low.at, Some(self.low.value)));
+        }
+        self.low = place;
+        true
+    }
+
+    /// Where to look next; at most at `reach`.
+    fn next(&self, reach: f64) -> f64 {
+        let low = self.low;
+        match self.high {
+            None => (low.at * GROWTH).min(reach),
+            // A point without a value tells nothing but that it is too far.
+            Some((high, None)) => 0.5 * (low.at + high),
+            Some((high, Some(value))) => {
+                // The parabola through both values with the slope of the low end.
+                let width = high - low.at;
+                let curvature = value - low.value - low.slope * width;
+                let share = -0.5 * low.slope * width / curvature;
+                let share = if share.is_finite() { share } else { 0.5 };
+                low.at + share.clamp(0.1, 0.9) * width
+            }
+        }
+    }
+}
+
+/// Searches from `x`, where the function is `here`, along `d`, from a step of 1 on and as far as `reach`.
+pub(super) fn search<D, E>(
+    x: &[f64],
+    here: &Evaluation<D>,
+    d: &[f64],
+    reach: f64,
+    function: &mut impl Function<D, E>,
+) -> Found<D, E> {
+    let slope = dot(&here.gradient, d);
+    if !(slope < 0.0) {
+        return Found::Nothing;
+    }
+    let start = Place {
+        at: 0.0,
+        value: here.value,
+        slope,
+    };
+    let mut bracket = Bracket {
+        low: start,
+        high: None,
+    };
+    let mut lowest = None;
+    let (mut at, mut trials, mut failure, mut failures) = (reach.min(1.0), 0, None, 0);
+    while trials < TRIALS && failures <= HALVINGS {
+        let point = moved(x, at, d);
+        match function(&point) {
+            Ok(evaluation) if is_finite(&evaluation) => {
+                trials += 1;
+                let place = Place {
+                    at,
+                    value: evaluation.value,
+                    slope: dot(&evaluation.gradient, d),
+                };
+                if bracket.take(place, &start) {
+                    lowest = Some((point, evaluation));
+                    if place.slope.abs() <= -FLATTEN * slope || at >= reach {
+                        break;
+                    }
+                }
+            }
+            failed => {
+                failures += 1;
+                failure = failed.err();
+                bracket.high = Some((at, None));
+            }
+        }
+        let next = bracket.next(reach);
+        if next == at {
+            break;
+        }
+        at = next;
+    }
+    match (lowest, failure) {
+        (Some((point, evaluation)), _) => Found::Lower(point, evaluation),
+        (None, Some(error)) if trials == 0 => Found::Failing(error),
+        _ => Found::Nothing,
+    }
+}

@@ -1,0 +1,165 @@
+//! Descent: from a point with a value and a gradient to a lower one, a step at a time.
+//!
+//! Both methods keep all they know in a [`State`] that can be written and read: a run that was stopped and
+//! resumed takes the same steps, to the last bit, as one that was not.
+//!
+//! # Why these are here
+//!
+//! [`argmin`](https://docs.rs/argmin) is the well-kept crate for this, and was tried first (0.11.0). It has no
+//! Adam. Its L-BFGS does not fit a function that is not defined everywhere and that is dear to evaluate:
+//!
+//! - A point without a value (parameters that make no body, a sample outside the grid) can't be answered: its
+//!   strong-Wolfe searches end with an error on a value that is not finite, and on any error the solver drops
+//!   the problem and the parameters with it, so that the run ends where it should take a shorter step.
+//! - It keeps every pair `(s, y)`, also those with `s·y ≤ 0`. After a search that ended early the direction may
+//!   then point uphill, which it reports as an error
+//!   ([#400](https://github.com/argmin-rs/argmin/issues/400)). Reconstruction is smooth only piecewise, so
+//!   that this does happen.
+//! - Value and gradient are asked for apart, and again at the end of each search. Here they come together, and
+//!   each costs a reconstruction.
+//! - Its state holds infinities, which JSON has no words for.
+//!
+//! The recursion itself is thirty lines, and so is Adam.
+
+mod adam;
+mod lbfgs;
+mod line_search;
+#[cfg(test)]
+mod tests;
+
+use serde::{Deserialize, Serialize};
+
+pub use adam::{Adam, Decay};
+pub use lbfgs::Lbfgs;
+
+/// How often a step is halved before a failing function ends the run.
+pub const HALVINGS: usize = 12;
+
+/// A method of descent and its options.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Optimizer {
+    /// Limited-memory BFGS with a search for the strong Wolfe conditions: the default. Few steps, each one
+    /// lower than the one before.
+    Lbfgs(Lbfgs),
+    /// Adam: steps of a given length, whatever the size of the gradient; may go uphill.
+    Adam(Adam),
+}
+
+impl Default for Optimizer {
+    fn default() -> Self {
+        Self::Lbfgs(Lbfgs::default())
+    }
+}
+
+/// A value, its gradient, and what else the function says of the point.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Evaluation<D> {
+    /// What is made small.
+    pub value: f64,
+    /// Its gradient.
+    pub gradient: Vec<f64>,
+    /// Anything to be kept with it.
+    pub detail: D,
+}
+
+/// Where the descent is, and what the method remembers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct State<D> {
+    /// The point.
+    pub x: Vec<f64>,
+    /// The function there.
+    pub here: Evaluation<D>,
+    memory: Memory,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Memory {
+    Lbfgs(lbfgs::Memory),
+    Adam(adam::Memory),
+}
+
+/// What a step came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// The point moved.
+    Moved,
+    /// No lower point was found along the direction of steepest descent: a minimum, as far as rounding and
+    /// the kinks of the function let one see.
+    Stalled,
+}
+
+/// A function to be made small: the value and gradient at a point, or why there is none.
+pub trait Function<D, E>: FnMut(&[f64]) -> Result<Evaluation<D>, E> {}
+impl<D, E, F: FnMut(&[f64]) -> Result<Evaluation<D>, E>> Function<D, E> for F {}
+
+impl<D: Clone> State<D> {
+    /// The start at `x`, where the function is `here`.
+    pub fn new(optimizer: &Optimizer, x: Vec<f64>, here: Evaluation<D>) -> Self {
+        let memory = match optimizer {
+            Optimizer::Lbfgs(_) => Memory::Lbfgs(lbfgs::Memory::default()),
+            Optimizer::Adam(_) => Memory::Adam(adam::Memory::new(x.len())),
+        };
+        Self { x, here, memory }
+    }
+
+    /// Whether the state has the lengths that a state of `variables` for `optimizer` has.
+    pub fn fits(&self, optimizer: &Optimizer, variables: usize) -> bool {
+        let memory = match (optimizer, &self.memory) {
+            (Optimizer::Lbfgs(_), Memory::Lbfgs(memory)) => memory.fits(variables),
+            (Optimizer::Adam(_), Memory::Adam(memory)) => memory.fits(variables),
+            _ => false,
+        };
+        memory && self.x.len() == variables && self.here.gradient.len() == variables
+    }
+
+    /// One step. Where the function has no value, or one that is not finite, the step is shortened.
+    ///
+    /// # Errors
+    /// What the function says, where however short a step ends in a point without a value; the state is then
+    /// as it was.
+    pub fn step<E>(
+        &mut self,
+        optimizer: &Optimizer,
+        function: &mut impl Function<D, E>,
+    ) -> Result<Step, E> {
+        match (optimizer, &mut self.memory) {
+            (Optimizer::Lbfgs(options), Memory::Lbfgs(memory)) => {
+                memory.step(options, &mut self.x, &mut self.here, function)
+            }
+            (Optimizer::Adam(options), Memory::Adam(memory)) => {
+                memory.step(options, &mut self.x, &mut self.here, function)
+            }
+            // The memory of one method says nothing to the other: it begins anew.
+            _ => {
+                *self = Self::new(optimizer, self.x.clone(), self.here.clone());
+                self.step(optimizer, function)
+            }
+        }
+    }
+}
+
+/// `Σ a_i b_i`, in order.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// `√(Σ a_i²)`.
+pub(crate) fn norm(a: &[f64]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+/// `max |a_i|`.
+fn largest(a: &[f64]) -> f64 {
+    a.iter().fold(0.0, |m, x| x.abs().max(m))
+}
+
+/// `x + step·d`.
+fn moved(x: &[f64], step: f64, d: &[f64]) -> Vec<f64> {
+    x.iter().zip(d).map(|(x, d)| x + step * d).collect()
+}
+
+fn is_finite<D>(evaluation: &Evaluation<D>) -> bool {
+    evaluation.value.is_finite() && evaluation.gradient.iter().all(|g| g.is_finite())
+}

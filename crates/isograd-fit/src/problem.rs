@@ -1,0 +1,153 @@
+//! The chain: variables → points → φ → loss, and its gradient back.
+
+use isograd::{CloudCotangent, Cotangent, PullbackScratch, Reconstruction, Reconstructor};
+use serde::{Deserialize, Serialize};
+
+use crate::error::Error;
+use crate::fingerprint::Fingerprint;
+use crate::loss::{Matching, Region};
+use crate::optimize::Evaluation;
+use crate::target::Target;
+use crate::variables::{Degrees, Variables};
+
+/// What the loss is made of, at one point.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Parts {
+    /// Mean squared difference of φ, in cells².
+    pub data: f64,
+    /// The smoothness term of raw points.
+    pub smoothness: f64,
+    /// What parameters beyond their bounds cost.
+    pub bounds: f64,
+    /// Mean absolute difference of φ, in cells.
+    pub mean_error: f64,
+}
+
+/// One plan for all evaluations of a fit.
+pub(crate) struct Problem {
+    pub degrees: Degrees,
+    plan: Reconstructor<f64>,
+    matching: Matching,
+    phi_bar: Vec<f64>,
+    scratch: PullbackScratch<f64>,
+    bar: CloudCotangent<f64>,
+}
+
+impl Problem {
+    pub fn new(
+        target: &Target,
+        variables: Variables,
+        region: Region,
+        options: &isograd::Options,
+    ) -> Result<Self, Error> {
+        // Nobody reads the report of a reconstruction among hundreds.
+        let degrees = Degrees::new(variables, target.grid().spacing())?;
+        let options = isograd::Options {
+            checks: false,
+            orientation: degrees.orientation(options.orientation),
+            ..options.clone()
+        };
+        Ok(Self {
+            degrees,
+            plan: Reconstructor::new(*target.grid(), options)?,
+            matching: Matching::new(target.sdf(), region)?,
+            phi_bar: vec![0.0; target.grid().cells()],
+            scratch: PullbackScratch::default(),
+            bar: CloudCotangent::default(),
+        })
+    }
+
+    /// Loss and gradient at `x`.
+    pub fn evaluate(&mut self, x: &[f64]) -> Result<Evaluation<Parts>, Error> {
+        let cloud = self.degrees.cloud(x)?;
+        let result = self.plan.reconstruct(&cloud)?;
+        let mismatch = self
+            .matching
+            .evaluate(result.sdf().values(), &mut self.phi_bar);
+        let cotangent = Cotangent {
+            sdf: Some(&self.phi_bar),
+            ..Cotangent::default()
+        };
+        result.pullback_into(&cloud, &cotangent, &mut self.scratch, &mut self.bar)?;
+        let mut gradient = self.degrees.pullback(x, &self.bar.points)?;
+        let extra = self.degrees.extra(x, &mut gradient);
+        Ok(Evaluation {
+            value: mismatch.loss + extra.smoothness + extra.bounds,
+            gradient,
+            detail: Parts {
+                data: mismatch.loss,
+                smoothness: extra.smoothness,
+                bounds: extra.bounds,
+                mean_error: mismatch.mean_error,
+            },
+        })
+    }
+
+    /// The reconstruction at `x`.
+    pub fn reconstruction(&mut self, x: &[f64]) -> Result<&Reconstruction<f64>, Error> {
+        let cloud = self.degrees.cloud(x)?;
+        Ok(self.plan.reconstruct(&cloud)?)
+    }
+
+    /// Draws new samples of a shape at `x`, the `turn`-th ones.
+    pub fn sample(&mut self, x: &[f64], turn: u64) -> Result<(), Error> {
+        match &mut self.degrees {
+            Degrees::Shape(shape) => shape.sample(x, turn),
+            Degrees::Points(_) => Ok(()),
+        }
+    }
+
+    /// Every how many epochs new samples are drawn.
+    pub fn resample(&self) -> Option<usize> {
+        match &self.degrees {
+            Degrees::Shape(shape) => shape.resample,
+            Degrees::Points(_) => None,
+        }
+    }
+}
+
+/// Hashes of what a state belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Fingerprints {
+    pub target: u64,
+    pub variables: u64,
+    pub options: u64,
+}
+
+impl Fingerprints {
+    pub fn new(
+        target: &Target,
+        degrees: &Degrees,
+        options: &isograd::Options,
+        others: &str,
+    ) -> Self {
+        let grid = target.grid();
+        let mut of_target = Fingerprint::default();
+        of_target.numbers(&grid.lower());
+        of_target.numbers(&[grid.spacing()]);
+        for n in grid.shape() {
+            of_target.number(n as u64);
+        }
+        of_target.numbers(target.sdf().values());
+        let mut of_options = Fingerprint::default();
+        of_options.text(&format!("{options:?} {others}"));
+        Self {
+            target: of_target.finish(),
+            variables: degrees.fingerprint(),
+            options: of_options.finish(),
+        }
+    }
+
+    /// What differs from `other`, if anything does.
+    pub fn difference(&self, other: &Self) -> Option<&'static str> {
+        if self.target != other.target {
+            Some("target or grid")
+        } else if self.variables != other.variables {
+            Some("variables, start or samples")
+        } else if self.options != other.options {
+            Some("options or optimiser")
+        } else {
+            None
+        }
+    }
+}
