@@ -5,6 +5,14 @@ use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+mod fit;
+mod gradcheck;
+mod pipeline;
+
+pub use fit::{Decay, Fit, Method, OffOr, TargetKind};
+pub use gradcheck::Gradcheck;
+pub use pipeline::{GridArgs, MethodArgs};
+
 /// Point cloud in, exact signed distance field out.
 #[derive(Debug, Parser)]
 #[command(name = "isograd", version, about, after_help = STATUS)]
@@ -26,6 +34,10 @@ pub enum Command {
     Sample(Sample),
     /// Signed distances at points, from a mesh or a field
     Query(Query),
+    /// Change a body, or points, until their field matches a target
+    Fit(Box<Fit>),
+    /// Compare the gradients of a cloud's field with finite differences
+    Gradcheck(Gradcheck),
     /// Say what a file holds
     Info(Info),
 }
@@ -62,51 +74,12 @@ pub struct Reconstruct {
         value_parser = finite, requires = "picture", help_heading = "Outputs")]
     pub view: Option<Vec<f64>>,
 
-    /// Cells on the longest side [default: 128]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=65535),
-        conflicts_with = "spacing", help_heading = "Grid")]
-    pub resolution: Option<u32>,
-    /// Cell size, in the cloud's unit
-    #[arg(long, value_name = "H", value_parser = positive, help_heading = "Grid")]
-    pub spacing: Option<f64>,
-    /// Room on every side, as a fraction of the longest side [default: 0.1]
-    #[arg(long, value_name = "FRACTION", value_parser = not_negative, help_heading = "Grid")]
-    pub padding: Option<f64>,
-    /// The box to compute in, instead of a fitted one
-    #[arg(long, num_args = 6, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"],
-        allow_negative_numbers = true, value_parser = finite, conflicts_with = "padding",
-        help_heading = "Grid")]
-    pub bounds: Option<Vec<f64>>,
-
-    /// Neighbourhood radius of the normals, in the cloud's unit
-    #[arg(
-        long,
-        value_name = "R|auto",
-        default_value = "auto",
-        help_heading = "Method"
-    )]
-    pub radius: AutoOr,
-    /// How the side of the surface is found
-    #[arg(long, default_value = "auto", help_heading = "Method")]
-    pub orient: Orient,
-    /// How a sample is spread over the cells round it
-    #[arg(long, default_value = "bspline", help_heading = "Method")]
-    pub splat: Splat,
-    /// Whether a sample counts by the area that it stands for
-    #[arg(long, default_value = "on", help_heading = "Method")]
-    pub area: Switch,
-    /// Width of the smoothing of the indicator, in cells
-    #[arg(long, value_name = "CELLS", default_value = "0", value_parser = not_negative,
-        help_heading = "Method")]
-    pub smooth: f64,
-    /// How far from the surface φ is computed, in the cloud's unit
-    #[arg(
-        long,
-        value_name = "H|full",
-        default_value = "full",
-        help_heading = "Method"
-    )]
-    pub band: FullOr,
+    /// Where to compute.
+    #[command(flatten)]
+    pub grid: GridArgs,
+    /// How to compute.
+    #[command(flatten)]
+    pub method: MethodArgs,
     /// Take N samples of the surface of a mesh file instead of its vertices
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=50_000_000),
         help_heading = "Method")]
@@ -208,6 +181,8 @@ pub enum Orient {
     Parity,
     /// The cloud's own normals
     Given,
+    /// The directions found, each on the side of the cloud's own normal
+    Signs,
 }
 
 /// See [`isograd::splat::Weights`].
@@ -360,8 +335,11 @@ mod tests {
         else {
             panic!("{cli:?}");
         };
-        assert_eq!(args.bounds, Some(vec![-1.0, -1.0, -1.0, 1.0, 1.0, 1.0]));
-        assert_eq!(args.radius, AutoOr::Value(0.2));
+        assert_eq!(
+            args.grid.bounds,
+            Some(vec![-1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
+        );
+        assert_eq!(args.method.radius, AutoOr::Value(0.2));
         let cli = parse("isograd sample fish -n 5 -o a.ply --param time=-0.5");
         let Ok(Cli {
             command: Command::Sample(args),
@@ -390,6 +368,7 @@ mod tests {
             "isograd sample fish -n 5 -o a.ply --param time",
             "isograd sample fish -n 5 -o a.ply --density w:3",
             "isograd query a.ply -o b.ply",
+            "isograd gradcheck a.ply --step 0",
         ] {
             assert!(Cli::try_parse_from(line.split(' ')).is_err(), "{line}");
         }

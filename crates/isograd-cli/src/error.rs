@@ -44,6 +44,28 @@ pub enum Error {
         /// What is wrong.
         source: isograd::Error,
     },
+    /// Gradients could not be compared.
+    #[error("{file}: {source}")]
+    Gradcheck {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        source: isograd::gradcheck::CheckError,
+    },
+    /// Gradients are not what they should be.
+    #[error(
+        "{file}: the pullback is off from a small step by {off:.1e} ({motion}), more than {tolerance:.1e}; look at the counts of that row: what changed on the way has no derivative"
+    )]
+    Gradients {
+        /// The file.
+        file: String,
+        /// The worst motion.
+        motion: &'static str,
+        /// Its relative error.
+        off: f64,
+        /// What was allowed.
+        tolerance: f64,
+    },
     /// Distances to a mesh can't be taken.
     #[error("{file}: {source}")]
     Distance {
@@ -58,6 +80,33 @@ pub enum Error {
     /// A shape could not be sampled.
     #[error(transparent)]
     Sample(#[from] SampleError),
+    /// A target can't be used.
+    #[error("{file}: {source}")]
+    Target {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        source: isograd_fit::TargetError,
+    },
+    /// A fit failed.
+    #[error(transparent)]
+    Fit(#[from] isograd_fit::Error),
+    /// A checkpoint can't be used.
+    #[error("{file}: {problem}")]
+    Checkpoint {
+        /// The file.
+        file: String,
+        /// What is wrong, and what to do.
+        problem: String,
+    },
+    /// Ctrl-C, and all that is to be kept is kept.
+    #[error("stopped after epoch {epoch}; go on with --resume {file}")]
+    Stopped {
+        /// The last epoch that was done.
+        epoch: usize,
+        /// The checkpoint.
+        file: String,
+    },
     /// The grid needs more memory than there is.
     #[error(
         "a grid of {shape:?} cells needs about {needed:.1} GiB, and {available:.1} GiB are free; use a lower resolution, a larger spacing or tighter bounds"
@@ -76,10 +125,14 @@ pub enum Error {
 }
 
 impl Error {
-    /// 2 where the command line is wrong, else 1.
+    /// 2 where the command line is wrong, 130 after Ctrl-C, else 1.
     pub fn status(&self) -> u8 {
+        use isograd_fit::Error as Fit;
         match self {
             Self::Usage(_) | Self::Shape(_) => 2,
+            Self::Fit(Fit::NoParameters | Fit::Whole { .. } | Fit::Option { .. }) => 2,
+            Self::Fit(Fit::Shape(_) | Fit::NoStart { .. }) => 2,
+            Self::Stopped { .. } => crate::interrupt::STATUS as u8,
             _ => 1,
         }
     }

@@ -3,7 +3,10 @@
 
 pub mod args;
 pub mod error;
+pub mod fit;
+pub mod gradcheck;
 pub mod info;
+mod interrupt;
 mod memory;
 pub mod outputs;
 pub mod plot;
@@ -28,9 +31,6 @@ use progress::to_stderr;
 #[global_allocator]
 static ALLOCATOR: PeakAlloc = PeakAlloc;
 
-/// What a shell expects of a program that Ctrl-C stopped: 128 + SIGINT.
-const STOPPED: i32 = 130;
-
 /// Runs the program on its arguments, the first of which is its own name.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let cli = match Cli::try_parse_from(arguments) {
@@ -41,7 +41,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             return ExitCode::from(error.exit_code().clamp(0, 255) as u8);
         }
     };
-    stop_cleanly_on_interrupt();
+    interrupt::handle();
     match dispatch(&cli.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -65,6 +65,14 @@ fn dispatch(command: &Command) -> Result<(), Error> {
             start_threads(args.running)?;
             query::run(args)
         }
+        Command::Fit(args) => {
+            start_threads(args.running)?;
+            fit::run(args)
+        }
+        Command::Gradcheck(args) => {
+            start_threads(args.running)?;
+            gradcheck::run(args)
+        }
         Command::Info(args) => info::run(args),
     }
 }
@@ -75,16 +83,4 @@ fn start_threads(running: Running) -> Result<(), Error> {
     };
     let builder = rayon::ThreadPoolBuilder::new().num_threads(threads as usize);
     Ok(builder.build_global()?)
-}
-
-/// On Ctrl-C (and on a polite kill) no half-written file stays behind.
-fn stop_cleanly_on_interrupt() {
-    let handled = ctrlc::set_handler(|| {
-        isograd_io::atomic::remove_unfinished();
-        to_stderr("stopped");
-        std::process::exit(STOPPED);
-    });
-    if handled.is_err() {
-        to_stderr("warning: Ctrl-C can't be handled here; a temporary file may stay behind");
-    }
 }

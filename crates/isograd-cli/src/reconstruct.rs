@@ -4,15 +4,10 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
-use isograd::distance::lattice::Band;
-use isograd::neighbors::Radius;
-use isograd::{
-    Attribute, Grid, GridError, Options, PointCloud, Real, Reconstruction, Reconstructor,
-    Resolution, Stage, orient, splat,
-};
+use isograd::{Attribute, Grid, PointCloud, Real, Reconstruction, Reconstructor, Stage};
 use isograd_io::Geometry;
 
-use crate::args::{self, AutoOr, FullOr, Precision};
+use crate::args::{self, Precision};
 use crate::error::Error;
 use crate::outputs::Outputs;
 use crate::plot;
@@ -86,13 +81,6 @@ impl Job<'_> {
         }
     }
 
-    fn grid_error(&self, source: GridError) -> Error {
-        Error::Grid {
-            file: self.file(),
-            source,
-        }
-    }
-
     fn cloud<T: Real>(&self, geometry: &Geometry) -> Result<PointCloud<T>, Error> {
         geometry.cloud().map_err(|source| Error::Cloud {
             file: self.file(),
@@ -122,18 +110,11 @@ impl Job<'_> {
     }
 
     fn grid<T: Real>(&self, cloud: &PointCloud<T>) -> Result<Grid<T>, Error> {
-        let resolution = match (self.args.spacing, self.args.resolution) {
-            (Some(h), _) => Resolution::Spacing(T::of(h)),
-            (None, n) => Resolution::Cells(n.unwrap_or(128) as usize),
-        };
-        let grid = match self.args.bounds.as_deref() {
-            Some(&[x0, y0, z0, x1, y1, z1]) => {
-                let corners = [[x0, y0, z0], [x1, y1, z1]].map(|corner| corner.map(T::of));
-                Grid::from_bounds(corners[0], corners[1], resolution)
-            }
-            _ => Grid::fit(cloud, resolution, T::of(self.args.padding.unwrap_or(0.1))),
-        };
-        grid.map_err(|source| self.grid_error(source))
+        let grid = self.args.grid.grid(cloud);
+        grid.map_err(|source| Error::Grid {
+            file: self.file(),
+            source,
+        })
     }
 
     fn run<T: Real>(
@@ -154,7 +135,8 @@ impl Job<'_> {
             file: self.file(),
             source,
         };
-        let mut plan = Reconstructor::new(grid, self.options(&grid)).map_err(failed)?;
+        let options = self.args.method.options(grid.spacing().f64());
+        let mut plan = Reconstructor::new(grid, options).map_err(failed)?;
         let mut observer = |stage: Stage| {
             progress.step(stage.name());
             ControlFlow::Continue(())
@@ -172,32 +154,6 @@ impl Job<'_> {
         progress.finish();
         self.say(progress, &result);
         Ok(())
-    }
-
-    fn options<T: Real>(&self, grid: &Grid<T>) -> Options {
-        let args = self.args;
-        Options {
-            radius: match args.radius {
-                AutoOr::Auto => Radius::Auto,
-                AutoOr::Value(r) => Radius::Fixed(r),
-            },
-            orientation: match args.orient {
-                args::Orient::Auto => orient::Method::Auto,
-                args::Orient::Parity => orient::Method::Parity(Default::default()),
-                args::Orient::Given => orient::Method::Given,
-            },
-            weights: match args.splat {
-                args::Splat::Bspline => splat::Weights::BSpline,
-                args::Splat::Paper => splat::Weights::Paper,
-            },
-            area_weights: args.area == args::Switch::On,
-            smoothing: args.smooth,
-            band: match args.band {
-                FullOr::Full => Band::Full,
-                FullOr::Value(h) => Band::Cells(h / grid.spacing().f64()),
-            },
-            ..Options::default()
-        }
     }
 
     fn write<T: Real>(

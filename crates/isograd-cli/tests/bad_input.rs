@@ -285,12 +285,15 @@ mod on_linux {
             .stderr(Stdio::piped())
             .stdout(Stdio::null());
         let mut child = command.spawn().expect("starts");
+        // Kept open, or `wait` would close it, and the end of the input could be first.
+        let input = child.stdin.take();
         std::thread::sleep(Duration::from_millis(500));
         let kill = Command::new("kill")
             .args(["-INT", &child.id().to_string()])
             .output();
         kill.expect("kill is there");
         assert_eq!(child.wait().expect("it ends").code(), Some(130));
+        drop(input);
         assert!(bench.files().is_empty());
     }
 

@@ -6,6 +6,8 @@
 mod axis;
 pub mod canvas;
 mod color;
+mod comparison;
+mod losses;
 mod overview;
 mod panel;
 mod scene;
@@ -15,6 +17,8 @@ mod slices;
 use std::path::Path;
 
 pub use canvas::Canvas;
+pub use comparison::{Comparison, side_by_side};
+pub use losses::losses;
 pub use overview::overview;
 pub use scene::{Camera, Scene, View};
 pub use slices::slices;

@@ -7,6 +7,9 @@ use super::canvas::{Canvas, Color, WHITE};
 /// Pixels drawn for each pixel shown, along each axis.
 const SUPERSAMPLING: usize = 3;
 
+/// Depth, in pixels drawn, over which something translucent comes to cover what is behind it.
+const FADE: f64 = 8.0;
+
 /// Where the viewer stands: a parallel projection, z upwards.
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
@@ -126,6 +129,33 @@ impl Scene {
             let corners = face.map(|v| screen[v as usize]);
             let shades = face.map(|v| normals[v as usize]);
             self.triangle(corners, shades, color);
+        }
+    }
+
+    /// The same, seen through: `alpha` of it covers what is behind its front, and nothing what is before it.
+    pub fn translucent(
+        &mut self,
+        vertices: &[[f64; 3]],
+        faces: &[[u32; 3]],
+        color: Color,
+        alpha: f32,
+    ) {
+        let (width, height) = (self.canvas.width(), self.canvas.height());
+        let mut layer = Self {
+            canvas: Canvas::new(width, height, WHITE),
+            depth: vec![f64::NEG_INFINITY; self.depth.len()],
+            ..*self
+        };
+        layer.surface(vertices, faces, color);
+        for (place, &depth) in layer.depth.iter().enumerate() {
+            let (x, y) = (place % width, place / width);
+            if depth > self.depth[place]
+                && let Some(seen) = layer.canvas.pixel(x, y)
+            {
+                // Where two surfaces all but coincide, which is in front means nothing.
+                let clear = ((depth - self.depth[place]) / FADE).min(1.0) as f32;
+                self.canvas.blend(x as i64, y as i64, seen, alpha * clear);
+            }
         }
     }
 
@@ -314,6 +344,28 @@ mod tests {
             let middle = scene.finish().pixel(20, 20).expect("inside");
             assert!(middle[0] > 0.3 && middle[1] < 0.3, "{middle:?}");
         }
+    }
+
+    #[test]
+    fn what_is_translucent_tints_what_is_behind_it_alone() {
+        let camera = Camera {
+            azimuth: 0.0,
+            elevation: 0.0,
+        };
+        let triangle = |y: f64| [[-1.0, y, -1.0], [1.0, y, -1.0], [0.0, y, 1.0]];
+        let seen = |y: f64, alpha: f32| {
+            let mut scene = Scene::new(40, 40, &View::new(camera, &corners()));
+            scene.surface(&triangle(0.0), &[[0, 1, 2]], [1.0, 0.0, 0.0]);
+            scene.translucent(&triangle(y), &[[0, 1, 2]], [0.0, 1.0, 0.0], alpha);
+            scene.finish().pixel(20, 20).expect("inside")
+        };
+        let (red, behind) = (seen(-0.5, 0.0), seen(0.5, 0.5));
+        assert_eq!(red, behind);
+        let before = seen(-0.5, 0.5);
+        assert!(
+            before[0] < 0.6 * red[0] && before[1] > red[1] + 0.2,
+            "{before:?}"
+        );
     }
 
     #[test]

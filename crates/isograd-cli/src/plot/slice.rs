@@ -125,32 +125,45 @@ impl Slice {
             .shape
             .map(|n| ((n as f64 * style.scale) as usize).max(1));
         let mut canvas = Canvas::new(size[0], size[1], WHITE);
-        let place = |x: f64, y: f64| {
-            let up = size[1] as f64 - y;
-            self.at([
-                (x + 0.5) / style.scale - 0.5,
-                (up - 0.5) / style.scale - 0.5,
-            ])
-        };
         for y in 0..size[1] {
             for x in 0..size[0] {
-                let (column, row) = (x as f64, y as f64);
-                let value = place(column, row);
-                // Change of the value from pixel to pixel.
-                let slope = 0.5
-                    * (place(column + 1.0, row) - place(column - 1.0, row))
-                        .hypot(place(column, row + 1.0) - place(column, row - 1.0));
+                let [value, slope] = self.at_pixel([x, y], size[1], style.scale);
                 let mut color = style.range.color(value);
                 let step = style.contour_steps[usize::from(value >= 0.0)];
                 if step > 0.0 {
                     let nearest = (value / step).round() * step;
                     mix(&mut color, BLACK, 0.28 * cover(value - nearest, slope, 1.0));
                 }
-                mix(&mut color, BLACK, cover(value, slope, style.zero_width));
+                if style.zero_width > 0.0 {
+                    mix(&mut color, BLACK, cover(value, slope, style.zero_width));
+                }
                 canvas.blend(x as i64, y as i64, color, 1.0);
             }
         }
         canvas
+    }
+
+    /// Draws the zero contour alone over a picture of the same plane at the same scale.
+    pub fn outline(&self, canvas: &mut Canvas, scale: f64, width: f32, color: Color) {
+        let height = canvas.height();
+        for y in 0..height {
+            for x in 0..canvas.width() {
+                let [value, slope] = self.at_pixel([x, y], height, scale);
+                canvas.blend(x as i64, y as i64, color, cover(value, slope, width));
+            }
+        }
+    }
+
+    /// The value at a pixel of a picture `height` pixels high, and how much it changes from pixel to pixel.
+    fn at_pixel(&self, [x, y]: [usize; 2], height: usize, scale: f64) -> [f64; 2] {
+        let place = |x: f64, y: f64| {
+            let up = height as f64 - y;
+            self.at([(x + 0.5) / scale - 0.5, (up - 0.5) / scale - 0.5])
+        };
+        let (column, row) = (x as f64, y as f64);
+        let across = place(column + 1.0, row) - place(column - 1.0, row);
+        let down = place(column, row + 1.0) - place(column, row - 1.0);
+        [place(column, row), 0.5 * across.hypot(down)]
     }
 }
 

@@ -1,0 +1,45 @@
+//! Arguments of `gradcheck`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{GridArgs, MethodArgs, Running, STATUS, positive};
+
+/// Arguments of `gradcheck`.
+#[derive(Debug, Args)]
+#[command(after_help = STATUS)]
+pub struct Gradcheck {
+    /// The cloud, in any format that `reconstruct` reads
+    pub cloud: PathBuf,
+    /// The same numbers: .json
+    #[arg(long, value_name = "FILE", help_heading = "Outputs")]
+    pub report: Option<PathBuf>,
+
+    /// Where to compute.
+    #[command(flatten)]
+    pub grid: GridArgs,
+    /// How to compute.
+    #[command(flatten)]
+    pub method: MethodArgs,
+
+    /// Motion of the large step, either way, in cells
+    #[arg(long, value_name = "CELLS", default_value = "0.5", value_parser = positive,
+        allow_negative_numbers = true, help_heading = "Comparison")]
+    pub step: f64,
+    /// Fail where the pullback is off from the small step by more than this share
+    #[arg(long, value_name = "SHARE", value_parser = positive, help_heading = "Comparison")]
+    pub tolerance: Option<f64>,
+    /// Seed of the random directions
+    #[arg(
+        long,
+        value_name = "S",
+        default_value = "1",
+        help_heading = "Comparison"
+    )]
+    pub seed: u64,
+
+    /// How to run.
+    #[command(flatten)]
+    pub running: Running,
+}

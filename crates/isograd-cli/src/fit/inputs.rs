@@ -1,0 +1,211 @@
+//! From the command line to a target, variables and options.
+
+use isograd::{Grid, GridError, PointCloud};
+use isograd_fit::{
+    Adam, Decay, Lbfgs, Optimizer, Options, Points, Region, ShapeParameters, Start, Target,
+    TargetError, Variables,
+};
+use isograd_io::{Content, Geometry};
+use isograd_shapes::{Sampling, Shape, by_name};
+
+use crate::args::{self, FullOr, Method, TargetKind};
+use crate::error::Error;
+use crate::memory;
+
+/// Samples that tell where a shape is.
+const SCOUTS: usize = 4000;
+
+/// All that a fit begins with.
+pub struct Inputs {
+    pub target: Target,
+    pub variables: Variables,
+    pub options: Options,
+}
+
+impl Inputs {
+    pub fn read(args: &args::Fit) -> Result<Self, Error> {
+        let variables = variables(args)?;
+        let target = target(args, &variables)?;
+        memory::check(target.grid().shape(), size_of::<f64>())?;
+        Ok(Self {
+            target,
+            variables,
+            options: options(args),
+        })
+    }
+}
+
+fn options(args: &args::Fit) -> Options {
+    let steps = args.epochs as usize;
+    let optimizer = match args.optimizer {
+        Method::Lbfgs => {
+            let default = Lbfgs::default();
+            Optimizer::Lbfgs(Lbfgs {
+                first_step: args.rate.unwrap_or(default.first_step),
+                ..default
+            })
+        }
+        Method::Adam => {
+            let default = Adam::default();
+            Optimizer::Adam(Adam {
+                rate: args.rate.unwrap_or(default.rate),
+                decay: match args.decay {
+                    args::Decay::Constant => Decay::Constant,
+                    args::Decay::Cosine => Decay::Cosine { steps },
+                    args::Decay::Exponential => Decay::Exponential {
+                        half_life: 0.1 * steps as f64,
+                    },
+                },
+                ..default
+            })
+        }
+    };
+    Options {
+        optimizer,
+        region: match args.band {
+            FullOr::Full => Region::Full,
+            FullOr::Value(cells) => Region::Band(cells),
+        },
+        epochs: steps,
+        tolerance: args.tolerance,
+        ..Options::default()
+    }
+}
+
+fn variables(args: &args::Fit) -> Result<Variables, Error> {
+    if let Some(path) = &args.points {
+        let geometry = isograd_io::read_geometry(path)?;
+        let file = || path.display().to_string();
+        let cloud = PointCloud::new(geometry.points).map_err(|source| Error::Cloud {
+            file: file(),
+            source,
+        })?;
+        let mut points = Points::new(cloud);
+        if let Some(weight) = args.smoothness {
+            points.smoothness = weight.0;
+        }
+        return Ok(Variables::Points(points));
+    }
+    // Clap requires one of the two.
+    let name = args.shape.as_deref().unwrap_or_default();
+    let mut shape = by_name(name)?;
+    shape.set_all(
+        args.parameters
+            .iter()
+            .map(|(name, value)| (name.as_str(), *value)),
+    )?;
+    let default = ShapeParameters::new(shape.clone());
+    Ok(Variables::Shape(ShapeParameters {
+        only: only(args, &shape)?,
+        samples: args.samples.map_or(default.samples, |n| n as usize),
+        seed: args.seed,
+        resample: args.resample.map(|epochs| epochs as usize),
+        start: args
+            .random_start
+            .map_or(Start::Given, |spread| Start::Random {
+                seed: args.seed,
+                spread,
+            }),
+        ..default
+    }))
+}
+
+/// The names that `--only` stands for.
+fn only(args: &args::Fit, shape: &Shape) -> Result<Option<Vec<String>>, Error> {
+    if args.only.is_empty() {
+        return Ok(None);
+    }
+    let mut names = Vec::new();
+    for pattern in &args.only {
+        let Some(beginning) = pattern.strip_suffix('*') else {
+            names.push(pattern.clone());
+            continue;
+        };
+        let all = shape.parameters().map(|(p, _)| p.name);
+        let before = names.len();
+        names.extend(
+            all.filter(|name| name.starts_with(beginning))
+                .map(String::from),
+        );
+        if names.len() == before {
+            return Err(Error::Usage(format!(
+                "--only {pattern}: no parameter of {} begins with '{beginning}'; see isograd sample --list",
+                shape.name()
+            )));
+        }
+    }
+    Ok(Some(names))
+}
+
+fn target(args: &args::Fit, variables: &Variables) -> Result<Target, Error> {
+    let file = || args.target.display().to_string();
+    let refused = |source: TargetError| Error::Target {
+        file: file(),
+        source,
+    };
+    let content = match args.target_kind {
+        TargetKind::Sdf => Content::Field(isograd_io::read_field(&args.target)?),
+        TargetKind::Mesh => Content::Geometry(isograd_io::read_mesh(&args.target)?),
+        TargetKind::Cloud => Content::Geometry(isograd_io::read_geometry(&args.target)?),
+        TargetKind::Auto => isograd_io::read(&args.target)?,
+    };
+    let geometry = match content {
+        Content::Field(field) if has_grid(args) => {
+            let [nx, ny, nz] = field.field.grid().shape();
+            return Err(Error::Usage(format!(
+                "{} is a field and brings its grid of {nx} × {ny} × {nz} cells; leave --resolution, --spacing, --padding and --bounds out",
+                file()
+            )));
+        }
+        Content::Field(field) => return Target::from_sdf(field.field).map_err(refused),
+        Content::Geometry(geometry) => geometry,
+    };
+    let grid = grid(args, &geometry, variables)?;
+    memory::check(grid.shape(), size_of::<f64>())?;
+    let as_cloud = args.target_kind == TargetKind::Cloud || geometry.faces.is_empty();
+    if as_cloud {
+        let cloud = geometry.cloud::<f64>().map_err(|source| Error::Cloud {
+            file: file(),
+            source,
+        })?;
+        Target::from_cloud(&cloud, grid, &isograd::Options::default()).map_err(refused)
+    } else {
+        let mesh = geometry.mesh::<f64>().map_err(|source| Error::Mesh {
+            file: file(),
+            source,
+        })?;
+        Target::from_mesh(mesh, grid).map_err(refused)
+    }
+}
+
+fn has_grid(args: &args::Fit) -> bool {
+    let args::GridArgs {
+        resolution,
+        spacing,
+        padding,
+        bounds,
+    } = &args.grid;
+    resolution.is_some() || spacing.is_some() || padding.is_some() || bounds.is_some()
+}
+
+/// The grid asked for, or one round the target and the start.
+fn grid(args: &args::Fit, target: &Geometry, variables: &Variables) -> Result<Grid<f64>, Error> {
+    let refused = |source: GridError| Error::Grid {
+        file: args.target.display().to_string(),
+        source,
+    };
+    let mut points = target.points.clone();
+    match variables {
+        Variables::Points(start) => points.extend(start.cloud.points()),
+        Variables::Shape(parameters) => {
+            let shape = parameters.started()?;
+            let scouts = shape.sample::<f64>(SCOUTS, &Sampling::default(), args.seed)?;
+            points.extend(scouts.cloud.points());
+        }
+    }
+    let all = PointCloud::new(points).map_err(|source| Error::Cloud {
+        file: args.target.display().to_string(),
+        source,
+    })?;
+    args.grid.grid(&all).map_err(refused)
+}

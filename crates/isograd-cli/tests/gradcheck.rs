@@ -1,0 +1,80 @@
+//! `isograd gradcheck`, run as a user runs it.
+
+mod common;
+
+use common::Bench;
+
+#[test]
+fn the_pullback_of_a_torus_agrees_with_small_steps() {
+    let bench = Bench::new();
+    bench.done("sample torus -n 6000 -o torus.ply");
+    let run = bench
+        .run("gradcheck torus.ply --resolution 48 --tolerance 1e-6 --report check.json --seed 2");
+    run.says(0, &[]);
+    let table = run.stdout;
+    for motion in [
+        "noise",
+        "waves",
+        "translation x",
+        "rotation z",
+        "growth",
+        "bending",
+    ] {
+        assert!(table.contains(motion), "{table}");
+    }
+    // A torus does not feel it where it turns round its own axis.
+    let line = table.lines().find(|line| line.starts_with("rotation z"));
+    assert!(line.is_some_and(|line| line.contains("≈ 0")), "{table}");
+    assert!(
+        table.contains("pullback and large step part most for"),
+        "{table}"
+    );
+    let report: serde_json::Value =
+        serde_json::from_slice(&bench.read("check.json")).expect("JSON");
+    assert_eq!(report["guarded"], 0);
+    let motions = report["motions"].as_array().expect("a list");
+    assert_eq!(motions.len(), 10);
+    for motion in motions {
+        let number = |key: &str| motion[key].as_f64().expect("a number");
+        let small = motion["small"]["value"].as_f64().expect("a number");
+        assert!(
+            (number("pullback") - small).abs() < 1e-6 * number("scale"),
+            "{motion}"
+        );
+    }
+}
+
+#[test]
+fn a_gradient_that_is_off_fails_where_a_tolerance_is_given() {
+    let bench = Bench::new();
+    bench.done("sample torus -n 3000 -o torus.ply --seed 4");
+    // No rounding is as small as this.
+    let run = bench.run("gradcheck torus.ply --resolution 32 --tolerance 1e-30 -q");
+    run.says(1, &["torus.ply: the pullback is off", "more than 1.0e-30"]);
+    assert_eq!(run.stdout, "");
+}
+
+#[test]
+fn bad_input_is_refused_with_a_reason() {
+    let bench = Bench::new();
+    bench.done("sample torus -n 3000 -o torus.ply");
+    bench.write("one.xyz", "1 2 3\n");
+    bench.run("gradcheck none.ply").says(1, &["none.ply"]);
+    bench
+        .run("gradcheck one.xyz")
+        .says(1, &["one.xyz", "can't be fitted"]);
+    let run = bench.run("gradcheck torus.ply --resolution 32 --step 9");
+    run.says(
+        1,
+        &["torus.ply: the cloud moved by 9 cells", "2 cells inside"],
+    );
+    bench
+        .run("gradcheck torus.ply --step -1")
+        .says(2, &["--step"]);
+    bench
+        .run("gradcheck torus.ply --report a.txt")
+        .says(2, &["a.txt", ".json"]);
+    bench
+        .run("gradcheck torus.ply --resolution 32 --orient given --report no/such/a.json")
+        .says(1, &["no/such"]);
+}
