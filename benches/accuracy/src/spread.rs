@@ -1,5 +1,6 @@
-//! Mean and maximum of errors.
+//! Mean and maximum of errors, and how they are written.
 
+use isograd_page::table::number;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -46,6 +47,21 @@ impl Spread {
             count,
         }
     }
+}
+
+/// Mean and maximum.
+pub fn pair(spread: &Spread) -> String {
+    format!("{} / {}", number(spread.mean), number(spread.max))
+}
+
+/// Mean, 99th percentile and maximum.
+pub fn triple(spread: &Spread) -> String {
+    format!(
+        "{} / {} / {}",
+        number(spread.mean),
+        number(spread.p99),
+        number(spread.max)
+    )
 }
 
 #[cfg(test)]

@@ -1,11 +1,13 @@
 //! What the tables say, in a few sentences with their figures.
 
-use super::sections::order;
-use super::table::{number, pair, percent};
+use isograd_page::table::{number, percent};
+use isograd_page::text::{item, thousands};
+
 use crate::Outcome;
 use crate::case::{Draw, Normals, Precision, Splat};
 use crate::measure::Measured;
-use crate::pictures::thousands;
+use crate::page::sections::order;
+use crate::spread::pair;
 use crate::study::{Results, Study};
 
 /// The short answer.
@@ -21,23 +23,6 @@ pub fn findings(study: &Study, results: &Results) -> Outcome<String> {
     ];
     let items: Vec<String> = parts.iter().map(|part| item(part)).collect();
     Ok(format!("## What is seen\n\n{}", items.concat()))
-}
-
-/// An item of a list, in lines of about as many letters as those of the code.
-fn item(text: &str) -> String {
-    const LETTERS: usize = 115;
-    let mut lines = vec!["-".to_string()];
-    for word in text.split_whitespace() {
-        let last = lines.len() - 1;
-        if lines[last].chars().count() + word.chars().count() >= LETTERS {
-            lines.push(format!("  {word}"));
-        } else {
-            lines[last].push(' ');
-            lines[last].push_str(word);
-        }
-    }
-    lines.push(String::new());
-    lines.join("\n")
 }
 
 fn surface(study: &Study, results: &Results) -> Outcome<String> {
@@ -166,18 +151,4 @@ fn precision(study: &Study, results: &Results) -> Outcome<String> {
     Ok(format!(
         "**f32 and f64** differ by {size} cells in the mean of the zero set."
     ))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::item;
-
-    #[test]
-    fn lines_of_an_item_are_of_moderate_length_and_lose_no_word() {
-        let text = "word ".repeat(100);
-        let item = item(&text);
-        assert!(item.lines().all(|line| line.len() <= 115));
-        assert!(item.starts_with("- word") && item.ends_with("word\n"));
-        assert_eq!(item.matches("word").count(), 100);
-    }
 }

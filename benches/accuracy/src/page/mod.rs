@@ -2,12 +2,12 @@
 
 mod findings;
 mod sections;
-mod table;
 #[cfg(test)]
 mod tests;
 
+use isograd_page::text::thousands;
+
 use crate::Outcome;
-use crate::pictures::thousands;
 use crate::study::{Results, Study};
 
 /// The whole page.

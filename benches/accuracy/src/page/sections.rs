@@ -1,10 +1,12 @@
 //! One section for each question.
 
-use super::table::{Table, number, pair, percent, triple};
+use isograd_page::table::{Table, number, percent};
+use isograd_page::text::thousands;
+
 use crate::Outcome;
 use crate::case::{Case, Draw, Normals, Precision, Splat};
 use crate::measure::{FieldErrors, Measured, Slope};
-use crate::pictures::thousands;
+use crate::spread::{pair, triple};
 use crate::study::{Results, Study};
 
 /// The grids of a body at the defaults, the finest once more with as many samples per cell as on the

@@ -1,4 +1,5 @@
-use super::table::number;
+use isograd_page::table::number;
+
 use crate::study::Study;
 
 /// Small grids, and few samples: seconds, not minutes.

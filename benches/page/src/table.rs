@@ -2,8 +2,6 @@
 
 use std::fmt;
 
-use crate::spread::Spread;
-
 /// A table: a head and rows of cells. The first columns, as many as `labels`, are words.
 pub struct Table {
     head: Vec<String>,
@@ -60,19 +58,14 @@ pub fn number(value: f64) -> String {
     format!("{value:.decimals$}").replace('-', "−")
 }
 
-/// Mean and maximum.
-pub fn pair(spread: &Spread) -> String {
-    format!("{} / {}", number(spread.mean), number(spread.max))
-}
-
-/// Mean, 99th percentile and maximum.
-pub fn triple(spread: &Spread) -> String {
-    format!(
-        "{} / {} / {}",
-        number(spread.mean),
-        number(spread.p99),
-        number(spread.max)
-    )
+/// As many digits as asked for, but no fewer than stand before the point: `0.03812`, `3818`.
+pub fn significant(value: f64, digits: usize) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return number(value);
+    }
+    let before = value.abs().log10().floor() as i64 + 1;
+    let decimals = (digits as i64 - before).max(0) as usize;
+    format!("{value:.decimals$}").replace('-', "−")
 }
 
 /// A relative error in percent, with its sign.
@@ -93,6 +86,8 @@ mod tests {
         assert_eq!(shown, wanted);
         assert_eq!(percent(-0.00019), "−0.019");
         assert_eq!(percent(0.1), "+10.00");
+        let shown = [0.038_123, -381.759, 2093.18, 0.0].map(|x| significant(x, 4));
+        assert_eq!(shown, ["0.03812", "−381.8", "2093", "0"]);
     }
 
     #[test]

@@ -1,33 +1,17 @@
 //! The pictures of the page.
 
-mod chart;
-
 use std::path::Path;
 
-use isograd_cli::plot::canvas::{Canvas, Color, INK, WHITE};
+use isograd_cli::plot::canvas::{Canvas, INK, WHITE};
 use isograd_cli::plot::write;
+use isograd_page::chart::{Axis, Chart, LETTERS, Line, Stroke, legend};
+use isograd_page::layout::{HEIGHT, WIDTH, dashed, places, solid};
+use isograd_page::text::thousands;
 
 use crate::Outcome;
 use crate::case::{Case, Draw, Normals, Splat};
 use crate::measure::{BINS, Slope};
 use crate::study::{Results, Study};
-use chart::{Axis, Chart, LETTERS, Line, Stroke, legend};
-
-const WIDTH: f32 = 1720.0;
-const HEIGHT: f32 = 640.0;
-const LEFT: f32 = 110.0;
-const GAP: f32 = 120.0;
-const RIGHT: f32 = 30.0;
-const TOP: f32 = 60.0;
-const BOTTOM: f32 = 560.0;
-
-const COLORS: [Color; 5] = [
-    [0.12, 0.36, 0.65],
-    [0.85, 0.37, 0.05],
-    [0.17, 0.55, 0.28],
-    [0.55, 0.25, 0.60],
-    [0.72, 0.12, 0.18],
-];
 
 /// Writes all of them into `folder`.
 ///
@@ -47,31 +31,6 @@ pub fn draw(study: &Study, results: &Results, folder: &Path) -> Outcome {
         &gradient(study, results)?,
     )?;
     Ok(())
-}
-
-/// Places of `count` charts side by side.
-fn places(count: usize) -> Vec<[f32; 4]> {
-    let width = (WIDTH - LEFT - RIGHT - GAP * (count - 1) as f32) / count as f32;
-    let left = |i: usize| LEFT + i as f32 * (width + GAP);
-    (0..count)
-        .map(|i| [left(i), TOP, left(i) + width, BOTTOM])
-        .collect()
-}
-
-fn solid(color: usize) -> Stroke {
-    Stroke {
-        color: COLORS[color % COLORS.len()],
-        dashed: false,
-        marked: true,
-    }
-}
-
-fn dashed(color: Color) -> Stroke {
-    Stroke {
-        color,
-        dashed: true,
-        marked: false,
-    }
 }
 
 fn cells_axis(study: &Study) -> Axis {
@@ -320,17 +279,4 @@ fn histogram(name: &str, color: usize, slope: &Slope) -> Line {
         stroke,
         points: stairs.collect(),
     }
-}
-
-/// `50,000`.
-pub fn thousands(number: usize) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
 }

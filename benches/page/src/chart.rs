@@ -128,7 +128,7 @@ impl Chart {
     }
 
     /// Pixel of a pair of values; `None` where it can't be drawn.
-    fn pixel(&self, [x, y]: [f64; 2]) -> Option<[f32; 2]> {
+    pub fn pixel(&self, [x, y]: [f64; 2]) -> Option<[f32; 2]> {
         let [left, top, right, bottom] = self.place;
         let (x, y) = (self.across.place(x) as f32, self.up.place(y) as f32);
         let drawn = x.is_finite() && y.is_finite();
