@@ -3,6 +3,7 @@
 mod bench;
 mod deny;
 mod examples;
+mod fit;
 mod links;
 mod pages;
 mod peers;
@@ -28,9 +29,13 @@ Checks
                    --offline leaves the advisories out
 
 Figures and pages
-  docs             every page and picture below docs/ that a command makes: accuracy, gallery
+  docs             every page and picture below docs/ that a command makes: accuracy, gradients,
+                   gallery, fit
   accuracy         docs/accuracy.md: errors against bodies with a closed form
+  gradients        docs/gradients.md: the pullback against differences and closed forms, and its
+                   cost; compares times, so leave the machine alone meanwhile
   gallery          docs/images/: pictures of the clouds in examples/clouds
+  fit              docs/fit.md: a fish found from its signed distance field
   bench [ARGS]     the benchmarks, every stage and the whole; --quick for a short run,
                    a stage's name for that stage; other arguments go to criterion
   peers [ARGS]     docs/peers.md: isograd beside libigl, Open3D, Warp and SciPy, measured in one
@@ -69,7 +74,9 @@ fn run(command: &str, rest: &[String]) -> Option<Outcome> {
         ("deny", [flag]) if flag == "--offline" => Some(deny::run(true)),
         ("docs", []) => Some(pages::all()),
         ("accuracy", []) => Some(pages::accuracy()),
+        ("gradients", []) => Some(pages::gradients()),
         ("gallery", []) => Some(pages::gallery()),
+        ("fit", []) => Some(fit::run()),
         ("bench", _) => Some(bench::run(rest)),
         ("peers", _) => Some(peers::run(rest)),
         _ => None,

@@ -8,16 +8,28 @@ use crate::process::{self, Outcome};
 /// Everything that a command makes, but for the comparison with peers, which needs Python.
 pub fn all() -> Outcome {
     accuracy()?;
-    gallery()
+    gradients()?;
+    gallery()?;
+    crate::fit::run()
 }
 
 /// `docs/accuracy.md`, with its numbers and pictures.
 pub fn accuracy() -> Outcome {
+    program("isograd-accuracy")
+}
+
+/// `docs/gradients.md`, with its numbers and pictures.
+pub fn gradients() -> Outcome {
+    program("isograd-gradients")
+}
+
+/// Runs the program of a package, which writes its page.
+fn program(package: &str) -> Outcome {
     process::run(&mut process::cargo([
         "run",
         "--release",
         "--package",
-        "isograd-accuracy",
+        package,
     ]))
 }
 
