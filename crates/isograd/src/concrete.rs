@@ -5,7 +5,8 @@
 
 use crate::data::PointCloud;
 use crate::pipeline::{
-    CloudCotangent, Cotangent, Error, PullbackError, PullbackScratch, Reconstruction, Reconstructor,
+    CloudCotangent, Cotangent, Error, PullbackError, PullbackScratch, Reconstruction,
+    Reconstructor, RestoreError, Saved,
 };
 use crate::poisson;
 use crate::report::Stage;
@@ -27,6 +28,18 @@ pub trait Concrete: Sized {
         cloud: &PointCloud<Self>,
         held: Option<&Reconstruction<Self>>,
     ) -> Result<(), Error>
+    where
+        Self: crate::Real;
+
+    /// [`Reconstructor::restore`].
+    ///
+    /// # Errors
+    /// As that.
+    fn bring_back(
+        plan: &mut Reconstructor<Self>,
+        cloud: &PointCloud<Self>,
+        saved: &Saved<'_, Self>,
+    ) -> Result<(), RestoreError>
     where
         Self: crate::Real;
 
@@ -59,6 +72,14 @@ macro_rules! concrete {
                 held: Option<&Reconstruction<Self>>,
             ) -> Result<(), Error> {
                 plan.run(stage, cloud, held)
+            }
+
+            fn bring_back(
+                plan: &mut Reconstructor<Self>,
+                cloud: &PointCloud<Self>,
+                saved: &Saved<'_, Self>,
+            ) -> Result<(), RestoreError> {
+                plan.bring_back(cloud, saved)
             }
 
             fn pull(

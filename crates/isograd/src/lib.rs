@@ -34,7 +34,7 @@ pub use data::{
 };
 pub use pipeline::{
     CloudCotangent, Cotangent, Error, ExtensionCotangent, Options, PullbackError, PullbackScratch,
-    Reconstruction, Reconstructor,
+    Reconstruction, Reconstructor, RestoreError, Saved,
 };
 pub use real::Real;
 pub use report::{Report, Seconds, Stage, Warning};

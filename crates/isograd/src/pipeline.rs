@@ -5,6 +5,7 @@ mod extend;
 mod memory;
 mod options;
 mod pullback;
+mod restore;
 mod stages;
 
 use std::ops::ControlFlow;
@@ -19,6 +20,7 @@ use crate::{Real, distance, isosurface, neighbors, normals, orient, poisson, spl
 pub use cotangent::{CloudCotangent, Cotangent, ExtensionCotangent, PullbackError};
 pub use options::{Error, Options};
 pub use pullback::PullbackScratch;
+pub use restore::{RestoreError, Saved};
 
 /// A plan for one grid and one set of options: Fourier tables and all memory, used again by every call.
 ///

@@ -10,7 +10,7 @@ use isograd::orient::Method;
 use isograd::splat::Weights;
 use isograd::{
     Attribute, CloudCotangent, Cotangent, ExtensionCotangent, Grid, Options, PointCloud,
-    PullbackError, Real, Reconstruction, Reconstructor,
+    PullbackError, Real, Reconstruction, Reconstructor, Saved,
 };
 
 /// A motion of a point in cells over which nothing that has no derivative is likely to change.
@@ -393,4 +393,50 @@ fn what_does_not_fit_is_refused_with_a_reason() {
     );
     let pulled = result.pullback(&cloud, &none).expect("nothing to do");
     assert!(pulled.points.iter().flatten().all(|&x| x == 0.0));
+}
+
+/// What is brought back from φ, χ, closest faces and normals pulls back to the same bits.
+fn assert_restored<T: Real>(options: &Options) {
+    let cloud = cloud::<T>();
+    let mut plan = Reconstructor::new(grid(), options.clone()).expect("options");
+    let result = plan.reconstruct(&cloud).expect("a torus").clone();
+    let extended = Extended::new(&result, &cloud);
+    let expected = Weighted::new(&result, &extended).pull(&result, &cloud, &extended);
+    let saved = Saved {
+        sdf: result.sdf().values(),
+        indicator: result.indicator().values(),
+        closest: result.closest(),
+        normals: result.normals(),
+    };
+    let mut other = Reconstructor::new(grid(), options.clone()).expect("options");
+    let restored = other.restore(&cloud, &saved).expect("all is there").clone();
+    assert!(restored.mesh() == result.mesh() && restored.areas() == result.areas());
+    assert_eq!(restored.iso_value().f64(), result.iso_value().f64());
+    let extended = Extended::new(&restored, &cloud);
+    let pulled = Weighted::new(&restored, &extended).pull(&restored, &cloud, &extended);
+    assert!(pulled == expected);
+    let short = Saved {
+        normals: &result.normals()[1..],
+        ..saved
+    };
+    let refused = other.restore(&cloud, &short).err().map(|e| e.to_string());
+    assert!(refused.is_some_and(|text| text.contains("list of normals")));
+    let beyond = vec![u32::MAX - 1; result.closest().len()];
+    let wrong = Saved {
+        closest: &beyond,
+        ..saved
+    };
+    let refused = other.restore(&cloud, &wrong).err().map(|e| e.to_string());
+    assert!(refused.is_some_and(|text| text.contains("another reconstruction")));
+}
+
+#[test]
+fn a_restored_result_pulls_back_to_the_same_bits() {
+    assert_restored::<f32>(&Options::default());
+    assert_restored::<f64>(&Options {
+        orientation: Method::Given,
+        weights: Weights::Paper,
+        smoothing: 0.7,
+        ..Options::default()
+    });
 }

@@ -27,7 +27,7 @@ impl<T: Real> Reconstructor<T> {
         Ok(())
     }
 
-    fn normals(
+    pub(super) fn normals(
         &mut self,
         cloud: &PointCloud<T>,
         held: Option<&Reconstruction<T>>,
@@ -99,7 +99,7 @@ impl<T: Real> Reconstructor<T> {
         Ok(())
     }
 
-    fn splat(&mut self, cloud: &PointCloud<T>) -> Result<(), Error> {
+    pub(super) fn splat(&mut self, cloud: &PointCloud<T>) -> Result<(), Error> {
         let Reconstruction {
             options,
             orientation,

@@ -1,0 +1,130 @@
+//! A reconstruction from arrays of known size, for callers that can keep nothing else between a forward and
+//! its pullback.
+
+use super::{Error, Reconstruction, Reconstructor};
+use crate::data::PointCloud;
+use crate::distance::NO_TRIANGLE;
+use crate::isosurface::iso_value;
+use crate::report::Report;
+use crate::{Real, isosurface};
+
+/// The results from which the others are found again in little time: arrays whose length is that of the cloud
+/// or of the grid, which is known before anything is computed.
+#[derive(Clone, Copy, Debug)]
+pub struct Saved<'a, T> {
+    /// `(nx, ny, nz)` φ.
+    pub sdf: &'a [T],
+    /// `(nx, ny, nz)` χ.
+    pub indicator: &'a [T],
+    /// `(nx, ny, nz)` closest faces.
+    pub closest: &'a [u32],
+    /// `(N, 3)` outward normals.
+    pub normals: &'a [[T; 3]],
+}
+
+/// Why nothing was restored.
+#[derive(Debug, thiserror::Error)]
+pub enum RestoreError {
+    /// An array is not that of a result of this plan and cloud.
+    #[error(
+        "the saved {what} has {found} entries and must have {expected}: it is that of another reconstruction"
+    )]
+    Length {
+        /// The array.
+        what: &'static str,
+        /// Entries given.
+        found: usize,
+        /// Entries of this plan and cloud.
+        expected: usize,
+    },
+    /// A cell's closest face is not in the mesh.
+    #[error(
+        "the saved closest faces are those of another reconstruction: the surface has {faces} faces"
+    )]
+    Face {
+        /// Number of faces of the surface that was found again.
+        faces: usize,
+    },
+    /// A stage that is done again failed.
+    #[error(transparent)]
+    Stage(#[from] Error),
+}
+
+impl<T: Real> Reconstructor<T> {
+    /// The reconstruction of `cloud` that `saved` is from, to the bit: what is not saved is computed again
+    /// (neighbours, planes, areas, mesh), a small share of the whole. The report is empty, and so is the confidence.
+    ///
+    /// # Errors
+    /// As [`RestoreError`] lists.
+    pub fn restore(
+        &mut self,
+        cloud: &PointCloud<T>,
+        saved: &Saved<'_, T>,
+    ) -> Result<&Reconstruction<T>, RestoreError> {
+        T::bring_back(self, cloud, saved)?;
+        Ok(&self.result)
+    }
+
+    /// [`Self::restore`], compiled where it is called: see [`concrete`](crate::concrete).
+    pub(crate) fn bring_back(
+        &mut self,
+        cloud: &PointCloud<T>,
+        saved: &Saved<'_, T>,
+    ) -> Result<(), RestoreError> {
+        let cells = self.grid().cells();
+        check("φ", saved.sdf.len(), cells)?;
+        check("indicator", saved.indicator.len(), cells)?;
+        check("list of closest faces", saved.closest.len(), cells)?;
+        check("list of normals", saved.normals.len(), cloud.len())?;
+        self.result.report = Report {
+            points: cloud.len(),
+            ..Report::default()
+        };
+        self.result.orientation.normals.clear();
+        self.result.orientation.confidence.clear();
+        self.result
+            .orientation
+            .normals
+            .extend_from_slice(saved.normals);
+        // Writes its right-hand side where the indicator will be.
+        self.normals(cloud, None)?;
+        self.splat(cloud)?;
+        let Reconstruction {
+            sdf,
+            indicator,
+            iso_value,
+            mesh,
+            closest,
+            areas,
+            residuals,
+            ..
+        } = &mut self.result;
+        sdf.values_mut().copy_from_slice(saved.sdf);
+        indicator.values_mut().copy_from_slice(saved.indicator);
+        closest.clear();
+        closest.extend_from_slice(saved.closest);
+        let level = iso_value::forward(indicator, cloud.points(), areas).map_err(Error::from)?;
+        (*iso_value, residuals.iso_value) = level;
+        isosurface::forward(indicator, *iso_value, &mut self.scratch.isosurface, mesh)
+            .map_err(Error::from)?;
+        let faces = mesh.faces().len();
+        if closest
+            .iter()
+            .any(|&f| f != NO_TRIANGLE && f as usize >= faces)
+        {
+            return Err(RestoreError::Face { faces });
+        }
+        Ok(())
+    }
+}
+
+fn check(what: &'static str, found: usize, expected: usize) -> Result<(), RestoreError> {
+    match found == expected {
+        true => Ok(()),
+        false => Err(RestoreError::Length {
+            what,
+            found,
+            expected,
+        }),
+    }
+}
