@@ -1,0 +1,60 @@
+"""Point cloud in, signed distance field out, gradients back.
+
+    >>> import isograd
+    >>> points = isograd.sample("sphere", 2000).points
+    >>> result = isograd.reconstruct(points, isograd.Grid.fit(points, 32))
+    >>> gradient = result.pullback(sdf=result.sdf).points   # of the loss Σ φ²/2
+
+φ is negative inside, in the unit of the points, at the centres of the cells; arrays are ``(nx, ny, nz)``, points
+``(N, 3)``; float32 stays float32. ``isograd.jax`` and ``isograd.torch`` are the same inside these libraries.
+"""
+
+from ._core import __version__
+from ._files import (
+    Cloud,
+    read_mesh,
+    read_points,
+    read_sdf,
+    write_mesh,
+    write_points,
+    write_sdf,
+)
+from ._fit import Fit, fit
+from ._grid import Grid
+from ._mesh import Hits, Mesh, query, query_pullback, signed_distance
+from ._options import Options, Orient, Splat
+from ._reconstruction import Extension, Gradients, Reconstruction, Reconstructor, reconstruct
+from ._shapes import Coordinates, Parameter, Samples, Shape, sample, shapes
+
+__all__ = [
+    "Cloud",
+    "Coordinates",
+    "Extension",
+    "Fit",
+    "Gradients",
+    "Grid",
+    "Hits",
+    "Mesh",
+    "Options",
+    "Orient",
+    "Parameter",
+    "Reconstruction",
+    "Reconstructor",
+    "Samples",
+    "Shape",
+    "Splat",
+    "__version__",
+    "fit",
+    "query",
+    "query_pullback",
+    "read_mesh",
+    "read_points",
+    "read_sdf",
+    "reconstruct",
+    "sample",
+    "shapes",
+    "signed_distance",
+    "write_mesh",
+    "write_points",
+    "write_sdf",
+]

@@ -1,0 +1,71 @@
+"""Whatever a user passes, as arrays that the Rust side takes; never reinterpreted, never silently cut."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import DTypeLike
+
+
+def floats(values: object, name: str, shape: tuple[int | None, ...], dtype: DTypeLike | None = None) -> np.ndarray:
+    """A float32 or float64 array: C-contiguous, aligned, of the native byte order.
+
+    float32 and float64 stay what they are, float16 becomes float32, integers become float64.
+
+    Args:
+        values: anything that NumPy takes for an array.
+        name: for errors.
+        shape: what it must have; ``None`` for any length.
+        dtype: the type that it must have after that, such as the points'; ``None`` for either.
+
+    Raises:
+        TypeError: for numbers that would lose something, and for what is no array of numbers.
+        ValueError: for another shape.
+    """
+    if isinstance(values, np.ma.MaskedArray):
+        raise TypeError(f"{name} is a masked array; fill it or drop what is masked")
+    try:
+        array = np.asarray(values)
+    except (ValueError, TypeError, RuntimeError) as error:
+        raise TypeError(f"{name} can't be read as an array: {error}") from None
+    kind = array.dtype.kind
+    if kind == "f" and array.dtype.itemsize in (4, 8):
+        wanted = array.dtype.newbyteorder("=")
+    elif kind == "f" and array.dtype.itemsize == 2:
+        wanted = np.dtype(np.float32)
+    elif kind in "iu":
+        wanted = np.dtype(np.float64)
+    else:
+        raise TypeError(f"{name} is of {array.dtype}; give float32 or float64")
+    if dtype is not None:
+        wanted = np.dtype(dtype)
+    _check_shape(array.shape, name, shape)
+    return np.require(array, dtype=wanted, requirements=["C", "A"])
+
+
+def indices(values: object, name: str, shape: tuple[int | None, ...]) -> np.ndarray:
+    """A uint32 array of the same kind, from whole numbers that fit.
+
+    Raises:
+        TypeError: for what is no array of whole numbers.
+        ValueError: for another shape, or numbers below 0 or beyond 2³² − 1.
+    """
+    array = np.asarray(values)
+    if array.dtype.kind not in "iu" and array.size:
+        raise TypeError(f"{name} is of {array.dtype}; give whole numbers")
+    _check_shape(array.shape, name, shape)
+    if array.size and (array.min() < 0 or array.max() > 0xFFFF_FFFF):
+        raise ValueError(f"{name} has entries from {array.min()} to {array.max()}; give 0 to 2**32 - 1")
+    return np.require(array, dtype=np.uint32, requirements=["C", "A"])
+
+
+def _check_shape(found: tuple[int, ...], name: str, shape: tuple[int | None, ...]) -> None:
+    fits = len(found) == len(shape) and all(n is None or n == m for n, m in zip(shape, found))
+    if not fits:
+        letters = iter("NMKL")
+        wanted = ", ".join(next(letters) if n is None else str(n) for n in shape)
+        comma = "," if len(shape) == 1 else ""
+        raise ValueError(f"{name} has the shape {found} and must have ({wanted}{comma})")

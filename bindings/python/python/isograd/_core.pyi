@@ -1,0 +1,215 @@
+"""The extension module. Arrays must be of one number type, C-contiguous, aligned and of the native byte order;
+``isograd._arrays`` makes them so."""
+
+from collections.abc import Callable, Sequence
+from os import PathLike
+from typing import Any, TypeAlias, TypedDict, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Floats: TypeAlias = NDArray[np.float32] | NDArray[np.float64]
+_Indices: TypeAlias = NDArray[np.uint32]
+_Path: TypeAlias = str | PathLike[str]
+_Vector: TypeAlias = tuple[float, float, float]
+_Cells: TypeAlias = tuple[int, int, int]
+# Name, components, values.
+_Attributes: TypeAlias = list[tuple[str, int, _Floats]]
+
+__all__ = [
+    "Extension",
+    "Plan",
+    "Result",
+    "Shape",
+    "__version__",
+    "call_target",
+    "check_grid",
+    "fit_grid",
+    "forward_saved",
+    "pullback_saved",
+    "query_mesh",
+    "query_mesh_pullback",
+    "read_field",
+    "read_geometry",
+    "run_fit",
+    "shapes",
+    "write_field",
+    "write_mesh",
+    "write_points",
+    "xla_targets",
+]
+
+__version__: str
+
+# Grids.
+
+def check_grid(lower: _Vector, spacing: float, shape: _Cells) -> None:
+    """Raises ValueError where the numbers make no grid."""
+
+def fit_grid(
+    points: _Floats, resolution: int | None, spacing: float | None, padding: float
+) -> tuple[_Vector, float, _Cells]:
+    """Lower corner, spacing and shape of the grid round ``(N, 3)`` points."""
+
+# Reconstruction.
+
+class _Cotangents(TypedDict):
+    points: _Floats
+    normals: _Floats | None
+    attributes: list[_Floats]
+    lower: _Vector
+    spacing: float
+    guarded: int
+
+@final
+class Extension:
+    """An attribute on the surface and round it."""
+
+    def array(self, name: str) -> NDArray[Any]:
+        """``vertices``, ``cells`` or ``values``: a new array at each call."""
+
+@final
+class Result:
+    """A cloud and what was made of it."""
+
+    def array(self, name: str) -> NDArray[Any]:
+        """One of the arrays, by name: a new one at each call."""
+
+    def iso_value(self) -> float:
+        """The level of the surface."""
+
+    def report(self) -> dict[str, Any]:
+        """The numbers of the report."""
+
+    def pullback(
+        self,
+        bars: dict[str, _Floats],
+        iso_value: float,
+        extensions: list[tuple[Extension, _Floats | None, _Floats | None]],
+    ) -> _Cotangents:
+        """Cotangents of the inputs, by name, from those of the results, by name."""
+
+    def extend(self, name: str, band: float) -> Extension:
+        """The attribute ``name`` of the cloud within ``band`` cells of the surface."""
+
+@final
+class Plan:
+    """A plan for one grid and one set of options, in either number type."""
+
+    def __new__(cls, settings: str) -> Plan: ...
+    def reconstruct(
+        self, points: _Floats, normals: _Floats | None, attributes: _Attributes
+    ) -> Result:
+        """Reconstructs a cloud: ``points`` and ``normals`` ``(N, 3)`` of one type."""
+
+def forward_saved(
+    settings: str, points: _Floats, normals: _Floats | None = None
+) -> tuple[_Floats, _Floats, _Indices, _Floats]:
+    """φ, indicator, closest faces and normals of a cloud."""
+
+def pullback_saved(
+    settings: str,
+    points: _Floats,
+    given: _Floats | None,
+    sdf: _Floats,
+    indicator: _Floats,
+    closest: _Indices,
+    normals: _Floats,
+    sdf_bar: _Floats,
+) -> tuple[_Floats, _Floats | None]:
+    """Cotangents of the points, and of the given normals where there are any, from that of φ."""
+
+# Meshes.
+
+def query_mesh(vertices: _Floats, faces: _Indices, queries: _Floats) -> list[NDArray[Any]]:
+    """Distance, gradient, closest point, face and barycentric coordinates of each of ``(M, 3)`` queries."""
+
+def query_mesh_pullback(
+    vertices: _Floats, faces: _Indices, queries: _Floats, distance_bar: _Floats
+) -> list[_Floats]:
+    """Cotangents of vertices and queries from those of the distances."""
+
+# Bodies.
+
+@final
+class Shape:
+    """A body with its parameters."""
+
+    def __new__(cls, name: str, values: list[tuple[str, float]]) -> Shape: ...
+    def name(self) -> str: ...
+    def parameters(self) -> list[tuple[str, str, str, float, float, float, bool]]:
+        """Name, meaning, unit, default, least, greatest, whether whole."""
+
+    def values(self) -> list[tuple[str, float]]: ...
+    def area(self) -> float: ...
+    def volume(self) -> float: ...
+    def sample(
+        self, n: int, seed: int, even: bool, density: tuple[int, float] | None, single: bool
+    ) -> tuple[_Floats, _Floats, _Floats | None, _Indices, NDArray[np.float64]]:
+        """Points, normals, velocity, patches, and coordinates ``(N, 2)`` on them."""
+
+    def points_at(
+        self, patch: _Indices, uv: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Material points, and their normals, at coordinates."""
+
+    def pullback(
+        self, patch: _Indices, uv: NDArray[np.float64], points_bar: _Floats
+    ) -> list[float]:
+        """Cotangents of all parameters, in order."""
+
+def shapes() -> list[tuple[str, str]]:
+    """Names and summaries of all bodies."""
+
+# Fits.
+
+def run_fit(
+    settings: str,
+    how: str,
+    kind: str,
+    target: Sequence[NDArray[Any]],
+    shape: Shape | None,
+    points: _Floats | None,
+    callback: Callable[[str], bool | None] | None,
+) -> tuple[str, str, list[tuple[str, float]], _Floats, _Floats, _Floats, _Indices]:
+    """Outcome, history as JSON, names and values of the shape, points, φ, vertices, faces.
+
+    ``target`` is φ, ``(vertices, faces)`` or points, as ``kind`` says."""
+
+# XLA.
+
+def xla_targets() -> dict[str, object]:
+    """``{name: capsule}`` for ``jax.ffi.register_ffi_target``."""
+
+def call_target(
+    name: str,
+    inputs: Sequence[NDArray[Any]],
+    outputs: Sequence[NDArray[Any]],
+    settings: str,
+    band: float | None = None,
+) -> None:
+    """Calls a target with NumPy arrays, and writes its results into ``outputs``: float32, float64 or uint32, in C
+    order."""
+
+# Files.
+
+def read_geometry(
+    path: _Path,
+) -> tuple[_Floats, _Floats | None, list[tuple[str, _Floats]], _Indices]:
+    """Points, normals, attributes by name, and faces of a file, in the type that it is stored in."""
+
+def read_field(path: _Path) -> tuple[_Vector, float, _Cells, _Floats]:
+    """Lower corner, spacing, shape and values of a field, in the type that it is stored in."""
+
+def write_points(
+    path: _Path, points: _Floats, normals: _Floats | None, attributes: _Attributes
+) -> None:
+    """Writes points, with normals and attributes."""
+
+def write_mesh(path: _Path, vertices: _Floats, faces: _Indices) -> None:
+    """Writes a mesh."""
+
+def write_field(
+    path: _Path, lower: _Vector, spacing: float, shape: _Cells, values: _Floats
+) -> None:
+    """Writes a field."""

@@ -1,0 +1,82 @@
+"""Readers and writers: PLY, XYZ, CSV, OBJ, STL, NPY, NPZ, VTP and VTI."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from . import _core
+from ._arrays import floats
+from ._grid import Grid
+from ._mesh import Mesh, as_mesh
+from ._reconstruction import _attributes
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    Path = str | os.PathLike[str]
+
+
+class Cloud(NamedTuple):
+    """What a file of points holds."""
+
+    points: np.ndarray
+    """``(N, 3)``, float32 or float64 as they are stored."""
+    normals: np.ndarray | None
+    """``(N, 3)``, as they stand in the file."""
+    attributes: dict[str, np.ndarray]
+    """``(N, components)`` by name."""
+
+
+def read_points(path: Path) -> Cloud:
+    """The points of a file; of a mesh, its vertices.
+
+    Raises:
+        FileNotFoundError, OSError: what the operating system says.
+        ValueError: content that can't be read, with its line or byte.
+    """
+    points, normals, attributes, _ = _core.read_geometry(os.fspath(path))
+    return Cloud(points, normals, dict(attributes))
+
+
+def read_mesh(path: Path) -> Mesh:
+    """The triangles of a file; errors as :func:`read_points`, and ValueError where it has none."""
+    points, _, _, faces = _core.read_geometry(os.fspath(path))
+    if len(faces) == 0:
+        raise ValueError(f"{os.fspath(path)} has points and no faces; read it with read_points")
+    return Mesh(points, faces)
+
+
+def read_sdf(path: Path) -> tuple[Grid, np.ndarray]:
+    """Grid and values of a field (VTI or NPZ); errors as :func:`read_points`."""
+    lower, spacing, shape, values = _core.read_field(os.fspath(path))
+    return Grid(lower, spacing, shape), values
+
+
+def write_points(
+    path: Path,
+    points: ArrayLike,
+    *,
+    normals: ArrayLike | None = None,
+    attributes: Mapping[str, ArrayLike] | None = None,
+) -> None:
+    """Writes points (PLY, NPZ, XYZ or CSV); the file appears whole or not at all."""
+    cloud = floats(points, "points", (None, 3))
+    if normals is not None:
+        normals = floats(normals, "normals", cloud.shape, cloud.dtype)
+    _core.write_points(os.fspath(path), cloud, normals, _attributes(attributes, cloud))
+
+
+def write_mesh(path: Path, mesh: Mesh | tuple[ArrayLike, ArrayLike]) -> None:
+    """Writes a mesh (PLY, OBJ, STL or VTP); the file appears whole or not at all."""
+    mesh = as_mesh(mesh)
+    _core.write_mesh(os.fspath(path), mesh.vertices, mesh.faces)
+
+
+def write_sdf(path: Path, grid: Grid, sdf: ArrayLike) -> None:
+    """Writes a field (VTI or NPZ); the file appears whole or not at all."""
+    values = floats(sdf, "sdf", grid.shape)
+    _core.write_field(os.fspath(path), grid.lower, grid.spacing, grid.shape, values)

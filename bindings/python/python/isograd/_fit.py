@@ -1,0 +1,143 @@
+"""Inverse shape optimisation: a body, or points, changed until their field is that of a target."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from . import _core
+from ._arrays import floats
+from ._grid import Grid
+from ._mesh import Mesh
+from ._numbers import number, whole
+from ._options import Options
+from ._settings import encode
+from ._shapes import Shape
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """What a fit ended in.
+
+    Attributes:
+        outcome: ``"met"`` (the tolerance), ``"minimum"`` (nothing lower was found), ``"epochs"`` (all are done) or
+            ``"stopped"`` (by the callback).
+        shape: the shape as it is at the end; ``None`` for points.
+        points: ``(N, 3)`` points at the end.
+        sdf: ``(nx, ny, nz)`` field at the end, negative inside.
+        mesh: surface at the end.
+        history: one dictionary for each epoch, the start first: ``epoch``, ``evaluations``, ``loss`` and its parts,
+            ``gradient_norm``, ``mean_error`` (mean difference of φ, in cells) and ``parameters``.
+    """
+
+    outcome: str
+    shape: Shape | None
+    points: np.ndarray
+    sdf: np.ndarray
+    mesh: Mesh
+    history: list[dict[str, Any]]
+
+
+def fit(
+    target: ArrayLike | Mesh,
+    grid: Grid,
+    *,
+    shape: Shape | None = None,
+    points: ArrayLike | None = None,
+    kind: Literal["sdf", "cloud"] | None = None,
+    only: Sequence[str] | None = None,
+    samples: int = 20_000,
+    seed: int = 1,
+    resample: int | None = None,
+    random_start: float | None = None,
+    smoothness: float = 0.01,
+    optimizer: Literal["lbfgs", "adam"] = "lbfgs",
+    rate: float | None = None,
+    epochs: int = 500,
+    tolerance: float = 1e-6,
+    band: float | None = 8.0,
+    options: Options | None = None,
+    callback: Callable[[dict[str, Any]], bool | None] | None = None,
+) -> Fit:
+    """Changes the parameters of ``shape``, or every one of ``points``, until the field is that of ``target``.
+
+    In double precision throughout.
+
+    Args:
+        target: a field ``(nx, ny, nz)`` on ``grid``, a closed :class:`Mesh`, or a cloud ``(N, 3)``.
+        grid: where the fields are compared; it must have room for start and target.
+        kind: says what an array is where its shape leaves that open.
+        only: names of the parameters that are fitted; all but time and whole numbers unless given.
+        samples: number of samples of the shape.
+        seed: of the samples, and of the random start.
+        resample: draws new samples every so many epochs.
+        random_start: each value times up to ``1 + random_start``, or divided by it.
+        smoothness: weight of the smoothness of the displacement of points; 0 for none.
+        rate: length of the first steps, as a share of the parameters, or in cells for points.
+        tolerance: mean difference of φ, in cells, below which the fit is done.
+        band: compares within so many cells of the target's surface; ``None`` for everywhere.
+        callback: called with each epoch; the fit stops where it returns ``False``.
+
+    Raises:
+        TypeError, ValueError: a target or a start that makes no field, with the reason and the remedy.
+    """
+    if (shape is None) == (points is None):
+        raise ValueError("give a shape or points to fit, and not both")
+    if shape is not None and not isinstance(shape, Shape):
+        raise TypeError(f"shape is a {type(shape).__name__}; give an isograd.Shape")
+    if optimizer not in ("lbfgs", "adam"):
+        raise ValueError(f"optimizer is {optimizer!r}; give 'lbfgs' or 'adam'")
+    how = {
+        "optimizer": optimizer,
+        "rate": None if rate is None else number(rate, "rate"),
+        "epochs": _count(epochs, "epochs"),
+        "tolerance": number(tolerance, "tolerance"),
+        "band": None if band is None else number(band, "band"),
+        "only": None if only is None else [str(name) for name in only],
+        "samples": _count(samples, "samples"),
+        "seed": _count(seed, "seed"),
+        "resample": None if resample is None else max(1, _count(resample, "resample")),
+        "random_start": None if random_start is None else number(random_start, "random_start"),
+        "smoothness": number(smoothness, "smoothness"),
+    }
+    found_kind, arrays = _target(target, grid, kind)
+    start = None if points is None else floats(points, "points", (None, 3), np.float64)
+    outcome, history, values, found, sdf, vertices, faces = _core.run_fit(
+        encode(grid, options),
+        json.dumps(how, allow_nan=False),
+        found_kind,
+        arrays,
+        None if shape is None else shape._core,
+        start,
+        None if callback is None else (lambda epoch: callback(json.loads(epoch))),
+    )
+    fitted = None if shape is None else Shape(shape.name, **dict(values))
+    return Fit(outcome, fitted, found, sdf, Mesh(vertices, faces), json.loads(history))
+
+
+def _target(target: object, grid: Grid, kind: str | None) -> tuple[str, list[np.ndarray]]:
+    if not isinstance(grid, Grid):
+        raise TypeError(f"grid is a {type(grid).__name__}; give an isograd.Grid")
+    if isinstance(target, Mesh):
+        vertices = floats(target.vertices, "vertices", (None, 3), np.float64)
+        return "mesh", [vertices, target.faces]
+    if kind is None:
+        kind = "sdf" if np.ndim(target) == 3 else "cloud"  # type: ignore[arg-type]
+    if kind not in ("sdf", "cloud"):
+        raise ValueError(f"kind is {kind!r}; give 'sdf' or 'cloud'")
+    shape = grid.shape if kind == "sdf" else (None, 3)
+    return kind, [floats(target, "the target", shape, np.float64)]
+
+
+def _count(value: object, name: str) -> int:
+    found = whole(value, name)
+    if found < 0:
+        raise ValueError(f"{name} is {found}; give 0 or more")
+    return found

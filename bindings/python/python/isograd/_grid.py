@@ -1,0 +1,105 @@
+"""Grids of cubic cells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import _core
+from ._arrays import floats
+from ._numbers import number, whole
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A box of cubic cells. Fields have one value for each cell, at its centre.
+
+    Attributes:
+        lower: corner of the box, ``(x, y, z)``, in the unit of the points.
+        spacing: side of a cell, in the unit of the points.
+        shape: number of cells along each axis, ``(nx, ny, nz)``.
+
+    The centre of cell ``(i, j, k)`` is ``lower + spacing * (i + 0.5, j + 0.5, k + 0.5)``.
+
+    Raises:
+        ValueError: where a number is not finite, or there are no cells.
+    """
+
+    lower: tuple[float, float, float]
+    spacing: float
+    shape: tuple[int, int, int]
+
+    def __post_init__(self) -> None:
+        lower = tuple(number(x, "lower") for x in _three(self.lower, "lower"))
+        shape = tuple(whole(n, "shape") for n in _three(self.shape, "shape"))
+        object.__setattr__(self, "lower", lower)
+        object.__setattr__(self, "spacing", number(self.spacing, "spacing"))
+        object.__setattr__(self, "shape", shape)
+        _core.check_grid(self.lower, self.spacing, self.shape)
+
+    @classmethod
+    def fit(
+        cls,
+        points: ArrayLike,
+        resolution: int | None = None,
+        *,
+        spacing: float | None = None,
+        padding: float = 0.1,
+    ) -> Grid:
+        """The grid round a cloud.
+
+        Args:
+            points: ``(N, 3)``.
+            resolution: cells on the longest side; 128 unless ``spacing`` is given.
+            spacing: side of a cell, instead of a resolution.
+            padding: room on every side, as a share of the longest side (at least 4 cells).
+
+        Raises:
+            ValueError: points that make no grid, or both ``resolution`` and ``spacing``.
+        """
+        if resolution is not None and spacing is not None:
+            raise ValueError("give resolution or spacing, not both")
+        if resolution is None and spacing is None:
+            resolution = 128
+        if resolution is not None:
+            resolution = whole(resolution, "resolution")
+        if spacing is not None:
+            spacing = number(spacing, "spacing")
+        padding = number(padding, "padding")
+        cloud = floats(points, "points", (None, 3))
+        return cls(*_core.fit_grid(cloud, resolution, spacing, padding))
+
+    @property
+    def upper(self) -> tuple[float, float, float]:
+        """The opposite corner of the box."""
+        x, y, z = (low + self.spacing * n for low, n in zip(self.lower, self.shape))
+        return (x, y, z)
+
+    @property
+    def origin(self) -> tuple[float, float, float]:
+        """The centre of cell ``(0, 0, 0)``."""
+        x, y, z = (low + 0.5 * self.spacing for low in self.lower)
+        return (x, y, z)
+
+    def centers(self, dtype: np.typing.DTypeLike = np.float64) -> np.ndarray:
+        """``(nx, ny, nz, 3)`` centres of all cells."""
+        axes = [
+            low + self.spacing * (np.arange(n) + 0.5) for low, n in zip(self.lower, self.shape)
+        ]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).astype(dtype)
+
+
+def _three(values: object, name: str) -> tuple[object, ...]:
+    found: tuple[object, ...]
+    try:
+        found = tuple(values)  # type: ignore[arg-type]
+    except TypeError:
+        found = ()
+    if len(found) != 3:
+        raise ValueError(f"{name} is {values!r}; give three numbers, one for each axis")
+    return found

@@ -1,0 +1,122 @@
+"""What to compute, and how."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from enum import Enum
+from typing import Literal
+
+from ._numbers import number
+
+
+class Orient(str, Enum):
+    """How the side of each normal is found."""
+
+    AUTO = "auto"
+    """From enclosure, sky, sheets and neighbours."""
+    PARITY = "parity"
+    """By counting crossings along the normal, as the paper prints it."""
+    GIVEN = "given"
+    """The normals that are given, as they are."""
+    SIGNS = "signs"
+    """The directions found, each on the side of the normal that is given."""
+
+
+class Splat(str, Enum):
+    """How a sample is spread over the cells round it."""
+
+    BSPLINE = "bspline"
+    """Quadratic B-spline."""
+    PAPER = "paper"
+    """The paper's weights."""
+
+
+OrientLike = Orient | Literal["auto", "parity", "given", "signs"]
+SplatLike = Splat | Literal["bspline", "paper"]
+
+
+@dataclass(frozen=True)
+class Options:
+    """What to compute, and how.
+
+    Attributes:
+        radius: neighbourhood radius of the normals, in the unit of the points, or ``"auto"``.
+        orient: see :class:`Orient`.
+        splat: see :class:`Splat`.
+        area: whether a sample counts by the area that it stands for.
+        smoothing: width of the smoothing of the indicator, in cells; 0 for none.
+        band: how far from the surface φ is computed, in cells; ``None`` for everywhere.
+        checks: whether to measure the result and look for reasons not to trust it.
+
+    Raises:
+        ValueError: for a value that makes no sense.
+    """
+
+    radius: float | Literal["auto"] = "auto"
+    orient: OrientLike = Orient.AUTO
+    splat: SplatLike = Splat.BSPLINE
+    area: bool = True
+    smoothing: float = 0.0
+    band: float | None = None
+    checks: bool = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "orient", _choice(Orient, self.orient, "orient"))
+        object.__setattr__(self, "splat", _choice(Splat, self.splat, "splat"))
+        if not isinstance(self.radius, str) or self.radius != "auto":
+            object.__setattr__(self, "radius", _above_zero(self.radius, "radius", '"auto"'))
+        if self.band is not None:
+            object.__setattr__(self, "band", _above_zero(self.band, "band", "None"))
+        smoothing = number(self.smoothing, "smoothing")
+        if not 0.0 <= smoothing < float("inf"):
+            raise ValueError(f"smoothing is {smoothing}; give 0 or more cells")
+        object.__setattr__(self, "smoothing", smoothing)
+        object.__setattr__(self, "area", bool(self.area))
+        object.__setattr__(self, "checks", bool(self.checks))
+
+
+def resolve(options: Options | None, changes: dict[str, object]) -> Options:
+    """``options``, or the defaults, with some fields changed.
+
+    Raises:
+        TypeError: for a name that is no option.
+    """
+    if options is not None and not isinstance(options, Options):
+        raise TypeError(f"options is a {type(options).__name__}; give an isograd.Options")
+    names = [field.name for field in fields(Options)]
+    for name in changes:
+        if name not in names:
+            raise TypeError(f"{name!r} is no option; the options are {', '.join(names)}")
+    values = {name: getattr(options or Options(), name) for name in names}
+    return Options(**{**values, **changes})
+
+
+def check_normals(options: Options, are_given: bool) -> None:
+    """Whether normals are there where they are used, and only there.
+
+    Raises:
+        ValueError: where not.
+    """
+    are_used = options.orient in (Orient.GIVEN, Orient.SIGNS)
+    if are_used and not are_given:
+        raise ValueError(f"orient is {Orient(options.orient).value!r} and there are no normals; give normals")
+    if are_given and not are_used:
+        raise ValueError(
+            f"normals are given and orient is {Orient(options.orient).value!r}, which does not use them; "
+            'give none, or options with orient="given" or "signs"'
+        )
+
+
+def _choice(kind: type[Enum], value: object, name: str) -> Enum:
+    try:
+        return kind(value)
+    except ValueError:
+        choices = ", ".join(repr(choice.value) for choice in kind)
+        raise ValueError(f"{name} is {value!r}; give one of {choices}") from None
+
+
+def _above_zero(value: object, name: str, other: str) -> float:
+    found = number(value, name)
+    if not 0.0 < found < float("inf"):
+        raise ValueError(f"{name} is {value!r}; give a finite number above 0, or {other}")
+    return found

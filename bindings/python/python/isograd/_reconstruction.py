@@ -1,0 +1,300 @@
+"""From points to φ, the surface and the normals, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import _core
+from ._arrays import floats
+from ._grid import Grid
+from ._mesh import Mesh
+from ._numbers import number
+from ._options import Options, check_normals, resolve
+from ._settings import encode
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+
+@dataclass(frozen=True, eq=False)
+class Gradients:
+    """Cotangents of what a reconstruction was made from: the derivative of a loss in each input.
+
+    Attributes:
+        points: ``(N, 3)``.
+        normals: ``(N, 3)`` of the given normals; ``None`` where normals were found.
+        attributes: of each extended attribute, ``(N, components)``.
+        lower: of the grid's corner, at fixed points.
+        spacing: of the grid's cell size, at fixed points.
+        guarded: places where a derivative does not exist, or has no bound, and a bounded one was taken.
+    """
+
+    points: np.ndarray
+    normals: np.ndarray | None
+    attributes: dict[str, np.ndarray]
+    lower: tuple[float, float, float]
+    spacing: float
+    guarded: int
+
+
+class Extension:
+    """An attribute of the samples, carried to the surface and to the cells near it."""
+
+    def __init__(self, core: _core.Extension, name: str, grid: Grid) -> None:
+        self._core = core
+        self.name = name
+        """Name of the attribute."""
+        self.grid = grid
+        """The grid."""
+
+    @cached_property
+    def vertices(self) -> np.ndarray:
+        """``(V, components)`` at the vertices of the mesh."""
+        return self._core.array("vertices")
+
+    @cached_property
+    def cells(self) -> np.ndarray:
+        """``(B,)`` flat indices of the cells in the band: ``numpy.unravel_index(cells, grid.shape)``."""
+        return self._core.array("cells")
+
+    @cached_property
+    def values(self) -> np.ndarray:
+        """``(B, components)`` at those cells."""
+        return self._core.array("values")
+
+    def dense(self, fill: float = 0.0) -> np.ndarray:
+        """``(nx, ny, nz, components)``, with ``fill`` outside the band."""
+        components = self.values.shape[1]
+        out = np.full((*self.grid.shape, components), fill, dtype=self.values.dtype)
+        out.reshape(-1, components)[self.cells] = self.values
+        return out
+
+
+class Reconstruction:
+    """What was made of a cloud. Arrays have the type of the points, are copies, and belong to you."""
+
+    def __init__(
+        self, core: _core.Result, grid: Grid, options: Options, count: int, dtype: np.dtype
+    ) -> None:
+        self._core = core
+        self._count = count
+        self.dtype = dtype
+        """float32 or float64: the type of the points."""
+        self.grid = grid
+        """The grid of all fields."""
+        self.options = options
+        """The options that it was made with."""
+
+    def __repr__(self) -> str:
+        return f"Reconstruction of {self._count} points on {self.grid.shape} cells, {self.dtype}"
+
+    @cached_property
+    def sdf(self) -> np.ndarray:
+        """``(nx, ny, nz)`` signed distance φ at the cell centres, in the points' unit, negative inside."""
+        return self._core.array("sdf")
+
+    @cached_property
+    def indicator(self) -> np.ndarray:
+        """``(nx, ny, nz)`` indicator χ: below :attr:`iso_value` inside, above it outside."""
+        return self._core.array("indicator")
+
+    @cached_property
+    def iso_value(self) -> float:
+        """The level of the surface."""
+        return self._core.iso_value()
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """The surface, counter-clockwise seen from outside."""
+        return Mesh(self._core.array("vertices"), self._core.array("faces"))
+
+    @cached_property
+    def closest(self) -> np.ndarray:
+        """``(nx, ny, nz)`` uint32: face of the mesh closest to each cell; 2**32 - 1 outside the band."""
+        return self._core.array("closest")
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """``(N, 3)`` outward unit normals, in the order of the points."""
+        return self._core.array("normals")
+
+    @cached_property
+    def confidence(self) -> np.ndarray:
+        """``(N,)`` how sure the side of each normal is, from 0 to 1."""
+        return self._core.array("confidence")
+
+    @cached_property
+    def areas(self) -> np.ndarray:
+        """``(N,)`` area that each sample stands for, in unit length²; 1 without area weights."""
+        return self._core.array("areas")
+
+    @cached_property
+    def neighbours(self) -> np.ndarray:
+        """``(N,)`` number of samples in the neighbourhood of each, itself included."""
+        return self._core.array("neighbours")
+
+    @cached_property
+    def report(self) -> dict[str, Any]:
+        """Numbers, times and warnings, with the names of the command line's ``report.json``."""
+        return self._core.report()
+
+    @property
+    def warnings(self) -> list[str]:
+        """What to know before trusting the result."""
+        return list(self.report["warnings"])
+
+    def extend(self, name: str, band: float) -> Extension:
+        """The attribute ``name`` of the cloud at the vertices, and within ``band`` cells of the surface at the
+        value that it has at the closest surface point.
+
+        Raises:
+            ValueError: no such attribute, or a band without width.
+        """
+        return Extension(self._core.extend(str(name), number(band, "band")), str(name), self.grid)
+
+    def pullback(
+        self,
+        sdf: ArrayLike | None = None,
+        *,
+        vertices: ArrayLike | None = None,
+        normals: ArrayLike | None = None,
+        indicator: ArrayLike | None = None,
+        areas: ArrayLike | None = None,
+        iso_value: float = 0.0,
+        extensions: list[tuple[Extension, ArrayLike | None, ArrayLike | None]] | None = None,
+    ) -> Gradients:
+        """Cotangents of the inputs, from those of any of the results.
+
+        Args:
+            sdf: ``(nx, ny, nz)`` derivative of a loss in φ.
+            vertices: ``(V, 3)`` in the vertices of the mesh.
+            normals: ``(N, 3)`` in the outward normals.
+            indicator: ``(nx, ny, nz)`` in χ.
+            areas: ``(N,)`` in the areas.
+            iso_value: in the level.
+            extensions: an :class:`Extension` with its derivatives in ``vertices`` and ``values``, or ``None``.
+
+        Neighbourhoods, signs of normals, signs of cells and closest faces are held constant.
+
+        Raises:
+            TypeError, ValueError: an array of another shape or type, or one that is not finite.
+        """
+        shape = self.grid.shape
+        given = {
+            "sdf": (sdf, shape),
+            "indicator": (indicator, shape),
+            "vertices": (vertices, (None, 3)),
+            "normals": (normals, (self._count, 3)),
+            "areas": (areas, (self._count,)),
+        }
+        bars = {
+            name: floats(values, f"the cotangent of {name}", wanted, self.dtype)
+            for name, (values, wanted) in given.items()
+            if values is not None
+        }
+        extended = [self._extension(*entry) for entry in extensions or []]
+        out = self._core.pullback(bars, number(iso_value, "iso_value"), extended)
+        names = [entry[0].name for entry in extensions or []]
+        return Gradients(
+            points=out["points"],
+            normals=out["normals"],
+            attributes=dict(zip(names, out["attributes"])),
+            lower=out["lower"],
+            spacing=out["spacing"],
+            guarded=out["guarded"],
+        )
+
+    def _extension(
+        self, extension: Extension, at_vertices: ArrayLike | None, in_band: ArrayLike | None
+    ) -> tuple[Any, np.ndarray | None, np.ndarray | None]:
+        if not isinstance(extension, Extension):
+            raise TypeError(f"an extension is a {type(extension).__name__}; give what extend() returned")
+
+        def bar(values: ArrayLike | None, like: np.ndarray) -> np.ndarray | None:
+            if values is None:
+                return None
+            return floats(values, f"the cotangent of {extension.name}", like.shape, self.dtype)
+
+        return (
+            extension._core,
+            bar(at_vertices, extension.vertices),
+            bar(in_band, extension.values),
+        )
+
+
+class Reconstructor:
+    """A plan for one grid and one set of options: made once, used for every time step.
+
+    Its memory is used again by every call. It may be called from several threads; they then wait for no one,
+    and each beyond the first makes a plan of its own.
+    """
+
+    def __init__(self, grid: Grid, options: Options | None = None, **changes: Any) -> None:
+        self.options = resolve(options, changes)
+        """What to compute, and how."""
+        self.grid = grid
+        """The grid of all results."""
+        self._plan = _core.Plan(encode(grid, self.options))
+
+    def __call__(
+        self,
+        points: ArrayLike,
+        *,
+        normals: ArrayLike | None = None,
+        attributes: Mapping[str, ArrayLike] | None = None,
+    ) -> Reconstruction:
+        """See :func:`reconstruct`."""
+        cloud = floats(points, "points", (None, 3))
+        if normals is not None:
+            normals = floats(normals, "normals", cloud.shape, cloud.dtype)
+        check_normals(self.options, normals is not None)
+        core = self._plan.reconstruct(cloud, normals, _attributes(attributes, cloud))
+        return Reconstruction(core, self.grid, self.options, len(cloud), cloud.dtype)
+
+    reconstruct = __call__
+
+
+def reconstruct(
+    points: ArrayLike,
+    grid: Grid | None = None,
+    *,
+    normals: ArrayLike | None = None,
+    attributes: Mapping[str, ArrayLike] | None = None,
+    options: Options | None = None,
+    **changes: Any,
+) -> Reconstruction:
+    """The signed distance field and the surface of a cloud.
+
+    Args:
+        points: ``(N, 3)`` samples of the surface; float32 or float64 decides the type of all results.
+        grid: where φ is wanted; ``Grid.fit(points)`` unless given.
+        normals: ``(N, 3)``, where ``orient`` is ``"given"`` or ``"signs"``, and only there.
+        attributes: values of the samples, ``(N,)`` or ``(N, components)`` by name, for
+            :meth:`Reconstruction.extend`.
+        options: what to compute, and how.
+        changes: single options by name, such as ``orient="given"``.
+
+    Raises:
+        TypeError, ValueError: input that makes no surface, with the reason and the remedy.
+        KeyboardInterrupt: at once, where Ctrl-C is pressed.
+    """
+    cloud = floats(points, "points", (None, 3))
+    plan = Reconstructor(Grid.fit(cloud) if grid is None else grid, options, **changes)
+    return plan(cloud, normals=normals, attributes=attributes)
+
+
+def _attributes(
+    attributes: Mapping[str, ArrayLike] | None, cloud: np.ndarray
+) -> list[tuple[str, int, np.ndarray]]:
+    found = []
+    for name, values in (attributes or {}).items():
+        shape = np.shape(values)
+        wanted = (len(cloud),) if len(shape) == 1 else (len(cloud), None)
+        array = floats(values, f"attribute {name!r}", wanted, cloud.dtype)
+        found.append((str(name), 1 if array.ndim == 1 else array.shape[1], array))
+    return found

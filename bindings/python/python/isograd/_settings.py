@@ -1,0 +1,35 @@
+"""Grid and options as one text, the only form that every interface can pass."""
+
+from __future__ import annotations
+
+import json
+
+from ._grid import Grid
+from ._options import Options, Orient, Splat
+
+
+def encode(grid: Grid, options: Options | None = None) -> str:
+    """The JSON text that the Rust side reads; numbers read back to the same bits.
+
+    Raises:
+        TypeError: for what is no grid or no options.
+    """
+    if not isinstance(grid, Grid):
+        raise TypeError(f"grid is a {type(grid).__name__}; give an isograd.Grid, such as Grid.fit(points)")
+    options = Options() if options is None else options
+    if not isinstance(options, Options):
+        raise TypeError(f"options is a {type(options).__name__}; give an isograd.Options")
+    return json.dumps(
+        {
+            "lower": grid.lower,
+            "spacing": grid.spacing,
+            "shape": grid.shape,
+            "radius": None if options.radius == "auto" else options.radius,
+            "orient": Orient(options.orient).value,
+            "splat": Splat(options.splat).value,
+            "area": options.area,
+            "smoothing": options.smoothing,
+            "band": options.band,
+            "checks": options.checks,
+        }
+    )

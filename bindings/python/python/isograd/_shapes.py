@@ -1,0 +1,151 @@
+"""Parametric bodies with exact points, normals and derivatives."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import numpy as np
+
+from . import _core
+from ._arrays import floats, indices
+from ._numbers import number, whole
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, DTypeLike
+
+
+class Coordinates(NamedTuple):
+    """Where on a surface ``N`` samples are: the same material points whatever the parameters are."""
+
+    patch: np.ndarray
+    """``(N,)`` uint32."""
+    uv: np.ndarray
+    """``(N, 2)`` from 0 to 1."""
+
+
+class Samples(NamedTuple):
+    """Samples of a body."""
+
+    points: np.ndarray
+    """``(N, 3)``."""
+    normals: np.ndarray
+    """``(N, 3)`` outward unit normals."""
+    velocity: np.ndarray | None
+    """``(N, 3)`` of a body that moves."""
+    coordinates: Coordinates
+    """Where they are."""
+
+
+class Parameter(NamedTuple):
+    """A parameter of a body."""
+
+    name: str
+    meaning: str
+    unit: str
+    default: float
+    min: float
+    max: float
+    whole: bool
+
+
+class Shape:
+    """A parametric body: ``Shape("fish", width1=0.04)``. :func:`shapes` lists all.
+
+    Raises:
+        ValueError: no such body or parameter, or a value out of range; the text lists what there is.
+    """
+
+    def __init__(self, name: str, **parameters: float) -> None:
+        values = [(key, number(value, key)) for key, value in parameters.items()]
+        self._core = _core.Shape(str(name), values)
+
+    def __repr__(self) -> str:
+        return f"Shape({self.name!r})"
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self._core.name()
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """What its parameters are, in order."""
+        return {entry[0]: Parameter(*entry) for entry in self._core.parameters()}
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The values of its parameters, in order."""
+        return dict(self._core.values())
+
+    @property
+    def area(self) -> float:
+        """Area of its surface."""
+        return self._core.area()
+
+    @property
+    def volume(self) -> float:
+        """Its volume."""
+        return self._core.volume()
+
+    def replace(self, **parameters: float) -> Shape:
+        """The same body with some parameters changed."""
+        return Shape(self.name, **{**self.values, **parameters})
+
+    def sample(
+        self,
+        n: int,
+        *,
+        seed: int = 1,
+        layout: Literal["even", "random"] = "even",
+        density: tuple[int, float] | None = None,
+        dtype: DTypeLike = np.float64,
+    ) -> Samples:
+        """``n`` samples of the surface; the same seed gives the same samples.
+
+        Args:
+            layout: ``"even"`` (blue noise) or ``"random"``.
+            density: ``(axis, ratio)``: so many times as many samples per area at the high end of an axis.
+            dtype: float32 or float64.
+        """
+        if layout not in ("even", "random"):
+            raise ValueError(f"layout is {layout!r}; give 'even' or 'random'")
+        dtype = np.dtype(dtype)
+        if dtype not in (np.float32, np.float64):
+            raise TypeError(f"dtype is {dtype}; give float32 or float64")
+        n, seed = whole(n, "n"), whole(seed, "seed")
+        if n < 1 or seed < 0:
+            raise ValueError(f"{n} samples with seed {seed}; give at least 1, and a seed of 0 or more")
+        single = dtype == np.float32
+        points, normals, velocity, patch, uv = self._core.sample(
+            n, seed, layout == "even", density, single
+        )
+        return Samples(points, normals, velocity, Coordinates(patch, uv))
+
+    def points_at(self, coordinates: Coordinates) -> tuple[np.ndarray, np.ndarray]:
+        """``(N, 3)`` points and outward normals at surface coordinates, float64."""
+        return self._core.points_at(*_checked(coordinates))
+
+    def pullback(self, coordinates: Coordinates, points_bar: ArrayLike) -> dict[str, float]:
+        """Cotangent of each parameter, from those of the points ``(N, 3)`` at fixed coordinates."""
+        patch, uv = _checked(coordinates)
+        bar = floats(points_bar, "points_bar", (len(patch), 3))
+        return dict(zip(self.values, self._core.pullback(patch, uv, bar)))
+
+
+def _checked(coordinates: Coordinates) -> tuple[np.ndarray, np.ndarray]:
+    patch, uv = coordinates
+    patch = indices(patch, "patch", (None,))
+    return patch, floats(uv, "uv", (len(patch), 2), np.float64)
+
+
+def shapes() -> dict[str, str]:
+    """Name and summary of every body."""
+    return dict(_core.shapes())
+
+
+def sample(shape: str, n: int, **parameters: object) -> Samples:
+    """``n`` samples of a body: ``sample("fish", 20_000, seed=3, width1=0.04)``; see :meth:`Shape.sample`."""
+    drawing = {"seed", "layout", "density", "dtype"}
+    how = {key: value for key, value in parameters.items() if key in drawing}
+    of = {key: value for key, value in parameters.items() if key not in drawing}
+    return Shape(shape, **of).sample(n, **how)  # type: ignore[arg-type]

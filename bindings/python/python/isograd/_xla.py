@@ -1,0 +1,170 @@
+"""Calls of the targets in Rust from JAX: what `isograd.jax` is made of."""
+
+from __future__ import annotations
+
+import os
+import threading
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from . import _core, _settings
+from ._options import check_normals, resolve
+
+if TYPE_CHECKING:
+    from jax.typing import ArrayLike
+
+    from ._grid import Grid
+    from ._options import Options
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is static: grid and options as one text, and the shape of fields."""
+
+    settings: str
+    shape: tuple[int, int, int]
+    band: float | None = None
+    """How far an attribute is extended, in cells."""
+
+    def kept(self, points: jax.Array) -> tuple[jax.ShapeDtypeStruct, ...]:
+        """φ, indicator, closest faces and normals: what a pullback needs besides its inputs."""
+        field = jax.ShapeDtypeStruct(self.shape, points.dtype)
+        closest = jax.ShapeDtypeStruct(self.shape, np.uint32)
+        return (field, field, closest, *like(points))
+
+
+def like(*arrays: jax.Array | None) -> tuple[jax.ShapeDtypeStruct, ...]:
+    """Results of the shapes and types of these arrays, of those that are there."""
+    return tuple(jax.ShapeDtypeStruct(a.shape, a.dtype) for a in arrays if a is not None)
+
+
+def pair(bars: tuple[jax.Array, ...]) -> tuple[jax.Array, jax.Array | None]:
+    """Cotangents of points and normals, of which the latter may not be there."""
+    return bars[0], bars[1] if len(bars) > 1 else None
+
+
+def prepare(
+    points: ArrayLike,
+    grid: Grid,
+    normals: ArrayLike | None,
+    options: Options | None,
+    band: float | None = None,
+) -> tuple[Plan, jax.Array, jax.Array | None]:
+    """Checks what can be checked while tracing.
+
+    Raises:
+        TypeError: for what is no array of numbers, no grid, no options.
+        ValueError: for another shape, and for normals that are missing or not used.
+    """
+    points = floats(points, "points", (None, 3))
+    if normals is not None:
+        normals = floats(normals, "normals", points.shape, points.dtype)
+    options = resolve(options, {"checks": False})
+    check_normals(options, normals is not None)
+    settings = _settings.encode(grid, options)
+    return Plan(settings, grid.shape, band), points, normals
+
+
+def floats(
+    values: ArrayLike, name: str, shape: tuple[int | None, ...], dtype: Any = None
+) -> jax.Array:
+    """An array of ``dtype``, or of float32 or float64 if there is none; ``None`` in the shape is any length.
+
+    Raises:
+        TypeError: for what is no array of real numbers.
+        ValueError: for another shape.
+    """
+    try:
+        array = jnp.asarray(values)
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"{name} can't be read as an array: {error}") from None
+    if jnp.issubdtype(array.dtype, jnp.integer):
+        array = array.astype(float)
+    elif not jnp.issubdtype(array.dtype, jnp.floating):
+        raise TypeError(f"{name} is of {array.dtype}; give float32 or float64")
+    elif array.dtype not in (jnp.float32, jnp.float64):
+        array = array.astype(jnp.float32)
+    fits = len(array.shape) == len(shape) and all(
+        n in (None, m) for n, m in zip(shape, array.shape)
+    )
+    if not fits:
+        wanted = ", ".join("NC"[axis] if n is None else str(n) for axis, n in enumerate(shape))
+        batch = "; for a batch use jax.vmap" if array.ndim > len(shape) else ""
+        raise ValueError(f"{name} has the shape {array.shape} and must have ({wanted}){batch}")
+    return array if dtype is None else array.astype(dtype)
+
+
+def call(
+    name: str,
+    plan: Plan,
+    results: tuple[jax.ShapeDtypeStruct, ...],
+    *arrays: jax.Array | None,
+) -> tuple[jax.Array, ...]:
+    """Calls a target: by XLA on CPUs, elsewhere through Python."""
+    present = [array for array in arrays if array is not None]
+    attributes: dict[str, Any] = {"settings": plan.settings}
+    if plan.band is not None:
+        attributes["band"] = np.float64(plan.band)
+
+    def by_callback(*arrays: jax.Array) -> tuple[jax.Array, ...]:
+        callback = _Callback(name, results, plan)
+        return jax.pure_callback(callback, results, *arrays, vmap_method="broadcast_all")
+
+    def by_handler(*arrays: jax.Array) -> tuple[jax.Array, ...]:
+        handler = jax.ffi.ffi_call(name, results, vmap_method="broadcast_all")
+        return tuple(handler(*arrays, **attributes))
+
+    if not _has_handlers():
+        return by_callback(*present)
+    return jax.lax.platform_dependent(*present, cpu=by_handler, default=by_callback)
+
+
+@dataclass(frozen=True)
+class _Callback:
+    """A target as a function of NumPy arrays. Equal ones compare equal, so that JAX compiles once."""
+
+    name: str
+    results: tuple[jax.ShapeDtypeStruct, ...]
+    plan: Plan
+
+    def __call__(self, *arrays: ArrayLike) -> tuple[np.ndarray, ...]:
+        inputs = [np.require(array, requirements=["C", "A"]) for array in arrays]
+        batch = inputs[0].shape[:-2]
+        outputs = [np.empty(batch + result.shape, result.dtype) for result in self.results]
+        _core.call_target(self.name, inputs, outputs, self.plan.settings, self.plan.band)
+        return tuple(outputs)
+
+
+_lock = threading.Lock()
+_taken: bool | None = None
+
+
+def _has_handlers() -> bool:
+    """Whether XLA has taken the handlers, which are offered on the first call."""
+    global _taken
+    if os.environ.get("ISOGRAD_JAX_CALLBACK", "0") not in ("", "0"):
+        return False
+    with _lock:
+        if _taken is None:
+            _taken = _register()
+        return _taken
+
+
+def _register() -> bool:
+    try:
+        for name, capsule in _core.xla_targets().items():
+            jax.ffi.register_ffi_target(name, capsule, platform="cpu")
+    except Exception as error:  # whatever a JAX of another age raises
+        warnings.warn(
+            f"this JAX does not take isograd's handlers ({error}); jax.pure_callback is used instead, "
+            "with the same results",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+        return False
+    return True

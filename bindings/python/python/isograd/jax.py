@@ -1,0 +1,317 @@
+"""Signed distance of a point cloud in JAX: inside ``jit``, ``grad``, ``vjp``, ``vmap``, ``scan`` and ``checkpoint``.
+
+    >>> grid = isograd.Grid.fit(points)
+    >>> loss = lambda points: jnp.mean(isograd.jax.signed_distance(points, grid) ** 2)
+    >>> gradient = jax.jit(jax.grad(loss))(points)   # (N, 3)
+
+Points and normals are arrays that are traced; grid and options are static. float32 and float64 stay what they are
+(float64 needs ``jax_enable_x64``), half precision becomes float32, whole numbers JAX's default float. On CPUs the
+work is done by handlers that XLA calls without Python. On other devices, and with the environment variable
+``ISOGRAD_JAX_CALLBACK=1``, it is done on the host through ``jax.pure_callback``, with the same bits.
+
+What can be seen from types and shapes raises ``TypeError`` or ``ValueError`` at once. What depends on the values (a
+point that is not finite or off the grid) raises ``jax.errors.JaxRuntimeError`` or, as JAX chooses, ``ValueError``,
+with the text of the NumPy functions, when the result is waited for.
+
+Gradients are of reverse mode and first order; see each function for what is held constant. A batch under ``vmap`` is
+worked through one cloud after the other, each on all cores. Under ``jax.shard_map`` pass ``check_vma=False``.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ._xla import Plan, call, floats, like, pair, prepare
+
+if TYPE_CHECKING:
+    from jax.typing import ArrayLike
+
+    from ._grid import Grid
+    from ._options import Options
+
+__all__ = ["Extension", "Mesh", "extend", "mesh", "query", "signed_distance"]
+
+
+def signed_distance(
+    points: ArrayLike,
+    grid: Grid,
+    *,
+    normals: ArrayLike | None = None,
+    options: Options | None = None,
+) -> jax.Array:
+    """The signed distance φ of the surface through ``points``, at the cell centres of ``grid``.
+
+    Differentiable in ``points``, and in ``normals`` with ``orient="given"``. Held constant: which samples are
+    neighbours, the sides of the normals, which face is closest to a cell; so φ jumps where these change.
+
+    Args:
+        points: ``(N, 3)``, at least 2 cells off the walls of the grid.
+        grid: static.
+        normals: ``(N, 3)``, outward, of any length but zero, where ``options.orient`` is ``"given"`` or ``"signs"``.
+        options: static; ``checks`` has no effect, since there is no report.
+
+    Returns:
+        ``(nx, ny, nz)``, in the unit of the points, negative inside, of the type of the points.
+
+    Raises:
+        TypeError: for what is no array of numbers, no grid, no options.
+        ValueError: for another shape, and for normals that are missing or not used.
+        jax.errors.JaxRuntimeError: for values that no surface can be made from.
+    """
+    plan, points, normals = prepare(points, grid, normals, options)
+    return _distance(plan, points, normals)
+
+
+@functools.partial(jax.custom_vjp, nondiff_argnums=(0,))
+def _distance(plan: Plan, points: jax.Array, normals: jax.Array | None) -> jax.Array:
+    (sdf,) = call("isograd_forward", plan, plan.kept(points)[:1], points, normals)
+    return sdf
+
+
+def _distance_forward(plan: Plan, points: jax.Array, normals: jax.Array | None) -> tuple:
+    kept = call("isograd_forward", plan, plan.kept(points), points, normals)
+    return kept[0], (points, normals, kept)
+
+
+def _distance_pullback(plan: Plan, residuals: tuple, sdf_bar: jax.Array) -> tuple:
+    points, normals, kept = residuals
+    bars = call(
+        "isograd_pullback", plan, like(points, normals), points, *kept, sdf_bar, normals
+    )
+    return pair(bars)
+
+
+_distance.defvjp(_distance_forward, _distance_pullback)
+
+
+def query(
+    points: ArrayLike,
+    grid: Grid,
+    queries: ArrayLike,
+    *,
+    normals: ArrayLike | None = None,
+    options: Options | None = None,
+) -> jax.Array:
+    """The signed distance from any places to the surface through ``points``: exact to each triangle of it.
+
+    Differentiable in ``points``, ``queries`` and, with ``orient="given"``, ``normals``. Held constant: what
+    :func:`signed_distance` holds, and which face is closest. Pass all places at once: under ``vmap`` the surface is
+    made for each member of the batch.
+
+    Args:
+        points: ``(N, 3)``, as for :func:`signed_distance`.
+        grid: static; the surface is found on it.
+        queries: ``(M, 3)``, on the grid or off it.
+        normals: as for :func:`signed_distance`.
+        options: as for :func:`signed_distance`.
+
+    Returns:
+        ``(M,)``, in the unit of the points, negative inside; NaN for a query that is not finite.
+
+    Raises:
+        TypeError, ValueError, jax.errors.JaxRuntimeError: as for :func:`signed_distance`.
+    """
+    plan, points, normals = prepare(points, grid, normals, options)
+    queries = floats(queries, "queries", (None, 3), points.dtype)
+    return _query(plan, points, queries, normals)
+
+
+@functools.partial(jax.custom_vjp, nondiff_argnums=(0,))
+def _query(
+    plan: Plan, points: jax.Array, queries: jax.Array, normals: jax.Array | None
+) -> jax.Array:
+    (distance,) = call("isograd_query", plan, _distances(queries), points, queries, normals)
+    return distance
+
+
+def _query_forward(
+    plan: Plan, points: jax.Array, queries: jax.Array, normals: jax.Array | None
+) -> tuple:
+    triangle = jax.ShapeDtypeStruct(queries.shape[:1], np.uint32)
+    (vector,) = like(queries)
+    results = (*_distances(queries), vector, triangle, vector, *plan.kept(points))
+    distance, *kept = call("isograd_query", plan, results, points, queries, normals)
+    return distance, (points, queries, normals, kept)
+
+
+def _query_pullback(plan: Plan, residuals: tuple, distance_bar: jax.Array) -> tuple:
+    points, queries, normals, kept = residuals
+    results = like(queries, points, normals)
+    arrays = (points, queries, *kept, distance_bar, normals)
+    queries_bar, *bars = call("isograd_query_pullback", plan, results, *arrays)
+    points_bar, normals_bar = pair(bars)
+    return points_bar, queries_bar, normals_bar
+
+
+def _distances(queries: jax.Array) -> tuple[jax.ShapeDtypeStruct]:
+    return (jax.ShapeDtypeStruct(queries.shape[:1], queries.dtype),)
+
+
+_query.defvjp(_query_forward, _query_pullback)
+
+
+class Mesh(NamedTuple):
+    """A surface in arrays of fixed size."""
+
+    vertices: jax.Array
+    """``(max_vertices, 3)``, zeros behind the last one."""
+    faces: jax.Array
+    """``(max_faces, 3)`` uint32, counter-clockwise from outside, ``(0, 0, 0)`` behind the last one."""
+    vertex_count: jax.Array
+    """``()`` uint32: vertices of the surface, whether they fit or not."""
+    face_count: jax.Array
+    """``()`` uint32: faces of the surface, whether they fit or not."""
+
+
+def mesh(
+    points: ArrayLike,
+    grid: Grid,
+    *,
+    max_vertices: int,
+    max_faces: int,
+    normals: ArrayLike | None = None,
+    options: Options | None = None,
+) -> Mesh:
+    """The surface through ``points`` as triangles.
+
+    The vertices are differentiable in ``points`` and, where they are used, ``normals``. Where a surface has more
+    vertices or faces than fit, the counts exceed the sizes of the arrays: these hold the first ones, and a face with
+    a vertex that is not there is ``(0, 0, 0)``. Nothing is raised, so check the counts. A closed surface has about
+    twice as many faces as vertices.
+
+    Faces ``(0, 0, 0)`` have no area, and sums of products of their corners, such as the volume, need no mask. A norm
+    of their normal does, since the derivative of a norm at 0 is NaN.
+
+    Args:
+        points: ``(N, 3)``, as for :func:`signed_distance`.
+        grid: static.
+        max_vertices: static; how many vertices to make room for.
+        max_faces: static; how many faces to make room for.
+        normals: as for :func:`signed_distance`.
+        options: as for :func:`signed_distance`.
+
+    Raises:
+        TypeError, ValueError, jax.errors.JaxRuntimeError: as for :func:`signed_distance`.
+    """
+    plan, points, normals = prepare(points, grid, normals, options)
+    sizes = (_size(max_vertices, "max_vertices"), _size(max_faces, "max_faces"))
+    vertices, faces, counts = _mesh(plan, sizes, points, normals)
+    return Mesh(vertices, faces, counts[0], counts[1])
+
+
+def _size(value: int, name: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 0 < value < 2**31:
+        raise ValueError(f"{name} is {value!r}; give a whole number from 1 to 2**31 - 1")
+    return int(value)
+
+
+@functools.partial(jax.custom_vjp, nondiff_argnums=(0, 1))
+def _mesh(
+    plan: Plan, sizes: tuple[int, int], points: jax.Array, normals: jax.Array | None
+) -> tuple[jax.Array, ...]:
+    return call("isograd_mesh", plan, _surface(points, sizes), points, normals)
+
+
+def _mesh_forward(
+    plan: Plan, sizes: tuple[int, int], points: jax.Array, normals: jax.Array | None
+) -> tuple:
+    results = (*_surface(points, sizes), *plan.kept(points))
+    found = call("isograd_mesh", plan, results, points, normals)
+    return found[:3], (points, normals, found[3:])
+
+
+def _mesh_pullback(plan: Plan, sizes: tuple[int, int], residuals: tuple, bars: tuple) -> tuple:
+    points, normals, kept = residuals
+    arrays = (points, *kept, bars[0], normals)
+    return pair(call("isograd_mesh_pullback", plan, like(points, normals), *arrays))
+
+
+def _surface(points: jax.Array, sizes: tuple[int, int]) -> tuple[jax.ShapeDtypeStruct, ...]:
+    vertices = jax.ShapeDtypeStruct((sizes[0], 3), points.dtype)
+    faces = jax.ShapeDtypeStruct((sizes[1], 3), np.uint32)
+    return vertices, faces, jax.ShapeDtypeStruct((2,), np.uint32)
+
+
+_mesh.defvjp(_mesh_forward, _mesh_pullback)
+
+
+class Extension(NamedTuple):
+    """What a solver with an immersed boundary needs at its cells."""
+
+    sdf: jax.Array
+    """``(nx, ny, nz)``, what :func:`signed_distance` gives."""
+    values: jax.Array
+    """``(nx, ny, nz, C)`` or ``(nx, ny, nz)``: in the band the value at the closest point of the surface, else 0."""
+
+
+def extend(
+    points: ArrayLike,
+    values: ArrayLike,
+    grid: Grid,
+    *,
+    band: float = 3.0,
+    normals: ArrayLike | None = None,
+    options: Options | None = None,
+) -> Extension:
+    """φ, and values of the samples (a surface velocity, a temperature) at the cells round the surface.
+
+    Both are differentiable in ``points`` and, where they are used, ``normals``; the extended values also in
+    ``values``, of which they are a linear function. Held constant: what :func:`signed_distance` holds, and which
+    cells are in the band.
+
+    Args:
+        points: ``(N, 3)``, as for :func:`signed_distance`.
+        values: ``(N, C)`` or ``(N,)``.
+        grid: static.
+        band: static; how far from the surface the values reach, in cells. No further than ``options.band``.
+        normals: as for :func:`signed_distance`.
+        options: as for :func:`signed_distance`.
+
+    Raises:
+        TypeError, ValueError, jax.errors.JaxRuntimeError: as for :func:`signed_distance`.
+    """
+    if not isinstance(band, (int, float)) or not 0 < band < float("inf"):
+        raise ValueError(f"band is {band!r}; give a finite number of cells above 0")
+    plan, points, normals = prepare(points, grid, normals, options, float(band))
+    values = jnp.asarray(values)
+    one = values.ndim == 1
+    shape = (points.shape[0],) if one else (points.shape[0], None)
+    values = floats(values, "values", shape, points.dtype)
+    values = values[:, None] if one else values
+    if values.shape[1] == 0:
+        raise ValueError(f"values has the shape {values.shape}; give at least one component")
+    field, sdf = _extend(plan, points, values, normals)
+    return Extension(sdf, field[..., 0] if one else field)
+
+
+@functools.partial(jax.custom_vjp, nondiff_argnums=(0,))
+def _extend(
+    plan: Plan, points: jax.Array, values: jax.Array, normals: jax.Array | None
+) -> tuple[jax.Array, jax.Array]:
+    return _extend_forward(plan, points, values, normals)[0]
+
+
+def _extend_forward(
+    plan: Plan, points: jax.Array, values: jax.Array, normals: jax.Array | None
+) -> tuple:
+    field = jax.ShapeDtypeStruct((*plan.shape, values.shape[1]), points.dtype)
+    results = (field, *plan.kept(points))
+    field, *kept = call("isograd_extend", plan, results, points, values, normals)
+    return (field, kept[0]), (points, values, normals, kept)
+
+
+def _extend_pullback(plan: Plan, residuals: tuple, bars: tuple) -> tuple:
+    points, values, normals, kept = residuals
+    results = like(values, points, normals)
+    arrays = (points, values, *kept, *bars, normals)
+    values_bar, *cloud_bars = call("isograd_extend_pullback", plan, results, *arrays)
+    points_bar, normals_bar = pair(cloud_bars)
+    return points_bar, values_bar, normals_bar
+
+
+_extend.defvjp(_extend_forward, _extend_pullback)

@@ -1,0 +1,199 @@
+"""Signed distance of points for PyTorch: inside ``autograd``, ``vmap`` and ``torch.compile``.
+
+The work is done on the CPU, in the number type of the points. The operators are registered with
+``torch.library`` as ``isograd::signed_distance`` and ``isograd::signed_distance_pullback``. ``torch.func.grad``
+refuses every operator of that kind: call ``torch.autograd.grad``. Needs PyTorch 2.5.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from typing import Any, Optional
+
+import numpy as np
+
+from . import _core, _settings
+from ._grid import Grid
+from ._options import Options, check_normals
+
+try:
+    import torch
+    from torch import Tensor
+except ImportError as error:
+    raise ImportError(f"isograd.torch needs PyTorch ({error}); install it by `pip install torch`") from error
+
+__all__ = ["signed_distance"]
+
+
+def signed_distance(
+    points: Tensor,
+    grid: Grid,
+    *,
+    normals: Tensor | None = None,
+    options: Options | None = None,
+) -> Tensor:
+    """φ: the signed distance to the surface that the points sample.
+
+    Differentiable once in ``points``, and in ``normals`` where the options use them. What jumps is held fixed:
+    which points are neighbours, on which side a normal is, and with ``radius="auto"`` the radius too.
+
+    Args:
+        points: ``(N, 3)``, float32 or float64, on the CPU. float16 and bfloat16 become float32.
+        grid: where φ is computed.
+        normals: ``(N, 3)`` outward normals, for the orientations ``"given"`` and ``"signs"``.
+        options: how; ``checks`` has no effect, since a tensor can't carry a report.
+
+    Returns:
+        ``grid.shape`` tensor of φ at the centres of the cells, in the unit of the points: negative inside.
+
+    Raises:
+        TypeError: for what is no tensor, and for integers and complex numbers.
+        ValueError: for another shape or device, and for what makes no surface: points that are not finite, too
+            few of them, or none of them on the grid.
+    """
+    points = _checked(points, "points")
+    if normals is not None:
+        normals = _checked(normals, "normals").to(points.dtype)
+    _check_normals(options, normals is not None)
+    return _signed_distance(points, normals, _encode(grid, options))[0]
+
+
+# The text is the same whenever grid and options are: the compiler need not look inside.
+@torch.compiler.assume_constant_result
+def _encode(grid: Grid, options: Options | None) -> str:
+    if isinstance(options, Options):
+        options = dataclasses.replace(options, checks=False)
+    return _settings.encode(grid, Options(checks=False) if options is None else options)
+
+
+@torch.compiler.assume_constant_result
+def _check_normals(options: Options | None, are_given: bool) -> None:
+    if options is None or isinstance(options, Options):
+        check_normals(options or Options(), are_given)
+
+
+def _checked(values: Tensor, name: str) -> Tensor:
+    if not isinstance(values, Tensor):
+        raise TypeError(f"{name} is a {type(values).__name__}; give a torch.Tensor")
+    if values.device.type != "cpu":
+        raise ValueError(f"{name} is on {values.device}; isograd computes on the CPU: pass {name}.cpu()")
+    if values.layout != torch.strided:
+        raise ValueError(f"{name} is of the layout {values.layout}; pass {name}.to_dense()")
+    if values.ndim != 2 or values.shape[1] != 3:
+        raise ValueError(f"{name} has the shape {tuple(values.shape)} and must have (N, 3)")
+    if values.dtype in (torch.float16, torch.bfloat16):
+        return values.to(torch.float32)
+    if values.dtype not in (torch.float32, torch.float64):
+        raise TypeError(f"{name} is of {values.dtype}; give float32 or float64")
+    return values
+
+
+@torch.library.custom_op("isograd::signed_distance", mutates_args=(), device_types="cpu")
+def _signed_distance(
+    points: Tensor, given: Optional[Tensor], settings: str
+) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """φ, and what its pullback needs: indicator, closest faces and normals."""
+    sdf, indicator, closest, normals = _core.forward_saved(settings, _array(points), _array(given))
+    # PyTorch can do little with uint32: the same bits as int32.
+    arrays = (sdf, indicator, closest.view(np.int32), normals)
+    return tuple(torch.from_numpy(array) for array in arrays)  # type: ignore[return-value]
+
+
+@_signed_distance.register_fake
+def _(points: Tensor, given: Optional[Tensor], settings: str) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    shape = json.loads(settings)["shape"]
+    field = points.new_empty(shape)
+    closest = points.new_empty(shape, dtype=torch.int32)
+    return field, torch.empty_like(field), closest, points.new_empty(points.shape)
+
+
+@torch.library.custom_op("isograd::signed_distance_pullback", mutates_args=(), device_types="cpu")
+def _pullback(
+    points: Tensor,
+    given: Optional[Tensor],
+    sdf: Tensor,
+    indicator: Tensor,
+    closest: Tensor,
+    normals: Tensor,
+    sdf_bar: Tensor,
+    settings: str,
+) -> tuple[Tensor, Tensor]:
+    """Cotangents of the points and of the given normals; the latter has no rows where none were given."""
+    points_bar, given_bar = _core.pullback_saved(
+        settings,
+        _array(points),
+        _array(given),
+        _array(sdf),
+        _array(indicator),
+        _array(closest).view(np.uint32),
+        _array(normals),
+        _array(sdf_bar),
+    )
+    if given_bar is None:
+        return torch.from_numpy(points_bar), points.new_empty((0, 3))
+    return torch.from_numpy(points_bar), torch.from_numpy(given_bar)
+
+
+@_pullback.register_fake
+def _(
+    points: Tensor,
+    given: Optional[Tensor],
+    sdf: Tensor,
+    indicator: Tensor,
+    closest: Tensor,
+    normals: Tensor,
+    sdf_bar: Tensor,
+    settings: str,
+) -> tuple[Tensor, Tensor]:
+    given_shape = (0, 3) if given is None else given.shape
+    return points.new_empty(points.shape), points.new_empty(given_shape)
+
+
+def _save(ctx: Any, inputs: tuple[Any, ...], output: tuple[Tensor, ...]) -> None:
+    points, given, ctx.settings = inputs
+    sdf, indicator, closest, normals = output
+    ctx.save_for_backward(points, given, sdf, indicator, closest, normals)
+    # Only φ is pulled back; the others are there to be saved.
+    ctx.mark_non_differentiable(indicator, closest, normals)
+
+
+def _backward(ctx: Any, sdf_bar: Tensor, *_unused: Tensor) -> tuple[Tensor | None, Tensor | None, None]:
+    points, given, *saved = ctx.saved_tensors
+    points_bar, given_bar = _pullback(points, given, *saved, sdf_bar, ctx.settings)
+    return points_bar, None if given is None else given_bar, None
+
+
+_signed_distance.register_autograd(_backward, setup_context=_save)
+
+
+def _twice(ctx: Any, *_bars: Tensor) -> None:
+    raise RuntimeError("isograd.torch.signed_distance can be differentiated once, not twice")
+
+
+_pullback.register_autograd(_twice)
+
+
+def _one_by_one(operator: Any) -> Any:
+    """How ``torch.vmap`` applies an operator to a batch: a call has many threads already."""
+
+    def apply(info: Any, axes: tuple[int | None, ...], *batch: Any) -> tuple[tuple[Tensor, ...], tuple[int, ...]]:
+        if info.batch_size == 0:
+            raise ValueError("vmap over an empty batch: give one cloud or more")
+        calls = [
+            operator(*(x if axis is None else x.select(axis, i) for x, axis in zip(batch, axes)))
+            for i in range(info.batch_size)
+        ]
+        outputs = tuple(torch.stack(output) for output in zip(*calls))
+        return outputs, (0,) * len(outputs)
+
+    return apply
+
+
+_signed_distance.register_vmap(_one_by_one(_signed_distance))
+_pullback.register_vmap(_one_by_one(_pullback))
+
+
+def _array(tensor: Tensor | None) -> np.ndarray | None:
+    """The same numbers in C order; a copy only where the tensor has another order."""
+    return None if tensor is None else tensor.detach().resolve_neg().contiguous().numpy()

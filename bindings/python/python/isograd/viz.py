@@ -1,0 +1,218 @@
+"""Pictures: slices of a field with matplotlib, a surface and its points with PyVista.
+
+Both come with ``pip install isograd[viz]``; each is imported by the function that needs it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ._arrays import floats
+from ._grid import Grid
+from ._mesh import Mesh, as_mesh
+
+if TYPE_CHECKING:
+    import pyvista
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
+    from numpy.typing import ArrayLike
+
+__all__ = ["scene", "slices"]
+
+AXES = "xyz"
+SURFACE_COLOR = "lightsteelblue"
+POINT_COLOR = "firebrick"
+MOST_ARROWS = 500
+# As a share of the diagonal of the surface's box.
+ARROW_LENGTH = 0.03
+
+
+def slices(
+    phi: ArrayLike,
+    grid: Grid,
+    *,
+    at: Sequence[float] | None = None,
+    points: ArrayLike | None = None,
+    limit: float | None = None,
+    title: str | None = None,
+    label: str = "φ",
+) -> Figure:
+    """Three slices of a field, one across each axis, with the surface φ = 0 as a black line.
+
+    Blue is inside, red outside, and white is zero. Cells without a finite value stay empty.
+
+    Args:
+        phi: ``grid.shape`` field, such as ``Reconstruction.sdf``.
+        grid: its grid.
+        at: the point ``(x, y, z)`` that the slices pass through, to the nearest cell; the centre of the grid
+            where it is left out.
+        points: ``(N, 3)``: those in the cells of a slice are drawn on it as dots.
+        limit: the value of the darkest colours, in the unit of φ; the largest of the three slices where it is
+            left out.
+        title: above the three.
+        label: of the colours.
+
+    Returns:
+        A figure of ``matplotlib.pyplot``: ``figure.savefig("slices.png")`` or ``pyplot.show()``, then
+        ``pyplot.close(figure)``.
+
+    Raises:
+        ImportError: without matplotlib.
+        TypeError, ValueError: for a field that does not fit the grid, and a place outside it.
+    """
+    try:
+        from matplotlib import pyplot
+    except ImportError as error:
+        raise ImportError(f"isograd.viz.slices needs matplotlib ({error}); `pip install isograd[viz]`") from error
+    if not isinstance(grid, Grid):
+        raise TypeError(f"grid is a {type(grid).__name__}; give an isograd.Grid")
+    field = np.ma.masked_invalid(floats(phi, "phi", grid.shape))
+    cell = _cell(grid, at)
+    dots = None if points is None else floats(points, "points", (None, 3))
+    planes = [field.take(cell[axis], axis=axis) for axis in range(3)]
+    limit = _limit(planes, limit)
+
+    figure, row = pyplot.subplots(1, 3, layout="constrained", **_layout(grid))
+    for axis, (axes, plane) in enumerate(zip(row, planes)):
+        image = _draw_slice(axes, plane, grid, axis, limit)
+        place = grid.origin[axis] + grid.spacing * cell[axis]
+        axes.set_title(f"{AXES[axis]} = {place:.4g}")
+        if dots is not None:
+            near = dots[np.abs(dots[:, axis] - place) <= 0.5 * grid.spacing]
+            axes.plot(*_across(near.T, axis), ".", color=POINT_COLOR, markersize=1.5)
+    figure.colorbar(image, ax=row, label=label, shrink=0.8)
+    if title is not None:
+        figure.suptitle(title)
+    return figure
+
+
+def _layout(grid: Grid) -> dict[str, Any]:
+    """Size of the figure in inches and shares of its width, so that the slices are of one scale."""
+    sides = [grid.spacing * n for n in grid.shape]
+    widths = [_across(sides, axis)[0] for axis in range(3)]
+    height = max(_across(sides, axis)[1] for axis in range(3))
+    scale = min(10.0 / sum(widths), 6.0 / height)
+    # Room for the labels; no panel is too narrow for its title.
+    widths = [max(scale * width, 1.2) for width in widths]
+    return {"figsize": (sum(widths) + 3.0, max(scale * height, 1.0) + 1.4), "width_ratios": widths}
+
+
+def _cell(grid: Grid, at: Sequence[float] | None) -> list[int]:
+    """Index of the cell that the slices pass through."""
+    if at is None:
+        return [n // 2 for n in grid.shape]
+    place = floats(at, "at", (3,))
+    if not all(low <= x <= high for low, x, high in zip(grid.lower, place, grid.upper)):
+        raise ValueError(f"at is {tuple(place.tolist())}, outside the grid from {grid.lower} to {grid.upper}")
+    index = (place - np.array(grid.lower)) // grid.spacing
+    return [min(int(i), n - 1) for i, n in zip(index, grid.shape)]
+
+
+def _limit(planes: list[np.ma.MaskedArray], limit: float | None) -> float:
+    if limit is not None:
+        if not 0.0 < float(limit) < float("inf"):
+            raise ValueError(f"limit is {limit!r}; give a finite number above 0")
+        return float(limit)
+    # A field without finite values, or all zero, still needs a scale.
+    largest = max((float(np.abs(plane).max()) for plane in planes if plane.count()), default=0.0)
+    return largest or 1.0
+
+
+def _across(values: Sequence[Any], axis: int) -> list[Any]:
+    """The two of three entries that belong to the axes of a slice across `axis`, in their order."""
+    return [value for other, value in enumerate(values) if other != axis]
+
+
+def _draw_slice(axes: Axes, plane: np.ma.MaskedArray, grid: Grid, axis: int, limit: float) -> AxesImage:
+    (left, bottom), (right, top) = _across(grid.lower, axis), _across(grid.upper, axis)
+    # Rows of an image are vertical: the second axis of the slice.
+    image = axes.imshow(
+        plane.T, cmap="RdBu_r", vmin=-limit, vmax=limit, origin="lower", extent=(left, right, bottom, top)
+    )
+    if plane.count() and plane.min() < 0.0 < plane.max() and min(plane.shape) > 1:
+        first, second = (
+            low + grid.spacing * (np.arange(n) + 0.5) for low, n in zip((left, bottom), plane.shape)
+        )
+        axes.contour(first, second, plane.T, levels=[0.0], colors="black", linewidths=1.0, zorder=3)
+    across, up = _across(AXES, axis)
+    axes.set(xlabel=across, ylabel=up)
+    return image
+
+
+def scene(
+    mesh: Mesh | tuple[ArrayLike, ArrayLike],
+    points: ArrayLike | None = None,
+    *,
+    normals: ArrayLike | None = None,
+    values: ArrayLike | None = None,
+    label: str = "value",
+    opacity: float = 1.0,
+    off_screen: bool = False,
+) -> pyvista.Plotter:
+    """A surface in three dimensions, with the points that it was made from.
+
+    Args:
+        mesh: such as ``Reconstruction.mesh``.
+        points: ``(N, 3)``, drawn as dots.
+        normals: ``(N, 3)`` of the points, drawn as arrows at 500 points at most.
+        values: ``(V,)`` at the vertices, as colours.
+        label: of these colours.
+        opacity: of the surface: 0 for nothing, 1 for solid.
+        off_screen: draw without a window, for ``plotter.screenshot("scene.png")``.
+
+    Returns:
+        A plotter: ``plotter.show()`` opens it, ``plotter.close()`` frees it.
+
+    Raises:
+        ImportError: without PyVista.
+        TypeError, ValueError: for arrays of another kind or shape, and a mesh without faces.
+    """
+    try:
+        import pyvista
+    except ImportError as error:
+        raise ImportError(f"isograd.viz.scene needs PyVista ({error}); `pip install isograd[viz]`") from error
+    mesh = _drawable(as_mesh(mesh))
+    colors = None if values is None else floats(values, "values", (len(mesh.vertices),))
+    dots = None if points is None else floats(points, "points", (None, 3))
+    arrows = _arrows(dots, normals)
+    if not 0.0 <= opacity <= 1.0:
+        raise ValueError(f"opacity is {opacity!r}; give 0 to 1")
+
+    plotter = pyvista.Plotter(off_screen=off_screen)
+    surface = pyvista.PolyData.from_regular_faces(mesh.vertices, mesh.faces.astype(np.int64))
+    if colors is None:
+        plotter.add_mesh(surface, color=SURFACE_COLOR, opacity=opacity, smooth_shading=True)
+    else:
+        surface.point_data[label] = colors
+        plotter.add_mesh(surface, scalars=label, opacity=opacity, smooth_shading=True)
+    if dots is not None and len(dots):
+        plotter.add_points(dots, color=POINT_COLOR, point_size=3.0, render_points_as_spheres=True)
+        if arrows is not None:
+            few = slice(None, None, -(-len(dots) // MOST_ARROWS))
+            length = ARROW_LENGTH * surface.length
+            plotter.add_arrows(dots[few], arrows[few], mag=length, color=POINT_COLOR, show_scalar_bar=False)
+    plotter.show_axes()
+    return plotter
+
+
+def _drawable(mesh: Mesh) -> Mesh:
+    """The mesh, if VTK can draw it: it trusts every index."""
+    if len(mesh.faces) == 0:
+        raise ValueError("the mesh has no faces, so there is nothing to draw")
+    if int(mesh.faces.max()) >= len(mesh.vertices):
+        raise ValueError(f"a face has the corner {mesh.faces.max()}, but there are {len(mesh.vertices)} vertices")
+    if not np.isfinite(mesh.vertices).all():
+        raise ValueError("the mesh has vertices that are not finite")
+    return mesh
+
+
+def _arrows(points: np.ndarray | None, normals: ArrayLike | None) -> np.ndarray | None:
+    if normals is None:
+        return None
+    if points is None:
+        raise ValueError("normals need points to stand on; give both")
+    return floats(normals, "normals", (len(points), 3), points.dtype)

@@ -1,0 +1,125 @@
+//! NumPy arrays to slices and back. `isograd._arrays` has made them float32 or float64, C-contiguous, aligned
+//! and of the native byte order; what is not so is refused here, and never read as something else.
+
+use isograd::Real;
+use numpy::{
+    Element, PyArray1, PyArray2, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray1,
+    PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
+};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+
+/// A number type on both sides.
+pub trait Number: Real + Element {}
+impl Number for f32 {}
+impl Number for f64 {}
+
+/// The two number types.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dtype {
+    /// `float32`
+    F32,
+    /// `float64`
+    F64,
+}
+
+/// Something in one of the two number types.
+pub enum Either<S, D> {
+    /// `float32`
+    F32(S),
+    /// `float64`
+    F64(D),
+}
+
+/// The number type of an array.
+///
+/// # Errors
+/// Anything else.
+pub fn dtype(array: &Bound<'_, PyAny>, name: &str) -> PyResult<Dtype> {
+    let untyped = array.cast::<PyUntypedArray>();
+    let untyped = untyped.map_err(|_| PyTypeError::new_err(format!("{name} is no NumPy array")))?;
+    let (py, dtype) = (array.py(), untyped.dtype());
+    if dtype.is_equiv_to(&numpy::dtype::<f32>(py)) {
+        Ok(Dtype::F32)
+    } else if dtype.is_equiv_to(&numpy::dtype::<f64>(py)) {
+        Ok(Dtype::F64)
+    } else {
+        Err(PyTypeError::new_err(format!(
+            "{name} is of {dtype}; give float32 or float64"
+        )))
+    }
+}
+
+/// A copy of an `(N, 3)` array.
+///
+/// # Errors
+/// Another type or shape.
+pub fn vectors<T: Number>(array: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<[T; 3]>> {
+    let array = array.extract::<PyReadonlyArray2<'_, T>>();
+    let array = array.map_err(|_| wrong(name, "(N, 3)", T::NAME))?;
+    if array.shape()[1] != 3 {
+        return Err(PyValueError::new_err(format!(
+            "{name} has the shape {:?} and must have (N, 3)",
+            array.shape()
+        )));
+    }
+    let values = array.as_slice().map_err(|_| scattered(name))?;
+    Ok(values.as_chunks::<3>().0.to_vec())
+}
+
+/// A copy of an array of any shape, in C order.
+///
+/// # Errors
+/// Another type, or memory in another order.
+pub fn values<T: Number>(array: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<T>> {
+    let array = array.extract::<PyReadonlyArrayDyn<'_, T>>();
+    let array = array.map_err(|_| wrong(name, "any shape", T::NAME))?;
+    Ok(array.as_slice().map_err(|_| scattered(name))?.to_vec())
+}
+
+/// A copy of `(N,)` indices.
+///
+/// # Errors
+/// Another type or shape.
+pub fn indices(array: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<u32>> {
+    if let Ok(flat) = array.extract::<PyReadonlyArray1<'_, u32>>() {
+        return Ok(flat.as_slice().map_err(|_| scattered(name))?.to_vec());
+    }
+    let array = array.extract::<PyReadonlyArrayDyn<'_, u32>>();
+    let array = array.map_err(|_| wrong(name, "any shape", "uint32"))?;
+    Ok(array.as_slice().map_err(|_| scattered(name))?.to_vec())
+}
+
+fn wrong(name: &str, shape: &str, type_name: &str) -> PyErr {
+    PyValueError::new_err(format!(
+        "{name} must be an array of shape {shape} and type {type_name}, as the points are"
+    ))
+}
+
+fn scattered(name: &str) -> PyErr {
+    PyValueError::new_err(format!(
+        "{name} is not C-contiguous; pass numpy.ascontiguousarray({name})"
+    ))
+}
+
+/// A new array of the given shape from its values in C order.
+///
+/// # Errors
+/// More or fewer values than the shape has places.
+pub fn shaped<'py, T: Element>(
+    py: Python<'py>,
+    values: Vec<T>,
+    shape: impl numpy::ndarray::IntoDimension,
+) -> PyResult<Bound<'py, PyAny>> {
+    Ok(PyArray1::from_vec(py, values).reshape(shape)?.into_any())
+}
+
+/// A new `(N, 3)` array.
+pub fn of_vectors<'py, E: Element + Copy>(py: Python<'py>, values: &[[E; 3]]) -> Bound<'py, PyAny> {
+    let flat = PyArray1::from_slice(py, values.as_flattened());
+    match flat.reshape([values.len(), 3]) {
+        Ok(array) => array.into_any(),
+        // As many values as places: can't happen, and an empty array says so.
+        Err(_) => PyArray2::<E>::zeros(py, [0, 3], false).into_any(),
+    }
+}

@@ -1,0 +1,147 @@
+//! Readers and writers.
+
+use std::path::PathBuf;
+
+use isograd::{Field, Grid, Mesh};
+use isograd_io::Dtype as Stored;
+use pyo3::prelude::*;
+
+use crate::arrays::{self, Dtype, Number};
+use crate::errors::{file, value};
+use crate::plan::{AttributeArray, cloud};
+
+/// Points, normals, attributes by name, and faces of a file.
+type Geometry<'py> = (
+    Bound<'py, PyAny>,
+    Option<Bound<'py, PyAny>>,
+    Vec<(String, Bound<'py, PyAny>)>,
+    Bound<'py, PyAny>,
+);
+
+/// What a file of points or of a mesh holds, in the type that it is stored in.
+#[pyfunction]
+pub fn read_geometry(py: Python<'_>, path: PathBuf) -> PyResult<Geometry<'_>> {
+    let geometry = py.detach(|| isograd_io::read_geometry(&path));
+    let geometry = geometry.map_err(file)?;
+    match geometry.dtype {
+        Stored::F32 => of_geometry::<f32>(py, &geometry),
+        _ => of_geometry::<f64>(py, &geometry),
+    }
+}
+
+fn of_geometry<'py, T: Number>(
+    py: Python<'py>,
+    geometry: &isograd_io::Geometry,
+) -> PyResult<Geometry<'py>> {
+    let cloud = geometry.cloud::<T>().map_err(value)?;
+    let mut attributes = Vec::new();
+    for of in cloud.attributes() {
+        let shape = [cloud.len(), of.components];
+        let array = arrays::shaped(py, of.values.clone(), shape)?;
+        attributes.push((of.name.clone(), array));
+    }
+    Ok((
+        arrays::of_vectors(py, cloud.points()),
+        cloud.normals().map(|n| arrays::of_vectors(py, n)),
+        attributes,
+        arrays::of_vectors(py, &geometry.faces),
+    ))
+}
+
+/// Lower corner, spacing, shape and values of a field.
+type FieldParts<'py> = ([f64; 3], f64, [usize; 3], Bound<'py, PyAny>);
+
+/// A field, in the type that it is stored in.
+#[pyfunction]
+pub fn read_field(py: Python<'_>, path: PathBuf) -> PyResult<FieldParts<'_>> {
+    let read = py.detach(|| isograd_io::read_field(&path)).map_err(file)?;
+    let (grid, values) = (*read.field.grid(), read.field.into_values());
+    let array = match read.dtype {
+        Stored::F32 => {
+            let values: Vec<f32> = values.into_iter().map(|v| v as f32).collect();
+            arrays::shaped(py, values, grid.shape())?
+        }
+        _ => arrays::shaped(py, values, grid.shape())?,
+    };
+    Ok((grid.lower(), grid.spacing(), grid.shape(), array))
+}
+
+/// Writes points, with normals and attributes `(name, components, values)`.
+#[pyfunction]
+pub fn write_points(
+    path: PathBuf,
+    points: &Bound<'_, PyAny>,
+    normals: Option<&Bound<'_, PyAny>>,
+    attributes: Vec<AttributeArray<'_>>,
+) -> PyResult<()> {
+    match arrays::dtype(points, "points")? {
+        Dtype::F32 => write_cloud::<f32>(path, points, normals, attributes),
+        Dtype::F64 => write_cloud::<f64>(path, points, normals, attributes),
+    }
+}
+
+fn write_cloud<T: Number>(
+    path: PathBuf,
+    points: &Bound<'_, PyAny>,
+    normals: Option<&Bound<'_, PyAny>>,
+    attributes: Vec<AttributeArray<'_>>,
+) -> PyResult<()> {
+    let py = points.py();
+    let cloud = cloud::<T>(points, normals, attributes)?;
+    py.detach(|| isograd_io::write_cloud(&path, &cloud))
+        .map_err(file)
+}
+
+/// Writes a mesh.
+#[pyfunction]
+pub fn write_mesh(
+    path: PathBuf,
+    vertices: &Bound<'_, PyAny>,
+    faces: &Bound<'_, PyAny>,
+) -> PyResult<()> {
+    fn write<T: Number>(
+        path: PathBuf,
+        vertices: &Bound<'_, PyAny>,
+        faces: Vec<[u32; 3]>,
+    ) -> PyResult<()> {
+        let mesh = Mesh::<T>::new(arrays::vectors(vertices, "vertices")?, faces);
+        let mesh = mesh.map_err(value)?;
+        let py = vertices.py();
+        py.detach(|| isograd_io::write_mesh(&path, &mesh))
+            .map_err(file)
+    }
+    let corners = arrays::indices(faces, "faces")?;
+    let faces = corners.as_chunks::<3>().0.to_vec();
+    match arrays::dtype(vertices, "vertices")? {
+        Dtype::F32 => write::<f32>(path, vertices, faces),
+        Dtype::F64 => write::<f64>(path, vertices, faces),
+    }
+}
+
+/// Writes a field.
+#[pyfunction]
+pub fn write_field(
+    path: PathBuf,
+    lower: [f64; 3],
+    spacing: f64,
+    shape: [usize; 3],
+    values: &Bound<'_, PyAny>,
+) -> PyResult<()> {
+    fn write<T: Number>(
+        path: PathBuf,
+        grid: &Grid<f64>,
+        values: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let lower = grid.lower().map(T::of);
+        let grid = Grid::new(lower, T::of(grid.spacing()), grid.shape()).map_err(value)?;
+        let field = Field::new(grid, arrays::values::<T>(values, "sdf")?).map_err(value)?;
+        let py = values.py();
+        py.detach(|| isograd_io::write_field(&path, &field))
+            .map_err(file)
+    }
+    let grid = Grid::new(lower, spacing, shape).map_err(value)?;
+    match arrays::dtype(values, "sdf")? {
+        Dtype::F32 => write::<f32>(path, &grid, values),
+        Dtype::F64 => write::<f64>(path, &grid, values),
+    }
+}

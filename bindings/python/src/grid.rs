@@ -1,0 +1,54 @@
+//! Grids: their checks, and the one round a cloud.
+
+use isograd::{Grid, PointCloud, Resolution};
+use pyo3::prelude::*;
+
+use crate::arrays;
+use crate::errors::value;
+
+/// A grid as `isograd.Grid` takes it.
+type Parts = ([f64; 3], f64, [usize; 3]);
+
+/// Raises where the numbers make no grid.
+#[pyfunction]
+pub fn check_grid(lower: [f64; 3], spacing: f64, shape: [i64; 3]) -> PyResult<()> {
+    let shape = cells(shape)?;
+    Grid::new(lower, spacing, shape).map_err(value)?;
+    Ok(())
+}
+
+fn cells(shape: [i64; 3]) -> PyResult<[usize; 3]> {
+    if let Some(n) = shape.iter().find(|n| **n < 1) {
+        return Err(value(format!("{n} cells along an axis; give at least 1")));
+    }
+    Ok(shape.map(|n| n as usize))
+}
+
+/// Lower corner, spacing and shape of the grid round `(N, 3)` points.
+#[pyfunction]
+#[pyo3(signature = (points, resolution, spacing, padding))]
+pub fn fit_grid(
+    points: &Bound<'_, PyAny>,
+    resolution: Option<i64>,
+    spacing: Option<f64>,
+    padding: f64,
+) -> PyResult<Parts> {
+    let points = match arrays::dtype(points, "points")? {
+        arrays::Dtype::F64 => arrays::vectors::<f64>(points, "points")?,
+        arrays::Dtype::F32 => {
+            let points = arrays::vectors::<f32>(points, "points")?;
+            points.into_iter().map(|p| p.map(f64::from)).collect()
+        }
+    };
+    let resolution = match (spacing, resolution) {
+        (Some(h), _) => Resolution::Spacing(h),
+        (None, Some(n)) if n > 0 => Resolution::Cells(n as usize),
+        (None, n) => {
+            let n = n.unwrap_or(0);
+            return Err(value(format!("a resolution of {n} cells; give at least 2")));
+        }
+    };
+    let cloud = PointCloud::new(points).map_err(value)?;
+    let grid = Grid::fit(&cloud, resolution, padding).map_err(value)?;
+    Ok((grid.lower(), grid.spacing(), grid.shape()))
+}

@@ -1,0 +1,49 @@
+//! The extension module `isograd._core`. Users see it through the package `isograd`, which is in `python/`.
+
+mod arrays;
+mod background;
+mod errors;
+mod files;
+mod fit;
+mod grid;
+mod plan;
+mod pool;
+mod pure;
+mod query;
+mod report;
+mod result;
+mod saved;
+mod settings;
+mod shape;
+mod xla;
+
+use pyo3::prelude::*;
+
+#[pymodule(gil_used = false)]
+mod _core {
+    use super::*;
+
+    #[pymodule_export]
+    use files::{read_field, read_geometry, write_field, write_mesh, write_points};
+    #[pymodule_export]
+    use fit::run_fit;
+    #[pymodule_export]
+    use grid::{check_grid, fit_grid};
+    #[pymodule_export]
+    use plan::Plan;
+    #[pymodule_export]
+    use pure::{forward_saved, pullback_saved};
+    #[pymodule_export]
+    use query::{query_mesh, query_mesh_pullback};
+    #[pymodule_export]
+    use result::{Extension, Outcome};
+    #[pymodule_export]
+    use shape::{Shape, shapes};
+    #[pymodule_export]
+    use xla::{call_target, xla_targets};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

@@ -1,0 +1,123 @@
+//! Plans and their results, behind `isograd.Reconstructor` and `isograd.Reconstruction`.
+
+use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use isograd::data::Attribute;
+use isograd::{PointCloud, Reconstruction, Reconstructor};
+use pyo3::prelude::*;
+
+use crate::arrays::{self, Dtype, Either, Number};
+use crate::background;
+use crate::errors::value;
+use crate::result::{Kept, Outcome};
+use crate::settings::Settings;
+
+/// A plan for one grid and one set of options, in either number type.
+#[pyclass(frozen)]
+pub struct Plan {
+    settings: Settings,
+    single: Mutex<Option<Reconstructor<f32>>>,
+    double: Mutex<Option<Reconstructor<f64>>>,
+}
+
+/// Name, components and values of an attribute, as `isograd.Reconstructor` passes it.
+pub type AttributeArray<'py> = (String, usize, Bound<'py, PyAny>);
+
+#[pymethods]
+impl Plan {
+    #[new]
+    fn new(settings: &str) -> PyResult<Self> {
+        let settings = Settings::parse(settings).map_err(value)?;
+        settings.grid::<f64>().map_err(value)?;
+        Ok(Self {
+            settings,
+            single: Mutex::default(),
+            double: Mutex::default(),
+        })
+    }
+
+    /// Reconstructs a cloud: `points` and `normals` `(N, 3)` of one type.
+    #[pyo3(signature = (points, normals, attributes))]
+    fn reconstruct(
+        &self,
+        points: &Bound<'_, PyAny>,
+        normals: Option<&Bound<'_, PyAny>>,
+        attributes: Vec<AttributeArray<'_>>,
+    ) -> PyResult<Outcome> {
+        match arrays::dtype(points, "points")? {
+            Dtype::F32 => {
+                let kept = self.run(&self.single, points, normals, attributes)?;
+                Ok(Outcome(Either::F32(Arc::new(kept))))
+            }
+            Dtype::F64 => {
+                let kept = self.run(&self.double, points, normals, attributes)?;
+                Ok(Outcome(Either::F64(Arc::new(kept))))
+            }
+        }
+    }
+}
+
+impl Plan {
+    /// With the plan that waits in `place`, or a new one where there is none: no lock is held meanwhile, and an
+    /// interrupt leaves none behind.
+    fn run<T: Number>(
+        &self,
+        place: &Mutex<Option<Reconstructor<T>>>,
+        points: &Bound<'_, PyAny>,
+        normals: Option<&Bound<'_, PyAny>>,
+        attributes: Vec<AttributeArray<'_>>,
+    ) -> PyResult<Kept<T>> {
+        let cloud = cloud::<T>(points, normals, attributes)?;
+        let waiting = place.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let settings = self.settings.clone();
+        let (plan, result) = background::run(points.py(), move |stop| {
+            let mut plan = match waiting {
+                Some(plan) => plan,
+                None => create(&settings)?,
+            };
+            let mut observer = |_| match stop.asked() {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            };
+            let result = plan.reconstruct_observed(&cloud, &mut observer);
+            let result: Result<Reconstruction<T>, String> =
+                result.cloned().map_err(|e| e.to_string());
+            Ok::<_, String>((plan, result.map(|result| Kept { cloud, result })))
+        })?
+        .map_err(value)?;
+        *place.lock().unwrap_or_else(PoisonError::into_inner) = Some(plan);
+        result.map_err(value)
+    }
+}
+
+fn create<T: Number>(settings: &Settings) -> Result<Reconstructor<T>, String> {
+    let grid = settings.grid::<T>().map_err(|e| e.to_string())?;
+    Reconstructor::new(grid, settings.options()).map_err(|e| e.to_string())
+}
+
+/// A cloud from its arrays: `points` and `normals` `(N, 3)`.
+///
+/// # Errors
+/// Arrays of another type or shape, and values that make no cloud.
+pub fn cloud<T: Number>(
+    points: &Bound<'_, PyAny>,
+    normals: Option<&Bound<'_, PyAny>>,
+    attributes: Vec<AttributeArray<'_>>,
+) -> PyResult<PointCloud<T>> {
+    let mut cloud = PointCloud::new(arrays::vectors(points, "points")?).map_err(value)?;
+    if let Some(normals) = normals {
+        let normals = arrays::vectors(normals, "normals")?;
+        cloud = cloud.with_normals(normals).map_err(value)?;
+    }
+    for (name, components, array) in attributes {
+        let values = arrays::values(&array, &name)?;
+        let attribute = Attribute {
+            name,
+            components,
+            values,
+        };
+        cloud = cloud.with_attribute(attribute).map_err(value)?;
+    }
+    Ok(cloud)
+}

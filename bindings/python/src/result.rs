@@ -1,0 +1,294 @@
+//! A reconstruction, its arrays and its pullback.
+
+use std::sync::Arc;
+
+use isograd::distance::extend;
+use isograd::{
+    CloudCotangent, Cotangent, ExtensionCotangent, PointCloud, PullbackError, Real, Reconstruction,
+};
+use pyo3::exceptions::PyKeyError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::{self, Either, Number};
+use crate::background;
+use crate::errors::value;
+use crate::report;
+
+/// A cloud and what was made of it.
+pub struct Kept<T: Number> {
+    /// The cloud.
+    pub cloud: PointCloud<T>,
+    /// What was made of it.
+    pub result: Reconstruction<T>,
+}
+
+/// In one of the two number types.
+#[pyclass(frozen, name = "Result")]
+pub struct Outcome(pub Either<Arc<Kept<f32>>, Arc<Kept<f64>>>);
+
+/// An attribute on the surface and round it.
+#[pyclass(frozen)]
+pub struct Extension(Either<Arc<Extended<f32>>, Arc<Extended<f64>>>);
+
+/// What came out, and what was kept for the pullback.
+pub struct Extended<T> {
+    attribute: isograd::Attribute<T>,
+    extension: extend::Extension<T>,
+    residual: extend::Residual<T>,
+}
+
+/// The same expression for both types.
+macro_rules! each {
+    ($of:expr, $kept:ident => $body:expr) => {
+        match $of {
+            Either::F32($kept) => $body,
+            Either::F64($kept) => $body,
+        }
+    };
+}
+
+#[pymethods]
+impl Outcome {
+    /// One of the arrays, by name: a new one at each call.
+    fn array<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        each!(&self.0, kept => array(py, &kept.result, name))
+    }
+
+    /// The level of the surface.
+    fn iso_value(&self) -> f64 {
+        each!(&self.0, kept => kept.result.iso_value().f64())
+    }
+
+    /// The numbers of the report.
+    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        each!(&self.0, kept => report::dict(py, kept.result.report()))
+    }
+
+    /// Cotangents of the inputs, by name, from those of the results, by name.
+    #[pyo3(signature = (bars, iso_value, extensions))]
+    fn pullback<'py>(
+        &self,
+        py: Python<'py>,
+        bars: &Bound<'py, PyDict>,
+        iso_value: f64,
+        extensions: Vec<ExtensionBar<'py>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        match &self.0 {
+            Either::F32(kept) => pull(py, kept, bars, iso_value as f32, extensions),
+            Either::F64(kept) => pull(py, kept, bars, iso_value, extensions),
+        }
+    }
+
+    /// The attribute `name` of the cloud within `band` cells of the surface.
+    fn extend(&self, py: Python<'_>, name: String, band: f64) -> PyResult<Extension> {
+        let extension = match &self.0 {
+            Either::F32(kept) => Either::F32(extended(py, kept, name, band)?),
+            Either::F64(kept) => Either::F64(extended(py, kept, name, band)?),
+        };
+        Ok(Extension(extension))
+    }
+}
+
+#[pymethods]
+impl Extension {
+    /// `vertices`, `cells` or `values`.
+    fn array<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        each!(&self.0, of => of.array(py, name))
+    }
+}
+
+impl<T: Number> Extended<T> {
+    fn array<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let of = &self.extension;
+        let components = of.components.max(1);
+        let rows = |values: &[T]| {
+            let shape = [values.len() / components, components];
+            arrays::shaped(py, values.to_vec(), shape)
+        };
+        match name {
+            "vertices" => rows(&of.vertices),
+            "values" => rows(&of.values),
+            "cells" => arrays::shaped(py, of.cells.clone(), [of.cells.len()]),
+            _ => Err(PyKeyError::new_err(name.to_owned())),
+        }
+    }
+}
+
+fn array<'py, T: Number>(
+    py: Python<'py>,
+    result: &Reconstruction<T>,
+    name: &str,
+) -> PyResult<Bound<'py, PyAny>> {
+    let shape = result.sdf().grid().shape();
+    let count = result.normals().len();
+    match name {
+        "sdf" => arrays::shaped(py, result.sdf().values().to_vec(), shape),
+        "indicator" => arrays::shaped(py, result.indicator().values().to_vec(), shape),
+        "closest" => arrays::shaped(py, result.closest().to_vec(), shape),
+        "vertices" => Ok(arrays::of_vectors(py, result.mesh().vertices())),
+        "faces" => Ok(arrays::of_vectors(py, result.mesh().faces())),
+        "normals" => Ok(arrays::of_vectors(py, result.normals())),
+        "confidence" => arrays::shaped(py, result.confidence().to_vec(), [count]),
+        "areas" => arrays::shaped(py, result.areas().to_vec(), [count]),
+        "neighbours" => arrays::shaped(py, result.neighbour_counts().to_vec(), [count]),
+        _ => Err(PyKeyError::new_err(name.to_owned())),
+    }
+}
+
+/// An extension and the cotangents of its values at vertices and cells.
+type ExtensionBar<'py> = (
+    Bound<'py, Extension>,
+    Option<Bound<'py, PyAny>>,
+    Option<Bound<'py, PyAny>>,
+);
+
+/// An extension in the type of the reconstruction.
+trait Typed: Number {
+    fn typed(extension: &Extension) -> Option<Arc<Extended<Self>>>;
+}
+
+impl Typed for f32 {
+    fn typed(extension: &Extension) -> Option<Arc<Extended<Self>>> {
+        match &extension.0 {
+            Either::F32(of) => Some(of.clone()),
+            Either::F64(_) => None,
+        }
+    }
+}
+
+impl Typed for f64 {
+    fn typed(extension: &Extension) -> Option<Arc<Extended<Self>>> {
+        match &extension.0 {
+            Either::F64(of) => Some(of.clone()),
+            Either::F32(_) => None,
+        }
+    }
+}
+
+/// An extension with the cotangents of its values at vertices and cells.
+type ExtendedBar<T> = (Arc<Extended<T>>, Option<Vec<T>>, Option<Vec<T>>);
+
+/// Copies of all cotangents, for the thread that works on them.
+struct Bars<T> {
+    sdf: Option<Vec<T>>,
+    indicator: Option<Vec<T>>,
+    areas: Option<Vec<T>>,
+    vertices: Option<Vec<[T; 3]>>,
+    normals: Option<Vec<[T; 3]>>,
+    iso_value: T,
+    extensions: Vec<ExtendedBar<T>>,
+}
+
+fn pull<'py, T: Typed>(
+    py: Python<'py>,
+    kept: &Arc<Kept<T>>,
+    bars: &Bound<'py, PyDict>,
+    iso_value: T,
+    extensions: Vec<ExtensionBar<'py>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let values = |name: &str| {
+        let given = bars.get_item(name)?;
+        given.map(|a| arrays::values::<T>(&a, name)).transpose()
+    };
+    let vectors = |name: &str| {
+        let given = bars.get_item(name)?;
+        given.map(|a| arrays::vectors::<T>(&a, name)).transpose()
+    };
+    let mut found = Vec::with_capacity(extensions.len());
+    for (extension, at_vertices, in_band) in extensions {
+        let of = T::typed(extension.get());
+        let of = of.ok_or_else(|| value("an extension is of another reconstruction's type"))?;
+        let numbers = |a: Option<Bound<'py, PyAny>>| {
+            a.map(|a| arrays::values::<T>(&a, "an extension's cotangent"))
+                .transpose()
+        };
+        found.push((of, numbers(at_vertices)?, numbers(in_band)?));
+    }
+    let bars = Bars {
+        sdf: values("sdf")?,
+        indicator: values("indicator")?,
+        areas: values("areas")?,
+        vertices: vectors("vertices")?,
+        normals: vectors("normals")?,
+        iso_value,
+        extensions: found,
+    };
+    let kept = kept.clone();
+    let out = background::run(py, move |_| bars.pull(&kept))?;
+    out_dict(py, &out.map_err(value)?)
+}
+
+impl<T: Number> Bars<T> {
+    fn pull(&self, kept: &Kept<T>) -> Result<CloudCotangent<T>, PullbackError> {
+        let extensions: Vec<ExtensionCotangent<'_, T>> = self
+            .extensions
+            .iter()
+            .map(|(of, vertices, values)| ExtensionCotangent {
+                attribute: &of.attribute,
+                extension: &of.extension,
+                residual: &of.residual,
+                vertices: vertices.as_deref(),
+                values: values.as_deref(),
+            })
+            .collect();
+        let cotangent = Cotangent {
+            sdf: self.sdf.as_deref(),
+            indicator: self.indicator.as_deref(),
+            iso_value: self.iso_value,
+            vertices: self.vertices.as_deref(),
+            normals: self.normals.as_deref(),
+            areas: self.areas.as_deref(),
+            extensions: &extensions,
+        };
+        kept.result.pullback(&kept.cloud, &cotangent)
+    }
+}
+
+fn out_dict<'py, T: Number>(
+    py: Python<'py>,
+    out: &CloudCotangent<T>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("points", arrays::of_vectors(py, &out.points))?;
+    let normals = (!out.normals.is_empty()).then(|| arrays::of_vectors(py, &out.normals));
+    dict.set_item("normals", normals)?;
+    let mut attributes = Vec::new();
+    for values in &out.attributes {
+        let components = values.len() / out.points.len().max(1);
+        let shape = [out.points.len(), components];
+        attributes.push(arrays::shaped(py, values.clone(), shape)?);
+    }
+    dict.set_item("attributes", attributes)?;
+    dict.set_item("lower", out.grid.lower.map(|x| x.f64()))?;
+    dict.set_item("spacing", out.grid.spacing.f64())?;
+    dict.set_item("guarded", out.guarded)?;
+    Ok(dict)
+}
+
+fn extended<T: Number>(
+    py: Python<'_>,
+    kept: &Arc<Kept<T>>,
+    name: String,
+    band: f64,
+) -> PyResult<Arc<Extended<T>>> {
+    let kept = kept.clone();
+    let out = background::run(py, move |_| {
+        let attributes = kept.cloud.attributes();
+        let attribute = attributes.iter().find(|a| a.name == name).cloned();
+        let attribute = attribute.ok_or_else(|| extend::Error::Missing {
+            name,
+            known: attributes.iter().map(|a| a.name.clone()).collect(),
+        })?;
+        let (mut residual, mut extension) = (Default::default(), Default::default());
+        let scratch = &mut extend::Scratch::default();
+        kept.result
+            .extend_into(&attribute, band, scratch, &mut residual, &mut extension)?;
+        Ok::<_, extend::Error>(Extended {
+            attribute,
+            extension,
+            residual,
+        })
+    })?;
+    Ok(Arc::new(out.map_err(value)?))
+}

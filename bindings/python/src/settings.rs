@@ -1,0 +1,78 @@
+//! Grid and options as one JSON text: the only form that every caller can pass, XLA's attributes included.
+//! Two plans are the same where their texts are.
+
+use isograd::distance::Band;
+use isograd::neighbors::Radius;
+use isograd::{Grid, GridError, Options, Real, orient, splat, vector};
+use serde::Deserialize;
+
+/// What `isograd._settings.encode` writes.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    lower: [f64; 3],
+    spacing: f64,
+    shape: [usize; 3],
+    radius: Option<f64>,
+    orient: Orient,
+    splat: Splat,
+    area: bool,
+    smoothing: f64,
+    band: Option<f64>,
+    checks: bool,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Orient {
+    Auto,
+    Parity,
+    Given,
+    Signs,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Splat {
+    Bspline,
+    Paper,
+}
+
+impl Settings {
+    /// Reads the text.
+    ///
+    /// # Errors
+    /// What is wrong with it, and where.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        serde_json::from_str(text).map_err(|error| format!("settings: {error}"))
+    }
+
+    /// The grid.
+    ///
+    /// # Errors
+    /// See [`GridError`].
+    pub fn grid<T: Real>(&self) -> Result<Grid<T>, GridError> {
+        Grid::new(vector::of_f64(self.lower), T::of(self.spacing), self.shape)
+    }
+
+    /// The options.
+    pub fn options(&self) -> Options {
+        Options {
+            radius: self.radius.map_or(Radius::Auto, Radius::Fixed),
+            orientation: match self.orient {
+                Orient::Auto => orient::Method::Auto,
+                Orient::Parity => orient::Method::Parity(orient::ParityOptions::default()),
+                Orient::Given => orient::Method::Given,
+                Orient::Signs => orient::Method::Signs,
+            },
+            weights: match self.splat {
+                Splat::Bspline => splat::Weights::BSpline,
+                Splat::Paper => splat::Weights::Paper,
+            },
+            area_weights: self.area,
+            smoothing: self.smoothing,
+            band: self.band.map_or(Band::Full, Band::Cells),
+            checks: self.checks,
+        }
+    }
+}

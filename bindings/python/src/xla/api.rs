@@ -1,0 +1,346 @@
+//! XLA's C interface for custom calls, as `xla/ffi/api/c_api.h` lays it out: only what is used, in its names
+//! without the prefix `XLA_FFI_`.
+//!
+//! This is the one place of the package with `unsafe` code, for XLA calls functions of the C ABI with pointers to
+//! C structures. A [`CallFrame`] is trusted to be what its header says: every pointer valid for the duration of the
+//! call, buffers dense and in C order, results not shared with anything. What can be checked (type, alignment,
+//! number of dimensions, text encoding) is, before a slice is made.
+#![allow(unsafe_code)]
+
+use std::ffi::{CString, c_char, c_int, c_void};
+use std::mem::offset_of;
+use std::ptr;
+
+use pyo3::prelude::*;
+
+use super::Target;
+use super::buffers::{Call, Data, DataMut, Input, Output};
+
+/// The oldest version with everything used here; a newer runtime takes it, too.
+const MAJOR: c_int = 0;
+const MINOR: c_int = 1;
+
+const EXTENSION_METADATA: c_int = 1;
+const STAGE_EXECUTE: c_int = 3;
+const BUFFER: c_int = 1;
+const SCALAR: c_int = 3;
+const STRING: c_int = 4;
+const U32: c_int = 8;
+const F32: c_int = 11;
+const F64: c_int = 12;
+const INVALID_ARGUMENT: c_int = 3;
+const INTERNAL: c_int = 13;
+
+/// What a handler returns: null, or an error that belongs to XLA.
+pub type Status = *mut c_void;
+
+/// A function that XLA calls.
+pub type Handler = unsafe extern "C" fn(*mut CallFrame) -> Status;
+
+#[repr(C)]
+struct Extension {
+    struct_size: usize,
+    kind: c_int,
+    next: *mut Extension,
+}
+
+#[repr(C)]
+struct ApiVersion {
+    struct_size: usize,
+    extension: *mut Extension,
+    major: c_int,
+    minor: c_int,
+}
+
+#[repr(C)]
+struct Metadata {
+    struct_size: usize,
+    version: ApiVersion,
+    traits: u32,
+}
+
+#[repr(C)]
+struct MetadataExtension {
+    base: Extension,
+    metadata: *mut Metadata,
+}
+
+#[repr(C)]
+struct Buffer {
+    struct_size: usize,
+    extension: *mut Extension,
+    dtype: c_int,
+    data: *mut c_void,
+    rank: i64,
+    dims: *const i64,
+}
+
+#[repr(C)]
+struct ByteSpan {
+    start: *const c_char,
+    length: usize,
+}
+
+#[repr(C)]
+struct Scalar {
+    dtype: c_int,
+    value: *const c_void,
+}
+
+/// Arguments, or results.
+#[repr(C)]
+struct Buffers {
+    struct_size: usize,
+    extension: *mut Extension,
+    size: i64,
+    types: *const c_int,
+    values: *const *mut c_void,
+}
+
+#[repr(C)]
+struct Attributes {
+    struct_size: usize,
+    extension: *mut Extension,
+    size: i64,
+    types: *const c_int,
+    names: *const *const ByteSpan,
+    values: *const *const c_void,
+}
+
+/// What XLA hands to a handler.
+#[repr(C)]
+pub struct CallFrame {
+    struct_size: usize,
+    extension: *mut Extension,
+    api: *const Api,
+    context: *mut c_void,
+    stage: c_int,
+    arguments: Buffers,
+    results: Buffers,
+    attributes: Attributes,
+}
+
+#[repr(C)]
+struct ErrorCreate {
+    struct_size: usize,
+    extension: *mut Extension,
+    message: *const c_char,
+    code: c_int,
+}
+
+/// XLA's own functions, as far as the one that is called.
+#[repr(C)]
+struct Api {
+    struct_size: usize,
+    extension: *mut Extension,
+    version: ApiVersion,
+    internal: *const c_void,
+    error_create: unsafe extern "C" fn(*mut ErrorCreate) -> Status,
+}
+
+/// Answers a call of XLA: its question for the version, or a call of the target. A panic ends here.
+///
+/// # Safety
+/// `frame` is what XLA passes to a handler.
+pub unsafe extern "C" fn handler<W: Target>(frame: *mut CallFrame) -> Status {
+    // SAFETY: the caller's promise; the frame and all it points to outlive this call.
+    let frame = unsafe { &*frame };
+    // SAFETY: as above.
+    if let Some(metadata) = unsafe { frame.metadata() } {
+        return unsafe { frame.tell_version(metadata) };
+    }
+    if frame.stage != STAGE_EXECUTE {
+        return frame.error(INTERNAL, "isograd's handlers can only be executed");
+    }
+    // SAFETY: as above.
+    let guarded = super::guard(|| W::call(unsafe { frame.call() }?));
+    match guarded {
+        Ok(Ok(())) => ptr::null_mut(),
+        Ok(Err(text)) => frame.error(INVALID_ARGUMENT, &text),
+        Err(defect) => frame.error(INTERNAL, &defect),
+    }
+}
+
+impl CallFrame {
+    /// Where to write the version, if that is what XLA asks for.
+    unsafe fn metadata(&self) -> Option<*mut Metadata> {
+        let mut extension = self.extension;
+        // SAFETY: a list that XLA made, each entry with the header of `Extension`.
+        while let Some(found) = unsafe { extension.as_ref() } {
+            if found.kind == EXTENSION_METADATA {
+                let found: *const MetadataExtension = extension.cast();
+                return Some(unsafe { (*found).metadata });
+            }
+            extension = found.next;
+        }
+        None
+    }
+
+    unsafe fn tell_version(&self, metadata: *mut Metadata) -> Status {
+        // SAFETY: XLA's own structure, of at least these fields; the runtime's version may be left out.
+        unsafe {
+            let theirs = self.api.as_ref().map_or(MINOR, |api| api.version.minor);
+            (*metadata).version.major = MAJOR;
+            (*metadata).version.minor = MINOR.min(theirs);
+            (*metadata).traits = 0;
+        }
+        ptr::null_mut()
+    }
+
+    fn error(&self, code: c_int, text: &str) -> Status {
+        let message = CString::new(text.replace('\0', " ")).unwrap_or_default();
+        let mut args = ErrorCreate {
+            struct_size: offset_of!(ErrorCreate, code) + size_of::<c_int>(),
+            extension: ptr::null_mut(),
+            message: message.as_ptr(),
+            code,
+        };
+        // SAFETY: XLA's function with its own structure; it copies the text.
+        unsafe { ((*self.api).error_create)(&mut args) }
+    }
+
+    unsafe fn call(&self) -> Result<Call<'_>, String> {
+        // SAFETY: the frame's arrays are as long as it says, and its results are borrowed nowhere else.
+        unsafe {
+            let inputs = self.arguments.each().map(|buffer| (*buffer?).input());
+            let inputs = inputs.collect::<Result<Vec<_>, _>>()?;
+            let outputs = self.results.each().map(|buffer| (*buffer?).output());
+            let outputs = outputs.collect::<Result<Vec<_>, _>>()?;
+            let settings = self.attributes.find("settings", STRING);
+            let settings = settings.ok_or("the attribute 'settings' is missing")?;
+            let band = match self.attributes.find("band", SCALAR) {
+                Some(scalar) => Some((*scalar.cast::<Scalar>()).f64()?),
+                None => None,
+            };
+            let settings = (*settings.cast::<ByteSpan>()).text()?;
+            Ok(Call::new(settings, band, inputs, outputs))
+        }
+    }
+}
+
+impl Buffers {
+    unsafe fn each(&self) -> impl Iterator<Item = Result<*const Buffer, String>> {
+        // SAFETY: both arrays have `size` entries.
+        (0..self.size.max(0) as usize).map(|i| unsafe {
+            match *self.types.add(i) {
+                BUFFER => Ok((*self.values.add(i)).cast_const().cast::<Buffer>()),
+                kind => Err(format!("argument {i} is no array but of kind {kind}")),
+            }
+        })
+    }
+}
+
+impl Buffer {
+    unsafe fn input<'a>(&self) -> Result<Input<'a>, String> {
+        // SAFETY: `data` has as many entries as the dimensions say.
+        let data = unsafe {
+            match self.dtype {
+                F32 => Data::F32(self.slice()?),
+                F64 => Data::F64(self.slice()?),
+                U32 => Data::U32(self.slice()?),
+                other => return Err(unknown(other)),
+            }
+        };
+        Ok(Input {
+            dims: unsafe { self.dims() },
+            data,
+        })
+    }
+
+    unsafe fn output<'a>(&self) -> Result<Output<'a>, String> {
+        // SAFETY: as for the inputs, and a result is given to nobody else during the call.
+        let data = unsafe {
+            match self.dtype {
+                F32 => DataMut::F32(self.slice_mut()?),
+                F64 => DataMut::F64(self.slice_mut()?),
+                U32 => DataMut::U32(self.slice_mut()?),
+                other => return Err(unknown(other)),
+            }
+        };
+        Ok(Output {
+            dims: unsafe { self.dims() },
+            data,
+        })
+    }
+
+    unsafe fn dims(&self) -> Vec<usize> {
+        let axes = 0..self.rank.max(0) as usize;
+        // SAFETY: `dims` has `rank` entries.
+        axes.map(|a| unsafe { (*self.dims.add(a)).max(0) as usize })
+            .collect()
+    }
+
+    unsafe fn slice<'a, E>(&self) -> Result<&'a [E], String> {
+        let length = unsafe { self.dims() }.iter().product::<usize>();
+        if length == 0 {
+            return Ok(&[]);
+        }
+        // SAFETY: dense, of that length, aligned, and not written during the call.
+        Ok(unsafe { std::slice::from_raw_parts(self.aligned::<E>()?, length) })
+    }
+
+    unsafe fn slice_mut<'a, E>(&self) -> Result<&'a mut [E], String> {
+        let length = unsafe { self.dims() }.iter().product::<usize>();
+        if length == 0 {
+            return Ok(&mut []);
+        }
+        // SAFETY: dense, of that length, aligned, and nobody else's during the call.
+        Ok(unsafe { std::slice::from_raw_parts_mut(self.aligned::<E>()?, length) })
+    }
+
+    fn aligned<E>(&self) -> Result<*mut E, String> {
+        let data = self.data.cast::<E>();
+        match !data.is_null() && data.is_aligned() {
+            true => Ok(data),
+            false => Err("XLA passed an array that is not aligned".into()),
+        }
+    }
+}
+
+impl Attributes {
+    /// The value of the attribute of that name and kind.
+    unsafe fn find(&self, name: &str, kind: c_int) -> Option<*const c_void> {
+        let mut places = 0..self.size.max(0) as usize;
+        // SAFETY: all three arrays have `size` entries.
+        unsafe {
+            let place = places.find(|&i| {
+                *self.types.add(i) == kind && (**self.names.add(i)).text() == Ok(name)
+            })?;
+            Some(*self.values.add(place))
+        }
+    }
+}
+
+impl ByteSpan {
+    unsafe fn text<'a>(&self) -> Result<&'a str, String> {
+        if self.length == 0 {
+            return Ok("");
+        }
+        // SAFETY: `length` bytes that live as long as the call.
+        let bytes = unsafe { std::slice::from_raw_parts(self.start.cast::<u8>(), self.length) };
+        std::str::from_utf8(bytes).map_err(|error| format!("an attribute is no text: {error}"))
+    }
+}
+
+impl Scalar {
+    unsafe fn f64(&self) -> Result<f64, String> {
+        match self.dtype {
+            // SAFETY: the type says what the value is.
+            F64 => Ok(unsafe { self.value.cast::<f64>().read_unaligned() }),
+            other => Err(unknown(other)),
+        }
+    }
+}
+
+fn unknown(dtype: c_int) -> String {
+    format!("XLA passed an array or number of its type {dtype}; give float32 or float64")
+}
+
+/// A handler as `jax.ffi.register_ffi_target` takes it: an unnamed capsule that holds the function itself.
+pub fn capsule(py: Python<'_>, handler: Handler) -> PyResult<Bound<'_, PyAny>> {
+    // SAFETY: a function is valid for ever, and the capsule owns nothing.
+    unsafe {
+        let capsule = pyo3::ffi::PyCapsule_New(handler as *mut c_void, ptr::null(), None);
+        Bound::from_owned_ptr_or_err(py, capsule)
+    }
+}
