@@ -8,6 +8,7 @@ mod links;
 mod pages;
 mod peers;
 mod process;
+mod python;
 mod readme;
 mod steps;
 mod tally;
@@ -23,8 +24,10 @@ cargo xtask COMMAND
 
 Checks
   test             everything a change must pass, cheapest first: format, links, clippy, docs,
-                   tests, doc tests, examples, and the commands and code of the README
+                   tests, doc tests, the Python package, examples, and the commands and code of
+                   the README
   lint             the first three of these
+  python           the step of the Python package alone
   deny             licences, sources and advisories of every dependency (needs cargo-deny);
                    --offline leaves the advisories out
 
@@ -70,6 +73,7 @@ fn run(command: &str, rest: &[String]) -> Option<Outcome> {
     match (command, rest) {
         ("test", []) => Some(test::all()),
         ("lint", []) => Some(test::lint()),
+        ("python", []) => Some(test::python()),
         ("deny", []) => Some(deny::run(false)),
         ("deny", [flag]) if flag == "--offline" => Some(deny::run(true)),
         ("docs", []) => Some(pages::all()),

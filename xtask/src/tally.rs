@@ -1,7 +1,8 @@
-//! Reads what the test runner prints: how many tests passed, failed, and were left out.
+//! Reads what the test runners print: how many tests passed, failed, and were left out.
 //!
 //! A test that cannot do its work here (data that is not there, say) prints a line that begins with
-//! `SKIPPED` and returns. The runner counts it as passed; here it counts as skipped.
+//! `SKIPPED` and returns. The runner counts it as passed; here it counts as skipped. pytest has its own words
+//! for the same, and counts them itself.
 
 use std::collections::BTreeSet;
 
@@ -43,6 +44,27 @@ impl Tally {
         !self.inside_successes
     }
 
+    /// Takes in a line of pytest: a `SKIPPED` line of its list, or its last line with the counts.
+    pub fn read_pytest(&mut self, line: &str) {
+        if line.starts_with("SKIPPED") {
+            self.lines.push(format!("{line}  [pytest]"));
+        }
+        let Some((counts, time)) = line.rsplit_once(" in ") else {
+            return;
+        };
+        // `12 passed, 1 skipped in 83.20s (0:01:23)`, not a sentence with these words.
+        let seconds = time
+            .split(' ')
+            .next()
+            .and_then(|time| time.strip_suffix('s'));
+        if seconds.is_some_and(|number| number.parse::<f64>().is_ok()) {
+            let sum = |names: &[&str]| names.iter().map(|name| count(counts, name)).sum::<usize>();
+            self.passed += sum(&["passed"]);
+            self.failed += sum(&["failed", "error", "errors"]);
+            self.ignored += sum(&["skipped", "xfailed"]);
+        }
+    }
+
     /// Number of tests read, whatever became of them.
     pub fn counted(&self) -> usize {
         self.passed + self.failed + self.ignored
@@ -80,10 +102,10 @@ impl Tally {
     }
 }
 
-/// The `N` of `N passed;` in a line of counts.
+/// The `N` of `N passed;` or `N passed,` in a line of counts.
 fn count(counts: &str, what: &str) -> usize {
     counts
-        .split([';', '.'])
+        .split([';', ',', '.'])
         .filter_map(|part| part.trim().strip_suffix(what))
         .find_map(|number| number.trim().parse().ok())
         .unwrap_or(0)
@@ -169,6 +191,21 @@ test result: FAILED. 1 passed; 1 failed; 0 ignored; 0 measured; 0 filtered out; 
         assert!(shown.contains("panicked at 1 + 1"));
         assert!(shown.contains("SKIPPED wing"));
         assert!(!shown.contains("nobody asked for"));
+    }
+
+    #[test]
+    fn the_counts_of_pytest_are_added() {
+        let (mut tally, _) = read(TWO_PROGRAMS);
+        for line in [
+            "..s.F    [100%]",
+            "SKIPPED [2] tests/test_torch.py:9: no torch",
+            "2 passed in time",
+            "1 failed, 4 passed, 2 skipped, 7 warnings, 1 error in 83.20s (0:01:23)",
+        ] {
+            tally.read_pytest(line);
+        }
+        assert_eq!(tally.summary(), "7 passed, 3 failed, 4 skipped");
+        assert!(tally.skipped_lines()[2].contains("no torch"));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use crate::examples;
 use crate::links;
 use crate::process::{self, Outcome};
+use crate::python;
 use crate::readme;
 use crate::steps::Steps;
 use crate::tally::Tally;
@@ -19,6 +20,14 @@ pub fn all() -> Outcome {
     result
 }
 
+/// The tests of the Python package.
+pub fn python() -> Outcome {
+    let mut tally = Tally::default();
+    python::run(&mut tally)?;
+    println!("{}", tally.summary());
+    Ok(())
+}
+
 /// Format, links and clippy.
 pub fn lint() -> Outcome {
     let mut steps = Steps::default();
@@ -30,6 +39,7 @@ fn run(steps: &mut Steps, tally: &mut Tally) -> Outcome {
     steps.step("docs", docs)?;
     steps.step("tests", || tests(tally, &["--lib", "--bins", "--tests"]))?;
     steps.step("doc tests", || tests(tally, &["--doc"]))?;
+    steps.step("Python", || python::run(tally))?;
     steps.step("examples", examples::run)?;
     steps.step("README commands", readme::run)
 }

@@ -50,7 +50,7 @@ def signed_distance(
     Raises:
         TypeError: for what is no tensor, and for integers and complex numbers.
         ValueError: for another shape or device, and for what makes no surface: points that are not finite, too
-            few of them, or none of them on the grid.
+            few of them, or nearer than two cells to the border of the grid.
     """
     points = _checked(points, "points")
     if normals is not None:
@@ -89,6 +89,7 @@ def _checked(values: Tensor, name: str) -> Tensor:
     return values
 
 
+# Operators say Optional and not `| None`: PyTorch reads their annotations, in every version the former.
 @torch.library.custom_op("isograd::signed_distance", mutates_args=(), device_types="cpu")
 def _signed_distance(
     points: Tensor, given: Optional[Tensor], settings: str

@@ -1,0 +1,25 @@
+"""Every example runs to its end; each ends with an assertion of its own."""
+
+import importlib.util
+import pathlib
+import re
+import subprocess
+import sys
+
+import pytest
+
+EXAMPLES = sorted((pathlib.Path(__file__).parents[1] / "examples").glob("*.py"))
+
+
+def test_there_are_examples_and_they_are_short():
+    assert len(EXAMPLES) >= 2
+    for path in EXAMPLES:
+        assert len(path.read_text().splitlines()) < 80, path.name
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.name)
+def test_an_example_runs(path):
+    for name in re.findall(r"^(?:import|from) (\w+)", path.read_text(), re.MULTILINE):
+        if importlib.util.find_spec(name) is None:
+            pytest.skip(f"SKIPPED: {name} is not installed")
+    subprocess.run([sys.executable, path], check=True, timeout=None)
