@@ -79,7 +79,7 @@ pub struct Neighbours {
 /// The signs of the normals.
 #[derive(Debug, Serialize)]
 pub struct Orientation {
-    /// `auto`, `parity` or `given`.
+    /// `auto`, `parity`, `given` or `signs`.
     pub method: &'static str,
     /// Axes whose sign was changed.
     pub flipped: usize,
