@@ -243,11 +243,24 @@ pub fn forward<T: Real>(
     out: &mut Orientation<T>,
 ) -> Result<(), Error> {
     out.clear();
-    if *method == Method::Given {
-        let given = given.ok_or(Error::NoNormals)?;
-        check_count(points, given, "normals")?;
-        return take_given(given, out);
+    if *method != Method::Given {
+        take_axes(points, axes, out)?;
     }
+    match method {
+        Method::Auto => automatically(neighborhoods, scratch, out),
+        Method::Parity(options) => by_parity(neighborhoods, options, scratch, out)?,
+        Method::Given => take_given(points, given, out)?,
+        Method::Signs => by_given_sides(points, given, out)?,
+    }
+    Ok(())
+}
+
+/// The axes as they are, for a sign to be chosen.
+fn take_axes<T: Real>(
+    points: &[[T; 3]],
+    axes: &[[T; 3]],
+    out: &mut Orientation<T>,
+) -> Result<(), Error> {
     check_count(points, axes, "axes")?;
     let has_direction = |v: &[T; 3]| vector::normalized(*v).is_some();
     if let Some(index) = axes.iter().position(|v| !has_direction(v)) {
@@ -258,14 +271,7 @@ pub fn forward<T: Real>(
     }
     out.normals.extend_from_slice(axes);
     out.confidence.resize(axes.len(), T::zero());
-    match method {
-        Method::Parity(options) => by_parity(neighborhoods, options, scratch, out),
-        Method::Signs => by_given_sides(given, out),
-        Method::Auto | Method::Given => {
-            automatically(neighborhoods, scratch, out);
-            Ok(())
-        }
-    }
+    Ok(())
 }
 
 fn check_count<T>(points: &[T], vectors: &[T], kind: &'static str) -> Result<(), Error> {
@@ -281,37 +287,47 @@ fn check_count<T>(points: &[T], vectors: &[T], kind: &'static str) -> Result<(),
     }
 }
 
-fn take_given<T: Real>(given: &[[T; 3]], out: &mut Orientation<T>) -> Result<(), Error> {
-    for (index, &normal) in given.iter().enumerate() {
-        let normal = vector::normalized(normal);
-        out.normals.push(normal.ok_or(Error::NoDirection {
+/// The cloud's own normals, each of unit length.
+fn units<'a, T: Real>(
+    points: &[[T; 3]],
+    given: Option<&'a [[T; 3]]>,
+) -> Result<impl Iterator<Item = Result<[T; 3], Error>> + 'a, Error> {
+    let given = given.ok_or(Error::NoNormals)?;
+    check_count(points, given, "normals")?;
+    Ok(given.iter().enumerate().map(|(index, &normal)| {
+        vector::normalized(normal).ok_or(Error::NoDirection {
             index,
             kind: "the normal",
-        })?);
+        })
+    }))
+}
+
+fn take_given<T: Real>(
+    points: &[[T; 3]],
+    given: Option<&[[T; 3]]>,
+    out: &mut Orientation<T>,
+) -> Result<(), Error> {
+    for normal in units(points, given)? {
+        out.normals.push(normal?);
     }
-    out.confidence.resize(given.len(), T::one());
+    out.confidence.resize(points.len(), T::one());
     out.method = MethodUsed::Given;
-    out.decided.given = given.len();
+    out.decided.given = points.len();
     Ok(())
 }
 
 /// Turns every axis to the side of the given normal.
 fn by_given_sides<T: Real>(
+    points: &[[T; 3]],
     given: Option<&[[T; 3]]>,
     out: &mut Orientation<T>,
 ) -> Result<(), Error> {
-    let given = given.ok_or(Error::NoNormals)?;
-    check_count(&out.normals, given, "normals")?;
-    for (index, &normal) in given.iter().enumerate() {
-        let normal = vector::normalized(normal).ok_or(Error::NoDirection {
-            index,
-            kind: "the normal",
-        })?;
-        let cosine = vector::dot(out.normals[index], normal).f64();
+    for (index, normal) in units(points, given)?.enumerate() {
+        let cosine = vector::dot(out.normals[index], normal?).f64();
         out.set_sign(index, cosine < 0.0, cosine.abs().min(1.0));
     }
     out.method = MethodUsed::Signs;
-    out.decided.given = given.len();
+    out.decided.given = points.len();
     Ok(())
 }
 
