@@ -9,7 +9,7 @@ use serde::Serialize;
 use crate::args;
 use crate::error::Error;
 use crate::memory;
-use crate::outputs::check_ending;
+use crate::outputs::{check_ending, write_report};
 use crate::progress::{Progress, to_stdout};
 
 /// Share of the derivative of a body that grows all over below which a derivative counts as nothing: its ratio
@@ -231,9 +231,5 @@ fn write(path: &Path, file: &str, check: &GradientCheck) -> Result<(), Error> {
         guarded: check.guarded,
         motions: motions.collect(),
     };
-    isograd_io::atomic::write(path, |out| {
-        serde_json::to_writer_pretty(&mut *out, &report)?;
-        std::io::Write::write_all(out, b"\n")
-    })?;
-    Ok(())
+    write_report(path, &report)
 }

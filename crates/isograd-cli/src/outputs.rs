@@ -1,8 +1,10 @@
 //! Which files a reconstruction writes, checked before the work begins.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use isograd_io::{FIELD_ENDINGS, MESH_ENDINGS, check_output};
+use serde::Serialize;
 
 use crate::args;
 use crate::error::Error;
@@ -153,4 +155,16 @@ fn same_name(path: &Path) -> PathBuf {
     resolve(path)
         .or_else(in_folder)
         .unwrap_or_else(|| path.to_path_buf())
+}
+
+/// Writes a report as JSON that people read too; the file appears whole or not at all.
+///
+/// # Errors
+/// What the operating system says.
+pub fn write_report(path: &Path, report: &impl Serialize) -> Result<(), Error> {
+    isograd_io::atomic::write(path, |out| {
+        serde_json::to_writer_pretty(&mut *out, report)?;
+        out.write_all(b"\n")
+    })?;
+    Ok(())
 }

@@ -9,7 +9,7 @@ use isograd_io::Geometry;
 
 use crate::args::{self, Precision};
 use crate::error::Error;
-use crate::outputs::Outputs;
+use crate::outputs::{Outputs, write_report};
 use crate::plot;
 use crate::progress::Progress;
 use crate::report::Report;
@@ -192,10 +192,7 @@ impl Job<'_> {
             report.seconds.write = begin.elapsed().as_secs_f64();
             report.seconds.total = self.start.elapsed().as_secs_f64();
             report.peak_memory_bytes = crate::ALLOCATOR.peak_usage();
-            isograd_io::atomic::write(path, |out| {
-                serde_json::to_writer_pretty(&mut *out, &report)?;
-                std::io::Write::write_all(out, b"\n")
-            })?;
+            write_report(path, &report)?;
             wrote(path);
         }
         Ok(())

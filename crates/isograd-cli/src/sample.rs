@@ -24,6 +24,16 @@ pub fn run(args: &args::Sample) -> Result<(), Error> {
     }
 }
 
+/// The body `name` with the parameters that `--param` set.
+pub(crate) fn shape(name: &str, parameters: &[(String, f64)]) -> Result<Shape, Error> {
+    let mut shape = by_name(name)?;
+    let values = parameters
+        .iter()
+        .map(|(name, value)| (name.as_str(), *value));
+    shape.set_all(values)?;
+    Ok(shape)
+}
+
 fn sample<T: Real>(args: &args::Sample) -> Result<(), Error> {
     // Clap requires the three wherever there is no --list.
     let (Some(name), Some(number), Some(output)) = (&args.shape, args.number, &args.output) else {
@@ -31,12 +41,7 @@ fn sample<T: Real>(args: &args::Sample) -> Result<(), Error> {
     };
     check_ending(output, CLOUD_ENDINGS)?;
     isograd_io::check_output(output, CLOUD_ENDINGS)?;
-    let mut shape = by_name(name)?;
-    shape.set_all(
-        args.parameters
-            .iter()
-            .map(|(name, value)| (name.as_str(), *value)),
-    )?;
+    let shape = shape(name, &args.parameters)?;
     let sampling = Sampling {
         layout: match args.layout {
             Layout::Even => isograd_shapes::Layout::Even,

@@ -6,7 +6,7 @@ use isograd_fit::{
     TargetError, Variables,
 };
 use isograd_io::{Content, Geometry};
-use isograd_shapes::{Sampling, Shape, by_name};
+use isograd_shapes::{Sampling, Shape};
 
 use crate::args::{self, FullOr, Method, TargetKind};
 use crate::error::Error;
@@ -88,12 +88,7 @@ fn variables(args: &args::Fit) -> Result<Variables, Error> {
     }
     // Clap requires one of the two.
     let name = args.shape.as_deref().unwrap_or_default();
-    let mut shape = by_name(name)?;
-    shape.set_all(
-        args.parameters
-            .iter()
-            .map(|(name, value)| (name.as_str(), *value)),
-    )?;
+    let shape = crate::sample::shape(name, &args.parameters)?;
     let default = ShapeParameters::new(shape.clone());
     Ok(Variables::Shape(ShapeParameters {
         only: only(args, &shape)?,
