@@ -1,13 +1,15 @@
 //! NumPy arrays to slices and back. `isograd._arrays` has made them float32 or float64, C-contiguous, aligned
 //! and of the native byte order; what is not so is refused here, and never read as something else.
 
-use isograd::Real;
+use isograd::{Mesh, Real};
 use numpy::{
     Element, PyArray1, PyArray2, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray1,
     PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+
+use crate::errors::value;
 
 /// A number type on both sides.
 pub trait Number: Real + Element {}
@@ -65,6 +67,30 @@ pub fn vectors<T: Number>(array: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<
     }
     let values = array.as_slice().map_err(|_| scattered(name))?;
     Ok(values.as_chunks::<3>().0.to_vec())
+}
+
+/// The same in double precision, whatever the type of the array.
+///
+/// # Errors
+/// Another type or shape.
+pub fn widened(array: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<[f64; 3]>> {
+    match dtype(array, name)? {
+        Dtype::F64 => vectors::<f64>(array, name),
+        Dtype::F32 => {
+            let values = vectors::<f32>(array, name)?;
+            Ok(values.into_iter().map(|v| v.map(f64::from)).collect())
+        }
+    }
+}
+
+/// A mesh from `(V, 3)` vertices and `(F, 3)` faces.
+///
+/// # Errors
+/// Another type or shape, and faces of vertices that are not there.
+pub fn mesh<T: Number>(vertices: &Bound<'_, PyAny>, faces: &Bound<'_, PyAny>) -> PyResult<Mesh<T>> {
+    let corners = indices(faces, "faces")?;
+    let faces = corners.as_chunks::<3>().0.to_vec();
+    Mesh::new(vectors(vertices, "vertices")?, faces).map_err(value)
 }
 
 /// A copy of an array of any shape, in C order.

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use isograd::{Field, Grid, Mesh};
+use isograd::{Field, Grid};
 use isograd_io::Dtype as Stored;
 use pyo3::prelude::*;
 
@@ -102,16 +102,13 @@ pub fn write_mesh(
     fn write<T: Number>(
         path: PathBuf,
         vertices: &Bound<'_, PyAny>,
-        faces: Vec<[u32; 3]>,
+        faces: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
-        let mesh = Mesh::<T>::new(arrays::vectors(vertices, "vertices")?, faces);
-        let mesh = mesh.map_err(value)?;
+        let mesh = arrays::mesh::<T>(vertices, faces)?;
         let py = vertices.py();
         py.detach(|| isograd_io::write_mesh(&path, &mesh))
             .map_err(file)
     }
-    let corners = arrays::indices(faces, "faces")?;
-    let faces = corners.as_chunks::<3>().0.to_vec();
     match arrays::dtype(vertices, "vertices")? {
         Dtype::F32 => write::<f32>(path, vertices, faces),
         Dtype::F64 => write::<f64>(path, vertices, faces),

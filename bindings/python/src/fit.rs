@@ -78,12 +78,7 @@ pub fn run_fit<'py>(
     let grid = settings.grid::<f64>().map_err(value)?;
     let wanted = match (kind, target.as_slice()) {
         ("sdf", [sdf]) => Wanted::Sdf(arrays::values(sdf, "the target")?),
-        ("mesh", [vertices, faces]) => {
-            let corners = arrays::indices(faces, "faces")?;
-            let faces = corners.as_chunks::<3>().0.to_vec();
-            let vertices = arrays::vectors(vertices, "vertices")?;
-            Wanted::Mesh(Mesh::new(vertices, faces).map_err(value)?)
-        }
+        ("mesh", [vertices, faces]) => Wanted::Mesh(arrays::mesh(vertices, faces)?),
         ("cloud", [cloud]) => Wanted::Cloud(arrays::vectors(cloud, "the target")?),
         _ => return Err(value(format!("a target of the kind '{kind}'"))),
     };

@@ -33,13 +33,7 @@ pub fn fit_grid(
     spacing: Option<f64>,
     padding: f64,
 ) -> PyResult<Parts> {
-    let points = match arrays::dtype(points, "points")? {
-        arrays::Dtype::F64 => arrays::vectors::<f64>(points, "points")?,
-        arrays::Dtype::F32 => {
-            let points = arrays::vectors::<f32>(points, "points")?;
-            points.into_iter().map(|p| p.map(f64::from)).collect()
-        }
-    };
+    let points = arrays::widened(points, "points")?;
     let resolution = match (spacing, resolution) {
         (Some(h), _) => Resolution::Spacing(h),
         (None, Some(n)) if n > 0 => Resolution::Cells(n as usize),

@@ -74,7 +74,7 @@ impl Plan {
         let (plan, result) = background::run(points.py(), move |stop| {
             let mut plan = match waiting {
                 Some(plan) => plan,
-                None => create(&settings)?,
+                None => settings.plan()?,
             };
             let mut observer = |_| match stop.asked() {
                 true => ControlFlow::Break(()),
@@ -89,11 +89,6 @@ impl Plan {
         *place.lock().unwrap_or_else(PoisonError::into_inner) = Some(plan);
         result.map_err(value)
     }
-}
-
-fn create<T: Number>(settings: &Settings) -> Result<Reconstructor<T>, String> {
-    let grid = settings.grid::<T>().map_err(|e| e.to_string())?;
-    Reconstructor::new(grid, settings.options()).map_err(|e| e.to_string())
 }
 
 /// A cloud from its arrays: `points` and `normals` `(N, 3)`.

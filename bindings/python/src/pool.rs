@@ -49,11 +49,8 @@ pub fn with_plan<T: Real, R>(
 }
 
 fn create<T: Real>(settings: &str) -> Result<Plan<T>, String> {
-    let settings = Settings::parse(settings)?;
-    let grid = settings.grid::<T>().map_err(|e| e.to_string())?;
-    let reconstructor = Reconstructor::new(grid, settings.options());
     Ok(Plan {
-        reconstructor: reconstructor.map_err(|e| e.to_string())?,
+        reconstructor: Settings::parse(settings)?.plan()?,
         scratch: PullbackScratch::default(),
         bar: CloudCotangent::default(),
     })

@@ -1,6 +1,5 @@
 //! Exact distances to a mesh, behind `isograd.signed_distance` and `isograd.query`.
 
-use isograd::Mesh;
 use isograd::distance::{Hit, Query};
 use pyo3::prelude::*;
 
@@ -24,19 +23,13 @@ pub fn query_mesh<'py>(
     }
 }
 
-fn mesh<T: Number>(vertices: &Bound<'_, PyAny>, faces: &Bound<'_, PyAny>) -> PyResult<Mesh<T>> {
-    let corners = arrays::indices(faces, "faces")?;
-    let faces = corners.as_chunks::<3>().0.to_vec();
-    Mesh::new(arrays::vectors(vertices, "vertices")?, faces).map_err(value)
-}
-
 fn query<'py, T: Number>(
     vertices: &Bound<'py, PyAny>,
     faces: &Bound<'py, PyAny>,
     queries: &Bound<'py, PyAny>,
 ) -> PyResult<Hits<'py>> {
     let py = vertices.py();
-    let mesh = mesh::<T>(vertices, faces)?;
+    let mesh = arrays::mesh::<T>(vertices, faces)?;
     let points = arrays::vectors::<T>(queries, "queries")?;
     let hits = background::run(py, move |_| {
         Query::new(mesh).map(|query| query.query(&points, None))
@@ -78,7 +71,7 @@ fn pullback<'py, T: Number>(
     distance_bar: &Bound<'py, PyAny>,
 ) -> PyResult<[Bound<'py, PyAny>; 2]> {
     let py = vertices.py();
-    let mesh = mesh::<T>(vertices, faces)?;
+    let mesh = arrays::mesh::<T>(vertices, faces)?;
     let points = arrays::vectors::<T>(queries, "queries")?;
     let bar = arrays::values::<T>(distance_bar, "distance_bar")?;
     let result = background::run(py, move |_| {

@@ -3,7 +3,7 @@
 
 use isograd::distance::Band;
 use isograd::neighbors::Radius;
-use isograd::{Grid, GridError, Options, Real, orient, splat, vector};
+use isograd::{Grid, GridError, Options, Real, Reconstructor, orient, splat, vector};
 use serde::Deserialize;
 
 /// What `isograd._settings.encode` writes.
@@ -53,6 +53,15 @@ impl Settings {
     /// See [`GridError`].
     pub fn grid<T: Real>(&self) -> Result<Grid<T>, GridError> {
         Grid::new(vector::of_f64(self.lower), T::of(self.spacing), self.shape)
+    }
+
+    /// A plan for grid and options.
+    ///
+    /// # Errors
+    /// What the grid or the options say.
+    pub fn plan<T: Real>(&self) -> Result<Reconstructor<T>, String> {
+        let grid = self.grid::<T>().map_err(|e| e.to_string())?;
+        Reconstructor::new(grid, self.options()).map_err(|e| e.to_string())
     }
 
     /// The options.

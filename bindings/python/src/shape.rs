@@ -4,7 +4,7 @@ use isograd::vector::of_f64;
 use isograd_shapes::{Density, Layout, Sampling, SurfaceCoordinate, by_name};
 use pyo3::prelude::*;
 
-use crate::arrays::{self, Dtype, Number};
+use crate::arrays::{self, Number};
 use crate::background;
 use crate::errors::value;
 
@@ -120,13 +120,7 @@ impl Shape {
         points_bar: &Bound<'_, PyAny>,
     ) -> PyResult<Vec<f64>> {
         let coordinates = coordinates(patch, uv)?;
-        let bar = match arrays::dtype(points_bar, "points_bar")? {
-            Dtype::F64 => arrays::vectors::<f64>(points_bar, "points_bar")?,
-            Dtype::F32 => {
-                let bar = arrays::vectors::<f32>(points_bar, "points_bar")?;
-                bar.into_iter().map(|b| b.map(f64::from)).collect()
-            }
-        };
+        let bar = arrays::widened(points_bar, "points_bar")?;
         self.0.pullback(&coordinates, &bar).map_err(value)
     }
 }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from ._grid import Grid
-from ._options import Options, Orient, Splat
+from ._options import Options, Orient, Splat, check_normals, resolve
 
 
 def encode(grid: Grid, options: Options | None = None) -> str:
@@ -33,3 +33,15 @@ def encode(grid: Grid, options: Options | None = None) -> str:
             "checks": options.checks,
         }
     )
+
+
+def encode_pure(grid: Grid, options: Options | None, normals_are_given: bool) -> str:
+    """The text for a function that returns arrays alone: nobody sees a report, so nothing is checked for one.
+
+    Raises:
+        TypeError: for what is no grid or no options.
+        ValueError: for normals that are missing or not used.
+    """
+    options = resolve(options, {"checks": False})
+    check_normals(options, normals_are_given)
+    return encode(grid, options)

@@ -13,7 +13,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from . import _core, _settings
-from ._options import check_normals, resolve
 
 if TYPE_CHECKING:
     from jax.typing import ArrayLike
@@ -64,9 +63,7 @@ def prepare(
     points = floats(points, "points", (None, 3))
     if normals is not None:
         normals = floats(normals, "normals", points.shape, points.dtype)
-    options = resolve(options, {"checks": False})
-    check_normals(options, normals is not None)
-    settings = _settings.encode(grid, options)
+    settings = _settings.encode_pure(grid, options, normals is not None)
     return Plan(settings, grid.shape, band), points, normals
 
 

@@ -7,7 +7,6 @@ refuses every operator of that kind: call ``torch.autograd.grad``. Needs PyTorch
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from typing import Any, Optional
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from . import _core, _settings
 from ._grid import Grid
-from ._options import Options, check_normals
+from ._options import Options
 
 try:
     import torch
@@ -55,22 +54,13 @@ def signed_distance(
     points = _checked(points, "points")
     if normals is not None:
         normals = _checked(normals, "normals").to(points.dtype)
-    _check_normals(options, normals is not None)
-    return _signed_distance(points, normals, _encode(grid, options))[0]
+    return _signed_distance(points, normals, _encode(grid, options, normals is not None))[0]
 
 
 # The text is the same whenever grid and options are: the compiler need not look inside.
 @torch.compiler.assume_constant_result
-def _encode(grid: Grid, options: Options | None) -> str:
-    if isinstance(options, Options):
-        options = dataclasses.replace(options, checks=False)
-    return _settings.encode(grid, Options(checks=False) if options is None else options)
-
-
-@torch.compiler.assume_constant_result
-def _check_normals(options: Options | None, are_given: bool) -> None:
-    if options is None or isinstance(options, Options):
-        check_normals(options or Options(), are_given)
+def _encode(grid: Grid, options: Options | None, normals_are_given: bool) -> str:
+    return _settings.encode_pure(grid, options, normals_are_given)
 
 
 def _checked(values: Tensor, name: str) -> Tensor:
