@@ -9,54 +9,30 @@ mod pictures;
 mod spread;
 mod study;
 
-use std::error::Error;
 use std::fs;
-use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+
+use isograd_page::program::{Outcome, json_lines, run};
 
 use study::{Results, Study};
 
-/// What can go wrong here ends the program with a message.
-type Outcome<T = ()> = Result<T, Box<dyn Error>>;
-
 fn main() -> ExitCode {
-    match run() {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    run(|folder, pictures| {
+        let study = Study::full();
+        let results = study.run()?;
+        fs::write(folder.join("accuracy.json"), json(&results)?)?;
+        fs::write(folder.join("accuracy.md"), page::page(&study, &results)?)?;
+        pictures::draw(&study, &results, pictures)?;
+        println!("{}", folder.join("accuracy.md").display());
+        Ok(())
+    })
 }
 
-fn run() -> Outcome {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2);
-    let docs = root.unwrap_or(Path::new("")).join("docs");
-    let folder = std::env::args_os().nth(1).map_or(docs, PathBuf::from);
-    let study = Study::full();
-    let results = study.run()?;
-    write(&study, &results, &folder)
-}
-
-/// All numbers, one case a line, so that a change of one is a change of one line.
+/// All numbers.
 fn json(results: &Results) -> Outcome<String> {
-    fn lines<V: serde::Serialize>(values: &[V]) -> Outcome<String> {
-        let lines: Result<Vec<_>, _> = values.iter().map(serde_json::to_string).collect();
-        Ok(lines?.join(",\n"))
-    }
-    let (rows, floors) = (lines(&results.rows)?, lines(&results.floors)?);
-    Ok(format!(
-        "{{\"rows\": [\n{rows}\n],\n\"floors\": [\n{floors}\n]}}\n"
-    ))
-}
-
-/// The page, the numbers and the pictures.
-fn write(study: &Study, results: &Results, folder: &Path) -> Outcome {
-    let pictures = folder.join("images");
-    fs::create_dir_all(&pictures)?;
-    fs::write(folder.join("accuracy.json"), json(results)?)?;
-    fs::write(folder.join("accuracy.md"), page::page(study, results)?)?;
-    pictures::draw(study, results, &pictures)?;
-    println!("{}", folder.join("accuracy.md").display());
-    Ok(())
+    let (rows, floors) = (
+        json_lines("rows", &results.rows)?,
+        json_lines("floors", &results.floors)?,
+    );
+    Ok(format!("{{{rows},\n{floors}}}\n"))
 }

@@ -1,7 +1,8 @@
-//! What the generated pages share: tables, numbers, sentences and charts.
+//! What the generated pages share: tables, numbers, sentences, charts, and the program that writes them.
 
 pub mod bars;
 pub mod chart;
 pub mod layout;
+pub mod program;
 pub mod table;
 pub mod text;
