@@ -25,9 +25,9 @@ fn areas<T: Real>(criterion: &mut Criterion) {
     let mut group = group(criterion, "areas");
     for count in POINTS {
         let neighborhoods = neighborhoods::<T>(count);
-        let (mut scratch, mut areas) = (area::Scratch::default(), Vec::new());
+        let mut areas = Vec::new();
         for_threads::<T>(&mut group, count, "points", || {
-            area::forward(&neighborhoods, &mut scratch, &mut areas);
+            area::forward(&neighborhoods, &mut areas);
         });
     }
 }

@@ -34,7 +34,6 @@ pub struct Reconstructor<T: Real> {
 /// Memory that the stages use again and nobody looks at.
 #[derive(Default)]
 struct Scratch<T: Real> {
-    areas: splat::area::Scratch<T>,
     orient: orient::Scratch,
     splat: splat::Scratch,
     poisson: poisson::Scratch<T>,

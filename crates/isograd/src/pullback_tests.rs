@@ -87,7 +87,7 @@ fn axes<T: Real>(near: &Neighborhoods<T>) -> normals::Residual<T> {
 
 fn areas<T: Real>(near: &Neighborhoods<T>) -> Vec<T> {
     let mut areas = Vec::new();
-    splat::area::forward(near, &mut Default::default(), &mut areas);
+    splat::area::forward(near, &mut areas);
     areas
 }
 

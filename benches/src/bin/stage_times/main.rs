@@ -5,6 +5,7 @@
 //! outputs are in FOLDER. Arrays are raw little-endian files, `NAME.f32`, `.f64` or `.u32`.
 
 mod files;
+mod samples;
 mod stages;
 
 use std::error::Error;

@@ -1,12 +1,12 @@
 //! The stages, each with its input in memory, its scratch warm, and its output kept.
 
-use isograd::neighbors::{self, Neighborhoods, Radius};
 use isograd::{
-    Field, Mesh, Options, PointCloud, Real, Reconstructor, distance, isosurface, normals, poisson,
+    Field, Mesh, Options, PointCloud, Real, Reconstructor, distance, isosurface, poisson,
 };
 
 use super::Outcome;
 use super::files::{Folder, Number};
+use super::samples::{Indicator, Normals, Oriented};
 
 /// One stage with its input.
 pub trait Stage: Send {
@@ -24,7 +24,10 @@ pub fn by_name<T: Real + Number>(name: &str, folder: &Folder) -> Outcome<Box<dyn
         "distance" => Box::new(Distance::<T>::open(folder)?),
         "whole" => Box::new(Whole::<T>::open(folder)?),
         "normals" => Box::new(Normals::<T>::open(folder)?),
+        "orient" => Box::new(Oriented::<T>::open(folder)?),
+        "indicator" => Box::new(Indicator::<T>::open(folder)?),
         "poisson" => Box::new(Poisson::<T>::open(folder)?),
+        "isosurface" => Box::new(Isosurface::<T>::open(folder)?),
         _ => return Err(format!("there is no stage '{name}'").into()),
     })
 }
@@ -64,35 +67,32 @@ impl<T: Real + Number> Stage for Poisson<T> {
     }
 }
 
-/// Points and a radius → normals, the index and the radii included.
-struct Normals<T: Real> {
-    points: Vec<[T; 3]>,
-    radius: Radius,
-    neighborhoods: Neighborhoods<T>,
-    residual: normals::Residual<T>,
+/// A field → the surface where it is 0.
+struct Isosurface<T: Real> {
+    chi: Field<T>,
+    mesh: Mesh<T>,
+    scratch: isosurface::Scratch,
 }
 
-impl<T: Real + Number> Normals<T> {
+impl<T: Real + Number> Isosurface<T> {
     fn open(folder: &Folder) -> Outcome<Self> {
         Ok(Self {
-            points: folder.read_rows("points")?,
-            radius: Radius::Fixed(folder.radius()),
-            neighborhoods: Neighborhoods::default(),
-            residual: normals::Residual::default(),
+            chi: Field::new(folder.grid()?, folder.read("chi")?)?,
+            mesh: Mesh::default(),
+            scratch: isosurface::Scratch::default(),
         })
     }
 }
 
-impl<T: Real + Number> Stage for Normals<T> {
+impl<T: Real + Number> Stage for Isosurface<T> {
     fn run(&mut self) -> Result<(), String> {
-        let found = neighbors::forward(&self.points, self.radius, &mut self.neighborhoods);
-        found.map_err(|error| error.to_string())?;
-        normals::forward(&self.neighborhoods, &mut self.residual);
-        Ok(())
+        let made = isosurface::forward(&self.chi, T::zero(), &mut self.scratch, &mut self.mesh);
+        made.map(drop).map_err(|error| error.to_string())
     }
 
     fn save(&self, folder: &Folder) -> Outcome {
-        folder.write("normals", self.residual.normals.iter().flatten().copied())
+        folder.write("vertices", self.mesh.vertices().iter().flatten().copied())?;
+        folder.write("faces", self.mesh.faces().iter().flatten().copied())
     }
 }
 

@@ -1,5 +1,6 @@
 //! Candidates for membership in a neighbourhood, laid out for loops over several at a time.
 
+use super::cell_index::{CELL, box_distance_squared};
 use crate::Real;
 
 /// Points processed at a time by the loops over candidates: sums are kept a lane, so the result is the
@@ -15,14 +16,28 @@ pub(crate) struct Lanes<T, const M: usize = 0> {
     pub limit: [T; LANES],
 }
 
+/// The sum over all lanes, halves added to halves: a fixed order, and short in vector code.
+#[inline(always)]
+pub(crate) fn sum_lanes<T: Real>(mut lanes: [T; LANES]) -> T {
+    let mut width = LANES / 2;
+    while width > 0 {
+        for l in 0..width {
+            lanes[l] += lanes[l + width];
+        }
+        width /= 2;
+    }
+    lanes[0]
+}
+
 /// Coordinates of the points that may be within a radius of some place, and `M` values of each.
 #[derive(Clone, Debug)]
 pub(crate) struct Candidates<T, const M: usize = 0> {
-    /// An array for each axis, filled up to a multiple of [`LANES`] with copies of the last point.
+    /// An array for each axis, longer than there are candidates; the rest of the last lanes holds copies of
+    /// the last point.
     coordinates: [Vec<T>; 3],
-    /// An array for each value, filled up with zeros.
+    /// An array for each value.
     values: [Vec<T>; M],
-    /// Number of candidates without the copies.
+    /// Number of candidates.
     len: usize,
 }
 
@@ -38,32 +53,56 @@ impl<T, const M: usize> Default for Candidates<T, M> {
 
 impl<T: Real, const M: usize> Candidates<T, M> {
     pub(super) fn clear(&mut self) {
-        for array in self.coordinates.iter_mut().chain(&mut self.values) {
-            array.clear();
-        }
+        self.len = 0;
     }
 
-    /// Adds points, an array for each axis, and their values.
+    /// Adds the points of a cell, an array for each axis, that are within the distance whose square is
+    /// `limit` of a box (from its low to its high corner), and their values.
     #[inline(always)]
-    pub(super) fn extend(&mut self, points: [&[T]; 3], values: [&[T]; M]) {
-        for (coordinates, more) in self.coordinates.iter_mut().zip(points) {
-            coordinates.extend_from_slice(more);
+    pub(super) fn extend_near(
+        &mut self,
+        cell: [&[T]; 3],
+        values: [&[T]; M],
+        corners: [[T; 3]; 2],
+        limit: T,
+    ) {
+        let count = cell[0].len().min(CELL);
+        let room = self.len..self.len + count;
+        self.make_room(room.end);
+        let near = near(cell, corners, limit);
+        let mut kept = 0;
+        for (to, from) in self.coordinates.iter_mut().zip(cell) {
+            kept = keep(&mut to[room.clone()], &from[..count], &near);
         }
-        for (values, more) in self.values.iter_mut().zip(values) {
-            values.extend_from_slice(more);
+        for (to, from) in self.values.iter_mut().zip(values) {
+            keep(&mut to[room.clone()], &from[..count], &near);
+        }
+        self.len += kept;
+    }
+
+    /// Makes all arrays at least `len` long.
+    #[inline(always)]
+    fn make_room(&mut self, len: usize) {
+        if self.coordinates[0].len() < len {
+            let len = (2 * len).next_multiple_of(LANES);
+            for array in self.coordinates.iter_mut().chain(&mut self.values) {
+                array.resize(len, T::zero());
+            }
         }
     }
 
     /// To be called when all candidates are there.
     pub(super) fn fill_last_lanes(&mut self) {
-        self.len = self.coordinates[0].len();
         let filled = self.len.next_multiple_of(LANES);
-        for coordinates in &mut self.coordinates {
-            let last = coordinates.last().copied().unwrap_or_default();
-            coordinates.resize(filled, last);
+        self.make_room(filled);
+        if let Some(last) = self.len.checked_sub(1) {
+            for coordinates in &mut self.coordinates {
+                let last = coordinates[last];
+                coordinates[self.len..filled].fill(last);
+            }
         }
         for values in &mut self.values {
-            values.resize(filled, T::zero());
+            values[self.len..filled].fill(T::zero());
         }
     }
 
@@ -72,9 +111,15 @@ impl<T: Real, const M: usize> Candidates<T, M> {
     #[inline(always)]
     pub(crate) fn for_each_lanes(&self, radius: T, mut visit: impl FnMut(&Lanes<T, M>)) {
         let within = radius * radius;
-        let [x, y, z] = [0, 1, 2].map(|a| self.coordinates[a].as_chunks::<LANES>().0);
-        let values: [&[[T; LANES]]; M] =
-            std::array::from_fn(|m| self.values[m].as_chunks::<LANES>().0);
+        let filled = self.len.next_multiple_of(LANES);
+        let [x, y, z] = self
+            .coordinates
+            .each_ref()
+            .map(|x| x[..filled].as_chunks::<LANES>().0);
+        let values = self
+            .values
+            .each_ref()
+            .map(|x| x[..filled].as_chunks::<LANES>().0);
         // One call alone, so that it is inlined into code for the instruction set at hand.
         for (group, ((&x, &y), &z)) in x.iter().zip(y).zip(z).enumerate() {
             let mut limit = [within; LANES];
@@ -91,4 +136,31 @@ impl<T: Real, const M: usize> Candidates<T, M> {
             });
         }
     }
+}
+
+/// Which points of a cell are within the distance whose square is `limit` of a box.
+#[inline(always)]
+fn near<T: Real>(cell: [&[T]; 3], corners: [[T; 3]; 2], limit: T) -> [bool; CELL] {
+    let mut points = [[T::zero(); CELL]; 3];
+    for (to, from) in points.iter_mut().zip(cell) {
+        to[..from.len()].copy_from_slice(from);
+    }
+    let mut near = [false; CELL];
+    for l in 0..CELL {
+        let point = [points[0][l], points[1][l], points[2][l]];
+        near[l] = box_distance_squared([point; 2], corners) <= limit;
+    }
+    near
+}
+
+/// Moves the entries that are to be kept to the front of `to`, and returns how many there are.
+#[inline(always)]
+fn keep<T: Copy>(to: &mut [T], from: &[T], kept: &[bool; CELL]) -> usize {
+    let mut count = 0;
+    for (&from, &kept) in from.iter().zip(kept) {
+        // Written in any case; what is not kept is written over.
+        to[count] = from;
+        count += usize::from(kept);
+    }
+    count
 }

@@ -1,15 +1,15 @@
 //! Points sorted into small cells: radius and nearest queries.
 
+use std::cmp::Ordering::Equal;
 use std::ops::Range;
 
-use super::candidates::Candidates;
 use crate::Real;
 
 /// Most points in one cell.
-const CELL: usize = 16;
+pub(super) const CELL: usize = 16;
 
 /// Subtrees of fewer points than this are built and walked by one thread.
-const TASK: usize = 2048;
+pub(super) const TASK: usize = 2048;
 
 /// Points sorted into the cells of a balanced k-d tree, for exact radius and nearest queries.
 ///
@@ -27,7 +27,7 @@ pub struct CellIndex<T> {
     /// Sorted position → input index.
     order: Vec<u32>,
     /// All nodes of the tree, each before its left and then its right subtree.
-    nodes: Vec<Node<T>>,
+    pub(super) nodes: Vec<Node<T>>,
     /// Splits between the root and a cell.
     levels: u32,
     /// Kept for the next build.
@@ -43,32 +43,25 @@ struct Entry<T> {
 
 /// The box round the points of a subtree, and the least input index among them.
 #[derive(Clone, Copy, Debug)]
-struct Node<T> {
+pub(super) struct Node<T> {
     low: [T; 3],
     high: [T; 3],
-    least: u32,
-}
-
-/// What is looked for: points within a radius, with values that they carry, arrays in sorted order.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Search<'a, T, const M: usize> {
-    pub radius: T,
-    pub values: [&'a [T]; M],
+    pub(super) least: u32,
 }
 
 /// Where a subtree stands: its node, its sorted positions, and the splits below it.
 #[derive(Clone, Copy, Debug)]
-struct Place {
-    node: usize,
-    start: usize,
-    end: usize,
-    levels: u32,
+pub(super) struct Place {
+    pub(super) node: usize,
+    pub(super) start: usize,
+    pub(super) end: usize,
+    pub(super) levels: u32,
 }
 
 impl Place {
     /// The two halves of the subtree.
     #[inline(always)]
-    fn children(self) -> [Self; 2] {
+    pub(super) fn children(self) -> [Self; 2] {
         let middle = self.start + (self.end - self.start) / 2;
         let levels = self.levels - 1;
         let left = Self {
@@ -95,9 +88,10 @@ impl<T: Real> Node<T> {
             least: u32::MAX,
         };
         for entry in entries {
-            for a in 0..3 {
-                node.low[a] = node.low[a].min(entry.point[a]);
-                node.high[a] = node.high[a].max(entry.point[a]);
+            for (a, x) in entry.point.into_iter().enumerate() {
+                // Points are finite: one comparison each, where `min` would look for NaN.
+                node.low[a] = if x < node.low[a] { x } else { node.low[a] };
+                node.high[a] = if x > node.high[a] { x } else { node.high[a] };
             }
             node.least = node.least.min(entry.index);
         }
@@ -111,33 +105,46 @@ impl<T: Real> Node<T> {
         if length(2) > length(axis) { 2 } else { axis }
     }
 
+    /// Low and high corner of the box.
+    pub(super) fn corners(&self) -> [[T; 3]; 2] {
+        [self.low, self.high]
+    }
+
     /// Squared distance from a point to the box. Never above the squared distance to a point inside it,
     /// rounding included: every operation is monotone, and in the order of [`distance_squared`].
     #[inline(always)]
-    fn distance_squared(&self, query: [T; 3]) -> T {
-        box_distance_squared(self.low, self.high, query, query)
+    pub(super) fn distance_squared(&self, query: [T; 3]) -> T {
+        box_distance_squared(self.corners(), [query; 2])
+    }
+
+    /// Squared distance between two boxes.
+    #[inline(always)]
+    pub(super) fn box_distance_squared(&self, other: &Self) -> T {
+        box_distance_squared(self.corners(), other.corners())
     }
 }
 
 /// Squared distance between two boxes, each from its low to its high corner; 0 where they meet.
 #[inline(always)]
-fn box_distance_squared<T: Real>(
-    low: [T; 3],
-    high: [T; 3],
-    other_low: [T; 3],
-    other_high: [T; 3],
+pub(super) fn box_distance_squared<T: Real>(
+    [low, high]: [[T; 3]; 2],
+    [other_low, other_high]: [[T; 3]; 2],
 ) -> T {
+    // All numbers are finite: one comparison each, where `max` would look for NaN.
+    let larger = |a: T, b: T| if a > b { a } else { b };
     let gap = |a: usize| {
-        (low[a] - other_high[a])
-            .max(other_low[a] - high[a])
-            .max(T::zero())
+        larger(
+            larger(low[a] - other_high[a], other_low[a] - high[a]),
+            T::zero(),
+        )
     };
-    gap(0) * gap(0) + gap(1) * gap(1) + gap(2) * gap(2)
+    let (x, y, z) = (gap(0), gap(1), gap(2));
+    x * x + y * y + z * z
 }
 
 /// `|a − b|²`, the one way in which every query of the index rounds it.
 #[inline(always)]
-fn distance_squared<T: Real>(a: [T; 3], b: [T; 3]) -> T {
+pub(super) fn distance_squared<T: Real>(a: [T; 3], b: [T; 3]) -> T {
     let d = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
 }
@@ -201,7 +208,15 @@ impl<T: Real> CellIndex<T> {
     /// The point at a sorted position.
     #[inline(always)]
     pub(crate) fn point(&self, position: usize) -> [T; 3] {
-        [0, 1, 2].map(|a| self.coordinates[a][position])
+        let [x, y, z] = &self.coordinates;
+        [x[position], y[position], z[position]]
+    }
+
+    /// The coordinates of the points at sorted positions, an array for each axis.
+    #[inline(always)]
+    pub(super) fn coordinates_of(&self, cell: Range<usize>) -> [&[T]; 3] {
+        let [x, y, z] = &self.coordinates;
+        [&x[cell.clone()], &y[cell.clone()], &z[cell]]
     }
 
     /// Low and high corner of the box round all points; an empty box (low above high) for no points.
@@ -232,41 +247,7 @@ impl<T: Real> CellIndex<T> {
         );
     }
 
-    /// The `k` points nearest to `query` as `(input index, distance²)`, nearest first, and the lower
-    /// index first among equals; all points where there are fewer than `k`. Includes the point itself
-    /// where `query` is one of the points. Exact. Takes `O(log N)` for a query near the points, in a
-    /// cluster or far outside; only where nearly all points are equally far (the centre of a sphere) does
-    /// it have to look at most of them.
-    pub fn nearest(&self, query: [T; 3], k: usize, out: &mut Vec<(u32, T)>) {
-        out.clear();
-        if k > 0 && !self.is_empty() {
-            self.nearest_below(self.root(), query, k, out);
-        }
-    }
-
-    fn nearest_below(&self, at: Place, query: [T; 3], k: usize, out: &mut Vec<(u32, T)>) {
-        if at.levels == 0 {
-            for position in at.start..at.end {
-                let d2 = distance_squared(self.point(position), query);
-                insert_nearest((self.order[position], d2), k, out);
-            }
-            return;
-        }
-        let bound = |child: Place| self.nodes[child.node].distance_squared(query);
-        let [left, right] = at.children();
-        let (left_bound, right_bound) = (bound(left), bound(right));
-        let mut order = [(left, left_bound), (right, right_bound)];
-        if right_bound < left_bound {
-            order.swap(0, 1);
-        }
-        for (child, d2) in order {
-            if may_enter((self.nodes[child.node].least, d2), k, out) {
-                self.nearest_below(child, query, k, out);
-            }
-        }
-    }
-
-    fn root(&self) -> Place {
+    pub(super) fn root(&self) -> Place {
         Place {
             node: 0,
             start: 0,
@@ -277,7 +258,11 @@ impl<T: Real> CellIndex<T> {
 
     /// Calls `visit` with the sorted positions of every cell that `enter` does not rule out, in order.
     #[inline(always)]
-    fn walk(&self, enter: &mut impl FnMut(&Node<T>) -> bool, visit: &mut impl FnMut(Range<usize>)) {
+    pub(super) fn walk(
+        &self,
+        enter: &mut impl FnMut(&Node<T>) -> bool,
+        visit: &mut impl FnMut(Range<usize>),
+    ) {
         if self.is_empty() {
             return;
         }
@@ -300,95 +285,6 @@ impl<T: Real> CellIndex<T> {
             depth += 2;
         }
     }
-
-    /// Fills `out`, which has a place for each point in sorted order, cell by cell and in parallel:
-    /// `fill(cell, candidates, out of that cell)`, where the candidates are all points that any point of
-    /// the cell can have within `radius`, each with its `values` (arrays in sorted order).
-    pub(crate) fn for_each_cell<const M: usize, U: Send>(
-        &self,
-        radius: T,
-        values: [&[T]; M],
-        out: &mut [U],
-        fill: &(impl Fn(Range<usize>, &Candidates<T, M>, &mut [U]) + Sync),
-    ) {
-        debug_assert_eq!(out.len(), self.len());
-        if !self.is_empty() {
-            let search = Search { radius, values };
-            self.cells_below(self.root(), search, out, &mut Candidates::default(), fill);
-        }
-    }
-
-    fn cells_below<const M: usize, U: Send>(
-        &self,
-        at: Place,
-        search: Search<'_, T, M>,
-        out: &mut [U],
-        candidates: &mut Candidates<T, M>,
-        fill: &(impl Fn(Range<usize>, &Candidates<T, M>, &mut [U]) + Sync),
-    ) {
-        if at.levels == 0 {
-            let Node { low, high, .. } = self.nodes[at.node];
-            self.candidates([low, high], search, candidates);
-            fill(at.start..at.end, candidates, out);
-            return;
-        }
-        let [left, right] = at.children();
-        let (left_out, right_out) = out.split_at_mut(left.end - left.start);
-        if at.end - at.start > TASK {
-            rayon::join(
-                || self.cells_below(left, search, left_out, &mut Candidates::default(), fill),
-                || self.cells_below(right, search, right_out, &mut Candidates::default(), fill),
-            );
-        } else {
-            self.cells_below(left, search, left_out, candidates, fill);
-            self.cells_below(right, search, right_out, candidates, fill);
-        }
-    }
-
-    /// All points within the radius of the box from `low` to `high`, and perhaps some more.
-    pub(crate) fn candidates<const M: usize>(
-        &self,
-        [low, high]: [[T; 3]; 2],
-        search: Search<'_, T, M>,
-        out: &mut Candidates<T, M>,
-    ) {
-        out.clear();
-        let limit = search.radius * search.radius;
-        self.walk(
-            &mut |node| box_distance_squared(node.low, node.high, low, high) <= limit,
-            &mut |cell| {
-                out.extend(
-                    [0, 1, 2].map(|a| &self.coordinates[a][cell.clone()]),
-                    search.values.map(|values| &values[cell.clone()]),
-                );
-            },
-        );
-        out.fill_last_lanes();
-    }
-}
-
-/// Whether `(index, distance²)` comes before the last of the `k` nearest found so far.
-#[inline(always)]
-fn may_enter<T: Real>((index, d2): (u32, T), k: usize, nearest: &[(u32, T)]) -> bool {
-    match nearest.last() {
-        Some(&last) if nearest.len() >= k => comes_before((index, d2), last),
-        _ => true,
-    }
-}
-
-#[inline(always)]
-fn comes_before<T: Real>(a: (u32, T), b: (u32, T)) -> bool {
-    a.1 < b.1 || (a.1 == b.1 && a.0 < b.0)
-}
-
-/// Puts `found` where it belongs among the `k` nearest found so far.
-#[inline(always)]
-fn insert_nearest<T: Real>(found: (u32, T), k: usize, nearest: &mut Vec<(u32, T)>) {
-    if may_enter(found, k, nearest) {
-        nearest.truncate(k - 1);
-        let place = nearest.partition_point(|&other| comes_before(other, found));
-        nearest.insert(place, found);
-    }
 }
 
 /// Sorts `entries` into the order of the cells, and writes the nodes of their subtree.
@@ -405,8 +301,8 @@ fn sort_into_cells<T: Real>(entries: &mut [Entry<T>], nodes: &mut [Node<T>], lev
     let middle = entries.len() / 2;
     // Equal coordinates are told apart by index: the two halves are sets that no algorithm can change.
     entries.select_nth_unstable_by(middle, |a, b| {
-        let along = a.point[axis].f64().total_cmp(&b.point[axis].f64());
-        along.then(a.index.cmp(&b.index))
+        let along = a.point[axis].partial_cmp(&b.point[axis]);
+        along.unwrap_or(Equal).then(a.index.cmp(&b.index))
     });
     let parallel = entries.len() > TASK;
     let (left, right) = entries.split_at_mut(middle);

@@ -21,12 +21,15 @@
 
 mod candidates;
 mod cell_index;
+mod cells;
+mod census;
 mod gather;
+mod nearest;
 mod radius;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub(crate) use candidates::{Candidates, LANES, Lanes};
+pub(crate) use candidates::{Candidates, LANES, Lanes, sum_lanes};
 pub use cell_index::CellIndex;
-pub(crate) use radius::hold;
 pub use radius::{Error, Neighborhoods, Radius, forward};
+pub(crate) use radius::{Found, forward_with, hold};

@@ -2,8 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::candidates::{Candidates, LANES, Lanes};
-use super::cell_index::{CellIndex, Search};
+use super::candidates::Candidates;
+use super::cell_index::CellIndex;
+use super::cells::Search;
+use super::census::Census;
 use crate::{Real, vector};
 
 /// Fewest points that can bound a volume.
@@ -99,12 +101,34 @@ pub struct Neighborhoods<T> {
     /// other; outliers have only samples that are closer to one another. A clump of outliers is not told
     /// from a sparse surface.
     pub isolated: Vec<bool>,
+    /// `(N,)` `Σ_j (1 − r_j²/R_i²)²` over the neighbourhood, in input order.
+    pub(crate) crowd: Vec<T>,
     /// See [`Self::spacing`].
     spacing: T,
-    /// Radius and count in sorted order: scratch.
-    sorted: Vec<(T, u32)>,
+    /// In sorted order: scratch.
+    sorted: Vec<Found<T, ()>>,
     /// Input index → sorted position.
     position: Vec<u32>,
+}
+
+/// What was found round one point.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Found<T, U> {
+    radius: T,
+    census: Census<T>,
+    /// What was asked for besides.
+    pub(crate) sum: U,
+}
+
+impl<T: Real, U> Found<T, U> {
+    /// The sum alone.
+    pub(crate) fn only(sum: U) -> Self {
+        Self {
+            radius: T::zero(),
+            census: Census::default(),
+            sum,
+        }
+    }
 }
 
 impl<T: Real> Neighborhoods<T> {
@@ -113,6 +137,7 @@ impl<T: Real> Neighborhoods<T> {
         let [tree, work] = self.index.bytes();
         let needed = size_of_val(self.radius.as_slice())
             + size_of_val(self.count.as_slice())
+            + size_of_val(self.crowd.as_slice())
             + size_of_val(self.isolated.as_slice())
             + size_of_val(self.position.as_slice());
         [tree + needed, work + size_of_val(self.sorted.as_slice())]
@@ -130,6 +155,18 @@ impl<T: Real> Neighborhoods<T> {
             .iter()
             .filter(|&&r| r > self.common_radius)
             .count()
+    }
+
+    /// Writes counts and crowds in input order.
+    fn spread_census<U: Sync>(&mut self, sorted: &[Found<T, U>]) {
+        let at = |&position: &u32| {
+            let census = &sorted[position as usize].census;
+            (census.count, census.crowd)
+        };
+        let positions = self.position.par_iter();
+        positions
+            .map(at)
+            .unzip_into_vecs(&mut self.count, &mut self.crowd);
     }
 
     /// Input index → sorted position in [`Self::index`].
@@ -155,7 +192,7 @@ impl<T: Real> Neighborhoods<T> {
                 } else {
                     let own = own.get_or_insert_with(Candidates::default);
                     let values = [];
-                    index.candidates([point; 2], Search { radius, values }, own);
+                    index.candidates(point, Search { radius, values }, own);
                     fill(point, radius, own)
                 };
             }
@@ -173,6 +210,24 @@ pub fn forward<T: Real>(
     radius: Radius,
     out: &mut Neighborhoods<T>,
 ) -> Result<(), Error> {
+    let mut sorted = std::mem::take(&mut out.sorted);
+    let done = forward_with(points, radius, out, &mut sorted, &|_, _, _| ());
+    out.sorted = sorted;
+    done
+}
+
+/// The same, and in the same walk what `sum(point, R_i, candidates)` makes of every neighbourhood, in sorted
+/// order; the candidates hold all of `N_i`. To gather them takes longer than to sum over them.
+///
+/// # Errors
+/// As [`forward`].
+pub(crate) fn forward_with<T: Real, U: Copy + Default + Send + Sync>(
+    points: &[[T; 3]],
+    radius: Radius,
+    out: &mut Neighborhoods<T>,
+    sorted: &mut Vec<Found<T, U>>,
+    sum: &(impl Fn([T; 3], T, &Candidates<T>) -> U + Sync),
+) -> Result<(), Error> {
     check(points)?;
     out.index.rebuild(points);
     check_extent(&out.index)?;
@@ -183,7 +238,7 @@ pub fn forward<T: Real>(
         Radius::Auto => automatic.max(smallest_radius()),
         Radius::Fixed(radius) => fixed_radius(radius)?,
     };
-    grow(out);
+    grow(out, sorted, sum);
     find_isolated(out);
     Ok(())
 }
@@ -211,13 +266,16 @@ pub(crate) fn hold<T: Real>(
     out.radius.clone_from(&held.radius);
     out.isolated.clone_from(&held.isolated);
     find_positions(out);
-    out.count.clear();
-    out.count.resize(points.len(), 0);
-    let (index, radius) = (&out.index, &out.radius);
-    let counts = out.count.par_iter_mut().enumerate();
-    counts.for_each(|(i, count)| {
-        index.for_each_within(points[i], radius[i], |_, _| *count += 1);
+    let mut sorted = std::mem::take(&mut out.sorted);
+    sorted.resize(points.len(), Found::default());
+    let arch = pulp::Arch::new();
+    out.for_each_neighborhood(&mut sorted, &|point, radius, candidates| Found {
+        radius,
+        census: Census::of(arch, point, radius, candidates),
+        sum: (),
     });
+    out.spread_census(&sorted);
+    out.sorted = sorted;
     Ok(())
 }
 
@@ -277,9 +335,9 @@ fn automatic_radius<T: Real>(index: &CellIndex<T>) -> T {
     let stride = n.div_ceil(AUTO_SAMPLES);
     let mut distances: Vec<T> = (0..n.div_ceil(stride))
         .into_par_iter()
-        .map_init(Vec::new, |nearest, sample| {
-            index.nearest(index.point(sample * stride), AUTO_NEIGHBORS, nearest);
-            nearest.last().map_or(T::zero(), |&(_, d2)| d2.sqrt())
+        .map_init(Vec::new, |distances, sample| {
+            let point = index.point(sample * stride);
+            index.reach_squared(point, AUTO_NEIGHBORS, distances).sqrt()
         })
         .filter(|&distance| distance > T::zero())
         .collect();
@@ -292,34 +350,35 @@ fn automatic_radius<T: Real>(index: &CellIndex<T>) -> T {
     *median.1 * T::of(AUTO_MARGIN)
 }
 
-/// Writes radius and count of every point: the common radius where it holds enough samples.
-fn grow<T: Real>(out: &mut Neighborhoods<T>) {
+/// Writes radius, census and sum of every point: the common radius where it holds enough samples.
+fn grow<T: Real, U: Copy + Default + Send + Sync>(
+    out: &mut Neighborhoods<T>,
+    sorted: &mut Vec<Found<T, U>>,
+    sum: &(impl Fn([T; 3], T, &Candidates<T>) -> U + Sync),
+) {
     let n = out.index.len();
-    let (index, common) = (&out.index, out.common_radius);
-    out.sorted.clear();
-    out.sorted.resize(n, (common, 0));
-    let arch = pulp::Arch::new();
-    index.for_each_cell(common, [], &mut out.sorted, &|cell, candidates, out| {
-        for (position, out) in cell.zip(out) {
+    let (index, common, arch) = (&out.index, out.common_radius, pulp::Arch::new());
+    sorted.resize(n, Found::default());
+    index.for_each_cell(common, [], sorted, &|cell, candidates, sorted| {
+        for (position, found) in cell.zip(sorted) {
             let point = index.point(position);
-            let count = crate::simd::dispatch(
-                arch,
-                #[inline(always)]
-                || count_within(point, common, candidates),
-            );
-            *out = if count as usize >= FEWEST_NEIGHBORS.min(n) {
-                (common, count)
+            let census = Census::of(arch, point, common, candidates);
+            *found = if census.count as usize >= FEWEST_NEIGHBORS.min(n) {
+                Found {
+                    radius: common,
+                    census,
+                    sum: sum(point, common, candidates),
+                }
             } else {
-                grown(index, point, common)
+                grown(index, point, common, sum)
             };
         }
     });
     find_positions(out);
-    let sorted = |&position: &u32| out.sorted[position as usize];
-    out.radius.clear();
-    out.radius.extend(out.position.iter().map(|p| sorted(p).0));
-    out.count.clear();
-    out.count.extend(out.position.iter().map(|p| sorted(p).1));
+    let radius_at = |&position: &u32| sorted[position as usize].radius;
+    let positions = out.position.par_iter();
+    positions.map(radius_at).collect_into_vec(&mut out.radius);
+    out.spread_census(sorted);
 }
 
 fn find_positions<T: Real>(out: &mut Neighborhoods<T>) {
@@ -330,15 +389,24 @@ fn find_positions<T: Real>(out: &mut Neighborhoods<T>) {
     }
 }
 
-/// The radius that reaches the 8th sample with a margin, and the count within it.
-fn grown<T: Real>(index: &CellIndex<T>, point: [T; 3], common: T) -> (T, u32) {
+/// What is found with the radius that reaches the 8th sample with a margin.
+fn grown<T: Real, U>(
+    index: &CellIndex<T>,
+    point: [T; 3],
+    common: T,
+    sum: &impl Fn([T; 3], T, &Candidates<T>) -> U,
+) -> Found<T, U> {
     let mut nearest = Vec::with_capacity(FEWEST_NEIGHBORS);
     index.nearest(point, FEWEST_NEIGHBORS, &mut nearest);
     let reach = nearest.last().map_or(T::zero(), |&(_, d2)| d2.sqrt());
     let radius = common.max(T::of(GROWTH_MARGIN) * reach);
-    let mut count = 0;
-    index.for_each_within(point, radius, |_, _| count += 1);
-    (radius, count)
+    let (values, mut candidates) = ([], Candidates::default());
+    index.candidates(point, Search { radius, values }, &mut candidates);
+    Found {
+        radius,
+        census: Census::of(pulp::Arch::new(), point, radius, &candidates),
+        sum: sum(point, radius, &candidates),
+    }
 }
 
 /// Marks the samples that are not neighbours of their neighbours.
@@ -363,31 +431,4 @@ fn mutual_share<T: Real>(index: &CellIndex<T>, radius: &[T], i: usize, position:
         }
     });
     f64::from(mutual) / f64::from(all.max(1))
-}
-
-#[inline(always)]
-fn count_within<T: Real>(center: [T; 3], radius: T, candidates: &Candidates<T>) -> u32 {
-    let mut count = [0u32; LANES];
-    candidates.for_each_lanes(
-        radius,
-        #[inline(always)]
-        |lanes| {
-            let d2 = distances_squared(center, lanes);
-            for l in 0..LANES {
-                count[l] += u32::from(d2[l] <= lanes.limit[l]);
-            }
-        },
-    );
-    count.iter().sum()
-}
-
-/// `|x_j − center|²` for each lane, rounded as in every query of the index.
-#[inline(always)]
-fn distances_squared<T: Real>(center: [T; 3], lanes: &Lanes<T>) -> [T; LANES] {
-    let mut d2 = [T::zero(); LANES];
-    for l in 0..LANES {
-        let d = [0, 1, 2].map(|a| lanes.point[a][l] - center[a]);
-        d2[l] = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-    }
-    d2
 }

@@ -128,7 +128,7 @@ fn queries<T: Real>(points: &[[T; 3]]) -> Vec<[T; 3]> {
 fn nearest_agrees_with_brute_force<T: Real>() {
     for (name, points) in ugly_clouds::<T>() {
         let index = CellIndex::new(&points);
-        let mut found = Vec::new();
+        let (mut found, mut distances) = (Vec::new(), Vec::new());
         for query in queries(&points) {
             let all = by_distance(&points, query);
             for k in [0, 1, 8, 24, 1000] {
@@ -138,6 +138,9 @@ fn nearest_agrees_with_brute_force<T: Real>() {
                     all[..k.min(all.len())],
                     "{name}, k = {k}, at {query:?}"
                 );
+                let farthest = found.last().map_or(T::zero(), |&(_, d2)| d2);
+                let reach = index.reach_squared(query, k, &mut distances);
+                assert_eq!(reach, farthest, "{name}, k = {k}, at {query:?}");
             }
         }
     }
@@ -296,12 +299,13 @@ fn heavily_clustered_clouds_take_no_quadratic_time() {
         .map(|_| random.point(1e-3).map(|x| x as f32))
         .collect();
     clusters[0] = [1e6; 3];
-    let mut found = Vec::new();
+    let (mut found, mut distances) = (Vec::new(), Vec::new());
     for points in [equal, clusters] {
         let index = CellIndex::new(&points);
         for &query in &points {
             index.nearest(query, 8, &mut found);
             assert_eq!(found.len(), 8);
+            index.reach_squared(query, 8, &mut distances);
         }
     }
 }

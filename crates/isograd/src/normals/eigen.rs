@@ -1,6 +1,6 @@
 //! Eigenvalues and eigenvectors of a symmetric 3×3 matrix.
 
-use crate::vector::{cross, dot, norm_squared, scale};
+use crate::vector::{add, cross, dot, norm_squared, scale};
 
 /// A symmetric matrix: `xx, xy, xz, yy, yz, zz`.
 pub(crate) type Symmetric = [f64; 6];
@@ -14,41 +14,63 @@ pub(crate) struct Eigen {
 
 /// Eigenvalues and eigenvectors of `a`, to a few units of rounding of its largest element. Where
 /// eigenvalues are equal, or the matrix is zero or not finite, the basis is some orthonormal one: the
-/// same every time.
+/// same every time. The values of a matrix that is not finite are 0.
 ///
 /// The eigenvalue that stands apart from the other two is a root of the characteristic cubic, and the
 /// other two are those of the 2×2 problem in the plane normal to its eigenvector, after D. Eberly, "A
 /// Robust Eigensolver for 3×3 Symmetric Matrices" (2014). The root is by Newton's method instead of
-/// `acos` and `cos`, so that the bits do not depend on the platform's mathematics library.
+/// `acos` and `cos`, so that the bits do not depend on the platform's mathematics library. There are
+/// choices between values but no branches: a loop over several matrices becomes vector code.
+#[inline(always)]
 pub(crate) fn eigen(a: Symmetric) -> Eigen {
-    let largest = a.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-    let finite = a.iter().all(|x| x.is_finite());
-    if !(largest > 0.0) || !finite {
-        return multiple_of_identity(0.0);
+    let (mut largest, mut finite) = (0.0, true);
+    for x in a {
+        largest = choose(x.abs() > largest, x.abs(), largest);
+        finite &= x.abs() <= f64::MAX;
     }
-    let mut b = a.map(|x| x / largest);
+    let usable = finite & (largest > 0.0);
+    let unit = choose(usable, largest, 1.0);
+    let mut b = a.map(
+        #[inline(always)]
+        |x| choose(usable, x, 0.0) / unit,
+    );
     let mean = (b[0] + b[3] + b[5]) / 3.0;
     for diagonal in [0, 3, 5] {
         b[diagonal] -= mean;
     }
     let square = b[0] * b[0] + b[3] * b[3] + b[5] * b[5];
     let spread = ((square + 2.0 * (b[1] * b[1] + b[2] * b[2] + b[4] * b[4])) / 6.0).sqrt();
-    if !(spread > 0.0) {
-        return multiple_of_identity(mean * largest);
-    }
-    let mut found = eigen_normalized(b.map(|x| x * (1.0 / spread)));
-    found.values = found.values.map(|x| (mean + spread * x) * largest);
+    // The zero matrix goes all the way like any other.
+    let inverse = choose(spread > 0.0, 1.0 / spread, 0.0);
+    let mut found = eigen_normalized(b.map(
+        #[inline(always)]
+        |x| x * inverse,
+    ));
+    found.values = found.values.map(
+        #[inline(always)]
+        |x| (mean + spread * x) * unit,
+    );
     found
 }
 
-fn multiple_of_identity(value: f64) -> Eigen {
-    Eigen {
-        values: [value; 3],
-        vectors: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-    }
+/// `a` where the condition holds, else `b`; both are there already.
+#[inline(always)]
+fn choose(condition: bool, a: f64, b: f64) -> f64 {
+    if condition { a } else { b }
 }
 
-/// The same for a matrix with trace 0 and `Σ λ² = 6`.
+/// [`choose`] for each component.
+#[inline(always)]
+fn choose_vector(condition: bool, a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        choose(condition, a[0], b[0]),
+        choose(condition, a[1], b[1]),
+        choose(condition, a[2], b[2]),
+    ]
+}
+
+/// The same for a matrix with trace 0 and `Σ λ² = 6`, or 0.
+#[inline(always)]
 fn eigen_normalized(b: Symmetric) -> Eigen {
     let half_determinant = 0.5 * determinant(b);
     let apart = eigenvalue_apart(half_determinant);
@@ -56,26 +78,34 @@ fn eigen_normalized(b: Symmetric) -> Eigen {
     let ([low, high], [second, third]) = eigen_in_plane(b, first);
     // The one apart is the largest where the determinant is positive, else the smallest. Cyclic order
     // keeps the basis right-handed.
-    if half_determinant >= 0.0 {
-        Eigen {
-            values: [low, high, apart.max(high)],
-            vectors: [second, third, first],
-        }
-    } else {
-        Eigen {
-            values: [apart.min(low), low, high],
-            vectors: [first, second, third],
-        }
+    let last = half_determinant >= 0.0;
+    let (above, below) = (
+        choose(apart > high, apart, high),
+        choose(apart < low, apart, low),
+    );
+    Eigen {
+        values: [
+            choose(last, low, below),
+            choose(last, high, low),
+            choose(last, above, high),
+        ],
+        vectors: [
+            choose_vector(last, second, first),
+            choose_vector(last, third, second),
+            choose_vector(last, first, third),
+        ],
     }
 }
 
+#[inline(always)]
 fn determinant([xx, xy, xz, yy, yz, zz]: Symmetric) -> f64 {
     xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
 }
 
 /// The root of `β³ − 3β − 2h = 0` of largest magnitude, which has the sign of `h` (`|h| ≤ 1`).
+#[inline(always)]
 fn eigenvalue_apart(h: f64) -> f64 {
-    let height = h.abs().min(1.0);
+    let height = choose(h.abs() < 1.0, h.abs(), 1.0);
     let root_of_three = 3f64.sqrt();
     // The chord from (0, √3) to (1, 2) is within 0.007 of the root; each step squares the error.
     let mut beta = root_of_three + (2.0 - root_of_three) * height;
@@ -87,6 +117,7 @@ fn eigenvalue_apart(h: f64) -> f64 {
 
 /// Unit eigenvector of a normalised matrix for an eigenvalue at least √3 away from the other two:
 /// `b − β` has rank 2, so at least one cross product of its rows is well away from 0.
+#[inline(always)]
 fn eigenvector_apart([xx, xy, xz, yy, yz, zz]: Symmetric, beta: f64) -> [f64; 3] {
     let rows = [
         [xx - beta, xy, xz],
@@ -99,16 +130,15 @@ fn eigenvector_apart([xx, xy, xz, yy, yz, zz]: Symmetric, beta: f64) -> [f64; 3]
         cross(rows[2], rows[0]),
     ];
     let mut best = products[0];
-    for other in &products[1..] {
-        if norm_squared(*other) > norm_squared(best) {
-            best = *other;
-        }
+    for &other in &products[1..] {
+        best = choose_vector(norm_squared(other) > norm_squared(best), other, best);
     }
     scale(best, 1.0 / norm_squared(best).sqrt())
 }
 
 /// Eigenvalues (ascending) and eigenvectors of `b` within the plane normal to `axis`, the two vectors
 /// and `axis` being right-handed.
+#[inline(always)]
 fn eigen_in_plane(b: Symmetric, axis: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
     let u = perpendicular(axis);
     let v = cross(axis, u);
@@ -117,35 +147,36 @@ fn eigen_in_plane(b: Symmetric, axis: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
     // One Jacobi rotation is exact: with t = tan of the angle, u − t v has the value uu − t uv, and
     // v + t u the value vv + t uv. The smaller |t| is the stable choice.
     let difference = vv - uu;
-    let t = if uv == 0.0 {
-        0.0
-    } else {
-        2.0 * uv
-            / (difference.abs() + (difference * difference + 4.0 * uv * uv).sqrt())
-                .copysign(difference)
-    };
+    let sum = difference.abs() + (difference * difference + 4.0 * uv * uv).sqrt();
+    let t = choose(uv == 0.0, 0.0, 2.0 * uv / sum.copysign(difference));
     let c = 1.0 / (1.0 + t * t).sqrt();
     let s = t * c;
-    let along = |p: f64, q: f64| [0, 1, 2].map(|a| p * u[a] + q * v[a]);
-    let (p, q) = (along(c, -s), along(s, c));
+    let (p, q) = (
+        add(scale(u, c), scale(v, -s)),
+        add(scale(u, s), scale(v, c)),
+    );
     let (p_value, q_value) = (uu - t * uv, vv + t * uv);
-    if p_value <= q_value {
-        ([p_value, q_value], [p, q])
-    } else {
-        ([q_value, p_value], [q, scale(p, -1.0)])
-    }
+    let ordered = p_value <= q_value;
+    let values = [
+        choose(ordered, p_value, q_value),
+        choose(ordered, q_value, p_value),
+    ];
+    let vectors = [
+        choose_vector(ordered, p, q),
+        choose_vector(ordered, q, scale(p, -1.0)),
+    ];
+    (values, vectors)
 }
 
 /// A unit vector at a right angle to the unit vector `a`.
+#[inline(always)]
 fn perpendicular(a: [f64; 3]) -> [f64; 3] {
-    let b = if a[0].abs() > a[1].abs() {
-        [-a[2], 0.0, a[0]]
-    } else {
-        [0.0, a[2], -a[1]]
-    };
+    let first = a[0].abs() > a[1].abs();
+    let b = choose_vector(first, [-a[2], 0.0, a[0]], [0.0, a[2], -a[1]]);
     scale(b, 1.0 / norm_squared(b).sqrt())
 }
 
+#[inline(always)]
 fn product([xx, xy, xz, yy, yz, zz]: Symmetric, x: [f64; 3]) -> [f64; 3] {
     [
         dot([xx, xy, xz], x),

@@ -50,8 +50,10 @@ mod pullback;
 #[cfg(test)]
 mod tests;
 
-pub use forward::forward;
+pub use forward::{forward, forward_with_neighborhoods};
 pub use pullback::{Scratch, pullback};
+
+use crate::neighbors::Found;
 
 /// The local plane of one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -75,8 +77,8 @@ pub struct Residual<T> {
     pub normals: Vec<[T; 3]>,
     /// The plane round each point.
     pub planes: Vec<Plane<T>>,
-    /// Both in the order of the cells: scratch.
-    sorted: Vec<([T; 3], Plane<T>)>,
+    /// Moments in the order of the cells: scratch.
+    sorted: Vec<Found<T, forward::Moments<T>>>,
 }
 
 impl<T> Residual<T> {

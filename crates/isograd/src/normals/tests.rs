@@ -4,7 +4,7 @@ use rayon::ThreadPoolBuilder;
 
 use super::eigen::{Symmetric, eigen};
 use super::forward::EPSILON;
-use super::{Residual, forward};
+use super::{Residual, forward, forward_with_neighborhoods};
 use crate::neighbors::tests::{Random, even_sphere, torus, ugly_clouds};
 use crate::neighbors::{self, Neighborhoods, Radius};
 use crate::{Real, vector};
@@ -101,6 +101,18 @@ fn normals_are_unit_with_their_largest_component_positive() {
                 .fold(0.0, |m: f32, x| if x.abs() > m.abs() { x } else { m });
             assert!(largest > 0.0, "{name}, point {i}: {n:?}");
         }
+    }
+}
+
+#[test]
+fn one_walk_gives_the_bits_that_two_give() {
+    for (name, points) in ugly_clouds::<f32>() {
+        let (two, residual) = axes(&points);
+        let (mut one, mut found) = <(Neighborhoods<f32>, Residual<f32>)>::default();
+        forward_with_neighborhoods(&points, Radius::Auto, &mut one, &mut found).expect(name);
+        assert_eq!(found.normals, residual.normals, "{name}");
+        assert_eq!(found.planes, residual.planes, "{name}");
+        assert_eq!((one.radius, one.count), (two.radius, two.count), "{name}");
     }
 }
 

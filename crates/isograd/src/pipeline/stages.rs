@@ -40,19 +40,26 @@ impl<T: Real> Reconstructor<T> {
             ..
         } = &mut self.result;
         let neighborhoods = &mut residuals.neighborhoods;
+        let given = options.orientation == orient::Method::Given;
         match held {
             Some(held) => {
                 neighbors::hold(cloud.points(), &held.residuals.neighborhoods, neighborhoods)?;
             }
-            None => neighbors::forward(cloud.points(), options.radius, neighborhoods)?,
+            None if given => neighbors::forward(cloud.points(), options.radius, neighborhoods)?,
+            None => normals::forward_with_neighborhoods(
+                cloud.points(),
+                options.radius,
+                neighborhoods,
+                &mut residuals.normals,
+            )?,
         }
-        if options.orientation == orient::Method::Given {
+        if given {
             residuals.normals.clear();
-        } else {
+        } else if held.is_some() {
             normals::forward(neighborhoods, &mut residuals.normals);
         }
         if options.area_weights {
-            splat::area::forward(neighborhoods, &mut self.scratch.areas, areas);
+            splat::area::forward(neighborhoods, areas);
         } else {
             areas.clear();
             areas.resize(cloud.len(), T::one());

@@ -8,6 +8,9 @@
 //! [`Neighborhoods::isolated`]) stands for no surface: `a_i = 0`. By the sum alone it would stand for
 //! about the square of its distance to the surface, and one in a hundred would outweigh the surface.
 //!
+//! The sum is made where the neighbours are counted ([`crate::neighbors`]): every other pass over all
+//! neighbours would cost ten times as much as the sum.
+//!
 //! # Residual
 //! The areas and the neighbourhoods themselves.
 //!
@@ -24,91 +27,36 @@
 
 use rayon::prelude::*;
 
-use crate::neighbors::{Candidates, LANES, Lanes, Neighborhoods};
+use crate::neighbors::{Candidates, LANES, Neighborhoods};
 use crate::{Real, vector};
-
-/// Buffers that are used again.
-#[derive(Clone, Debug, Default)]
-pub struct Scratch<T> {
-    /// Areas in the order of the cells.
-    sorted: Vec<T>,
-}
 
 /// Writes the `(N,)` areas `a_i`, in input order and the unit of the points squared; positive, and 0
 /// for isolated samples.
 ///
 /// They add up to the area of the surface where the sampling is even; for random samples the sum is
 /// lower, by about `3/count` of it, for each sample counts itself.
-pub fn forward<T: Real>(
-    neighborhoods: &Neighborhoods<T>,
-    scratch: &mut Scratch<T>,
-    areas: &mut Vec<T>,
-) {
-    let arch = pulp::Arch::new();
-    scratch.sorted.resize(neighborhoods.index.len(), T::zero());
-    neighborhoods.for_each_neighborhood(&mut scratch.sorted, &|center, radius, candidates| {
-        area(
-            radius,
-            crate::simd::dispatch(
-                arch,
-                #[inline(always)]
-                || kernel_sum(center, radius, candidates),
-            ),
-        )
-    });
-    let at = |(&position, &isolated): (&u32, &bool)| {
+pub fn forward<T: Real>(neighborhoods: &Neighborhoods<T>, areas: &mut Vec<T>) {
+    let Neighborhoods {
+        radius,
+        crowd,
+        isolated,
+        ..
+    } = neighborhoods;
+    let samples = radius.par_iter().zip(crowd).zip(isolated);
+    let area = |((&radius, &crowd), &isolated): ((&T, &T), &bool)| {
         if isolated {
             T::zero()
         } else {
-            scratch.sorted[position as usize]
+            area(radius, crowd)
         }
     };
-    let samples = neighborhoods
-        .position()
-        .par_iter()
-        .zip(&neighborhoods.isolated);
-    samples.map(at).collect_into_vec(areas);
+    samples.map(area).collect_into_vec(areas);
 }
 
-/// `a_i` from `Σ_j (1 − r_j²/R_i²)²`.
+/// `a_i` from `Σ_j (1 − r_j²/R_i²)²`, which is at least 1, the sample's own part.
 #[inline(always)]
-fn area<T: Real>(radius: T, kernel_sum: T) -> T {
-    T::PI() * radius * radius / (T::of(3.0) * kernel_sum)
-}
-
-/// `Σ_j (1 − r_j²/R_i²)²`; at least 1, the sample's own part.
-#[inline(always)]
-fn kernel_sum<T: Real>(center: [T; 3], radius: T, candidates: &Candidates<T>) -> T {
-    let scale = T::one() / (radius * radius);
-    let mut sums = [T::zero(); LANES];
-    candidates.for_each_lanes(
-        radius,
-        #[inline(always)]
-        |lanes| {
-            let terms = kernel_terms(center, scale, lanes);
-            for l in 0..LANES {
-                sums[l] += terms[l];
-            }
-        },
-    );
-    sums.into_iter().sum()
-}
-
-/// `(1 − r²/R²)²` of each lane, 0 outside the radius.
-#[inline(always)]
-fn kernel_terms<T: Real>(center: [T; 3], scale: T, lanes: &Lanes<T>) -> [T; LANES] {
-    let mut terms = [T::zero(); LANES];
-    for l in 0..LANES {
-        let [x, y, z] = [0, 1, 2].map(|a| lanes.point[a][l] - center[a]);
-        let d2 = x * x + y * y + z * z;
-        let s = T::one() - d2 * scale;
-        terms[l] = if d2 <= lanes.limit[l] {
-            s * s
-        } else {
-            T::zero()
-        };
-    }
-    terms
+fn area<T: Real>(radius: T, crowd: T) -> T {
+    T::PI() * radius * radius / (T::of(3.0) * crowd)
 }
 
 /// Buffers of the pullback.

@@ -2,7 +2,7 @@
 
 use rayon::ThreadPoolBuilder;
 
-use super::{Scratch, forward};
+use super::forward;
 use crate::neighbors::tests::{Random, even_sphere, torus, ugly_clouds};
 use crate::neighbors::{self, Neighborhoods, Radius};
 use crate::{Real, vector};
@@ -10,7 +10,7 @@ use crate::{Real, vector};
 fn areas<T: Real>(points: &[[T; 3]]) -> (Neighborhoods<T>, Vec<T>) {
     let (mut neighborhoods, mut areas) = Default::default();
     neighbors::forward(points, Radius::Auto, &mut neighborhoods).expect("a valid cloud");
-    forward(&neighborhoods, &mut Scratch::default(), &mut areas);
+    forward(&neighborhoods, &mut areas);
     (neighborhoods, areas)
 }
 

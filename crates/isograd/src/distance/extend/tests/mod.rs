@@ -35,7 +35,7 @@ impl<T: Real> Scene<T> {
         let mut neighborhoods = Neighborhoods::default();
         neighbors::forward(&points, Radius::Auto, &mut neighborhoods).expect("samples");
         let mut areas = Vec::new();
-        splat::area::forward(&neighborhoods, &mut Default::default(), &mut areas);
+        splat::area::forward(&neighborhoods, &mut areas);
 
         let spacing = T::of(2.2 / cells as f64);
         let grid = Grid::new([T::of(-1.1); 3], spacing, [cells; 3]).expect("a grid");
