@@ -46,8 +46,9 @@ class Case:
         self.checks = self.check()
 
     def ours(self, dtype: str, threads: int) -> Entry:
-        """Our entry of the same type, with as many threads as the peer had."""
-        mine = [entry for entry in self.entries if entry.ours and entry.dtype == dtype]
+        """Our entry of the same type, where there is one, with as many threads as the peer had."""
+        all_mine = [entry for entry in self.entries if entry.ours]
+        mine = [entry for entry in all_mine if entry.dtype == dtype] or all_mine
         same = [entry for entry in mine if entry.threads == threads]
         return (same or mine)[-1]
 

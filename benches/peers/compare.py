@@ -1,4 +1,4 @@
-"""Times isograd beside libigl, Open3D, Warp and SciPy in one run: `cargo xtask peers`."""
+"""Times isograd beside other libraries in one run: `cargo xtask peers`."""
 
 import argparse
 import os
@@ -10,9 +10,12 @@ import numpy as np
 import warp as wp
 
 import distance
+import isosurface
 import normals
+import orientation
 import poisson
 import report
+import shape_as_points
 import whole
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -54,7 +57,10 @@ def jobs(options) -> dict:
             for shape in shapes
             for dtype in (np.float32, np.float64)
         ],
+        "indicator": [job(shape_as_points.case, count, cells)],
         "normals": [job(normals.case, n) for n in (count, 10 * count)],
+        "orientation": [job(orientation.case, count)],
+        "isosurface": [job(isosurface.case, n) for n in (cells, 2 * cells)],
         "distance": [job(distance.case, cells)],
         "whole": [job(whole.case, count, cells)],
     }
@@ -71,7 +77,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--repeats", type=int, default=None, help="runs that count (5; quick: 2)")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--quick", action="store_true", help="small sizes, few runs")
-    parser.add_argument("--only", nargs="*", help="poisson, normals, distance, whole")
+    parser.add_argument("--only", nargs="*", help="names of comparisons")
     options = parser.parse_args()
     options.repeats = options.repeats or (2 if options.quick else 5)
     # What is committed is a whole run.

@@ -1,4 +1,4 @@
-"""D-PCA normals against Warp's hash grid doing the same sums."""
+"""D-PCA normals and area weights against Warp's hash grid doing the same sums."""
 
 import numpy as np
 import warp as wp
@@ -18,11 +18,13 @@ def warp_normals(
     radius: float,
     guard: float,
     out: wp.array(dtype=wp.vec3),
+    areas: wp.array(dtype=float),
 ):
     # Neighbouring threads take neighbouring points, as Warp's manual advises.
     i = wp.hash_grid_point_id(grid, wp.tid())
     x = points[i]
     total = float(0.0)
+    crowd = float(0.0)
     first = wp.vec3()
     second = wp.mat33()
     query = wp.hash_grid_query(grid, x, radius)
@@ -33,38 +35,45 @@ def warp_normals(
         if r <= radius:
             w = 1.0 / (r + guard)
             total += w
+            rise = 1.0 - r * r / (radius * radius)
+            crowd += rise * rise
             first += w * d
             second += w * wp.outer(d, d)
     m = first / total
     vectors, values = wp.eig3(second / total - wp.outer(m, m))
     least = wp.argmin(values)
     out[i] = wp.vec3(vectors[0, least], vectors[1, least], vectors[2, least])
+    areas[i] = wp.pi * radius * radius / (3.0 * crowd)
 
 
 def case(stack, program, folder, count: int, threads: int) -> Case:
-    """Each entry gets points and a radius and returns normals: its grid or index counts."""
+    """Each entry gets points and a radius and returns normals and areas: its grid or index counts."""
     folder = folder / f"normals-{count}"
     points, truth = torus.samples(count)
     points = points.astype(np.float32)
     area = 4 * np.pi**2 * torus.MAJOR * torus.MINOR
     radius = float(np.sqrt(24 * area / (np.pi * count)))
     write_input(folder, {"radius": radius}, points=points)
-    entries = [
-        stack.enter_context(Stage(program, "normals", folder, np.float32, number)).entry("normals")
+    stages = [
+        stack.enter_context(Stage(program, "normals", folder, np.float32, number))
         for number in sorted({1, threads})
     ]
+    entries = [stage.entry("normals") for stage in stages]
     entries.append(peer("Warp hash grid, CPU", "float32", 1, warp(points, radius)))
 
     def check() -> list[str]:
-        mine, theirs = entries[0].result().reshape(-1, 3), entries[-1].result()
+        mine = entries[0].result().reshape(-1, 3)
+        theirs, their_areas = entries[-1].result()
+        areas = stages[0].result("areas")
         return [
             f"isograd: {degrees(mine, truth)} from the true axis",
             f"Warp: {degrees(theirs, truth)} from the true axis",
             f"isograd and Warp: {degrees(mine, theirs)} apart",
+            f"areas add up to {areas.sum() / area:.4f} and {their_areas.sum() / area:.4f} of the torus",
         ]
 
-    title = f"D-PCA, {count:,} points"
-    what = "neighbours within a radius (24 at the mean), weighted sums, least eigenvector"
+    title = f"D-PCA and areas, {count:,} points"
+    what = "neighbours within a radius (24 at the mean), weighted sums, least eigenvector, area"
     return Case(title, what, ("point", count), entries, check)
 
 
@@ -78,12 +87,13 @@ def degrees(a: np.ndarray, b: np.ndarray) -> str:
 def warp(points, radius):
     positions = wp.array(points, dtype=wp.vec3, device="cpu")
     out = wp.zeros(len(points), dtype=wp.vec3, device="cpu")
+    areas = wp.zeros(len(points), dtype=float, device="cpu")
     grid = wp.HashGrid(128, 128, 128, device="cpu")
 
     def work():
         grid.build(positions, radius)
-        inputs = [grid.id, positions, radius, GUARD * radius, out]
+        inputs = [grid.id, positions, radius, GUARD * radius, out, areas]
         wp.launch(warp_normals, len(points), inputs, device="cpu")
-        return out.numpy()
+        return out.numpy(), areas.numpy()
 
     return work

@@ -11,7 +11,16 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
-PACKAGES = ["libigl", "open3d-cpu", "warp-lang", "scipy", "numpy"]
+PACKAGES = [
+    "libigl",
+    "open3d-cpu",
+    "warp-lang",
+    "pymeshlab",
+    "scikit-image",
+    "jax",
+    "scipy",
+    "numpy",
+]
 
 
 def machine() -> dict:
@@ -81,8 +90,8 @@ def page(cases, about: dict, command: str) -> str:
         f"{about['processor']}, {about['cores']} cores, {about['system']}; load average at the end "
         f"{about['load_average']:.1f}. {versions}.",
         "",
-        "“Times ours” is the peer's time over that of isograd with the same number type and number of "
-        "threads. Warp's CPU kernels run on one thread.",
+        "“Times ours” is the peer's time over that of isograd with the same number type (where both have it) "
+        "and number of threads. Warp's CPU kernels, scikit-image and PyMeshLab run on one thread.",
         "",
         "![Times of isograd and its peers](images/peers.png)",
     ]

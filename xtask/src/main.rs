@@ -41,7 +41,7 @@ Figures and pages
   fit              docs/fit.md: a fish found from its signed distance field
   bench [ARGS]     the benchmarks, every stage and the whole; --quick for a short run,
                    a stage's name for that stage; other arguments go to criterion
-  peers [ARGS]     docs/peers.md: isograd beside libigl, Open3D, Warp and SciPy, measured in one
+  peers [ARGS]     docs/peers.md: isograd beside other libraries, measured in one
                    run (needs Python 3 and PyPI); --quick for a short run
 
 Exit status: 0 done, 1 a step failed, 2 the command line is wrong.";

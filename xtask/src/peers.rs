@@ -1,4 +1,4 @@
-//! `cargo xtask peers`: isograd beside libigl, Open3D, Warp and SciPy, by a script of Python.
+//! `cargo xtask peers`: isograd beside other libraries, by a script of Python.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
