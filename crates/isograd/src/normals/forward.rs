@@ -30,7 +30,7 @@ pub fn forward<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residual<T>)
     find_all_planes(neighborhoods, arch, out);
 }
 
-/// [`neighbors::forward`] and [`forward`] in one walk over all neighbours, in two thirds of the time of both.
+/// [`neighbors::forward`] and [`forward`] in one walk over all neighbours, in four fifths of the time of both.
 ///
 /// # Errors
 /// As [`neighbors::forward`].
