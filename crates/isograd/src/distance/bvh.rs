@@ -209,6 +209,38 @@ impl Bvh {
         }
     }
 
+    /// The triangle closest to one point, by its place, if one is within a distance (squared).
+    #[inline(always)]
+    pub(super) fn nearest_to(&self, q: [f64; 3], within: f64, stack: &mut Stack) -> Option<u32> {
+        let mut best = (within, None);
+        stack.clear();
+        stack.push((self.levels.len() as u32, 0, 0.0));
+        while let Some((level, index, least)) = stack.pop() {
+            if !(least < best.0) {
+                continue;
+            }
+            if level == 0 {
+                for place in self.leaf(index) {
+                    let [squared] = self.frame(place).distances(&q.map(|x| [x]));
+                    if squared < best.0 {
+                        best = (squared, Some(place));
+                    }
+                }
+                continue;
+            }
+            let squared = self.levels[level as usize - 1][index as usize].distances_from(q);
+            let top = stack.len();
+            for slot in 0..WIDTH {
+                if squared[slot] < best.0 {
+                    let child = index * WIDTH as u32 + slot as u32;
+                    stack.push((level - 1, child, squared[slot]));
+                }
+            }
+            sort_descending(&mut stack[top..]);
+        }
+        best.1
+    }
+
     #[inline(always)]
     fn nearest_in_leaf(&self, points: &Points, leaf: u32, found: &mut Found) {
         for place in self.leaf(leaf) {
@@ -245,10 +277,7 @@ impl Found {
     /// Takes the triangle for every point to which it is closer than what was found.
     #[inline(always)]
     pub(super) fn try_triangle(&mut self, frame: &Frame, place: u32, points: &Points) {
-        let mut squared = [0.0; LANES];
-        for l in 0..LANES {
-            squared[l] = frame.distance_squared([points[0][l], points[1][l], points[2][l]]);
-        }
+        let squared = frame.distances(points);
         // Both arrays are written whole: a store of some lanes would hold up the next load.
         for l in 0..LANES {
             let old = self.triangle[l];
@@ -338,6 +367,19 @@ impl Node {
             for l in 0..LANES {
                 let d = interval_distance(low, high, points[a][l]);
                 squared[l] += d * d;
+            }
+        }
+        squared
+    }
+
+    /// Squared distances from a point to the children.
+    #[inline(always)]
+    fn distances_from(&self, q: [f64; 3]) -> [f64; WIDTH] {
+        let mut squared = [0.0; WIDTH];
+        for a in 0..3 {
+            for s in 0..WIDTH {
+                let d = interval_distance(self.low[a][s], self.high[a][s], q[a]);
+                squared[s] += d * d;
             }
         }
         squared

@@ -6,6 +6,8 @@
 //! slivers, needles and single points lose nothing: the result is that of a triangle whose corners moved by
 //! a few units in the last place.
 
+use num_traits::Float;
+
 use crate::vector::{add, cross, dot, norm, norm_squared, normalized, scale, sub};
 
 /// The part of a triangle on which a closest point lies.
@@ -91,18 +93,12 @@ fn combine(corners: [[f64; 3]; 3], weights: [f64; 3]) -> [f64; 3] {
 /// A triangle in its own plane; see the head of this file.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Frame {
-    origin: [f64; 3],
-    u: [f64; 3],
-    v: [f64; 3],
-    normal: [f64; 3],
-    base: f64,
-    apex: [f64; 2],
-    /// Unit direction and length of the side from the origin to the apex.
-    left: [f64; 2],
-    left_length: f64,
-    /// Unit direction and length of the side from the end of the base to the apex.
-    right: [f64; 2],
-    right_length: f64,
+    pub(super) origin: [f64; 3],
+    /// Unit vectors along the base, up to the apex, and across the plane.
+    pub(super) axes: [[f64; 3]; 3],
+    pub(super) outline: Outline<f64>,
+    /// Height of the apex.
+    height: f64,
     /// For every point `q`: `d²(q, triangle) ≥ min_k |q − y_k|² − slack`.
     slack: f64,
     /// Which corner the origin is.
@@ -121,21 +117,12 @@ impl Frame {
         let u = normalized(side).unwrap_or([1.0, 0.0, 0.0]);
         let foot = dot(u, to_apex);
         let (v, height) = perpendicular(u, sub(to_apex, scale(u, foot)));
-        let apex = [foot, height];
-        let (left, left_length) = direction(apex, [1.0, 0.0]);
-        let (right, right_length) = direction([foot - base, height], [-1.0, 0.0]);
         Self {
             origin,
-            u,
-            v,
-            normal: cross(u, v),
-            base,
-            apex,
-            left,
-            left_length,
-            right,
-            right_length,
-            slack: slack(base, apex),
+            axes: [u, v, cross(u, v)],
+            outline: Outline::new(base, foot, height),
+            height,
+            slack: slack(base, [foot, height]),
             first,
         }
     }
@@ -143,17 +130,21 @@ impl Frame {
     /// [`closest_point`], for the corners that the frame was made of.
     pub(crate) fn closest(&self, query: [f64; 3], corners: [[f64; 3]; 3]) -> Closest {
         let (barycentric, feature) = self.barycentric(query);
-        closest_from(query, corners, barycentric, feature, self.normal)
+        closest_from(query, corners, barycentric, feature, self.axes[2])
     }
 
     /// [`unit_normal`] of the triangle.
     pub(crate) fn unit_normal(&self) -> Option<[f64; 3]> {
-        (self.apex[1] > 0.0).then_some(self.normal)
+        (self.height > 0.0).then_some(self.axes[2])
     }
 
-    pub(crate) fn centroid(&self) -> [f64; 3] {
-        let along = scale(self.u, (self.base + self.apex[0]) / 3.0);
-        add(self.origin, add(along, scale(self.v, self.apex[1] / 3.0)))
+    /// Corner `k` of the triangle in its plane.
+    pub(super) fn corner(&self, k: usize) -> [f64; 2] {
+        match (k + 3 - self.first) % 3 {
+            0 => [0.0, 0.0],
+            1 => [self.outline.base, 0.0],
+            _ => [self.outline.foot, self.height],
+        }
     }
 
     pub(crate) fn slack(&self) -> f64 {
@@ -161,36 +152,40 @@ impl Frame {
     }
 
     pub(crate) fn longest_edge(&self) -> f64 {
-        self.base
+        self.outline.base
     }
 
-    /// Squared distance from `q`. Without branches, so that a loop over points becomes vector code.
+    /// Squared distances from points, `[axis][point]`. Without branches, so that it becomes vector code.
     #[inline(always)]
-    pub(crate) fn distance_squared(&self, q: [f64; 3]) -> f64 {
-        let p = sub(q, self.origin);
-        let (x, y, z) = (dot(self.u, p), dot(self.v, p), dot(self.normal, p));
-        let beyond = x - clamp(x, self.base);
-        let base = beyond * beyond + y * y;
-        let (left, left_side) = side_distance(self.left, self.left_length, [x, y]);
-        let (right, right_side) = side_distance(self.right, self.right_length, [x - self.base, y]);
-        let inside = (y > 0.0) & (left_side < 0.0) & (right_side > 0.0);
-        let border = min(base, min(left, right));
-        z * z + if inside { 0.0 } else { border }
+    pub(super) fn distances<const N: usize>(&self, points: &[[f64; N]; 3]) -> [f64; N] {
+        let Self {
+            origin,
+            axes: [u, v, w],
+            outline,
+            ..
+        } = *self;
+        let mut squared = [0.0; N];
+        for l in 0..N {
+            let p = sub([points[0][l], points[1][l], points[2][l]], origin);
+            let (x, y, z) = (dot(u, p), dot(v, p), dot(w, p));
+            squared[l] = z * z + outline.distance_squared(x, y);
+        }
+        squared
     }
 
     /// The point of the triangle closest to `q`, rounded.
     pub(crate) fn nearest(&self, q: [f64; 3]) -> [f64; 3] {
+        let [u, v, _] = self.axes;
         let p = sub(q, self.origin);
-        let ([_, b, c], _) = self.plane_barycentric([dot(self.u, p), dot(self.v, p)]);
-        let along = b * self.base + c * self.apex[0];
-        let up = c * self.apex[1];
-        add(self.origin, add(scale(self.u, along), scale(self.v, up)))
+        let ([_, b, c], _) = self.plane_barycentric(dot(u, p), dot(v, p));
+        let along = b * self.outline.base + c * self.outline.foot;
+        add(self.origin, add(scale(u, along), scale(v, c * self.height)))
     }
 
     /// Weights of the corners, in their own order, at the closest point, and where it lies.
     fn barycentric(&self, q: [f64; 3]) -> ([f64; 3], Feature) {
         let p = sub(q, self.origin);
-        let (weights, feature) = self.plane_barycentric([dot(self.u, p), dot(self.v, p)]);
+        let (weights, feature) = self.plane_barycentric(dot(self.axes[0], p), dot(self.axes[1], p));
         let mut turned = [0.0; 3];
         for k in 0..3 {
             turned[(k + self.first) % 3] = weights[k];
@@ -204,26 +199,117 @@ impl Frame {
     }
 
     /// The same in the plane, the origin being corner 0.
-    fn plane_barycentric(&self, [x, y]: [f64; 2]) -> ([f64; 3], Feature) {
-        let beyond = x - clamp(x, self.base);
-        let base = beyond * beyond + y * y;
-        let (left, left_side) = side_distance(self.left, self.left_length, [x, y]);
-        let (right, right_side) = side_distance(self.right, self.right_length, [x - self.base, y]);
-        if y > 0.0 && left_side < 0.0 && right_side > 0.0 {
-            let c = min(y / self.apex[1], 1.0);
-            let b = clamp((x - c * self.apex[0]) / self.base, 1.0 - c);
-            return ([1.0 - b - c, b, c], Feature::Face);
+    fn plane_barycentric(&self, x: f64, y: f64) -> ([f64; 3], Feature) {
+        let Outline { base, foot, .. } = self.outline;
+        if !(y > 0.0) {
+            return on_edge(0, x, base);
         }
-        if base <= left && base <= right {
-            on_edge(0, x, self.base)
-        } else if left <= right {
+        let (side, way) = self.outline.side(x);
+        let (along, across) = side.coordinates(way, y);
+        if across < 0.0 {
+            let c = min(y / self.height, 1.0);
+            let b = clamp((x - c * foot) / base, 1.0 - c);
+            ([1.0 - b - c, b, c], Feature::Face)
+        } else if x < foot {
             // The left side runs from corner 2 to corner 0.
-            let back = self.left_length - (x * self.left[0] + y * self.left[1]);
-            on_edge(2, back, self.left_length)
+            on_edge(2, side.length - along, side.length)
         } else {
-            let along = (x - self.base) * self.right[0] + y * self.right[1];
-            on_edge(1, along, self.right_length)
+            on_edge(1, along, side.length)
         }
+    }
+}
+
+/// A triangle in its plane, its base from `(0, 0)` to `(base, 0)`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Outline<T> {
+    pub base: T,
+    /// Where under the apex the base is: in `0..=base`, as the base is the longest edge.
+    pub foot: T,
+    /// The right side, seen in a mirror, from the other end of the base.
+    pub right: Side<T>,
+    /// The left side less the right one: to add a number or nothing is one operation of vector code, while a
+    /// choice of two numbers in memory would be made of addresses, and gathered.
+    pub left_from_right: Side<T>,
+}
+
+/// The side from an end of the base, which is the origin, up to the apex.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Side<T> {
+    /// Unit direction; along the base where the apex is on it.
+    pub unit: [T; 2],
+    pub length: T,
+}
+
+impl Outline<f64> {
+    fn new(base: f64, foot: f64, height: f64) -> Self {
+        let left = Side::new(foot, height);
+        let right = Side::new(base - foot, height);
+        Self {
+            base,
+            foot,
+            right,
+            left_from_right: Side {
+                unit: [left.unit[0] - right.unit[0], left.unit[1] - right.unit[1]],
+                length: left.length - right.length,
+            },
+        }
+    }
+}
+
+impl Side<f64> {
+    fn new(foot: f64, height: f64) -> Self {
+        let length = (foot * foot + height * height).sqrt();
+        let unit = if height > 0.0 && length > 0.0 {
+            [foot / length, height / length]
+        } else {
+            [1.0, 0.0]
+        };
+        Self { unit, length }
+    }
+}
+
+impl<T: Float> Side<T> {
+    /// Coordinates along the side and across it, positive outside.
+    #[inline(always)]
+    fn coordinates(&self, x: T, y: T) -> (T, T) {
+        let [c, s] = self.unit;
+        (c * x + s * y, c * y - s * x)
+    }
+}
+
+impl<T: Float> Outline<T> {
+    /// Squared distance from a point of the plane.
+    ///
+    /// Angles at the base are not above 90°. So what is closest to a point above the base is on the side on
+    /// its side of the apex, or inside; and a point below is as far from the triangle as from the point over
+    /// it on the line of the base, and that way besides.
+    #[inline(always)]
+    pub fn distance_squared(&self, x: T, y: T) -> T {
+        let zero = T::zero();
+        let above = if y > zero { y } else { zero };
+        let below = y - above;
+        let (side, way) = self.side(x);
+        let (along, across) = side.coordinates(way, above);
+        let beyond = along - clamp(along, side.length);
+        let outside = if across > zero { across } else { zero };
+        below * below + (beyond * beyond + outside * outside)
+    }
+
+    /// The side on this side of the apex, and how far `x` is from its end of the base.
+    #[inline(always)]
+    fn side(&self, x: T) -> (Side<T>, T) {
+        let (zero, left) = (T::zero(), x < self.foot);
+        let Side { unit: a, length: m } = self.right;
+        let Side { unit: b, length: n } = self.left_from_right;
+        let side = Side {
+            unit: [
+                a[0] + if left { b[0] } else { zero },
+                a[1] + if left { b[1] } else { zero },
+            ],
+            length: m + if left { n } else { zero },
+        };
+        let back = self.base - x;
+        (side, if left { x } else { back })
     }
 }
 
@@ -244,20 +330,10 @@ fn on_edge(k: usize, along: f64, length: f64) -> ([f64; 3], Feature) {
     (weights, Feature::Edge(k))
 }
 
-/// Squared distance in the plane from `p` to the segment from 0 along a unit direction, and on which side of
-/// its line `p` is (positive on the left).
-#[inline(always)]
-fn side_distance(unit: [f64; 2], length: f64, p: [f64; 2]) -> (f64, f64) {
-    let along = unit[0] * p[0] + unit[1] * p[1];
-    let across = unit[0] * p[1] - unit[1] * p[0];
-    let beyond = along - clamp(along, length);
-    (beyond * beyond + across * across, across)
-}
-
 /// `x` held to `0..=high`. As the machine does it: `f64::clamp` and `f64::max` cost more for their NaN rule.
 #[inline(always)]
-fn clamp(x: f64, high: f64) -> f64 {
-    let x = if x > 0.0 { x } else { 0.0 };
+fn clamp<T: Float>(x: T, high: T) -> T {
+    let x = if x > T::zero() { x } else { T::zero() };
     if x < high { x } else { high }
 }
 
@@ -287,17 +363,6 @@ fn any_perpendicular(u: [f64; 3]) -> [f64; 3] {
     let mut axis = [0.0; 3];
     axis[least] = 1.0;
     normalized(cross(u, axis)).unwrap_or([0.0, 0.0, 1.0])
-}
-
-/// Unit direction and length of a plane vector. Without a length, or along the base, it is `otherwise`, with
-/// which no point is inside: the two sides then ask for opposite signs of `y`.
-fn direction(r: [f64; 2], otherwise: [f64; 2]) -> ([f64; 2], f64) {
-    let length = (r[0] * r[0] + r[1] * r[1]).sqrt();
-    if r[1] > 0.0 {
-        ([r[0] / length, r[1] / length], length)
-    } else {
-        (otherwise, length)
-    }
 }
 
 /// The most by which a point of the triangle can be closer (squared) than its closest corner: for the point

@@ -1,12 +1,17 @@
 //! Boxes of cells.
 
-use super::kernels::CHILDREN;
 use crate::distance::bvh::{LANES, Points};
 use crate::vector::{add, norm, norm_squared, scale, sub};
 use crate::{Grid, Real};
 
 /// Cells along a side of a block that is solved on its own.
 pub(super) const BLOCK: usize = 16;
+
+/// Blocks that a block is cut into.
+pub(super) const CHILDREN: usize = 8;
+
+/// Sides of a packet, which is measured at once.
+pub(super) const PACKET: [usize; 3] = [2, 2, 4];
 
 /// A box of cells, clipped to the grid.
 #[derive(Clone, Copy, Debug)]
@@ -32,9 +37,29 @@ impl Block {
         Self::new(start, half, self.end)
     }
 
-    /// Cell of a lane of a block of side 2; lanes outside the grid repeat a cell inside it.
-    pub(super) fn cell(&self, lane: usize) -> [usize; 3] {
-        std::array::from_fn(|a| (self.start[a] + bit(lane, a)).min(self.end[a] - 1))
+    /// The packets of a block of side 4 that are in the grid, with their numbers: children `2 i` and `2 i + 1`
+    /// are the halves of packet `i`.
+    pub(super) fn packets(&self) -> impl Iterator<Item = (usize, Self)> {
+        (0..4)
+            .map(|index| {
+                let start = [
+                    self.start[0] + 2 * (index >> 1),
+                    self.start[1] + 2 * (index & 1),
+                    self.start[2],
+                ];
+                (index, Self { start, ..*self })
+            })
+            .filter(|(_, packet)| !packet.is_empty())
+    }
+
+    /// Whether a cell, from the first one, is in the grid.
+    pub(super) fn contains(&self, offset: [usize; 3]) -> bool {
+        (0..3).all(|a| self.start[a] + offset[a] < self.end[a])
+    }
+
+    /// A cell of the block, from its first one; the last one inside the grid for those outside.
+    pub(super) fn clipped(&self, offset: [usize; 3]) -> [usize; 3] {
+        std::array::from_fn(|a| (self.start[a] + offset[a]).min(self.end[a] - 1))
     }
 }
 

@@ -1,47 +1,80 @@
 //! From the lists of a block to those of its children.
 
-use super::block::{Children, Extent, bit};
-use super::kernels::{self, Boxes, CHILDREN, MARGIN};
+use super::block::{CHILDREN, Children, Extent, bit, centres, closest_of};
+use super::kernels::{self, MARGIN};
+use super::site_list::{Boxes, closest};
 use super::task::{Local, Task};
-use super::workspace::Lists;
+use super::workspace::{Kept, Lists};
 use crate::Real;
 use crate::distance::bvh::{LANES, Points};
+use crate::simd::dispatch;
 use crate::vector::{norm, sub};
 
 impl<T: Real> Task<'_, T> {
-    /// Coordinates in cells from `origin`, in single precision.
-    pub(super) fn in_cells(&self, points: &Points, origin: [f64; 3]) -> [[f32; CHILDREN]; 3] {
-        let per_cell = 1.0 / self.grid.spacing().f64();
-        std::array::from_fn(|a| points[a].map(|x| ((x - origin[a]) * per_cell) as f32))
-    }
-
     /// Fills the lists of the children from those of their parent.
-    pub(super) fn cull(
-        &self,
-        local: &Local,
-        lists: &Lists,
-        children: &Children,
-        feet: &[Option<[f64; 3]>; CHILDREN],
-        kept: &mut [Lists; CHILDREN],
-    ) {
+    pub(super) fn cull(&self, local: &Local, lists: Lists, children: &Children, kept: &mut Kept) {
+        let feet = self.feet(local, lists, children);
         let mut boxes = Boxes::NOTHING;
         for l in 0..CHILDREN {
-            kept[l].clear();
+            kept.large[l].clear();
             if let (Some(extent), Some(foot)) = (&children[l].1, feet[l]) {
                 self.set_box(&mut boxes, l, local, extent, foot);
                 if !lists.large.is_empty() {
-                    self.cull_large(&lists.large, extent, foot, &mut kept[l].large);
+                    self.cull_large(lists.large, extent, foot, &mut kept.large[l]);
                 }
             }
         }
-        if !lists.sites.is_empty() {
-            self.arch.dispatch(kernels::CullSites {
-                sites: local.sites,
-                list: &lists.sites,
-                boxes: &boxes,
-                lists: kept,
-            });
+        dispatch(
+            self.arch,
+            #[inline(always)]
+            || kept.sites.cull(local.sites, lists.sites, &boxes),
+        );
+    }
+
+    /// A point of the mesh close to the centre of each child, where the lists hold one.
+    fn feet(
+        &self,
+        local: &Local,
+        lists: Lists,
+        children: &Children,
+    ) -> [Option<[f64; 3]>; CHILDREN] {
+        let centres = centres(children, local.centre);
+        let sites = (!lists.sites.is_empty()).then(|| self.closest_sites(local, lists, &centres));
+        let large = (!lists.large.is_empty()).then(|| {
+            self.arch.dispatch(kernels::ClosestListed {
+                bvh: self.bvh,
+                list: lists.large,
+                points: &centres,
+            })
+        });
+        std::array::from_fn(|l| {
+            let centre = children[l].1?.centre;
+            let site =
+                sites.map(|sites| self.sites.position(local.sites[sites[l] as usize].number));
+            let on_large = large.map(|found| self.bvh.frame(found.triangle[l]).nearest(centre));
+            closest_of([site, on_large], centre)
+        })
+    }
+
+    /// Places of the listed sites closest to some points.
+    pub(super) fn closest_sites(
+        &self,
+        local: &Local,
+        lists: Lists,
+        points: &Points,
+    ) -> [u32; LANES] {
+        let per_cell = 1.0 / self.grid.spacing().f64();
+        let mut in_cells = [[0.0; LANES]; 3];
+        for a in 0..3 {
+            for l in 0..LANES {
+                in_cells[a][l] = ((points[a][l] - local.centre[a]) * per_cell) as f32;
+            }
         }
+        dispatch(
+            self.arch,
+            #[inline(always)]
+            || closest(local.sites, lists.sites, &in_cells),
+        )
     }
 
     fn set_box(&self, boxes: &mut Boxes, l: usize, local: &Local, extent: &Extent, foot: [f64; 3]) {

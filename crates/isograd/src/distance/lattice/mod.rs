@@ -5,8 +5,11 @@
 
 mod block;
 mod cull;
+mod facet;
 mod kernels;
+mod packet;
 mod pullback;
+mod site_list;
 mod sites;
 mod task;
 mod workspace;
@@ -20,7 +23,7 @@ use crate::{Field, Grid, Mesh, Real};
 use block::{BLOCK, Block};
 pub use pullback::{PullbackScratch, pullback};
 use sites::Sites;
-use task::{Output, Task};
+use task::{NEAR, Output, Task};
 use workspace::Pool;
 
 /// Where the distance is wanted.
@@ -88,9 +91,10 @@ pub fn forward<T: Real>(
         Band::Cells(cells) => return Err(Error::Band { cells }),
     };
     scratch.bvh.rebuild(mesh)?;
+    let magnitude = magnitude(grid).max(scratch.bvh.magnitude());
     scratch
         .sites
-        .rebuild(mesh, &scratch.bvh, grid.spacing().f64());
+        .rebuild(mesh, &scratch.bvh, grid.spacing().f64(), magnitude);
     if phi.grid() != grid {
         *phi = Field::zeros(*grid);
     }
@@ -131,14 +135,14 @@ fn solve_wave<T: Real>(
     scratch.closest.resize(blocks * CELLS, NO_TRIANGLE);
     let bvh = &scratch.bvh;
     let sites = &scratch.sites;
-    let magnitude = magnitude(grid).max(bvh.magnitude());
     let task = Task {
         grid,
         mesh,
         bvh,
         sites,
         width,
-        magnitude,
+        near: (NEAR * sites.longest_edge()).powi(2),
+        magnitude: magnitude(grid).max(bvh.magnitude()),
         arch: Arch::new(),
     };
     let results = scratch.distance.par_chunks_mut(CELLS);
@@ -186,10 +190,13 @@ fn write_wave<T: Real>(
         let runs = phi.chunks_mut(BLOCK).zip(closest.chunks_mut(BLOCK));
         for (run, (phi, closest)) in runs.enumerate() {
             let from = (((first_block + run) * BLOCK + i % BLOCK) * BLOCK + j % BLOCK) * BLOCK;
-            closest.copy_from_slice(&scratch.closest[from..from + closest.len()]);
-            for (k, value) in phi.iter_mut().enumerate() {
-                let d = scratch.distance[from + k];
-                *value = if inside(row * nz + run * BLOCK + k) {
+            let distance = &scratch.distance[from..from + BLOCK];
+            let found = &scratch.closest[from..from + BLOCK];
+            let first = row * nz + run * BLOCK;
+            for k in 0..phi.len().min(closest.len()) {
+                closest[k] = found[k];
+                let d = distance[k];
+                phi[k] = if inside(first + k) {
                     -d.max(T::min_positive_value())
                 } else {
                     d

@@ -1,5 +1,8 @@
 //! What culling needs to know of a mesh: its vertices in the order of the tree, and the triangles round each.
 
+use rayon::prelude::*;
+
+use super::facet::Facet;
 use crate::distance::bvh::{Bvh, LEAF};
 use crate::vector::to_f64;
 use crate::{Mesh, Real};
@@ -19,25 +22,58 @@ pub(super) struct Sites {
     slack: Vec<f64>,
     /// Where the triangles of each site begin in `stars`.
     starts: Vec<u32>,
-    /// Small triangles, by their places in the tree.
-    stars: Vec<u32>,
+    /// The small triangles of each.
+    stars: Vec<Spoke>,
+    /// All triangles, in the order of the tree.
+    facets: Vec<Facet>,
     /// Whether each triangle of the tree is large; empty where none is.
     large: Vec<bool>,
+    longest_edge: f64,
     /// The site of each vertex.
     of_vertex: Vec<u32>,
 }
+
+/// A small triangle of the star of a vertex.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Spoke {
+    /// Its place in the tree.
+    pub place: u32,
+    /// Which of its corners the vertex is.
+    pub corner: u32,
+}
+
+/// Beyond this many cells squares leave the range of single precision: then all triangles count as large.
+const FAR: f64 = 1e15;
 
 /// The site of a vertex that only large triangles have.
 const NONE: u32 = u32::MAX;
 
 impl Sites {
-    /// For a lattice of cell size `spacing`.
-    pub(super) fn rebuild<T: Real>(&mut self, mesh: &Mesh<T>, bvh: &Bvh, spacing: f64) {
-        let limit = LARGE * spacing * spacing;
+    /// For a lattice of cell size `spacing`; `magnitude` is the largest absolute coordinate.
+    pub(super) fn rebuild<T: Real>(
+        &mut self,
+        mesh: &Mesh<T>,
+        bvh: &Bvh,
+        spacing: f64,
+        magnitude: f64,
+    ) {
+        let limit = if magnitude < FAR * spacing {
+            LARGE * spacing * spacing
+        } else {
+            f64::NEG_INFINITY
+        };
         let triangles = 0..bvh.len() as u32;
+        let edges = triangles
+            .clone()
+            .map(|place| bvh.frame(place).longest_edge());
+        self.longest_edge = edges.fold(0.0, f64::max);
         self.large.clear();
         self.large
             .extend(triangles.map(|place| !(bvh.frame(place).slack() <= limit)));
+        (0..bvh.len() as u32)
+            .into_par_iter()
+            .map(|place| Facet::new(bvh.frame(place), bvh.face(place), 1.0 / spacing))
+            .collect_into_vec(&mut self.facets);
         self.number(mesh, bvh);
         self.collect_stars(mesh, bvh);
         if !self.large.contains(&true) {
@@ -95,12 +131,15 @@ impl Sites {
             *start = total;
         }
         self.stars.clear();
-        self.stars.resize(total as usize, 0);
+        self.stars.resize(total as usize, Spoke::default());
         // Filled from the back, so that every start ends where it belongs.
         for place in (0..bvh.len()).rev().filter(small) {
-            for site in sites(place) {
+            for (corner, site) in sites(place).into_iter().enumerate() {
                 self.starts[site] -= 1;
-                self.stars[self.starts[site] as usize] = place as u32;
+                self.stars[self.starts[site] as usize] = Spoke {
+                    place: place as u32,
+                    corner: corner as u32,
+                };
             }
         }
     }
@@ -111,7 +150,13 @@ impl Sites {
             + self.position.capacity()
             + self.starts.capacity()
             + self.stars.capacity()
+            + self.facets.capacity()
             + self.of_vertex.capacity()
+    }
+
+    /// The longest edge of all triangles.
+    pub(super) fn longest_edge(&self) -> f64 {
+        self.longest_edge
     }
 
     /// Whether there is a triangle that is culled by itself.
@@ -141,9 +186,15 @@ impl Sites {
         self.slack[site as usize]
     }
 
+    /// The triangle at a place of the tree.
+    #[inline(always)]
+    pub(super) fn facet(&self, place: u32) -> &Facet {
+        &self.facets[place as usize]
+    }
+
     /// The small triangles round a site.
     #[inline(always)]
-    pub(super) fn star(&self, site: u32) -> &[u32] {
+    pub(super) fn star(&self, site: u32) -> &[Spoke] {
         let s = site as usize;
         &self.stars[self.starts[s] as usize..self.starts[s + 1] as usize]
     }

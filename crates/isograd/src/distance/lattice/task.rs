@@ -1,23 +1,26 @@
 //! Distances in one block of cells.
 //!
-//! A block is halved along every axis down to 2×2×2 cells, and with it the list of what may be closest: each
-//! child keeps what is not farther than one point of the mesh, its *foot*, from the whole of the child. The
-//! last list is short, and every one of its triangles is measured from the eight cells at once.
+//! A block is halved along every axis down to 4×4×4 cells, and with it the list of vertices whose triangles may
+//! be closest: each child keeps what is not farther than one point of the mesh, its *foot*, from the whole of the
+//! child. The last list is short, and [`packet`] does the rest for sixteen cells at once.
 
 use pulp::Arch;
 
 use super::NO_TRIANGLE;
-use super::block::{BLOCK, Block, Children, Extent, centres, children, closest_of};
-use super::kernels::{self, CHILDREN, Site};
+use super::block::{BLOCK, Block, CHILDREN, Extent, centres, children};
+use super::kernels;
+use super::packet::{self, CELLS, Packet, Search};
+use super::site_list::Site;
 use super::sites::{LARGE, Sites};
-use super::workspace::{Lists, Measured, Workspace};
-use crate::distance::bvh::{Bvh, LANES, NOWHERE, Points, Region, Stack};
+use super::workspace::{Kept, Lists, Measured, Workspace};
+use crate::distance::bvh::{Bvh, Found, LANES, NOWHERE, Region, Stack};
 use crate::distance::triangle;
-use crate::vector::{norm_squared, scale, sub, to_f64};
+use crate::simd::dispatch;
+use crate::vector::{scale, sub, to_f64};
 use crate::{Grid, Mesh, Real};
 
 /// Where a distance is below this share of a triangle's longest edge, it is measured from the nearest corner.
-const NEAR: f64 = 0.1;
+pub(super) const NEAR: f64 = 0.1;
 
 /// What is the same for all blocks.
 pub(super) struct Task<'a, T> {
@@ -27,6 +30,8 @@ pub(super) struct Task<'a, T> {
     pub sites: &'a Sites,
     /// Width of the band, in the user's unit.
     pub width: f64,
+    /// Square of a distance above which no triangle is [`NEAR`].
+    pub near: f64,
     /// The largest absolute coordinate of the mesh and the grid.
     pub magnitude: f64,
     pub arch: Arch,
@@ -43,8 +48,6 @@ pub(super) struct Local<'a> {
     /// Its first cell.
     origin: [usize; 3],
     pub sites: &'a [Site],
-    /// The number of each of the sites.
-    pub numbers: &'a [u32],
     pub centre: [f64; 3],
     pub radius: f64,
 }
@@ -55,19 +58,14 @@ impl<T: Real> Task<'_, T> {
         output.distance.fill(T::of(self.width));
         output.closest.fill(NO_TRIANGLE);
         let extent = Extent::new(self.grid, block);
-        let near = self.nearest_to_children(block, &extent, &mut workspace.stack);
-        let feet = near.map(|place| match place {
-            NOWHERE => None,
-            _ => Some(self.bvh.frame(place).nearest(extent.centre)),
-        });
-        let Some(foot) = closest_of(feet, extent.centre) else {
+        let Some(foot) = self.foot(&extent, &mut workspace.stack) else {
             return;
         };
         self.gather(&extent, foot, workspace);
         let Workspace {
             sites,
-            numbers,
-            top,
+            listed,
+            large,
             levels,
             measured,
             ..
@@ -75,11 +73,14 @@ impl<T: Real> Task<'_, T> {
         let local = Local {
             origin: block.start,
             sites,
-            numbers,
             centre: extent.centre,
             radius: extent.radius,
         };
-        self.refine(&local, block, top, levels, measured, output);
+        let lists = Lists {
+            sites: listed,
+            large,
+        };
+        self.refine(&local, block, lists, levels, measured, output);
     }
 
     /// How far from the centre of a box of this radius the corner of a triangle may be that lies within the
@@ -99,24 +100,15 @@ impl<T: Real> Task<'_, T> {
         1e-14 * self.magnitude
     }
 
-    /// The triangle closest to the centre of each child.
-    fn nearest_to_children(
-        &self,
-        block: &Block,
-        extent: &Extent,
-        stack: &mut Stack,
-    ) -> [u32; LANES] {
-        let points = centres(&children(self.grid, block), extent.centre);
+    /// The point of the mesh closest to the centre of a block, if any matters.
+    fn foot(&self, extent: &Extent, stack: &mut Stack) -> Option<[f64; 3]> {
         let reach = self.reach(extent.radius);
-        let (bvh, points, reach) = (self.bvh, &points, reach * reach);
-        self.arch
-            .dispatch(kernels::Closest {
-                bvh,
-                points,
-                reach,
-                stack,
-            })
-            .triangle
+        let place = dispatch(
+            self.arch,
+            #[inline(always)]
+            || self.bvh.nearest_to(extent.centre, reach * reach, stack),
+        )?;
+        Some(self.bvh.frame(place).nearest(extent.centre))
     }
 
     /// Lists what may be closest to some cell of a block.
@@ -125,8 +117,8 @@ impl<T: Real> Task<'_, T> {
             stack,
             leaves,
             sites,
-            numbers,
-            top,
+            listed,
+            large,
             ..
         } = workspace;
         let region = Region::new(
@@ -145,30 +137,29 @@ impl<T: Real> Task<'_, T> {
             leaves,
         });
         sites.clear();
-        numbers.clear();
-        top.clear();
-        let per_cell = 1.0 / self.grid.spacing().f64();
+        large.clear();
         for &leaf in leaves.iter() {
-            numbers.extend(self.sites.of_leaf(leaf));
             sites.extend(
                 self.sites
                     .of_leaf(leaf)
-                    .map(|n| self.site(n, extent.centre, per_cell)),
+                    .map(|number| self.site(number, extent.centre)),
             );
             if self.sites.any_large() {
-                top.large
-                    .extend(bvh.leaf(leaf).filter(|&place| self.sites.is_large(place)));
+                large.extend(bvh.leaf(leaf).filter(|&place| self.sites.is_large(place)));
             }
         }
-        top.sites.extend(0..sites.len() as u32);
+        listed.clear();
+        listed.extend(0..sites.len() as u32);
     }
 
     #[inline(always)]
-    fn site(&self, number: u32, centre: [f64; 3], per_cell: f64) -> Site {
+    fn site(&self, number: u32, centre: [f64; 3]) -> Site {
+        let per_cell = 1.0 / self.grid.spacing().f64();
         let slack = self.sites.slack(number) * per_cell * per_cell;
         Site {
             position: scale(sub(self.sites.position(number), centre), per_cell).map(|x| x as f32),
             slack: (slack * (1.0 + 2.0 * kernels::MARGIN)) as f32,
+            number,
         }
     }
 
@@ -177,8 +168,8 @@ impl<T: Real> Task<'_, T> {
         &self,
         local: &Local,
         block: &Block,
-        lists: &Lists,
-        levels: &mut [[Lists; CHILDREN]],
+        lists: Lists,
+        levels: &mut [Kept],
         measured: &mut Measured,
         output: &mut Output<T>,
     ) {
@@ -186,95 +177,78 @@ impl<T: Real> Task<'_, T> {
             return self.finish(local, block, lists, measured, output);
         };
         let children = children(self.grid, block);
-        let feet = self.feet(local, lists, &children);
-        self.cull(local, lists, &children, &feet, kept);
+        self.cull(local, lists, &children, kept);
         for l in 0..CHILDREN {
-            if !kept[l].is_empty() {
-                self.refine(local, &children[l].0, &kept[l], deeper, measured, output);
+            let lists = kept.of(l);
+            if !lists.is_empty() {
+                self.refine(local, &children[l].0, lists, deeper, measured, output);
             }
         }
     }
 
-    /// A point of the mesh close to the centre of each child, where the lists hold one.
-    fn feet(
-        &self,
-        local: &Local,
-        lists: &Lists,
-        children: &Children,
-    ) -> [Option<[f64; 3]>; CHILDREN] {
-        let centres = centres(children, local.centre);
-        let site = (!lists.sites.is_empty()).then(|| {
-            self.arch.dispatch(kernels::ClosestSites {
-                sites: local.sites,
-                list: &lists.sites,
-                centre: &self.in_cells(&centres, local.centre),
-            })
-        });
-        let large = (!lists.large.is_empty()).then(|| {
-            self.arch.dispatch(kernels::ClosestListed {
-                bvh: self.bvh,
-                list: &lists.large,
-                points: &centres,
-            })
-        });
-        std::array::from_fn(|l| {
-            let centre = children[l].1?.centre;
-            let on_site = site.map(|site| {
-                let place = self.closest_in_star(local.numbers[site[l] as usize], centre);
-                self.bvh.frame(place).nearest(centre)
-            });
-            let on_large = large.map(|found| self.bvh.frame(found.triangle[l]).nearest(centre));
-            closest_of([on_site, on_large], centre)
-        })
-    }
-
-    /// The small triangle round a site whose centroid is closest to `q`.
-    fn closest_in_star(&self, site: u32, q: [f64; 3]) -> u32 {
-        let mut best = (f64::INFINITY, NOWHERE);
-        for &place in self.sites.star(site) {
-            let squared = norm_squared(sub(self.bvh.frame(place).centroid(), q));
-            if squared < best.0 {
-                best = (squared, place);
-            }
-        }
-        best.1
-    }
-
-    /// Measures what is left in the list of a block of side 2.
+    /// Measures what is left in the lists of a block of side 4.
     fn finish(
         &self,
         local: &Local,
         block: &Block,
-        lists: &Lists,
+        lists: Lists,
         measured: &mut Measured,
         output: &mut Output<T>,
     ) {
-        let stars = lists
-            .sites
-            .iter()
-            .map(|&site| self.sites.star(local.numbers[site as usize]));
-        measured.collect(&lists.large, stars, self.bvh.len());
-        let mut points: Points = [[0.0; LANES]; 3];
-        for l in 0..LANES {
-            let c = self.grid.center_f64(block.cell(l));
-            for a in 0..3 {
-                points[a][l] = c[a];
-            }
-        }
-        let found = self.arch.dispatch(kernels::ClosestListed {
+        let per_cell = 1.0 / self.grid.spacing().f64();
+        let width = self.width * per_cell;
+        let search = Search {
             bvh: self.bvh,
-            list: &measured.list,
-            points: &points,
-        });
-        for l in 0..LANES {
-            let cell = block.cell(l);
-            let at: [usize; 3] = std::array::from_fn(|a| cell[a] - local.origin[a]);
-            let index = (at[0] * BLOCK + at[1]) * BLOCK + at[2];
-            let q = [points[0][l], points[1][l], points[2][l]];
-            let distance = self.measure(q, found.triangle[l], found.squared[l]);
+            sites: self.sites,
+            all: local.sites,
+            listed: lists.sites,
+            large: lists.large,
+            // The longest edge of a small triangle is below 2 √LARGE.
+            way: (2.0 * local.radius * per_cell + 2.0 * LARGE.sqrt() + 1.0) as f32,
+            per_cell,
+            width: (width * width) as f32,
+        };
+        let centres = centres(&children(self.grid, block), local.centre);
+        let seeds = self.closest_sites(local, lists, &centres);
+        for (index, packet) in block.packets() {
+            let seeds = [seeds[2 * index], seeds[2 * index + 1]];
+            let cells = Packet::new(self.grid, &packet, local.centre);
+            let mut found = [Found::NOTHING; 2];
+            dispatch(
+                self.arch,
+                #[inline(always)]
+                || search.closest(&cells, seeds, measured, &mut found),
+            );
+            self.write(local, &packet, &cells, &found, output);
+        }
+    }
+
+    fn write(
+        &self,
+        local: &Local,
+        block: &Block,
+        packet: &Packet,
+        found: &[Found; 2],
+        output: &mut Output<T>,
+    ) {
+        for lane in 0..CELLS {
+            let (half, l) = (lane / LANES, lane % LANES);
+            let (place, squared) = (found[half].triangle[l], found[half].squared[l]);
+            let offset = packet::offset(lane);
+            if place == NOWHERE || !block.contains(offset) {
+                continue;
+            }
+            let distance = if squared > self.near {
+                squared.sqrt()
+            } else {
+                self.measure(packet.points[half].map(|x| x[l]), place, squared)
+            };
             if distance <= self.width {
+                let at: [usize; 3] =
+                    std::array::from_fn(|a| block.start[a] + offset[a] - local.origin[a]);
+                let index = (at[0] * BLOCK + at[1]) * BLOCK + at[2];
                 output.distance[index] = T::of(distance);
-                output.closest[index] = self.bvh.face(found.triangle[l]);
+                output.closest[index] = self.sites.facet(place).face;
             }
         }
     }
@@ -284,7 +258,7 @@ impl<T: Real> Task<'_, T> {
         if squared >= edge * edge {
             return squared.sqrt();
         }
-        let face = self.bvh.face(place);
+        let face = self.sites.facet(place).face;
         triangle::closest_point(q, self.mesh.corners(face as usize).map(to_f64)).distance
     }
 }

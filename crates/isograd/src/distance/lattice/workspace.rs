@@ -2,22 +2,26 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use super::kernels::{CHILDREN, Site};
-use crate::distance::bvh::Stack;
+use super::block::CHILDREN;
+use super::packet::CELLS;
+use super::site_list::{ChildLists, Site};
+use super::sites::Spoke;
+use crate::distance::bvh::{LANES, Stack};
 
-/// Halvings from a block to 2×2×2 cells.
-pub(super) const LEVELS: usize = 3;
+/// Halvings from a block to 4×4×4 cells.
+pub(super) const LEVELS: usize = 2;
 
 /// Memory of one thread.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Workspace {
     pub stack: Stack,
     pub leaves: Vec<u32>,
+    /// What matters for a block of side [`BLOCK`](super::block::BLOCK).
     pub sites: Vec<Site>,
-    /// The number of each of the sites.
-    pub numbers: Vec<u32>,
-    pub top: Lists,
-    pub levels: [[Lists; CHILDREN]; LEVELS],
+    /// All of them, by their places.
+    pub listed: Vec<u32>,
+    pub large: Vec<u32>,
+    pub levels: [Kept; LEVELS],
     pub measured: Measured,
 }
 
@@ -42,30 +46,59 @@ impl Clone for Pool {
     }
 }
 
-/// The triangles to measure, each once.
+/// A small triangle that may be closest to some cell of a packet.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Candidate {
+    /// Its place in the tree.
+    pub place: u32,
+    /// The corner that is at `from`.
+    pub corner: u32,
+    /// In cells from the centre of the block.
+    pub from: [f32; 3],
+}
+
+/// Triangles measured in single precision, each once.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Measured {
-    pub list: Vec<u32>,
-    pub seen: Seen,
+    pub candidates: Vec<Candidate>,
+    /// Squared distances from the cells of a packet.
+    pub squared: Vec<[f32; CELLS]>,
+    pub length: usize,
+    /// Places of sites.
+    pub near: Vec<u32>,
+    chosen: Vec<u32>,
+    choices: usize,
+    seen: Seen,
 }
 
 /// What may be closest to some cell of a block.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Lists {
-    /// Places in `[`Workspace::sites`]`.
-    pub sites: Vec<u32>,
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lists<'a> {
+    /// Places in [`Workspace::sites`].
+    pub sites: &'a [u32],
     /// Large triangles, by their places in the tree.
-    pub large: Vec<u32>,
+    pub large: &'a [u32],
 }
 
-impl Lists {
-    pub(super) fn clear(&mut self) {
-        self.sites.clear();
-        self.large.clear();
-    }
-
+impl Lists<'_> {
     pub(super) fn is_empty(&self) -> bool {
         self.sites.is_empty() && self.large.is_empty()
+    }
+}
+
+/// Lists for the children of a block.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Kept {
+    pub sites: ChildLists,
+    pub large: [Vec<u32>; CHILDREN],
+}
+
+impl Kept {
+    pub(super) fn of(&self, child: usize) -> Lists<'_> {
+        Lists {
+            sites: self.sites.of(child),
+            large: &self.large[child],
+        }
     }
 }
 
@@ -97,26 +130,57 @@ impl Seen {
 }
 
 impl Measured {
-    /// Lists `first` and what is in the stars; all are below `size`.
-    pub(super) fn collect<'a>(
-        &mut self,
-        first: &[u32],
-        stars: impl Iterator<Item = &'a [u32]> + Clone,
-        size: usize,
-    ) {
+    /// Forgets all; what comes is below `size`.
+    pub(super) fn clear(&mut self, size: usize) {
         self.seen.empty(size);
-        self.list.clear();
-        self.list.extend_from_slice(first);
-        let mut length = first.len();
-        self.list
-            .resize(length + stars.clone().map(<[u32]>::len).sum::<usize>(), 0);
-        for star in stars {
-            for &place in star {
-                // Written in any case, and kept if new: half of them are, and no branch can foretell which.
-                self.list[length] = place;
-                length += usize::from(self.seen.insert(place));
-            }
+        self.length = 0;
+    }
+
+    /// Lists the triangles of a star that are not listed yet; `from` is its vertex.
+    #[inline(always)]
+    pub(super) fn extend(&mut self, star: &[Spoke], from: [f32; 3]) {
+        let most = self.length + star.len();
+        if most > self.candidates.len() {
+            self.candidates.resize(2 * most, Candidate::default());
+            self.squared.resize(2 * most, [0.0; CELLS]);
         }
-        self.list.truncate(length);
+        let candidates = &mut self.candidates[self.length..most];
+        let mut length = 0;
+        for spoke in star {
+            // Written in any case, and kept if new: half of them are, and no branch can foretell which.
+            candidates[length] = Candidate {
+                place: spoke.place,
+                corner: spoke.corner,
+                from,
+            };
+            length += usize::from(self.seen.insert(spoke.place));
+        }
+        self.length += length;
+    }
+
+    /// Chooses the triangles that are within the limit of some cell of a half of the packet.
+    #[inline(always)]
+    pub(super) fn choose(&mut self, half: usize, limit: &[f32; CELLS]) {
+        if self.chosen.len() < self.length {
+            self.chosen.resize(self.length, 0);
+        }
+        let measured = self.candidates.iter().zip(&self.squared);
+        let mut length = 0;
+        for (candidate, squared) in measured.take(self.length) {
+            let mut near = false;
+            for l in half * LANES..(half + 1) * LANES {
+                near |= !(squared[l] > limit[l]);
+            }
+            // Written in any case, and kept if near: no branch can foretell which are.
+            self.chosen[length] = candidate.place;
+            length += usize::from(near);
+        }
+        self.choices = length;
+    }
+
+    /// Places in the tree of the triangles chosen.
+    #[inline(always)]
+    pub(super) fn chosen(&self) -> &[u32] {
+        &self.chosen[..self.choices]
     }
 }

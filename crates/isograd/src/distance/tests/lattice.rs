@@ -119,6 +119,23 @@ fn distance_far_from_the_origin_loses_nothing() {
 }
 
 #[test]
+fn triangles_beyond_the_range_of_single_precision_are_measured() {
+    let triangle = |at: [f64; 3]| {
+        let edges = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.02], [0.0, 0.1, 0.01]];
+        edges.map(|e| [at[0] + e[0], at[1] + e[1], at[2] + e[2]])
+    };
+    let faces = vec![[0, 1, 2], [3, 4, 5]];
+    let grid = Grid::new([-1.0; 3], 0.1, [9, 18, 7]).expect("valid");
+    for far in [1e13, 1e18, 1e25, 1e100] {
+        for near in [[0.1, 0.2, 0.3], [-far, far, far]] {
+            let vertices = [triangle(near), triangle([far, -far, 0.0])].concat();
+            let mesh = Mesh::new(vertices, faces.clone()).expect("finite");
+            assert_exact(&mesh, grid, 7, 1e-12);
+        }
+    }
+}
+
+#[test]
 fn band_is_exact_within_its_width_and_constant_beyond() {
     for (mesh, cells) in [
         (soup::<f64>(30, 8), 1.5),

@@ -1,6 +1,5 @@
 //! Meshes for the tests of the stage, and the plain slow distance.
 
-mod explore;
 mod lattice;
 mod query;
 mod query_pullback;

@@ -1,0 +1,225 @@
+//! Sixteen cells, measured together.
+//!
+//! Single precision finds out which triangles come into question; they are measured in double precision.
+
+use super::block::{Block, PACKET};
+use super::facet::Facet;
+use super::site_list::Site;
+use super::sites::Sites;
+use super::workspace::Measured;
+use crate::distance::bvh::{Bvh, Found, LANES, Points};
+use crate::{Grid, Real};
+
+/// Cells of a packet, in halves of [`LANES`].
+pub(super) const CELLS: usize = 2 * LANES;
+
+/// Bounds the error of single precision, when multiplied by the way from the centre of the block to a cell and
+/// on to a triangle.
+///
+/// In units of 2⁻²⁴: what is between a cell and a corner is off by 2 of them, its coordinates in the frame of
+/// the triangle by 13, and the parts of the distance by 21; so the square of a distance `d` by `46 d`, and a
+/// difference of two by `92 d`.
+const ERROR: f32 = 128.0 / (1u32 << 24) as f32;
+
+/// The centres of the cells of a packet.
+pub(super) struct Packet {
+    /// In the user's unit, by halves.
+    pub points: [Points; 2],
+    /// In cells from the centre of the block, `[axis][cell]`.
+    local: [[f32; CELLS]; 3],
+}
+
+impl Packet {
+    pub(super) fn new<T: Real>(grid: &Grid<T>, block: &Block, origin: [f64; 3]) -> Self {
+        let per_cell = 1.0 / grid.spacing().f64();
+        let mut packet = Self {
+            points: [[[0.0; LANES]; 3]; 2],
+            local: [[0.0; CELLS]; 3],
+        };
+        let longest = PACKET.into_iter().fold(0, usize::max);
+        for step in 0..longest {
+            let centre = grid.center_f64(block.clipped([step; 3]));
+            for a in 0..3 {
+                let local = ((centre[a] - origin[a]) * per_cell) as f32;
+                for l in (0..CELLS).filter(|&l| offset(l)[a] == step) {
+                    packet.points[l / LANES][a][l % LANES] = centre[a];
+                    packet.local[a][l] = local;
+                }
+            }
+        }
+        packet
+    }
+}
+
+/// Where in its packet a cell is.
+pub(super) fn offset(lane: usize) -> [usize; 3] {
+    [
+        lane >> 2 & 1,
+        lane >> 1 & 1,
+        (lane & 1) + 2 * (lane / LANES),
+    ]
+}
+
+/// What is the same for all packets of a block.
+pub(super) struct Search<'a> {
+    pub bvh: &'a Bvh,
+    pub sites: &'a Sites,
+    /// All sites of the block of side 16.
+    pub all: &'a [Site],
+    /// Places of those that matter.
+    pub listed: &'a [u32],
+    /// Large triangles, by their places in the tree.
+    pub large: &'a [u32],
+    /// In cells, with the distance to a triangle, more than that from the centre of the block to a cell and to
+    /// any corner of the triangle together.
+    pub way: f32,
+    pub per_cell: f64,
+    /// Square of the width of the band, in cells.
+    pub width: f32,
+}
+
+impl Search<'_> {
+    /// The closest triangle to each cell.
+    #[inline(always)]
+    pub(super) fn closest(
+        &self,
+        packet: &Packet,
+        seeds: [u32; 2],
+        measured: &mut Measured,
+        found: &mut [Found; 2],
+    ) {
+        for half in 0..2 {
+            for &place in self.large {
+                found[half].try_triangle(self.bvh.frame(place), place, &packet.points[half]);
+            }
+        }
+        let mut best = self.bounds(found);
+        measured.clear(self.bvh.len());
+        if !self.listed.is_empty() {
+            self.filter(packet, seeds, &mut best, measured);
+        }
+        let limit = self.limits(&best);
+        for half in 0..2 {
+            measured.choose(half, &limit);
+            for &place in measured.chosen() {
+                found[half].try_triangle(self.bvh.frame(place), place, &packet.points[half]);
+            }
+        }
+    }
+
+    /// In squared cells and single precision.
+    #[inline(always)]
+    fn bounds(&self, found: &[Found; 2]) -> [f32; CELLS] {
+        let scale = self.per_cell * self.per_cell;
+        let mut best = [self.width; CELLS];
+        for l in 0..CELLS {
+            let squared = (found[l / LANES].squared[l % LANES] * scale) as f32;
+            best[l] = if squared < best[l] { squared } else { best[l] };
+        }
+        best
+    }
+
+    /// What is measured above this, squared, is not closest.
+    #[inline(always)]
+    fn limits(&self, best: &[f32; CELLS]) -> [f32; CELLS] {
+        let mut limit = *best;
+        for l in 0..CELLS {
+            let d = best[l].sqrt();
+            let way = self.way + d;
+            limit[l] += ERROR * way * (d + ERROR * way);
+        }
+        limit
+    }
+
+    /// Measures all small triangles that may be closest to a cell. `seeds` are places of sites near its halves.
+    #[inline(always)]
+    fn filter(
+        &self,
+        packet: &Packet,
+        seeds: [u32; 2],
+        best: &mut [f32; CELLS],
+        measured: &mut Measured,
+    ) {
+        for seed in seeds {
+            self.collect_star(seed, measured);
+        }
+        self.measure(packet, 0, best, measured);
+        let first = measured.length;
+        self.collect_near(packet, best, measured);
+        self.measure(packet, first, best, measured);
+    }
+
+    /// Lists the small triangles round a site.
+    #[inline(always)]
+    fn collect_star(&self, place: u32, measured: &mut Measured) {
+        let site = &self.all[place as usize];
+        measured.extend(self.sites.star(site.number), site.position);
+    }
+
+    /// Lists the small triangles round the sites that matter.
+    #[inline(always)]
+    fn collect_near(&self, packet: &Packet, best: &[f32; CELLS], measured: &mut Measured) {
+        let limit = self.limits(best);
+        let [x, y, z] = &packet.local;
+        // |q − v|² − slack = (|q|² − limit) − 2 q·v + (|v|² − slack)
+        let (mut twice, mut power) = (packet.local, limit);
+        for l in 0..CELLS {
+            let way = self.way + limit[l].sqrt();
+            let radius = limit[l] + ERROR * way * way;
+            power[l] = x[l] * x[l] + y[l] * y[l] + z[l] * z[l] - radius;
+            for a in 0..3 {
+                twice[a][l] = 2.0 * packet.local[a][l];
+            }
+        }
+        if measured.near.len() < self.listed.len() {
+            measured.near.resize(self.listed.len(), 0);
+        }
+        let mut length = 0;
+        for &place in self.listed {
+            let site = &self.all[place as usize];
+            let v = site.position;
+            let gap = v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - site.slack;
+            let mut near = false;
+            for l in 0..CELLS {
+                let along = twice[0][l] * v[0] + twice[1][l] * v[1] + twice[2][l] * v[2];
+                near |= gap + power[l] <= along;
+            }
+            // Written in any case, and kept if near: no branch can foretell which are.
+            measured.near[length] = place;
+            length += usize::from(near);
+        }
+        for index in 0..length {
+            self.collect_star(measured.near[index], measured);
+        }
+    }
+
+    /// Measures the triangles listed from `first` on.
+    #[inline(always)]
+    fn measure(
+        &self,
+        packet: &Packet,
+        first: usize,
+        best: &mut [f32; CELLS],
+        measured: &mut Measured,
+    ) {
+        for index in first..measured.length {
+            let candidate = measured.candidates[index];
+            let mut from = packet.local;
+            for a in 0..3 {
+                for l in 0..CELLS {
+                    from[a][l] -= candidate.from[a];
+                }
+            }
+            let facet: &Facet = self.sites.facet(candidate.place);
+            let squared = facet.distances(candidate.corner, &from);
+            for l in 0..CELLS {
+                best[l] = if squared[l] < best[l] {
+                    squared[l]
+                } else {
+                    best[l]
+                };
+            }
+            measured.squared[index] = squared;
+        }
+    }
+}
