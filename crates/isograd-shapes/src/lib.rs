@@ -31,6 +31,7 @@
 //! | ellipsoid | exact (bracketed root) | exact | closed form | quadrature |
 //! | nacelle | exact to 1e-12 (2-D reduction) | exact | closed form | quadrature |
 //! | vessels | exact outside; inside away from joints | exact | quadrature, 1e-5 | quadrature, 1e-5 |
+//! | knot | none | none | quadrature | quadrature |
 //! | fish, eel | none | exact when straight | quadrature | quadrature |
 //! | airliner | none | exact | quadrature, 1e-5 | quadrature, 1e-5 |
 //! | car | none | exact | closed form | quadrature |

@@ -5,6 +5,7 @@ pub(crate) mod airliner;
 pub(crate) mod car;
 pub(crate) mod ellipsoid;
 pub(crate) mod fish;
+pub(crate) mod knot;
 pub(crate) mod nacelle;
 pub(crate) mod rounded_box;
 pub(crate) mod sphere;
@@ -15,10 +16,11 @@ pub(crate) mod wing;
 use crate::kind::Kind;
 
 /// Every kind of body, in the order in which they are listed.
-pub(crate) static KINDS: [&Kind; 10] = [
+pub(crate) static KINDS: [&Kind; 11] = [
     &sphere::KIND,
     &ellipsoid::KIND,
     &torus::KIND,
+    &knot::KIND,
     &rounded_box::KIND,
     &fish::FISH,
     &fish::EEL,
