@@ -9,29 +9,31 @@ use isograd::neighbors::{self, Neighborhoods, Radius};
 use isograd::orient::{self, Method, Orientation};
 use isograd::{normals, vector};
 
-/// Most wrong signs, in per cent of the axes within 60° of the truth.
-///
-/// For the clean clouds: what a plain exterior fill with the best cell size for these very shapes gets
-/// wrong (`docs/design`), rounded up to a tenth, and 0.1 where it gets all right. For the degraded ones,
-/// on which that fill is wrong for 3 to 21 %: 2 %, but for noise as large as the wings are thick.
+/// Most wrong signs, in per cent of the axes within 60° of the truth: half a per cent on clean clouds and
+/// where samples are missing, a tenth where they are uneven or the noise is small beside the body, and 3
+/// where the noise is as large as the wings are thick.
 const LIMITS: [(&str, f64); 16] = [
-    ("airliner", 0.1),
-    ("aorta", 0.1),
-    ("blub_fish", 0.1),
-    ("bwb", 1.1),
-    ("c172_wing", 0.6),
-    ("featuretype", 0.7),
-    ("scorpion", 0.1),
-    ("spot_cow", 0.1),
-    ("tray_plate", 0.6),
-    ("wingnut", 0.2),
-    ("airliner.density10", 2.0),
-    ("airliner.missing30", 2.0),
-    ("airliner.noise005", 4.0),
-    ("spot_cow.density10", 2.0),
-    ("spot_cow.missing30", 2.0),
-    ("spot_cow.noise005", 2.0),
+    ("airliner", 0.5),
+    ("aorta", 0.5),
+    ("blub_fish", 0.5),
+    ("bwb", 0.5),
+    ("c172_wing", 0.5),
+    ("featuretype", 0.5),
+    ("scorpion", 0.5),
+    ("spot_cow", 0.5),
+    ("tray_plate", 0.5),
+    ("wingnut", 0.5),
+    ("airliner.density10", 0.1),
+    ("airliner.missing30", 0.5),
+    ("airliner.noise005", 3.0),
+    ("spot_cow.density10", 0.1),
+    ("spot_cow.missing30", 0.5),
+    ("spot_cow.noise005", 0.1),
 ];
+
+/// The first ten are clean; most wrong signs on them at the mean, in per cent.
+const CLEAN: usize = 10;
+const CLEAN_MEAN: f64 = 0.1;
 
 /// Bytes of a sample: position and normal, all `f32`.
 const SAMPLE: usize = 24;
@@ -100,7 +102,8 @@ fn signs_agree_with_the_mesh_that_made_the_samples() {
         return;
     };
     let mut failed = Vec::new();
-    for (name, limit) in LIMITS {
+    let mut clean = 0.0;
+    for (k, (name, limit)) in LIMITS.into_iter().enumerate() {
         let (points, truth) = read(&folder.join(format!("{name}.points.ply")));
         let (wrong, out, seconds) = measure(&points, &truth);
         let doubtful = 100.0 * out.doubtful();
@@ -108,9 +111,13 @@ fn signs_agree_with_the_mesh_that_made_the_samples() {
             "{name:20} {:6} points  wrong {wrong:5.2} %  doubtful {doubtful:5.2} %  {seconds:.3} s",
             points.len()
         );
+        if k < CLEAN {
+            clean += wrong / CLEAN as f64;
+        }
         if wrong > limit {
             failed.push(format!("{name}: {wrong:.2} % > {limit} %"));
         }
     }
     assert!(failed.is_empty(), "{failed:?}");
+    assert!(clean <= CLEAN_MEAN, "clean clouds: {clean:.3} %");
 }

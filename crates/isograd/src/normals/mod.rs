@@ -50,6 +50,7 @@ mod pullback;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use eigen::{Symmetric, eigen};
 pub use forward::{forward, forward_with_neighborhoods};
 pub use pullback::{Scratch, pullback};
 

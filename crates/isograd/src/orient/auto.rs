@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::fill::{Fill, Lattice};
 use super::graph::{Graph, NEIGHBORS};
 use super::groups::Groups;
-use super::settle::Settle;
+use super::settle::{Place, Settle};
 use crate::Real;
 use crate::neighbors::Neighborhoods;
 use crate::parallel::CHUNK;
@@ -23,13 +23,28 @@ const MOST_CELLS: usize = 1 << 24;
 const FINE: f64 = 1.1;
 
 /// What the evidence of a second sheet weighs.
-const SHEET: f32 = 5.0;
+const SHEET: f32 = 4.0;
+
+/// Evidence of a second sheet below this makes no difference.
+const SLIGHT: f32 = 0.05;
 
 /// Rounds in which every point takes the mean of its own evidence and what its neighbours say.
 const ROUNDS: usize = 60;
 
+/// What beliefs are worth, the other way round, where they were overruled as a whole.
+const OVERRULED: f32 = 0.5;
+
 /// Evidence from here on decides by itself.
 const CLEAR: f32 = 0.1;
+
+/// How sheets close to each other are read: as the two sides of a thin body, or of a narrow gap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Reading {
+    /// A thin body, unless there seems to be matter on the far side of the sheet.
+    Careful,
+    /// A thin body.
+    Bold,
+}
 
 /// What decided the sign of an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,6 +62,14 @@ pub(super) struct Verdict {
     pub by: Decision,
 }
 
+/// One way of orienting the whole cloud, in sorted order.
+#[derive(Clone, Debug, Default)]
+struct Solution {
+    sign: Vec<f32>,
+    evidence: Vec<f32>,
+    belief: Vec<f32>,
+}
+
 /// Scratch of the automatic method.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Auto {
@@ -54,30 +77,90 @@ pub(super) struct Auto {
     groups: Groups,
     fill: Fill,
     settle: Settle,
-    /// In sorted order: own evidence, belief, and the belief of the next round.
+    /// In sorted order: what the fills say, the light on both sides of each axis, and what sheets say.
+    filled: Vec<f32>,
+    ends: Vec<[f32; 2]>,
+    sheets: Vec<f32>,
+    /// Own evidence, belief, and the belief of the next round.
     evidence: Vec<f32>,
     belief: Vec<f32>,
     next: Vec<f32>,
+    best: Solution,
     reaches: Vec<f32>,
+}
+
+/// Where the points are, relative to one of them.
+struct Sorted<'a, T> {
+    neighborhoods: &'a Neighborhoods<T>,
+    origin: [f64; 3],
+    spacing: f64,
+}
+
+impl<T: Real> Place for Sorted<'_, T> {
+    fn user(&self, p: usize) -> [f64; 3] {
+        vector::to_f64(self.neighborhoods.index.point(p))
+    }
+
+    fn in_spacings(&self, p: usize) -> [f32; 3] {
+        let offset = vector::sub(self.user(p), self.origin);
+        offset.map(|x| (x / self.spacing) as f32)
+    }
 }
 
 impl Auto {
     /// Finds the sign of each axis.
+    ///
+    /// Two sheets close to each other are the two sides of a thin body or of a narrow gap, and nothing near
+    /// them says which. So where it matters both are tried, and the winding number of the whole decides.
     pub(super) fn run<T: Real>(&mut self, axes: &[[T; 3]], neighborhoods: &Neighborhoods<T>) {
+        let place = Sorted {
+            neighborhoods,
+            origin: vector::to_f64(neighborhoods.index.point(0)),
+            spacing: neighborhoods.spacing().f64(),
+        };
         self.graph.build(axes, neighborhoods);
-        let point = |p: usize| vector::to_f64(neighborhoods.index.point(p));
-        self.groups.find(&self.graph, point);
-        self.gather_evidence(neighborhoods.spacing().f64(), point);
+        self.groups.find(&self.graph, |p| place.user(p));
+        self.gather_evidence(place.spacing, |p| place.user(p));
+        self.solve(Reading::Careful, &place);
+        if (0..self.sheets.len()).any(|p| self.differs(p)) {
+            let careful = self.settle.misfit(&self.graph, &place);
+            self.keep();
+            self.solve(Reading::Bold, &place);
+            if self.settle.misfit(&self.graph, &place) < careful {
+                self.keep();
+            }
+        } else {
+            self.keep();
+        }
+    }
+
+    fn solve(&mut self, reading: Reading, place: &impl Place) {
+        let mut evidence = std::mem::take(&mut self.evidence);
+        evidence.clear();
+        evidence.extend((0..self.sheets.len()).map(|p| self.weighed(p, reading)));
+        self.evidence = evidence;
         self.relax();
         self.settle
-            .run(&self.graph, &self.evidence, &self.belief, point);
+            .run(&self.graph, &self.evidence, &self.belief, place);
+    }
+
+    fn keep(&mut self) {
+        self.best.sign.clone_from(&self.settle.sign);
+        self.best.evidence.clone_from(&self.evidence);
+        let overruled = self.settle.overruled.iter();
+        let heard =
+            |(&belief, &over): (&f32, &bool)| if over { -OVERRULED * belief } else { belief };
+        self.best.belief.clear();
+        self.best
+            .belief
+            .extend(self.belief.iter().zip(overruled).map(heard));
     }
 
     /// What was found for the point at a sorted position.
     pub(super) fn verdict(&self, p: usize) -> Verdict {
-        let sign = self.settle.sign[p];
-        let confidence = (sign * self.belief[p]).max(0.0);
-        let seen = sign * self.evidence[p] >= CLEAR;
+        let sign = self.best.sign[p];
+        let confidence = (sign * self.best.belief[p]).max(0.0);
+        let seen = sign * self.best.evidence[p] >= CLEAR;
         let by = match (confidence > 0.0, seen) {
             (true, true) => Decision::Evidence,
             (true, false) => Decision::Neighbors,
@@ -92,8 +175,10 @@ impl Auto {
 
     fn gather_evidence(&mut self, spacing: f64, point: impl Fn(usize) -> [f64; 3] + Sync) {
         let n = self.graph.near.len();
-        self.evidence.clear();
-        self.evidence.resize(n, 0.0);
+        self.filled.clear();
+        self.filled.resize(n, 0.0);
+        self.ends.clear();
+        self.ends.resize(n, [1.0; 2]);
         for (group, bounds) in self.groups.bounds.iter().enumerate() {
             let (graph, members) = (&self.graph, self.groups.members(group));
             let reach = spacing * median_reach(graph, members, &mut self.reaches);
@@ -105,18 +190,34 @@ impl Auto {
                     let p = members[m] as usize;
                     (point(p), graph.axis[p], growth * f64::from(graph.reach[p]))
                 });
-                for (&p, &evidence) in members.iter().zip(&self.fill.evidence) {
-                    self.evidence[p as usize] += weight * evidence;
+                for (&p, sights) in members.iter().zip(&self.fill.sights) {
+                    let (filled, ends) = (&mut self.filled[p as usize], &mut self.ends[p as usize]);
+                    *filled += weight * sights.evidence;
+                    *ends = [0, 1].map(|side| ends[side].min(sights.ends[side]));
                 }
             }
         }
-        let graph = &self.graph;
-        self.evidence
-            .par_iter_mut()
-            .enumerate()
-            .for_each(|(p, evidence)| {
-                *evidence = (*evidence + SHEET * graph.sheet_evidence(p)).clamp(-1.0, 1.0);
-            });
+        let (graph, all) = (&self.graph, (0..n).into_par_iter());
+        all.map(|p| graph.sheet_evidence(p))
+            .collect_into_vec(&mut self.sheets);
+    }
+
+    fn weighed(&self, p: usize, reading: Reading) -> f32 {
+        let open = match reading {
+            Reading::Careful => self.open(p),
+            Reading::Bold => 1.0,
+        };
+        (self.filled[p] + SHEET * open * self.sheets[p]).clamp(-1.0, 1.0)
+    }
+
+    /// In 0..1, how open the side is that a second sheet behind the point makes the outer one.
+    fn open(&self, p: usize) -> f32 {
+        let side = usize::from(self.sheets[p] < 0.0);
+        (1.0 + self.ends[p][side]).clamp(0.0, 1.0)
+    }
+
+    fn differs(&self, p: usize) -> bool {
+        (1.0 - self.open(p)) * self.sheets[p].abs() > SLIGHT
     }
 
     /// Spreads the evidence: repeated weighted means, each point's own evidence held with its strength.

@@ -90,6 +90,15 @@ struct Sight {
     steps: usize,
 }
 
+/// What a sample sees.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sights {
+    /// The evidence, in −1..1: positive where the axis points into the air.
+    pub evidence: f32,
+    /// The light in front, along the axis, and behind: −1 in matter, up to 1 in the open air.
+    pub ends: [f32; 2],
+}
+
 /// The grid of occupied cells, its regions and its sky: scratch that is used again.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Fill {
@@ -100,8 +109,8 @@ pub(super) struct Fill {
     sky: Sky,
     walls: Vec<(u32, u32)>,
     sides: Vec<i8>,
-    /// `(members,)` the evidence, in −1..1: positive where the axis points into the air.
-    pub evidence: Vec<f32>,
+    /// `(members,)`
+    pub sights: Vec<Sights>,
 }
 
 impl Fill {
@@ -165,33 +174,37 @@ impl Fill {
 
     /// The evidence of each disc: light on one side less light on the other, over a cone of directions.
     fn look_both_ways(&mut self, lattice: &Lattice) {
-        let mut evidence = std::mem::take(&mut self.evidence);
-        evidence.resize(self.discs.len(), 0.0);
+        let mut sights = std::mem::take(&mut self.sights);
+        sights.resize(self.discs.len(), Sights::default());
         let this = &*self;
-        let chunks = evidence
+        let chunks = sights
             .par_chunks_mut(CHUNK)
             .zip(this.discs.par_chunks(CHUNK));
-        chunks.for_each(|(evidence, discs)| {
-            for (evidence, disc) in evidence.iter_mut().zip(discs) {
-                *evidence = this.contrast(lattice, disc);
+        chunks.for_each(|(sights, discs)| {
+            for (sights, disc) in sights.iter_mut().zip(discs) {
+                *sights = this.look(lattice, disc);
             }
         });
-        self.evidence = evidence;
+        self.sights = sights;
     }
 
-    fn contrast(&self, lattice: &Lattice, disc: &Disc) -> f32 {
+    fn look(&self, lattice: &Lattice, disc: &Disc) -> Sights {
         let light = |direction: [f32; 3]| {
             self.first_free(lattice, disc.center, direction)
                 .map_or(0.0, |sight| self.light(&sight))
         };
         let pair = |direction: [f32; 3]| light(direction) - light(direction.map(|d| -d));
         let [t, b] = tangents(disc.axis);
-        let mut sum = 2.0 * pair(disc.axis);
+        let ends = [light(disc.axis), light(disc.axis.map(|a| -a))];
+        let mut sum = 2.0 * (ends[0] - ends[1]);
         for tangent in [t, b] {
             sum += pair(vector::add(disc.axis, tangent));
             sum += pair(vector::sub(disc.axis, tangent));
         }
-        sum / 12.0
+        Sights {
+            evidence: sum / 12.0,
+            ends,
+        }
     }
 
     /// Light in the cell that a ray meets: −1 in matter, up to 1 in the open air, less for a longer way.

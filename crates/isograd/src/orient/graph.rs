@@ -1,7 +1,10 @@
 //! The neighbour graph: who is next to whom, and how the signs of two neighbours hang together.
 
+use std::f32::consts::PI;
+
 use rayon::prelude::*;
 
+use super::sheet;
 use crate::neighbors::Neighborhoods;
 use crate::parallel::CHUNK;
 use crate::{Real, vector};
@@ -18,6 +21,14 @@ const REACH_GROWTH: f32 = 1.5;
 
 /// Offsets shorter than this share of the reach have no direction to speak of.
 const BLUNT: f32 = 0.22;
+
+/// A sample lies off a sheet from this many times as far as the samples of the sheet scatter.
+const APART: f32 = 3.0;
+
+/// A neighbour of a coupling above this along the same direction lies on the same sheet; and the least share
+/// of the neighbours that do.
+const SAME_SHEET: f32 = 0.1;
+const LEAST_SHARE: f32 = 1.0 / 3.0;
 
 /// Couplings are raised to this odd power: a half-hearted one, as between a sample of one sheet and one
 /// slantwise across on the other, is mostly wrong, and must not count for half.
@@ -37,6 +48,10 @@ pub(super) struct Graph {
     pub axis: Vec<[f32; 3]>,
     /// In −1..1: above 0 where the two axes should have the sign they have, relative to each other.
     pub coupling: Vec<[f32; NEIGHBORS]>,
+    /// How far the samples of its sheet lie off it, where that is known; else 0.
+    pub scatter: Vec<f32>,
+    /// The area of surface that this sample stands for.
+    pub area: Vec<f32>,
     /// Scratch: distance to the last sample of the ring.
     ring: Vec<f32>,
     /// Scratch: typical distance of the nearest samples from the tangent plane.
@@ -55,12 +70,19 @@ impl Graph {
         self.near.resize(n, [0; NEIGHBORS]);
         self.offset.resize(n, [[0.0; 3]; NEIGHBORS]);
         self.coupling.resize(n, [0.0; NEIGHBORS]);
-        for lengths in [&mut self.reach, &mut self.ring, &mut self.thickness] {
+        for lengths in [
+            &mut self.area,
+            &mut self.reach,
+            &mut self.ring,
+            &mut self.thickness,
+        ] {
             lengths.resize(n, 0.0);
         }
         self.find_neighbors(neighborhoods);
+        self.find_sheets();
         self.measure();
         self.couple();
+        self.measure_areas();
     }
 
     fn find_neighbors<T: Real>(&mut self, neighborhoods: &Neighborhoods<T>) {
@@ -87,6 +109,21 @@ impl Graph {
                         let d = vector::sub(index.point(other as usize), point);
                         offset[slot] = d.map(|x| (x.f64() * unit) as f32);
                     }
+                }
+            });
+    }
+
+    /// Takes the axis of its own sheet for each point whose neighbours lie on several.
+    fn find_sheets(&mut self) {
+        self.scatter.resize(self.offset.len(), 0.0);
+        let points = self.axis.par_iter_mut().zip(&mut self.scatter);
+        points
+            .zip(&self.offset)
+            .for_each(|((axis, scatter), offset)| {
+                *scatter = 0.0;
+                if let Some(found) = sheet::find(offset, *axis) {
+                    *axis = found.axis;
+                    *scatter = found.scatter;
                 }
             });
     }
@@ -121,30 +158,50 @@ impl Graph {
     }
 
     fn couple(&mut self) {
-        let Self {
-            near,
-            offset,
-            reach,
-            axis,
-            thickness,
-            coupling,
-            ..
-        } = self;
+        let mut coupling = std::mem::take(&mut self.coupling);
+        let this = &*self;
         coupling
             .par_iter_mut()
             .enumerate()
             .for_each(|(p, coupling)| {
-                let blunt = (BLUNT * reach[p]).powi(2);
                 for (slot, coupling) in coupling.iter_mut().enumerate() {
-                    let q = near[p][slot] as usize;
-                    let blur = blunt + thickness[p] * thickness[q];
-                    *coupling = if q == p {
-                        0.0
-                    } else {
-                        coupled(axis[p], axis[q], offset[p][slot], blur).powi(TRUST)
-                    };
+                    let q = this.near[p][slot] as usize;
+                    *coupling = if q == p { 0.0 } else { this.tie(p, q, slot) };
                 }
             });
+        self.coupling = coupling;
+    }
+
+    fn tie(&self, p: usize, q: usize, slot: usize) -> f32 {
+        let blunt = (BLUNT * self.reach[p]).powi(2);
+        let blur = blunt + self.thickness[p] * self.thickness[q];
+        let gap = self.least_gap(p, q);
+        coupled(self.axis[p], self.axis[q], self.offset[p][slot], blur, gap).powi(TRUST)
+    }
+
+    /// The square of the height from which on one of two samples lies off the sheet of the other; infinite
+    /// where a sheet is not known.
+    fn least_gap(&self, p: usize, q: usize) -> f32 {
+        let (a, b) = (self.scatter[p], self.scatter[q]);
+        if a > 0.0 && b > 0.0 {
+            (APART * a.max(b)).powi(2)
+        } else {
+            f32::INFINITY
+        }
+    }
+
+    /// The area of surface that each sample stands for, in squares of the sample spacing.
+    fn measure_areas(&mut self) {
+        let (near, coupling, axis, reach) = (&self.near, &self.coupling, &self.axis, &self.reach);
+        self.area.par_iter_mut().enumerate().for_each(|(p, area)| {
+            // Neighbours on another sheet take nothing away from this one.
+            let parallel = |&(slot, &q): &(usize, &u32)| {
+                coupling[p][slot] * vector::dot(axis[p], axis[q as usize]) > SAME_SHEET
+            };
+            let own = 1 + near[p].iter().enumerate().filter(parallel).count();
+            let share = (own as f32 / (NEIGHBORS + 1) as f32).max(LEAST_SHARE);
+            *area = PI * reach[p] * reach[p] / ((RING as f32 + 0.5) * share);
+        });
     }
 
     /// Evidence for the sign of each axis from a second sheet close by: the samples of the other side of
@@ -152,11 +209,18 @@ impl Graph {
     pub(super) fn sheet_evidence(&self, p: usize) -> f32 {
         let (mut signed, mut total) = (0.0, 0.0);
         for (slot, &d) in self.offset[p].iter().enumerate() {
-            let length = vector::norm(d);
-            if length > 0.0 {
-                let parallel =
-                    vector::dot(self.axis[p], self.axis[self.near[p][slot] as usize]).powi(4);
-                let across = (vector::dot(d, self.axis[p]) / length).powi(3) * parallel;
+            let square = vector::norm_squared(d);
+            if square > 0.0 {
+                let q = self.near[p][slot] as usize;
+                let parallel = vector::dot(self.axis[p], self.axis[q]).powi(4);
+                let height = vector::dot(d, self.axis[p]);
+                let gap = self.least_gap(p, q);
+                let off = if gap.is_finite() {
+                    height * height / (height * height + gap)
+                } else {
+                    (height.abs() / square.sqrt()).powi(3)
+                };
+                let across = off.copysign(height) * parallel;
                 signed += across;
                 total += across.abs();
             }
@@ -173,19 +237,27 @@ impl Graph {
 /// plane half-way between the two samples and compared with `b`. Along a sheet that is `a·b`; round an
 /// edge it turns with the surface; and two sheets that face each other, whether matter or air is
 /// between them, have opposite outward normals. `blur` (a squared length) takes the reflection back
-/// where `d` is too short to tell.
+/// where `d` is too short to tell. Two parallel sheets much closer to each other than their samples are
+/// face each other although `d` runs along them: there the reflection is full from the height whose square
+/// is `gap` on.
 ///
 /// Source: the reflected transfer of H. Xie, K. McDonnell, H. Qin, "Surface reconstruction of noisy
 /// and defective data sets" (2004).
 #[inline(always)]
-fn coupled(a: [f32; 3], b: [f32; 3], d: [f32; 3], blur: f32) -> f32 {
-    let length = vector::norm_squared(d) + blur;
-    let turned = if length > 0.0 {
-        2.0 * vector::dot(a, d) * vector::dot(b, d) / length
+fn coupled(a: [f32; 3], b: [f32; 3], d: [f32; 3], blur: f32, gap: f32) -> f32 {
+    let parallel = vector::dot(a, b);
+    let heights = vector::dot(a, d) * vector::dot(b, d);
+    let mut square = vector::norm_squared(d) + blur;
+    if gap < square && heights * parallel > 0.0 {
+        let share = parallel.powi(8);
+        square = square.min(share * (heights.abs() + gap) + (1.0 - share) * square);
+    }
+    let turned = if square > 0.0 {
+        2.0 * heights / square
     } else {
         0.0
     };
-    (vector::dot(a, b) - turned).clamp(-1.0, 1.0)
+    (parallel - turned).clamp(-1.0, 1.0)
 }
 
 /// The upper median.

@@ -4,15 +4,18 @@
 //! Axes `(N, 3)` of unit length and arbitrary sign (from [`normals`](crate::normals)), or the cloud's
 //! own normals → unit normals `(N, 3)` that point outward, with a confidence for each. Four methods:
 //!
-//! - [`Method::Auto`], the default, weighs evidence of four kinds. *Enclosure*: the samples are drawn on a
+//! - [`Method::Auto`], the default, weighs evidence of five kinds. *Enclosure*: the samples are drawn on a
 //!   grid as discs in their tangent planes, and what they close off from the outside is matter (a cavity
 //!   inside matter is air again, and so on). *Sky*: where the samples leave holes, the side of the
-//!   surface that sees less of the sky, along 26 directions, is the inner one. *Sheets*: a parallel sheet
-//!   less than a few spacings away is the other side of a thin body. *Neighbours*: two axes next to each
-//!   other hang together, reflected at the plane half-way between their samples, so that the tie
-//!   holds along a sheet, round an edge, and across a thin body or a narrow gap. The first three are
-//!   summed for each point, spread over the neighbour graph, and where two regions still contradict each
-//!   other, the weaker tie yields. Time and memory are `O(N log N)`, wherever outliers are.
+//!   surface that sees less of the sky, along 26 directions, is the inner one. *Sheets*: where neighbours
+//!   lie on several sheets, the one through the sample is told from the others by a robust fit; a parallel
+//!   sheet close by is the other side of a thin body, or of a narrow gap. *Neighbours*: two axes next to
+//!   each other hang together, reflected at the plane half-way between their samples, so that the tie
+//!   holds along a sheet, round an edge, and across a thin body or a narrow gap. What these say is spread
+//!   over the neighbour graph; points that agree make domains, and between domains that contradict each
+//!   other the *winding number* decides: the right signs are those with which it is ½ on the surface.
+//!   Thin bodies and narrow gaps look alike from near; where that matters, both readings are tried, and
+//!   the winding number chooses. Time and memory are `O(N log N)`, wherever outliers are.
 //! - [`Method::Parity`]: the paper's method as printed (its §2.2), with its hyperparameters.
 //! - [`Method::Given`]: the cloud's own normals, trusted as they are.
 //! - [`Method::Signs`]: each axis, turned to the side of the cloud's own normal: for normals whose side is
@@ -23,10 +26,10 @@
 //! inner one. A part without any evidence (a flat patch, a handful of points) points away from its
 //! centroid, with confidence 0.
 //!
-//! Known limits: where the wall of a closed hollow body is thinner than about three spacings, both its
-//! sheets can pass for one, and the cavity for matter; so does a closed cavity inside a body whose own
-//! surface has a hole. Noise as large as the body is thick leaves a few per cent of wrong signs, most of
-//! them marked by a low confidence.
+//! Known limits: where the wall of a hollow body is thinner than about a spacing, or a sharp edge is, its
+//! sheets can't be told apart beyond doubt, and a few per cent of the signs there are wrong. Noise as large
+//! as the body is thick leaves a few per cent of wrong signs, most of them marked by a low confidence. Faces
+//! of two bodies that lie in the same place have samples of both signs mixed, which nothing can part.
 //!
 //! # Residual
 //! [`Orientation::normals`] holds the sign that was chosen: the stage multiplies by it.
@@ -52,9 +55,11 @@ mod pullback;
 mod settle;
 #[cfg(test)]
 mod shapes;
+mod sheet;
 mod sky;
 #[cfg(test)]
 mod tests;
+mod winding;
 
 pub use parity::ParityOptions;
 pub(crate) use pullback::hold;

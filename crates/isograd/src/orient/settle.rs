@@ -3,20 +3,48 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
+use rayon::prelude::*;
+
 use super::graph::Graph;
+use super::winding::{Dipole, Misfit};
 use crate::vector;
 
 /// Neighbours whose coupling is at least this strong belong to one domain if their beliefs agree.
 const STRONG: f32 = 0.5;
 
+/// What a sample at which the winding number is wrong by 1 weighs, beside evidence of 1.
+const WINDING: f64 = 4.0;
+
+/// Fewest points of a domain about which the winding number is asked, and the most such domains: the
+/// others have too little surface to matter to it.
+const SMALLEST: usize = 12;
+const MOST_DOMAINS: usize = 256;
+
+/// A domain is overruled where this much more speaks against its signs than for them.
+const MOSTLY: f64 = 3.0;
+
+/// Rounds in which single domains may turn.
+const SWEEPS: usize = 20;
+
 /// A belief below this says nothing.
-const SILENT: f32 = 1e-4;
+const SILENT: f32 = 1e-2;
+
+/// Where points are.
+pub(super) trait Place: Sync {
+    /// Position of a point, in the unit of the user.
+    fn user(&self, p: usize) -> [f64; 3];
+
+    /// Position of a point relative to one of them, in sample spacings.
+    fn in_spacings(&self, p: usize) -> [f32; 3];
+}
 
 /// Turns beliefs into one sign for each point; all in sorted order.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Settle {
     /// `+1` where the axis points outward, `−1` where it points inward.
     pub sign: Vec<f32>,
+    /// Whether the domain of a point was turned against what its points believed.
+    pub overruled: Vec<bool>,
     domains: Domains,
     /// The domain of each point.
     domain: Vec<u32>,
@@ -79,15 +107,19 @@ impl Settle {
         graph: &Graph,
         evidence: &[f32],
         belief: &[f32],
-        point: impl Fn(usize) -> [f64; 3],
+        place: &impl Place,
     ) {
         self.domains.reset(belief);
         self.join_agreeing(graph, belief);
         self.join_silent(graph, belief);
         let domains = self.number_domains();
-        let outcome = contract(self.ties(graph, evidence, domains));
+        let mut ties = self.ties(graph, evidence, domains);
+        self.arbitrate(graph, place, &mut ties);
+        let mut outcome = contract(ties.clone());
+        improve(&ties, &mut outcome);
         self.apply(&outcome);
-        self.turn_from_centroids(graph, &outcome, point);
+        self.find_overruled(domains, belief);
+        self.turn_from_centroids(graph, &outcome, |p| place.user(p));
     }
 
     fn join_agreeing(&mut self, graph: &Graph, belief: &[f32]) {
@@ -176,6 +208,68 @@ impl Settle {
         ties
     }
 
+    /// Adds what the winding number says for and between the larger domains.
+    fn arbitrate(&self, graph: &Graph, place: &impl Place, ties: &mut [BTreeMap<u32, f64>]) {
+        let ground = ties.len() - 1;
+        let large = self.large_domains(ground);
+        let mut row = vec![None; ground];
+        for (k, &domain) in large.iter().enumerate() {
+            row[domain] = Some(k);
+        }
+        let mut dipoles = vec![Vec::new(); large.len()];
+        for (p, &domain) in self.domain.iter().enumerate() {
+            if let Some(k) = row[domain as usize] {
+                dipoles[k].push(self.dipole(graph, place, p));
+            }
+        }
+        let misfit = Misfit::of(&dipoles);
+        let mut tie = |a: usize, b: usize, weight: f64| {
+            *ties[a].entry(b as u32).or_insert(0.0) += weight;
+            *ties[b].entry(a as u32).or_insert(0.0) += weight;
+        };
+        for (k, &a) in large.iter().enumerate() {
+            tie(a, ground, WINDING * misfit.pull[k]);
+            for (l, &b) in large[..k].iter().enumerate() {
+                tie(a, b, -2.0 * WINDING * misfit.gram[k * large.len() + l]);
+            }
+        }
+    }
+
+    /// The domains that the winding number is asked about, largest first.
+    fn large_domains(&self, domains: usize) -> Vec<usize> {
+        let mut size = vec![0; domains];
+        self.domain.iter().for_each(|&d| size[d as usize] += 1);
+        let mut large: Vec<usize> = (0..domains).filter(|&d| size[d] >= SMALLEST).collect();
+        large.sort_by_key(|&d| (Reverse(size[d]), d));
+        large.truncate(MOST_DOMAINS);
+        large
+    }
+
+    fn dipole(&self, graph: &Graph, place: &impl Place, p: usize) -> Dipole {
+        let normal = vector::scale(graph.axis[p], self.sign[p]);
+        Dipole::new(place.in_spacings(p), normal, graph.area[p])
+    }
+
+    /// How far the winding number of the whole is from that of a body.
+    pub(super) fn misfit(&self, graph: &Graph, place: &impl Place) -> f64 {
+        let all = 0..self.sign.len();
+        let dipoles = all.into_par_iter().map(|p| self.dipole(graph, place, p));
+        Misfit::of(&[dipoles.collect()]).total()
+    }
+
+    /// Marks the domains whose signs are against most of what their points believed: the winding number of all
+    /// domains together, or their neighbours, said otherwise.
+    fn find_overruled(&mut self, domains: usize, belief: &[f32]) {
+        let mut heard = vec![[0.0; 2]; domains];
+        for (p, &domain) in self.domain.iter().enumerate() {
+            let said = f64::from(self.sign[p] * belief[p]);
+            heard[domain as usize][usize::from(said < 0.0)] += said.abs();
+        }
+        let against = |&d: &u32| heard[d as usize][1] > MOSTLY * heard[d as usize][0];
+        self.overruled.clear();
+        self.overruled.extend(self.domain.iter().map(against));
+    }
+
     fn apply(&mut self, outcome: &[(u32, f32)]) {
         let ground = outcome[outcome.len() - 1].1;
         for (sign, &domain) in self.sign.iter_mut().zip(&self.domain) {
@@ -209,6 +303,21 @@ impl Settle {
             };
             if members.iter().map(outward).sum::<f64>() < 0.0 {
                 members.iter().for_each(|&p| self.sign[p] = -self.sign[p]);
+            }
+        }
+    }
+}
+
+/// Turns single nodes as long as that satisfies more of their ties: a contraction can't take back what it
+/// has joined.
+fn improve(ties: &[BTreeMap<u32, f64>], outcome: &mut [(u32, f32)]) {
+    let ground = outcome.len() - 1;
+    for _ in 0..SWEEPS {
+        for a in 0..ground {
+            let tied = |(&b, &weight): (&u32, &f64)| weight * f64::from(outcome[b as usize].1);
+            let sum: f64 = ties[a].iter().map(tied).sum();
+            if sum * f64::from(outcome[a].1) < 0.0 && outcome[a].0 == outcome[ground].0 {
+                outcome[a].1 = -outcome[a].1;
             }
         }
     }
