@@ -1,6 +1,7 @@
 //! The report as a dictionary, with the names of the command line's `report.json`.
 
 use isograd::differential::Spread;
+use isograd::orient::doubt::{Doubt, Reason};
 use isograd::{Report, Stage};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -41,6 +42,17 @@ fn orientation<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'py, PyD
     dict.set_item("method", report.orientation)?;
     dict.set_item("flipped", report.flipped)?;
     dict.set_item("confidence", confidence)?;
+    dict.set_item("doubtful", doubtful(py, &report.doubt)?)?;
+    Ok(dict)
+}
+
+/// Shares of the points that are doubtful: all, and by reason.
+pub fn doubtful<'py>(py: Python<'py>, doubt: &Doubt) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("share", doubt.share())?;
+    for reason in Reason::ALL {
+        dict.set_item(reason.name(), doubt.share_of(reason))?;
+    }
     Ok(dict)
 }
 

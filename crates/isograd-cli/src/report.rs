@@ -4,6 +4,7 @@ use std::path::Path;
 
 use isograd::differential::Spread;
 use isograd::isosurface::measure::Measures;
+use isograd::orient::doubt::{Doubt, Reason};
 use isograd::{Grid, Real, Stage};
 use serde::Serialize;
 
@@ -85,6 +86,39 @@ pub struct Orientation {
     pub flipped: usize,
     /// How sure the signs are.
     pub confidence: Confidence,
+    /// How many are doubtful.
+    pub doubtful: Doubtful,
+}
+
+/// Shares of the points, from 0 to 1; see [`isograd::orient::doubt`].
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Doubtful {
+    /// Of all points whose sign is doubtful.
+    pub share: f64,
+    /// Of those where two sheets are close to each other.
+    pub thin: f64,
+    /// Of those that are far from others.
+    pub sparse: f64,
+    /// Of those near a rim or hole.
+    pub open: f64,
+    /// Of those that scatter.
+    pub noisy: f64,
+    /// Of all others.
+    pub unexplained: f64,
+}
+
+impl Doubtful {
+    /// The shares of a count.
+    pub fn new(doubt: &Doubt) -> Self {
+        Self {
+            share: doubt.share(),
+            thin: doubt.share_of(Reason::Thin),
+            sparse: doubt.share_of(Reason::Sparse),
+            open: doubt.share_of(Reason::Open),
+            noisy: doubt.share_of(Reason::Noisy),
+            unexplained: doubt.share_of(Reason::Unexplained),
+        }
+    }
 }
 
 /// How sure the signs are, from 0 to 1.
@@ -196,6 +230,7 @@ impl Report {
                     p05: report.confidence_p05,
                     median: report.confidence_median,
                 },
+                doubtful: Doubtful::new(&report.doubt),
             },
             iso_value: report.iso_value,
             surface: Surface::new(&report.surface),

@@ -56,8 +56,12 @@ fn the_folder_gets_its_five_files_and_the_report_its_fields() {
     assert_keys(&report["grid"], "shape origin spacing");
     assert_keys(&report["normals"], "radius neighbours guarded");
     assert_keys(&report["normals"]["neighbours"], "min median max");
-    assert_keys(&report["orientation"], "method flipped confidence");
+    assert_keys(&report["orientation"], "method flipped confidence doubtful");
     assert_keys(&report["orientation"]["confidence"], "p05 median");
+    assert_keys(
+        &report["orientation"]["doubtful"],
+        "share thin sparse open noisy unexplained",
+    );
     assert_keys(
         &report["surface"],
         "vertices faces components area volume euler closed",

@@ -6,7 +6,11 @@ use rayon::prelude::*;
 
 use crate::differential::{Eikonal, EikonalOptions, eikonal};
 use crate::isosurface::measure::Measures;
+use crate::orient::doubt::{Doubt, Reason};
 use crate::{Field, Real};
+
+/// A reason is named where it stands for one in this many of the doubtful samples.
+const SMALLEST_REASON: usize = 10;
 
 /// The parts of a reconstruction, in the order in which they run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,6 +98,8 @@ pub struct Report {
     pub confidence_p05: f64,
     /// Median of the confidence in the signs.
     pub confidence_median: f64,
+    /// How many signs are doubtful, and why.
+    pub doubt: Doubt,
     /// The level `c` of the surface `χ = c`.
     pub iso_value: f64,
     /// Measures of the surface.
@@ -174,8 +180,8 @@ pub enum Warning {
     },
     /// The sign of many normals is a guess.
     DoubtfulSigns {
-        /// Share of such samples, from 0 to 1.
-        share: f64,
+        /// How many, and why.
+        doubt: Doubt,
     },
     /// Normals are not defined by their neighbours.
     Guarded {
@@ -221,11 +227,7 @@ impl fmt::Display for Warning {
                 "{} of the samples lie more than one cell from the surface (parts thinner than a cell, outliers or wrong normals)",
                 percent(*share)
             ),
-            Self::DoubtfulSigns { share } => write!(
-                f,
-                "the side of the surface is doubtful for {} of the samples; give normals, or look at the confidence in the output",
-                percent(*share)
-            ),
+            Self::DoubtfulSigns { doubt } => f.write_str(&doubtful_signs(doubt)),
             Self::Guarded { samples } => write!(
                 f,
                 "{samples} samples have no well-defined normal (a corner, a line or an isolated point)"
@@ -234,6 +236,52 @@ impl fmt::Display for Warning {
                 f,
                 "coordinates are rounded to {cells:.1e} cells by the number type; use f64 or move the cloud towards the origin"
             ),
+        }
+    }
+}
+
+/// What there is to say about doubtful signs: how many, why, and what helps against the main reasons.
+fn doubtful_signs(doubt: &Doubt) -> String {
+    let mut text = format!(
+        "the side of the surface is doubtful for {} of the samples",
+        percent(doubt.share())
+    );
+    let mut named = doubt.by_frequency();
+    named.retain(|&reason| doubt.of(reason) * SMALLEST_REASON >= doubt.doubtful());
+    for (k, &reason) in named.iter().enumerate() {
+        let lead = if k == 0 { ":" } else { "," };
+        text += &format!(
+            "{lead} {} {}",
+            percent(doubt.share_of(reason)),
+            cause(reason)
+        );
+    }
+    let main = named.first().copied().unwrap_or(Reason::Unexplained);
+    text + &format!("; {}", remedy(main))
+}
+
+/// Why samples are doubtful.
+fn cause(reason: Reason) -> &'static str {
+    match reason {
+        Reason::Thin => "lie on sheets less than about 3 samples apart",
+        Reason::Sparse => "are far from all others",
+        Reason::Open => "lie at a rim or hole, or on an open surface",
+        Reason::Noisy => "scatter about the surface",
+        Reason::Unexplained => "for no plain reason",
+    }
+}
+
+/// What helps; how to give more is the same for all.
+fn remedy(reason: Reason) -> &'static str {
+    match reason {
+        Reason::Thin => "sample more densely there, or give sensor positions or normals",
+        Reason::Sparse => {
+            "sample more densely there or remove outliers, or give sensor positions or normals"
+        }
+        Reason::Open => "close the gaps, or give sensor positions or normals",
+        Reason::Noisy => "use a larger radius, or give sensor positions or normals",
+        Reason::Unexplained => {
+            "give sensor positions or normals, or look at the confidence in the output"
         }
     }
 }

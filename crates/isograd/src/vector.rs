@@ -65,6 +65,16 @@ pub fn normalized<T: Float>(a: [T; 3]) -> Option<[T; 3]> {
     Some([b[0] / length, b[1] / length, b[2] / length])
 }
 
+/// Two unit vectors that make a right-handed basis with the unit vector `a` before them, or `None` where `a`
+/// has no direction.
+pub fn tangents<T: Float>(a: [T; 3]) -> Option<[[T; 3]; 2]> {
+    let smaller = |m: usize, k: usize| if a[k].abs() < a[m].abs() { k } else { m };
+    let mut axis = [T::zero(); 3];
+    axis[(0..3).fold(0, smaller)] = T::one();
+    let first = normalized(cross(a, axis))?;
+    Some([first, cross(a, first)])
+}
+
 /// Whether all three components are finite.
 #[inline(always)]
 pub fn is_finite<T: Float>(a: [T; 3]) -> bool {

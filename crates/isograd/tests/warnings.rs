@@ -3,6 +3,7 @@
 mod common;
 
 use common::{TORUS, Uniform};
+use isograd::orient::doubt::Reason;
 use isograd::{Error, Grid, Options, PointCloud, Reconstructor, Report, Resolution, Warning};
 
 fn report(points: Vec<[f64; 3]>, cells: usize) -> Report {
@@ -40,6 +41,29 @@ fn a_bowl_is_called_open() {
         let warnings = report(sphere(12_000, lowest, [0.0; 3], 1.0), 48).warnings;
         let open = warnings.iter().any(|w| matches!(w, Warning::Open { .. }));
         assert!(open, "rim at z = {lowest}: {warnings:?}");
+    }
+}
+
+#[test]
+fn doubtful_signs_come_with_their_reason_and_a_remedy() {
+    // A flat sheet has no inside: every sign is a guess.
+    let mut random = Uniform::new(8);
+    let mut sheet = || [random.next(), random.next(), 0.0];
+    let report = report((0..4_000).map(|_| sheet()).collect(), 48);
+    let text = report.warnings.iter().find_map(|warning| match warning {
+        Warning::DoubtfulSigns { doubt } => {
+            assert_eq!(doubt, &report.doubt);
+            assert!(doubt.share_of(Reason::Open) > 0.95, "{doubt:?}");
+            Some(warning.to_string())
+        }
+        _ => None,
+    });
+    let text = text.expect("a warning");
+    for part in [
+        "% of the samples: ",
+        "open surface; close the gaps, or give",
+    ] {
+        assert!(text.contains(part), "'{part}' is missing: {text}");
     }
 }
 

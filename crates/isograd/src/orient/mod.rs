@@ -42,6 +42,7 @@
 //! The signs are discrete; nothing of how they are chosen has a derivative. The confidence has none.
 
 mod auto;
+pub mod doubt;
 mod fill;
 mod flood;
 mod graph;
@@ -52,6 +53,7 @@ mod parity;
 #[cfg(test)]
 mod parity_tests;
 mod pullback;
+pub(crate) mod rim;
 mod settle;
 #[cfg(test)]
 mod shapes;
@@ -154,7 +156,7 @@ impl<T: Real> Orientation<T> {
     /// are a few spacings thick it is under 0.01; more than about a tenth says that the surface is
     /// open, or the noise as large as the body is thick, and that signs may be wrong in whole regions.
     pub fn doubtful(&self) -> f64 {
-        let doubtful = |c: &&T| c.f64() < DOUBTFUL;
+        let doubtful = |c: &&T| doubt::is_doubtful(**c);
         let count = self.confidence.iter().filter(doubtful).count();
         count as f64 / self.confidence.len().max(1) as f64
     }

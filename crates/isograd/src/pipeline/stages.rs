@@ -210,9 +210,13 @@ impl<T: Real> Reconstructor<T> {
             residuals.neighborhoods.spacing(),
             sdf.grid().spacing(),
         ));
-        warnings.extend(checks::open(points, normals, &residuals.neighborhoods));
+        let neighborhoods = &residuals.neighborhoods;
+        let rims = orient::rim::rims(points, normals, neighborhoods);
+        let reasons = orient::doubt::reasons_beside(&rims, points, orientation, neighborhoods);
+        report.doubt = orient::doubt::Doubt::count(points.len(), &reasons);
+        warnings.extend(checks::open(&rims));
         warnings.extend(checks::components(report.surface.components));
-        warnings.extend(checks::doubtful_signs(&orientation.confidence));
+        warnings.extend(checks::doubtful_signs(report.doubt));
         warnings.extend(checks::guarded(report.guarded, points.len()));
         warnings.extend(checks::rounded(points, sdf.grid().spacing()));
     }
