@@ -5,7 +5,7 @@
 
 use crate::data::PointCloud;
 use crate::pipeline::{
-    CloudCotangent, Cotangent, Error, PullbackError, PullbackScratch, Reconstruction,
+    CloudCotangent, Cotangent, Error, Orienter, PullbackError, PullbackScratch, Reconstruction,
     Reconstructor, RestoreError, Saved,
 };
 use crate::poisson;
@@ -28,6 +28,14 @@ pub trait Concrete: Sized {
         cloud: &PointCloud<Self>,
         held: Option<&Reconstruction<Self>>,
     ) -> Result<(), Error>
+    where
+        Self: crate::Real;
+
+    /// [`Orienter::orient`].
+    ///
+    /// # Errors
+    /// As that.
+    fn orient(plan: &mut Orienter<Self>, cloud: &PointCloud<Self>) -> Result<(), Error>
     where
         Self: crate::Real;
 
@@ -72,6 +80,10 @@ macro_rules! concrete {
                 held: Option<&Reconstruction<Self>>,
             ) -> Result<(), Error> {
                 plan.run(stage, cloud, held)
+            }
+
+            fn orient(plan: &mut Orienter<Self>, cloud: &PointCloud<Self>) -> Result<(), Error> {
+                plan.run(cloud)
             }
 
             fn bring_back(

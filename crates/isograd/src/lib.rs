@@ -30,11 +30,11 @@ pub mod vector;
 
 pub use data::{
     Attribute, Field, FieldError, Grid, GridCotangent, GridError, LatticeEdge, Mesh, MeshError,
-    PointCloud, PointCloudError, Resolution,
+    PointCloud, PointCloudError, Resolution, Sensors,
 };
 pub use pipeline::{
-    CloudCotangent, Cotangent, Error, ExtensionCotangent, Options, PullbackError, PullbackScratch,
-    Reconstruction, Reconstructor, RestoreError, Saved,
+    CloudCotangent, Cotangent, Error, ExtensionCotangent, Options, Orienter, PullbackError,
+    PullbackScratch, Reconstruction, Reconstructor, RestoreError, Saved,
 };
 pub use real::Real;
 pub use report::{Report, Seconds, Stage, Warning};

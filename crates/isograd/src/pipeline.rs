@@ -4,6 +4,7 @@ mod cotangent;
 mod extend;
 mod memory;
 mod options;
+mod orienter;
 mod pullback;
 mod restore;
 mod stages;
@@ -19,6 +20,7 @@ use crate::{Real, distance, isosurface, neighbors, normals, orient, poisson, spl
 
 pub use cotangent::{CloudCotangent, Cotangent, ExtensionCotangent, PullbackError};
 pub use options::{Error, Options};
+pub use orienter::Orienter;
 pub use pullback::PullbackScratch;
 pub use restore::{RestoreError, Saved};
 

@@ -13,11 +13,31 @@ pub struct Attribute<T> {
     pub values: Vec<T>,
 }
 
-/// Samples of a surface: `(N, 3)` points, and, where known, normals and attributes.
+/// Where the samples were seen from, in their unit.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Sensors<T> {
+    /// `(N, 3)`: a position for each sample.
+    Each(Vec<[T; 3]>),
+    /// `(M, 3)`: every sample was seen from at least one of these; from which, is not known. One position is
+    /// that of all samples.
+    Any(Vec<[T; 3]>),
+}
+
+impl<T> Sensors<T> {
+    /// The positions, whatever they belong to.
+    pub fn positions(&self) -> &[[T; 3]] {
+        match self {
+            Self::Each(positions) | Self::Any(positions) => positions,
+        }
+    }
+}
+
+/// Samples of a surface: `(N, 3)` points, and, where known, normals, sensors and attributes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointCloud<T> {
     points: Vec<[T; 3]>,
     normals: Option<Vec<[T; 3]>>,
+    sensors: Option<Sensors<T>>,
     attributes: Vec<Attribute<T>>,
 }
 
@@ -48,6 +68,22 @@ pub enum PointCloudError {
     #[error("the normal of point {index} is not finite; remove the point or mend the normal")]
     NormalNotFinite {
         /// Index of the point, from 0.
+        index: usize,
+    },
+    /// The sensor positions do not match the points.
+    #[error(
+        "{sensors} sensor positions for {points} points; give one for each point, or at least one that all share"
+    )]
+    SensorCount {
+        /// Number of points.
+        points: usize,
+        /// Number of positions.
+        sensors: usize,
+    },
+    /// A coordinate of a sensor is NaN or infinite.
+    #[error("sensor position {index} is not finite; mend it, or give one for all points")]
+    SensorNotFinite {
+        /// Index of the position, from 0.
         index: usize,
     },
     /// An attribute does not match the points.
@@ -93,6 +129,7 @@ impl<T: Real> PointCloud<T> {
         Ok(Self {
             points,
             normals: None,
+            sensors: None,
             attributes: Vec::new(),
         })
     }
@@ -113,6 +150,30 @@ impl<T: Real> PointCloud<T> {
             return Err(PointCloudError::NormalNotFinite { index });
         }
         self.normals = Some(normals);
+        Ok(self)
+    }
+
+    /// The same cloud, with where its points were seen from.
+    ///
+    /// # Errors
+    /// A number of positions other than that of the points where there is one for each, none where all share
+    /// them, or one that is not finite.
+    pub fn with_sensors(mut self, sensors: Sensors<T>) -> Result<Self, PointCloudError> {
+        let positions = sensors.positions();
+        let is_enough = match &sensors {
+            Sensors::Each(positions) => positions.len() == self.points.len(),
+            Sensors::Any(positions) => !positions.is_empty(),
+        };
+        if !is_enough {
+            return Err(PointCloudError::SensorCount {
+                points: self.points.len(),
+                sensors: positions.len(),
+            });
+        }
+        if let Some(index) = positions.iter().position(|&p| !vector::is_finite(p)) {
+            return Err(PointCloudError::SensorNotFinite { index });
+        }
+        self.sensors = Some(sensors);
         Ok(self)
     }
 
@@ -142,6 +203,11 @@ impl<T: Real> PointCloud<T> {
     /// `(N, 3)` normals, where the cloud has them.
     pub fn normals(&self) -> Option<&[[T; 3]]> {
         self.normals.as_deref()
+    }
+
+    /// Where the points were seen from, where that is known.
+    pub fn sensors(&self) -> Option<&Sensors<T>> {
+        self.sensors.as_ref()
     }
 
     /// The attributes, in the order in which they were added.

@@ -8,7 +8,7 @@ mod mesh;
 
 pub(crate) use cloud::bounds;
 
-pub use cloud::{Attribute, PointCloud, PointCloudError};
+pub use cloud::{Attribute, PointCloud, PointCloudError, Sensors};
 pub use field::{Field, FieldError};
 pub use grid::{Grid, GridCotangent, GridError, Resolution};
 pub use mesh::{LatticeEdge, Mesh, MeshError};

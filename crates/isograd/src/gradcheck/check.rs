@@ -205,7 +205,7 @@ fn unequal<E: PartialEq>(a: &[E], b: &[E]) -> usize {
     a.iter().zip(b).filter(|(a, b)| a != b).count()
 }
 
-/// The cloud with every point moved by `length` times its direction, its normals as they are. A point that
+/// The cloud with every point moved by `length` times its direction, its normals and sensors as they are. A point that
 /// the motion would make infinite stays.
 fn moved(cloud: &PointCloud<f64>, direction: &[[f64; 3]], length: f64) -> PointCloud<f64> {
     let points = cloud.points().iter().zip(direction);
@@ -213,6 +213,10 @@ fn moved(cloud: &PointCloud<f64>, direction: &[[f64; 3]], length: f64) -> PointC
     let moved = PointCloud::new(points.collect());
     let moved = moved.and_then(|moved| match cloud.normals() {
         Some(normals) => moved.with_normals(normals.to_vec()),
+        None => Ok(moved),
+    });
+    let moved = moved.and_then(|moved| match cloud.sensors() {
+        Some(sensors) => moved.with_sensors(sensors.clone()),
         None => Ok(moved),
     });
     moved.unwrap_or_else(|_| cloud.clone())

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::fill::{Fill, Lattice};
 use super::graph::{Graph, NEIGHBORS};
 use super::groups::Groups;
+use super::sensors;
 use super::settle::{Place, Settle};
 use crate::Real;
 use crate::neighbors::Neighborhoods;
@@ -24,6 +25,9 @@ const FINE: f64 = 1.1;
 
 /// What the evidence of a second sheet weighs.
 const SHEET: f32 = 4.0;
+
+/// What a sample at which the winding number is wrong by 1 weighs, beside evidence of 1.
+const WINDING: f64 = 4.0;
 
 /// Evidence of a second sheet below this makes no difference.
 const SLIGHT: f32 = 0.05;
@@ -81,6 +85,8 @@ pub(super) struct Auto {
     filled: Vec<f32>,
     ends: Vec<[f32; 2]>,
     sheets: Vec<f32>,
+    /// What sensors know; empty without them.
+    seen: Vec<f32>,
     /// Own evidence, belief, and the belief of the next round.
     evidence: Vec<f32>,
     belief: Vec<f32>,
@@ -108,11 +114,18 @@ impl<T: Real> Place for Sorted<'_, T> {
 }
 
 impl Auto {
-    /// Finds the sign of each axis.
+    /// Finds the sign of each axis. `views`, in input order, say from which side each point was seen, where
+    /// that is known; see [`sensors`].
     ///
     /// Two sheets close to each other are the two sides of a thin body or of a narrow gap, and nothing near
-    /// them says which. So where it matters both are tried, and the winding number of the whole decides.
-    pub(super) fn run<T: Real>(&mut self, axes: &[[T; 3]], neighborhoods: &Neighborhoods<T>) {
+    /// them says which. So where it matters both are tried, and the winding number of the whole decides;
+    /// where sensors know, they do.
+    pub(super) fn run<T: Real>(
+        &mut self,
+        axes: &[[T; 3]],
+        neighborhoods: &Neighborhoods<T>,
+        views: Option<&[f32]>,
+    ) {
         let place = Sorted {
             neighborhoods,
             origin: vector::to_f64(neighborhoods.index.point(0)),
@@ -121,8 +134,14 @@ impl Auto {
         self.graph.build(axes, neighborhoods);
         self.groups.find(&self.graph, |p| place.user(p));
         self.gather_evidence(place.spacing, |p| place.user(p));
+        self.seen.clear();
+        if let Some(views) = views {
+            let order = neighborhoods.index.order().iter();
+            self.seen
+                .extend(order.map(|&i| sensors::evidence(views[i as usize])));
+        }
         self.solve(Reading::Careful, &place);
-        if (0..self.sheets.len()).any(|p| self.differs(p)) {
+        if views.is_none() && (0..self.sheets.len()).any(|p| self.differs(p)) {
             let careful = self.settle.misfit(&self.graph, &place);
             self.keep();
             self.solve(Reading::Bold, &place);
@@ -140,8 +159,9 @@ impl Auto {
         evidence.extend((0..self.sheets.len()).map(|p| self.weighed(p, reading)));
         self.evidence = evidence;
         self.relax();
+        let winding = if self.seen.is_empty() { WINDING } else { 0.0 };
         self.settle
-            .run(&self.graph, &self.evidence, &self.belief, place);
+            .run(&self.graph, &self.evidence, &self.belief, winding, place);
     }
 
     fn keep(&mut self) {
@@ -207,7 +227,9 @@ impl Auto {
             Reading::Careful => self.open(p),
             Reading::Bold => 1.0,
         };
-        (self.filled[p] + SHEET * open * self.sheets[p]).clamp(-1.0, 1.0)
+        let found = (self.filled[p] + SHEET * open * self.sheets[p]).clamp(-1.0, 1.0);
+        let seen = self.seen.get(p).copied().unwrap_or(0.0);
+        seen + (1.0 - seen.abs()) * found
     }
 
     /// In 0..1, how open the side is that a second sheet behind the point makes the outer one.

@@ -2,7 +2,7 @@
 //!
 //! # Map
 //! Axes `(N, 3)` of unit length and arbitrary sign (from [`normals`](crate::normals)), or the cloud's
-//! own normals → unit normals `(N, 3)` that point outward, with a confidence for each. Four methods:
+//! own normals → unit normals `(N, 3)` that point outward, with a confidence for each. Six methods:
 //!
 //! - [`Method::Auto`], the default, weighs evidence of five kinds. *Enclosure*: the samples are drawn on a
 //!   grid as discs in their tangent planes, and what they close off from the outside is matter (a cavity
@@ -21,6 +21,14 @@
 //! - [`Method::Signs`]: each axis, turned to the side of the cloud's own normal: for normals whose side is
 //!   known better than their direction (from a scanner, a coarser mesh, the step before), and for those who
 //!   need the derivative with respect to the points alone.
+//! - [`Method::Sensors`]: each axis, turned to the side from which the sample was seen; grazing views, and
+//!   points of which the sensors disagree, are settled as in the automatic method.
+//! - [`Method::Previous`], in a plan: each axis, turned to the side of the normal that the same point had in
+//!   the call before; axes that have turned by more than 60° follow their neighbours. The first call orients
+//!   automatically, and so does one with another number of points, or where more than 3 % have turned so far.
+//!   *The result then depends on the calls before it*, in whose order it can be had again.
+//!
+//! Doubtful signs have [reasons](doubt).
 //!
 //! An open surface has no outside: its signs agree with each other, and its hollow side counts as the
 //! inner one. A part without any evidence (a flat patch, a handful of points) points away from its
@@ -49,11 +57,15 @@ mod graph;
 #[cfg(test)]
 mod grid_tests;
 mod groups;
+#[cfg(test)]
+mod known_tests;
 mod parity;
 #[cfg(test)]
 mod parity_tests;
+mod previous;
 mod pullback;
 pub(crate) mod rim;
+mod sensors;
 mod settle;
 #[cfg(test)]
 mod shapes;
@@ -67,9 +79,10 @@ pub use parity::ParityOptions;
 pub(crate) use pullback::hold;
 pub use pullback::{axes_pullback, given_pullback};
 
+use crate::data::Sensors;
 use crate::neighbors::Neighborhoods;
-use crate::{Real, vector};
-use auto::Decision;
+use crate::{PointCloud, Real, vector};
+use auto::{Decision, Verdict};
 
 /// Confidence below which a sign is [doubtful](Orientation::doubtful).
 const DOUBTFUL: f64 = 0.1;
@@ -86,6 +99,10 @@ pub enum Method {
     Given,
     /// The side of the cloud's own normals.
     Signs,
+    /// The side of the cloud's sensors.
+    Sensors,
+    /// The side of the normals of the call before.
+    Previous,
 }
 
 /// How the signs were chosen.
@@ -103,16 +120,25 @@ pub enum MethodUsed {
     Given,
     /// See [`Method::Signs`].
     Signs,
+    /// See [`Method::Sensors`].
+    Sensors,
+    /// See [`Method::Previous`]; a call that had to orient automatically has [`Self::Auto`].
+    Previous {
+        /// Axes that have turned far since the call before.
+        turned: usize,
+    },
 }
 
 impl MethodUsed {
-    /// `"auto"`, `"parity"`, `"given"` or `"signs"`.
+    /// `"auto"`, `"parity"`, `"given"`, `"signs"`, `"sensors"` or `"previous"`.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Auto => "auto",
             Self::Parity { .. } => "parity",
             Self::Given => "given",
             Self::Signs => "signs",
+            Self::Sensors => "sensors",
+            Self::Previous { .. } => "previous",
         }
     }
 }
@@ -120,7 +146,7 @@ impl MethodUsed {
 /// How many signs were decided by what. The counts add up to the number of points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Decided {
-    /// Taken from the cloud.
+    /// By what was given: normals, sensors or the call before.
     pub given: usize,
     /// By parity.
     pub parity: usize,
@@ -140,7 +166,8 @@ pub struct Orientation<T> {
     /// `(N,)` in 0..1: how clearly the evidence round a point speaks for its sign. 1: the point and
     /// those round it lie between open air and enclosed matter; about 0.2 where a gap in the sampling
     /// lets light in; 0: nothing speaks for it. Given normals have 1; given sides the cosine between normal
-    /// and axis; with parity it is 1 where the parities of the two directions differ, as they must on a
+    /// and axis; a clear view from a sensor 1; a sign that follows the call before what it had when it was
+    /// searched for, but at most the cosine between the two normals; with parity it is 1 where the parities of the two directions differ, as they must on a
     /// closed surface, else 0.
     pub confidence: Vec<T>,
     /// Number of axes whose sign was changed.
@@ -159,6 +186,14 @@ impl<T: Real> Orientation<T> {
         let doubtful = |c: &&T| doubt::is_doubtful(**c);
         let count = self.confidence.iter().filter(doubtful).count();
         count as f64 / self.confidence.len().max(1) as f64
+    }
+
+    /// Whether the sign of point `i` is one of those.
+    ///
+    /// # Panics
+    /// There is no such point.
+    pub fn is_doubtful(&self, i: usize) -> bool {
+        doubt::is_doubtful(self.confidence[i])
     }
 
     fn clear(&mut self) {
@@ -182,6 +217,35 @@ impl<T: Real> Orientation<T> {
 pub struct Scratch {
     auto: auto::Auto,
     parity: Vec<parity::Verdict>,
+    previous: previous::Previous,
+    views: Vec<f32>,
+}
+
+/// What is known of a cloud's orientation beside its points.
+#[derive(Clone, Copy, Debug)]
+pub struct Known<'a, T> {
+    /// `(N, 3)` normals of any length, for [`Method::Given`] and [`Method::Signs`].
+    pub normals: Option<&'a [[T; 3]]>,
+    /// Where the points were seen from, for [`Method::Sensors`].
+    pub sensors: Option<&'a Sensors<T>>,
+}
+
+impl<'a, T> From<Option<&'a [[T; 3]]>> for Known<'a, T> {
+    fn from(normals: Option<&'a [[T; 3]]>) -> Self {
+        Self {
+            normals,
+            sensors: None,
+        }
+    }
+}
+
+impl<'a, T: Real> From<&'a PointCloud<T>> for Known<'a, T> {
+    fn from(cloud: &'a PointCloud<T>) -> Self {
+        Self {
+            normals: cloud.normals(),
+            sensors: cloud.sensors(),
+        }
+    }
 }
 
 /// Why there is no orientation.
@@ -195,9 +259,9 @@ pub enum Error {
     Count {
         /// Number of points.
         points: usize,
-        /// Number of axes or normals.
+        /// Number of axes, normals or sensor positions.
         vectors: usize,
-        /// `"axes"` or `"normals"`.
+        /// `"axes"`, `"normals"` or `"sensor positions"`.
         kind: &'static str,
     },
     /// A vector that has no direction.
@@ -209,6 +273,17 @@ pub enum Error {
         index: usize,
         /// `"the axis"` or `"the normal"`.
         kind: &'static str,
+    },
+    /// Sensor positions were asked for, and there are none.
+    #[error("the cloud has no sensor positions; give them, or orient automatically")]
+    NoSensors,
+    /// A point that is where its sensor is.
+    #[error(
+        "point {index} lies exactly at a sensor, so that it has no line of sight; remove it (scanners write such points for rays that met nothing)"
+    )]
+    SensorOnPoint {
+        /// Index of the first such point, from 0.
+        index: usize,
     },
     /// A parity option out of range.
     #[error("the parity option {name} is {value}; give a finite number of at least {least}")]
@@ -233,31 +308,35 @@ pub enum Error {
 /// Chooses the sign of every axis, or takes the given normals; see the [module](self) for the map.
 ///
 /// `axes` `(N, 3)` are unit vectors of any sign (not read by [`Method::Given`], and may then be empty);
-/// `neighborhoods` must be those of `points` `(N, 3)`; `given` are the cloud's own normals, of any
-/// length. The memory of `scratch` and `out` is used again. The same input gives the same bits on any
-/// number of threads.
+/// `neighborhoods` must be those of `points` `(N, 3)`; `known` are the cloud's own normals, and where it was
+/// seen from. The memory of `scratch` and `out` is used again; for [`Method::Previous`], `scratch` holds the
+/// call before. The same input gives the same bits on any number of threads.
 ///
 /// # Errors
-/// [`Method::Given`] or [`Method::Signs`] without normals; a number of vectors that is not the number of points; a vector
-/// that is zero or not finite; parity options out of range, or a cloud of duplicates for parity.
-pub fn forward<T: Real>(
+/// [`Method::Given`] or [`Method::Signs`] without normals, [`Method::Sensors`] without sensors; a number of
+/// vectors that is not the number of points; a vector that is zero or not finite; a point at its sensor; parity
+/// options out of range, or a cloud of duplicates for parity.
+pub fn forward<'a, T: Real>(
     points: &[[T; 3]],
     axes: &[[T; 3]],
     neighborhoods: &Neighborhoods<T>,
-    given: Option<&[[T; 3]]>,
+    known: impl Into<Known<'a, T>>,
     method: &Method,
     scratch: &mut Scratch,
     out: &mut Orientation<T>,
 ) -> Result<(), Error> {
+    let known = known.into();
     out.clear();
     if *method != Method::Given {
         take_axes(points, axes, out)?;
     }
     match method {
-        Method::Auto => automatically(neighborhoods, scratch, out),
+        Method::Auto => automatically(neighborhoods, None, &mut scratch.auto, out),
         Method::Parity(options) => by_parity(neighborhoods, options, scratch, out)?,
-        Method::Given => take_given(points, given, out)?,
-        Method::Signs => by_given_sides(points, given, out)?,
+        Method::Given => take_given(points, known.normals, out)?,
+        Method::Signs => by_given_sides(points, known.normals, out)?,
+        Method::Sensors => by_sensors(points, neighborhoods, &known, scratch, out)?,
+        Method::Previous => by_previous(points, neighborhoods, scratch, out),
     }
     Ok(())
 }
@@ -355,20 +434,64 @@ fn by_parity<T: Real>(
     Ok(())
 }
 
+/// `views` are cosines between axes and lines of sight, in input order, where those are known.
 fn automatically<T: Real>(
+    neighborhoods: &Neighborhoods<T>,
+    views: Option<&[f32]>,
+    auto: &mut auto::Auto,
+    out: &mut Orientation<T>,
+) {
+    auto.run(&out.normals, neighborhoods, views);
+    for (position, &i) in neighborhoods.index.order().iter().enumerate() {
+        let i = i as usize;
+        match views
+            .map(|views| views[i])
+            .filter(|&view| sensors::is_clear(view))
+        {
+            Some(view) => {
+                out.set_sign(i, view < 0.0, 1.0);
+                out.decided.given += 1;
+            }
+            None => take_verdict(i, auto.verdict(position), out),
+        }
+    }
+    out.method = MethodUsed::Auto;
+}
+
+fn take_verdict<T: Real>(i: usize, verdict: Verdict, out: &mut Orientation<T>) {
+    out.set_sign(i, verdict.flip, f64::from(verdict.confidence));
+    match verdict.by {
+        Decision::Evidence => out.decided.evidence += 1,
+        Decision::Neighbors => out.decided.neighbors += 1,
+        Decision::Rule => out.decided.rule += 1,
+    }
+}
+
+/// Turns every axis to the side from which its point was seen.
+fn by_sensors<T: Real>(
+    points: &[[T; 3]],
+    neighborhoods: &Neighborhoods<T>,
+    known: &Known<'_, T>,
+    scratch: &mut Scratch,
+    out: &mut Orientation<T>,
+) -> Result<(), Error> {
+    let Scratch { auto, views, .. } = scratch;
+    sensors::views(points, &out.normals, known, views)?;
+    automatically(neighborhoods, Some(views), auto, out);
+    out.method = MethodUsed::Sensors;
+    Ok(())
+}
+
+/// Turns every axis to the side of the call before, or orients automatically.
+fn by_previous<T: Real>(
+    points: &[[T; 3]],
     neighborhoods: &Neighborhoods<T>,
     scratch: &mut Scratch,
     out: &mut Orientation<T>,
 ) {
-    scratch.auto.run(&out.normals, neighborhoods);
-    for (position, &i) in neighborhoods.index.order().iter().enumerate() {
-        let verdict = scratch.auto.verdict(position);
-        out.set_sign(i as usize, verdict.flip, f64::from(verdict.confidence));
-        match verdict.by {
-            Decision::Evidence => out.decided.evidence += 1,
-            Decision::Neighbors => out.decided.neighbors += 1,
-            Decision::Rule => out.decided.rule += 1,
-        }
+    let Scratch { auto, previous, .. } = scratch;
+    if !previous.follow(points, neighborhoods, out) {
+        automatically(neighborhoods, None, auto, out);
+        previous.keep(out);
     }
-    out.method = MethodUsed::Auto;
 }

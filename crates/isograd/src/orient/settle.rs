@@ -12,9 +12,6 @@ use crate::vector;
 /// Neighbours whose coupling is at least this strong belong to one domain if their beliefs agree.
 const STRONG: f32 = 0.5;
 
-/// What a sample at which the winding number is wrong by 1 weighs, beside evidence of 1.
-const WINDING: f64 = 4.0;
-
 /// Fewest points of a domain about which the winding number is asked, and the most such domains: the
 /// others have too little surface to matter to it.
 const SMALLEST: usize = 12;
@@ -98,6 +95,8 @@ impl Domains {
 }
 
 impl Settle {
+    /// `winding` is what a sample at which the winding number is wrong by 1 weighs, beside evidence of 1.
+    ///
     /// Domains of neighbours that agree are first oriented as a whole, the strongest tie first: to the
     /// evidence, or to the domain next to them. So a part whose evidence is weak follows the neighbours
     /// on which it borders, however large it is. What is tied to no evidence at all turns its axes away
@@ -107,6 +106,7 @@ impl Settle {
         graph: &Graph,
         evidence: &[f32],
         belief: &[f32],
+        winding: f64,
         place: &impl Place,
     ) {
         self.domains.reset(belief);
@@ -114,7 +114,9 @@ impl Settle {
         self.join_silent(graph, belief);
         let domains = self.number_domains();
         let mut ties = self.ties(graph, evidence, domains);
-        self.arbitrate(graph, place, &mut ties);
+        if winding > 0.0 {
+            self.arbitrate(graph, winding, place, &mut ties);
+        }
         let mut outcome = contract(ties.clone());
         improve(&ties, &mut outcome);
         self.apply(&outcome);
@@ -209,7 +211,13 @@ impl Settle {
     }
 
     /// Adds what the winding number says for and between the larger domains.
-    fn arbitrate(&self, graph: &Graph, place: &impl Place, ties: &mut [BTreeMap<u32, f64>]) {
+    fn arbitrate(
+        &self,
+        graph: &Graph,
+        winding: f64,
+        place: &impl Place,
+        ties: &mut [BTreeMap<u32, f64>],
+    ) {
         let ground = ties.len() - 1;
         let large = self.large_domains(ground);
         let mut row = vec![None; ground];
@@ -228,9 +236,9 @@ impl Settle {
             *ties[b].entry(a as u32).or_insert(0.0) += weight;
         };
         for (k, &a) in large.iter().enumerate() {
-            tie(a, ground, WINDING * misfit.pull[k]);
+            tie(a, ground, winding * misfit.pull[k]);
             for (l, &b) in large[..k].iter().enumerate() {
-                tie(a, b, -2.0 * WINDING * misfit.gram[k * large.len() + l]);
+                tie(a, b, -2.0 * winding * misfit.gram[k * large.len() + l]);
             }
         }
     }

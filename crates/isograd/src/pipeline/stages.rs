@@ -1,9 +1,11 @@
 //! The stages of a plan, each from the results of those before it.
 
-use super::{Error, Reconstruction, Reconstructor};
+use super::{Error, Reconstruction, Reconstructor, Residuals};
 use crate::data::PointCloud;
 use crate::isosurface::measure;
-use crate::report::{Stage, Warning};
+use crate::neighbors::{Neighborhoods, Radius};
+use crate::orient::Orientation;
+use crate::report::{Report, Stage, Warning};
 use crate::{Real, checks, distance, isosurface, neighbors, normals, orient, splat};
 
 impl<T: Real> Reconstructor<T> {
@@ -39,38 +41,27 @@ impl<T: Real> Reconstructor<T> {
             report,
             ..
         } = &mut self.result;
-        let neighborhoods = &mut residuals.neighborhoods;
-        let given = options.orientation == orient::Method::Given;
-        match held {
-            Some(held) => {
-                neighbors::hold(cloud.points(), &held.residuals.neighborhoods, neighborhoods)?;
-            }
-            None if given => neighbors::forward(cloud.points(), options.radius, neighborhoods)?,
-            None => normals::forward_with_neighborhoods(
-                cloud.points(),
-                options.radius,
-                neighborhoods,
-                &mut residuals.normals,
-            )?,
-        }
-        if given {
-            residuals.normals.clear();
-        } else if held.is_some() {
-            normals::forward(neighborhoods, &mut residuals.normals);
-        }
+        let Residuals {
+            neighborhoods,
+            normals,
+            ..
+        } = residuals;
+        let held = held.map(|held| &held.residuals.neighborhoods);
+        let is_given = options.orientation == orient::Method::Given;
+        find_axes(
+            cloud,
+            options.radius,
+            is_given,
+            held,
+            neighborhoods,
+            normals,
+            report,
+        )?;
         if options.area_weights {
             splat::area::forward(neighborhoods, areas);
         } else {
             areas.clear();
             areas.resize(cloud.len(), T::one());
-        }
-        report.radius = neighborhoods.common_radius.f64();
-        report.sample_spacing = neighborhoods.spacing().f64();
-        report.guarded = residuals.normals.guarded();
-        if report.guarded == cloud.len() {
-            return Err(Error::NoPlane {
-                points: cloud.len(),
-            });
         }
         Ok(())
     }
@@ -96,7 +87,7 @@ impl<T: Real> Reconstructor<T> {
             cloud.points(),
             &residuals.normals.normals,
             &residuals.neighborhoods,
-            cloud.normals(),
+            cloud,
             &options.orientation,
             &mut self.scratch.orient,
             orientation,
@@ -200,24 +191,64 @@ impl<T: Real> Reconstructor<T> {
             report,
             ..
         } = &mut self.result;
-        report.measure_samples(&residuals.neighborhoods.count, &orientation.confidence);
+        let (points, neighborhoods) = (cloud.points(), &residuals.neighborhoods);
         report.measure_field(sdf);
         report.surface = measure::measure(mesh, &mut self.scratch.measure);
-        let (points, normals) = (cloud.points(), &orientation.normals);
         let warnings = &mut report.warnings;
-        warnings.extend(checks::thin_and_missed(points, normals, sdf));
-        warnings.extend(checks::sparse(
-            residuals.neighborhoods.spacing(),
-            sdf.grid().spacing(),
-        ));
-        let neighborhoods = &residuals.neighborhoods;
-        let rims = orient::rim::rims(points, normals, neighborhoods);
-        let reasons = orient::doubt::reasons_beside(&rims, points, orientation, neighborhoods);
-        report.doubt = orient::doubt::Doubt::count(points.len(), &reasons);
-        warnings.extend(checks::open(&rims));
+        warnings.extend(checks::thin_and_missed(points, &orientation.normals, sdf));
+        let spacing = sdf.grid().spacing();
+        warnings.extend(checks::sparse(neighborhoods.spacing(), spacing));
         warnings.extend(checks::components(report.surface.components));
-        warnings.extend(checks::doubtful_signs(report.doubt));
-        warnings.extend(checks::guarded(report.guarded, points.len()));
-        warnings.extend(checks::rounded(points, sdf.grid().spacing()));
+        warnings.extend(checks::rounded(points, spacing));
+        check_samples(points, neighborhoods, orientation, report);
     }
+}
+
+/// Neighbourhoods, with the radii of `held` where there is such a thing, and the axis of every point, unless
+/// all normals are given.
+pub(super) fn find_axes<T: Real>(
+    cloud: &PointCloud<T>,
+    radius: Radius,
+    is_given: bool,
+    held: Option<&Neighborhoods<T>>,
+    neighborhoods: &mut Neighborhoods<T>,
+    out: &mut normals::Residual<T>,
+    report: &mut Report,
+) -> Result<(), Error> {
+    let points = cloud.points();
+    match held {
+        Some(held) => neighbors::hold(points, held, neighborhoods)?,
+        None if is_given => neighbors::forward(points, radius, neighborhoods)?,
+        None => normals::forward_with_neighborhoods(points, radius, neighborhoods, out)?,
+    }
+    if is_given {
+        out.clear();
+    } else if held.is_some() {
+        normals::forward(neighborhoods, out);
+    }
+    report.radius = neighborhoods.common_radius.f64();
+    report.sample_spacing = neighborhoods.spacing().f64();
+    report.guarded = out.guarded();
+    if report.guarded == points.len() {
+        let points = points.len();
+        return Err(Error::NoPlane { points });
+    }
+    Ok(())
+}
+
+/// Measures the samples and their normals, and looks for reasons not to trust them.
+pub(super) fn check_samples<T: Real>(
+    points: &[[T; 3]],
+    neighborhoods: &Neighborhoods<T>,
+    orientation: &Orientation<T>,
+    report: &mut Report,
+) {
+    report.measure_samples(&neighborhoods.count, &orientation.confidence);
+    let rims = orient::rim::rims(points, &orientation.normals, neighborhoods);
+    let reasons = orient::doubt::reasons_beside(&rims, points, orientation, neighborhoods);
+    report.doubt = orient::doubt::Doubt::count(points.len(), &reasons);
+    let warnings = &mut report.warnings;
+    warnings.extend(checks::open(&rims));
+    warnings.extend(checks::doubtful_signs(report.doubt));
+    warnings.extend(checks::guarded(report.guarded, points.len()));
 }

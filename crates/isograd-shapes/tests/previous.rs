@@ -1,0 +1,40 @@
+//! Signs that follow a moving body from step to step.
+
+use isograd::neighbors::Radius;
+use isograd::orient::{Method, MethodUsed};
+use isograd::vector::dot;
+use isograd::{Orienter, PointCloud};
+use isograd_shapes::{Layout, Sampling, by_name};
+
+/// Samples of the fish: about 4 spacings across its thinnest fin.
+const SAMPLES: usize = 12_000;
+
+/// Steps of one beat of the tail.
+const STEPS: usize = 20;
+
+#[test]
+fn the_fish_keeps_its_signs_through_a_beat_of_its_tail() {
+    let mut fish = by_name("fish").expect("a shape");
+    fish.set("amplitude", 0.12).expect("in range");
+    let period = fish.get("period").expect("a parameter");
+    let sampling = Sampling {
+        layout: Layout::Even,
+        ..Sampling::default()
+    };
+    let samples = fish.sample::<f64>(SAMPLES, &sampling, 3).expect("samples");
+    let mut plan = Orienter::new(Radius::Auto, Method::Previous);
+    for step in 0..=STEPS {
+        let time = period * step as f64 / STEPS as f64;
+        fish.set("time", time).expect("in range");
+        let points = fish.points_at(&samples.coordinates).expect("points");
+        let truth = fish.normals_at(&samples.coordinates).expect("normals");
+        let cloud = PointCloud::new(points).expect("finite");
+        let found = plan.orient(&cloud).expect("normals");
+        let cosines = found.normals.iter().zip(&truth).map(|(&n, &t)| dot(n, t));
+        let judged: Vec<f64> = cosines.filter(|c| c.abs() > 0.5).collect();
+        let wrong = judged.iter().filter(|&&c| c < 0.0).count();
+        assert!(wrong * 1000 <= judged.len(), "step {step}: {wrong}");
+        let follows = matches!(found.method, MethodUsed::Previous { .. });
+        assert_eq!(follows, step > 0, "step {step}");
+    }
+}

@@ -1,0 +1,128 @@
+//! The signs of the step before: for bodies that move.
+//!
+//! Between two steps of a simulation an axis turns by a few degrees, and keeps its side. So its sign is that
+//! of the normal which the same point had in the step before: a product for each point, instead of a search.
+//! Where an axis has jumped (at a sharp edge it may belong to one side now and to the other then) the
+//! neighbours decide.
+
+use super::{MethodUsed, Orientation};
+use crate::neighbors::Neighborhoods;
+use crate::{Real, vector};
+
+/// An axis whose cosine with the normal of the step before is smaller than this has turned far.
+const FAR: f64 = 0.5;
+
+/// Where more than this share of the axes has turned far, the points are not those of the step before.
+const MOST_FAR: f64 = 0.03;
+
+/// Offsets shorter than this share of a neighbourhood's radius have no direction to speak of.
+const BLUNT: f64 = 0.1;
+
+/// What is kept of the step before, in input order.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Previous {
+    /// Outward normals: their sides are all that counts.
+    normals: Vec<[f32; 3]>,
+    /// The confidence that each sign had when it was searched for.
+    confidence: Vec<f32>,
+    /// Scratch: cosine between each axis and the normal before, and the points where it is small.
+    cosines: Vec<f64>,
+    turned: Vec<u32>,
+}
+
+impl Previous {
+    /// Remembers a result of another method.
+    pub(super) fn keep<T: Real>(&mut self, out: &Orientation<T>) {
+        self.keep_normals(out);
+        let confidence = out.confidence.iter().map(|c| c.f64() as f32);
+        self.confidence.clear();
+        self.confidence.extend(confidence);
+    }
+
+    fn keep_normals<T: Real>(&mut self, out: &Orientation<T>) {
+        self.normals.clear();
+        let single = |n: &[T; 3]| n.map(|x| x.f64() as f32);
+        self.normals.extend(out.normals.iter().map(single));
+    }
+
+    /// Turns the axes that `out` holds to the sides of the step before. `false`, and nothing is changed, where
+    /// there was none with as many points that these could have come from.
+    pub(super) fn follow<T: Real>(
+        &mut self,
+        points: &[[T; 3]],
+        neighborhoods: &Neighborhoods<T>,
+        out: &mut Orientation<T>,
+    ) -> bool {
+        if !self.compare(&out.normals) {
+            return false;
+        }
+        for (i, cosine) in self.cosines.iter().enumerate() {
+            if cosine.abs() >= FAR {
+                let confidence = f64::from(self.confidence[i]).min(cosine.abs());
+                out.set_sign(i, *cosine < 0.0, confidence);
+            }
+        }
+        for k in 0..self.turned.len() {
+            let i = self.turned[k] as usize;
+            let side = self.side_among_neighbors(i, points, neighborhoods, &out.normals);
+            let side = side.unwrap_or(0.0);
+            let flip = side < 0.0 || side == 0.0 && self.cosines[i] < 0.0;
+            out.set_sign(i, flip, side.abs().min(1.0));
+            self.confidence[i] = out.confidence[i].f64() as f32;
+        }
+        out.decided.given = points.len() - self.turned.len();
+        out.decided.neighbors = self.turned.len();
+        out.method = MethodUsed::Previous {
+            turned: self.turned.len(),
+        };
+        self.keep_normals(out);
+        true
+    }
+
+    /// Finds the axes that have turned far; `false` where they are too many, or these are other points.
+    fn compare<T: Real>(&mut self, axes: &[[T; 3]]) -> bool {
+        if axes.is_empty() || self.normals.len() != axes.len() {
+            return false;
+        }
+        let cosine = |(axis, before): (&[T; 3], &[f32; 3])| {
+            vector::dot(vector::to_f64(*axis), before.map(f64::from))
+        };
+        self.cosines.clear();
+        self.cosines
+            .extend(axes.iter().zip(&self.normals).map(cosine));
+        let far = (0u32..).zip(&self.cosines);
+        self.turned.clear();
+        self.turned
+            .extend(far.filter(|(_, c)| !(c.abs() >= FAR)).map(|(i, _)| i));
+        self.turned.len() as f64 <= MOST_FAR * axes.len() as f64
+    }
+
+    /// What the neighbours that have not turned say of the axis of point `i`, from −1 to 1; `None` where there
+    /// is none. Each carries its normal over by reflection at the plane half-way between the two, so that it
+    /// turns with the surface round an edge, and changes sides across a thin body.
+    fn side_among_neighbors<T: Real>(
+        &self,
+        i: usize,
+        points: &[[T; 3]],
+        neighborhoods: &Neighborhoods<T>,
+        normals: &[[T; 3]],
+    ) -> Option<f64> {
+        let axis = vector::to_f64(normals[i]);
+        let radius = neighborhoods.radius[i];
+        let blunt = (BLUNT * radius.f64()).powi(2);
+        let (mut sum, mut weight) = (0.0, 0.0);
+        let index = &neighborhoods.index;
+        index.for_each_within(points[i], radius, |j, distance_squared| {
+            if self.cosines[j].abs() >= FAR {
+                let offset = vector::to_f64(vector::sub(points[j], points[i]));
+                let normal = vector::to_f64(normals[j]);
+                let near = 1.0 / (distance_squared.f64() + blunt);
+                let turned = 2.0 * vector::dot(normal, offset) * near;
+                let carried = vector::sub(normal, vector::scale(offset, turned));
+                sum += near * vector::dot(axis, carried);
+                weight += near;
+            }
+        });
+        (weight > 0.0).then(|| sum / weight)
+    }
+}
