@@ -27,7 +27,7 @@ fn sign<T: Real>(criterion: &mut Criterion) {
             for_threads::<T>(&mut group, count, "points", || {
                 orient::forward(
                     &points,
-                    &axes.normals,
+                    &axes,
                     &neighborhoods,
                     None,
                     &method,

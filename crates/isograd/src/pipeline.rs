@@ -224,6 +224,11 @@ impl<T: Real> Reconstruction<T> {
         &self.residuals.neighborhoods.count
     }
 
+    /// `(N,)` number of samples in the neighbourhood that each axis was found in; empty with given normals.
+    pub(crate) fn axis_counts(&self) -> &[u32] {
+        &self.residuals.normals.count
+    }
+
     /// `(N,)` area of surface that each sample stands for, in unit length²; 1 without area weights.
     pub fn areas(&self) -> &[T] {
         &self.areas

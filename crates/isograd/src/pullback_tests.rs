@@ -119,6 +119,30 @@ fn axes_and_areas_with_grown_radii() {
 }
 
 #[test]
+fn axes_from_wider_neighbourhoods() {
+    let mut random = Random::new(11);
+    let mut noise = || 0.12 * (random.uniform() + random.uniform() - 1.0);
+    let rough = torus(1600, 4).into_iter().map(|s| s.0.map(|x| x + noise()));
+    let near = Near::new(rough.collect());
+    let residual = axes(&near.held);
+    let pairs = residual.radius.iter().zip(&near.held.radius);
+    let wide = pairs.filter(|(wide, own)| wide > own).count();
+    assert!(wide > 100 && wide < near.points.len(), "{wide}");
+
+    let n = near.points.len();
+    let (v, w) = (vectors(n, &mut random), vectors(n, &mut random));
+    let step = STEP * near.held.common_radius * 1e-2;
+    let mut bar = vec![[0.0; 3]; n];
+    normals::pullback(&near.held, &residual, &w, &mut Default::default(), &mut bar);
+    agrees("axes", inner(&bar, &v), step, |s| {
+        let mut at = normals::Residual::default();
+        normals::hold(&near.moved(&v, s), &residual, &mut at);
+        assert_eq!(at.count, residual.count, "a neighbourhood changed");
+        inner(&at.normals, &w)
+    });
+}
+
+#[test]
 fn degenerate_clouds_have_finite_gradients_in_f32_and_f64() {
     degenerate::<f32>();
     degenerate::<f64>();

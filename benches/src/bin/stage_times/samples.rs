@@ -76,7 +76,7 @@ impl<T: Real + Number> Stage for Oriented<T> {
         self.axes.run()?;
         let chosen = orient::forward(
             &self.axes.points,
-            &self.axes.residual.normals,
+            &self.axes.residual,
             &self.axes.neighborhoods,
             None,
             &orient::Method::Auto,

@@ -148,7 +148,7 @@ impl<'a> Check<'a> {
             parts: self.functional.parts(result.sdf()),
             inside: values.iter().map(|&phi| phi < 0.0).collect(),
             between: places.map(|x| x.map(between)).collect(),
-            counts: result.neighbour_counts().to_vec(),
+            counts: [result.neighbour_counts(), result.axis_counts()].concat(),
             normals: result.normals().to_vec(),
             surface: held.then(|| (result.mesh().clone(), result.closest().to_vec())),
         })

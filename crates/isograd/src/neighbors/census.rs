@@ -5,7 +5,7 @@ use crate::Real;
 
 /// Sums over the samples within `R` of a place.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Census<T> {
+pub(crate) struct Census<T> {
     pub count: u32,
     /// `Σ_j (1 − r_j²/R²)²`: the count, with samples near the radius counting less. The areas are made of
     /// it (`splat::area`); here, beside the count, it costs next to nothing.
@@ -14,7 +14,7 @@ pub(super) struct Census<T> {
 
 impl<T: Real> Census<T> {
     /// Over candidates that hold all samples within the radius.
-    pub(super) fn of(arch: pulp::Arch, center: [T; 3], radius: T, near: &Candidates<T>) -> Self {
+    pub(crate) fn of(arch: pulp::Arch, center: [T; 3], radius: T, near: &Candidates<T>) -> Self {
         let (counts, crowds) = crate::simd::dispatch(
             arch,
             #[inline(always)]

@@ -3,7 +3,7 @@
 //! A point `k` gets `−Σ_j d̄_j` as the centre of its own neighbourhood, and the `d̄_k` of every other centre
 //! that has it as a neighbour. Where both have the common radius, `k` is a neighbour of `c` exactly where
 //! `c` is one of `k`, rounding included; so one walk over the points within that radius gathers both. The
-//! few centres whose radius has grown hand out what they have in a fixed order.
+//! few centres with a wider radius hand out what they have in a fixed order.
 
 use rayon::prelude::*;
 
@@ -48,21 +48,21 @@ impl<T: Real> Neighborhoods<T> {
             .for_each(|(bar, &position)| *bar = vector::add(*bar, sorted[position as usize]));
     }
 
-    /// Adds to `(N, 3)` `points_bar` what the centres whose radius has grown contribute:
+    /// Adds to `(N, 3)` `points_bar` what the centres contribute whose `radius` is above the common one:
     /// `offset_bar(centre, neighbour, offset)` is `d̄_j`, not called for the centre itself.
-    pub(crate) fn add_from_grown(
+    pub(crate) fn add_from_wide(
         &self,
+        radius: &[T],
         points_bar: &mut [[T; 3]],
         offset_bar: &(impl Fn(usize, usize, [T; 3]) -> [T; 3] + Sync),
     ) {
-        let grown: Vec<usize> = (0..self.radius.len())
-            .filter(|&i| self.has_grown(i))
-            .collect();
+        let wide = (0..radius.len()).filter(|&i| radius[i] > self.common_radius);
+        let wide: Vec<usize> = wide.collect();
         // Rounds of a fixed number of centres, so that the lists stay short.
-        for round in grown.chunks(16 * CHUNK) {
+        for round in wide.chunks(4 * CHUNK) {
             let lists: Vec<Vec<(u32, [T; 3])>> = round
                 .par_chunks(CHUNK / 8)
-                .map(|centres| self.contributions(centres, offset_bar))
+                .map(|centres| self.contributions(radius, centres, offset_bar))
                 .collect();
             for (j, bar) in lists.into_iter().flatten() {
                 points_bar[j as usize] = vector::add(points_bar[j as usize], bar);
@@ -72,6 +72,7 @@ impl<T: Real> Neighborhoods<T> {
 
     fn contributions(
         &self,
+        radius: &[T],
         centres: &[usize],
         offset_bar: &impl Fn(usize, usize, [T; 3]) -> [T; 3],
     ) -> Vec<(u32, [T; 3])> {
@@ -79,7 +80,7 @@ impl<T: Real> Neighborhoods<T> {
         for &i in centres {
             let centre = self.index.point(self.position()[i] as usize);
             let mut total = [T::zero(); 3];
-            self.index.for_each_within(centre, self.radius[i], |j, _| {
+            self.index.for_each_within(centre, radius[i], |j, _| {
                 if j != i {
                     let point = self.index.point(self.position()[j] as usize);
                     let bar = offset_bar(i, j, vector::sub(point, centre));

@@ -31,5 +31,7 @@ pub(crate) mod tests;
 
 pub(crate) use candidates::{Candidates, LANES, Lanes, sum_lanes};
 pub use cell_index::CellIndex;
+pub(crate) use cells::Search;
+pub(crate) use census::Census;
 pub use radius::{Error, Neighborhoods, Radius, forward};
 pub(crate) use radius::{Found, forward_with, hold};

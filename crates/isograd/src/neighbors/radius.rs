@@ -90,6 +90,8 @@ pub enum Error {
 pub struct Neighborhoods<T> {
     /// The points, sorted into cells.
     pub index: CellIndex<T>,
+    /// How the radius was chosen.
+    pub rule: Radius,
     /// `R`: the radius of every point that has enough neighbours within it.
     pub common_radius: T,
     /// `(N,)` the radius `R_i` of each point, in input order; at least [`Self::common_radius`].
@@ -234,6 +236,7 @@ pub(crate) fn forward_with<T: Real, U: Copy + Default + Send + Sync>(
     let automatic = automatic_radius(&out.index);
     out.spacing =
         automatic * T::of((std::f64::consts::PI / AUTO_NEIGHBORS.min(points.len()) as f64).sqrt());
+    out.rule = radius;
     out.common_radius = match radius {
         Radius::Auto => automatic.max(smallest_radius()),
         Radius::Fixed(radius) => fixed_radius(radius)?,
@@ -261,6 +264,7 @@ pub(crate) fn hold<T: Real>(
     }
     out.index.rebuild(points);
     check_extent(&out.index)?;
+    out.rule = held.rule;
     out.common_radius = held.common_radius;
     out.spacing = held.spacing;
     out.radius.clone_from(&held.radius);

@@ -4,7 +4,7 @@ use pulp::Arch;
 use rayon::prelude::*;
 
 use super::eigen::{Eigen, eigen};
-use super::{Plane, Residual};
+use super::{Plane, Residual, widen};
 use crate::neighbors::{self, Candidates, Found, LANES, Lanes, Neighborhoods, Radius, sum_lanes};
 use crate::parallel::CHUNK;
 use crate::{Real, simd, vector};
@@ -21,6 +21,23 @@ pub(super) const SMALLEST_GAP: f64 = 1e-3;
 /// where the points of a neighbourhood lie on a line or in one place, the axis is some unit vector at a
 /// right angle to the line, or any, and is marked [`Plane::guarded`].
 pub fn forward<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residual<T>) {
+    find_in_own(neighborhoods, out);
+    widen::choose(neighborhoods, out);
+}
+
+/// The axes of moved points, in neighbourhoods as wide as those of `held`: what the pullback holds constant.
+/// `neighborhoods` are those of the moved points, as many as before, with the radii of before.
+pub(crate) fn hold<T: Real>(
+    neighborhoods: &Neighborhoods<T>,
+    held: &Residual<T>,
+    out: &mut Residual<T>,
+) {
+    find_in_own(neighborhoods, out);
+    widen::repeat(neighborhoods, &held.radius, out);
+}
+
+/// Axes in the neighbourhoods as they are.
+fn find_in_own<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residual<T>) {
     let arch = Arch::new();
     out.sorted
         .resize(neighborhoods.index.len(), Found::default());
@@ -50,13 +67,14 @@ pub fn forward_with_neighborhoods<T: Real>(
         &|center, radius, candidates| moments(arch, center, radius, candidates),
     )?;
     find_all_planes(neighborhoods, arch, out);
+    widen::choose(neighborhoods, out);
     Ok(())
 }
 
 /// `Σ w`, `Σ w d` and `Σ w d dᵀ` over a neighbourhood: `xx, xy, xz, yy, yz, zz`.
 pub(super) type Moments<T> = [T; 10];
 
-fn moments<T: Real>(
+pub(super) fn moments<T: Real>(
     arch: Arch,
     center: [T; 3],
     radius: T,
@@ -122,6 +140,8 @@ fn moment_terms<T: Real>(center: [T; 3], epsilon: T, lanes: &Lanes<T>) -> [[T; L
 /// Normals and planes from the moments in sorted order.
 fn find_all_planes<T: Real>(neighborhoods: &Neighborhoods<T>, arch: Arch, out: &mut Residual<T>) {
     let n = neighborhoods.index.len();
+    out.radius.clone_from(&neighborhoods.radius);
+    out.count.clone_from(&neighborhoods.count);
     out.normals.resize(n, [T::zero(); 3]);
     out.planes.resize(n, Plane::default());
     let sorted = &out.sorted;
@@ -140,7 +160,7 @@ fn find_all_planes<T: Real>(neighborhoods: &Neighborhoods<T>, arch: Arch, out: &
 
 /// Normals and planes of the points at these sorted positions, from the moments in sorted order.
 #[inline(always)]
-fn find_planes<T: Real>(
+pub(super) fn find_planes<T: Real>(
     sorted: &[Found<T, Moments<T>>],
     positions: &[u32],
     normals: &mut [[T; 3]],

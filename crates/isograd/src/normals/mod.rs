@@ -20,6 +20,18 @@
 //! | torus, noise 0.2 R | 17.3 | 17.0 | 15.4 | 11.1 | 10.0 | 9.6 | 9.4 |
 //! | cube, no noise | 5.99 | 5.94 | 5.63 | 5.19 | 5.19 | 5.27 | 5.38 |
 //!
+//! Where samples scatter about their plane by a large part of the radius, from noise or because they lie on
+//! both sides of a thin body, neighbourhoods of up to `2√2 R_i` are tried, and the axis is that of the first
+//! that is far less rough than those before it ([`Residual::radius`]; a radius that the caller has given
+//! stays). Mean error of the axes in degrees, with the same radius given and with the automatic one:
+//!
+//! | cloud | given | automatic |
+//! |---|---|---|
+//! | torus, noise of 0.25 / 0.5 / 1 % of its length, 30,000 samples | 4.3 / 9.9 / 27 | 2.5 / 2.6 / 4.9 |
+//! | plate 1 / 1.5 / 2 spacings thick, 50,000 samples | 13 / 27 / 28 | 2.2 / 3.0 / 3.3 |
+//! | knot, fish, airliner with noise of 0.5 % | 10 / 36 / 32 | 5.3 / 9.6 / 12 |
+//! | the same without noise | 1.2 / 1.1 / 4.2 | 1.2 / 1.0 / 3.3 |
+//!
 //! The paper takes the vectors from a singular value decomposition of the weighted offsets instead, to
 //! keep digits and gradients. Here `C` is formed relative to `x_i`, where its rounding tilts the axis by
 //! a few units of rounding of the number type; it is solved in double precision, and the pullback is
@@ -40,7 +52,7 @@
 //! `N_i`, and over all `i` with `j ∈ N_i`: [`pullback`].
 //!
 //! # Not differentiable
-//! The neighbourhoods and radii (held constant, `ε` with them), and the sign. Where `λ₂ − λ₁` is at most
+//! The neighbourhoods and radii (held constant, `ε` with them; the choice of a wider one too), and the sign. Where `λ₂ − λ₁` is at most
 //! `10⁻³ λ₃` (a line, an isolated point, a corner as thick as it is wide) the axis itself is ill defined:
 //! such a plane is marked [`Plane::guarded`], and the pullback bounds `1/(λ₁ − λ_k)` there.
 
@@ -49,8 +61,12 @@ mod forward;
 mod pullback;
 #[cfg(test)]
 mod tests;
+mod widen;
+#[cfg(test)]
+mod widen_tests;
 
 pub(crate) use eigen::{Symmetric, eigen};
+pub(crate) use forward::hold;
 pub use forward::{forward, forward_with_neighborhoods};
 pub use pullback::{Scratch, pullback};
 
@@ -76,6 +92,10 @@ pub struct Plane<T> {
 pub struct Residual<T> {
     /// Unit normals, each with its component of largest magnitude positive.
     pub normals: Vec<[T; 3]>,
+    /// The radius within which each was found: `R_i`, or up to `2√2 R_i`.
+    pub radius: Vec<T>,
+    /// Number of samples within that radius, the point itself included.
+    pub count: Vec<u32>,
     /// The plane round each point.
     pub planes: Vec<Plane<T>>,
     /// Moments in the order of the cells: scratch.
@@ -90,13 +110,18 @@ impl<T> Residual<T> {
 
     /// Bytes of what the pullback needs, and of work space.
     pub(crate) fn bytes(&self) -> [usize; 2] {
-        let needed = size_of_val(self.normals.as_slice()) + size_of_val(self.planes.as_slice());
+        let needed = size_of_val(self.normals.as_slice())
+            + size_of_val(self.radius.as_slice())
+            + size_of_val(self.count.as_slice())
+            + size_of_val(self.planes.as_slice());
         [needed, size_of_val(self.sorted.as_slice())]
     }
 
     /// Forgets all points, for a cloud whose normals are given; keeps the memory.
     pub fn clear(&mut self) {
         self.normals.clear();
+        self.radius.clear();
+        self.count.clear();
         self.planes.clear();
     }
 }

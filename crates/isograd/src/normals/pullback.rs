@@ -19,7 +19,7 @@ const VALUES: usize = 9;
 pub struct Scratch<T> {
     /// `ĝ/Ŵ` of every point, in input order.
     slopes: Vec<[T; 3]>,
-    /// [`VALUES`] of every point in the order of the cells; `ĝ` is 0 there where the radius has grown.
+    /// [`VALUES`] of every point in the order of the cells; `ĝ` is 0 there where the radius is wider.
     values: [Vec<T>; VALUES],
     sorted: Vec<[T; 3]>,
 }
@@ -41,7 +41,7 @@ pub fn pullback<T: Real>(
         values,
         sorted,
     } = scratch;
-    let slope = |i: usize| slope(&residual.planes[i], neighborhoods.radius[i], normals_bar[i]);
+    let slope = |i: usize| slope(&residual.planes[i], residual.radius[i], normals_bar[i]);
     let samples = (0..normals_bar.len()).into_par_iter();
     samples.map(slope).collect_into_vec(slopes);
     sort_values(neighborhoods, residual, slopes, values);
@@ -61,8 +61,8 @@ pub fn pullback<T: Real>(
         },
     );
     let slopes = &*slopes;
-    neighborhoods.add_from_grown(points_bar, &|i, _, offset| {
-        let radius = neighborhoods.radius[i];
+    neighborhoods.add_from_wide(&residual.radius, points_bar, &|i, _, offset| {
+        let radius = residual.radius[i];
         let plane = &residual.planes[i];
         let mean = scale(plane.centroid, T::one() / radius);
         let unit = scale(offset, T::one() / radius);
@@ -103,14 +103,15 @@ fn sort_values<T: Real>(
     values: &mut [Vec<T>; VALUES],
 ) {
     let order = neighborhoods.index.order();
-    let inverse = T::one() / neighborhoods.common_radius;
+    let common = neighborhoods.common_radius;
+    let inverse = T::one() / common;
     values.par_iter_mut().enumerate().for_each(|(m, out)| {
         let (what, axis) = (m / 3, m % 3);
         out.clear();
         out.extend(order.iter().map(|&i| {
             let i = i as usize;
             match what {
-                0 if neighborhoods.has_grown(i) => T::zero(),
+                0 if residual.radius[i] > common => T::zero(),
                 0 => slopes[i][axis],
                 1 => residual.normals[i][axis],
                 _ => residual.planes[i].centroid[axis] * inverse,

@@ -47,10 +47,10 @@ fn covariance(members: &[(usize, [f64; 3])], radius: f64) -> (f64, [f64; 3], Sym
 
 fn planes_agree_with_plain_sums<T: Real>() {
     for (name, points) in ugly_clouds::<T>() {
-        let (neighborhoods, found) = axes(&points);
+        let found = axes(&points).1;
         for (i, plane) in found.planes.iter().enumerate() {
-            let radius = neighborhoods.radius[i].f64();
-            let (weight, m, c) = covariance(&members(&points, i, neighborhoods.radius[i]), radius);
+            let radius = found.radius[i].f64();
+            let (weight, m, c) = covariance(&members(&points, i, found.radius[i]), radius);
             // Sums of up to a few hundred terms, each rounded a few times.
             let tolerance = 300.0 * T::epsilon().f64();
             let size = tolerance * radius * radius;
@@ -195,7 +195,7 @@ fn same_bits_for_any_number_of_threads_and_in_used_memory() {
             .build()
             .expect("a pool");
         pool.install(|| forward(&neighborhoods, out));
-        (out.normals.clone(), out.planes.clone())
+        (out.normals.clone(), out.planes.clone(), out.radius.clone())
     };
     let one = run(1, &mut Residual::default());
     assert_eq!(one, run(2, &mut reused));
@@ -243,10 +243,10 @@ fn pullback(
 #[test]
 fn the_residual_holds_all_that_the_pullback_needs() {
     let points: Vec<[f64; 3]> = torus(3000, 9).iter().map(|s| s.0).collect();
-    let (neighborhoods, found) = axes(&points);
+    let found = axes(&points).1;
     let mut random = Random::new(10);
     for i in (0..points.len()).step_by(300) {
-        let radius = neighborhoods.radius[i];
+        let radius = found.radius[i];
         let members = members(&points, i, radius);
         let normal_bar = [0; 3].map(|_| random.uniform() - 0.5);
         let direction: Vec<[f64; 3]> = members

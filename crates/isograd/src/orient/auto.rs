@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::Axes;
 use super::fill::{Fill, Lattice};
 use super::graph::{Graph, NEIGHBORS};
 use super::groups::Groups;
@@ -25,6 +26,11 @@ const FINE: f64 = 1.1;
 
 /// What the evidence of a second sheet weighs.
 const SHEET: f32 = 4.0;
+
+/// What the side weighs on which a sample lies in a layer that scatters; and how soon it is clear, by the height
+/// in spreads.
+const SLAB: f32 = 2.0;
+const SLAB_SLOPE: f32 = 2.0;
 
 /// What a sample at which the winding number is wrong by 1 weighs, beside evidence of 1.
 const WINDING: f64 = 4.0;
@@ -85,6 +91,8 @@ pub(super) struct Auto {
     filled: Vec<f32>,
     ends: Vec<[f32; 2]>,
     sheets: Vec<f32>,
+    /// How much light there is on both sides of samples that scatter: 0..1.
+    slabs: Vec<f32>,
     /// What sensors know; empty without them.
     seen: Vec<f32>,
     /// Own evidence, belief, and the belief of the next round.
@@ -122,7 +130,7 @@ impl Auto {
     /// where sensors know, they do.
     pub(super) fn run<T: Real>(
         &mut self,
-        axes: &[[T; 3]],
+        axes: &Axes<'_, T>,
         neighborhoods: &Neighborhoods<T>,
         views: Option<&[f32]>,
     ) {
@@ -197,6 +205,8 @@ impl Auto {
         let n = self.graph.near.len();
         self.filled.clear();
         self.filled.resize(n, 0.0);
+        self.slabs.clear();
+        self.slabs.resize(n, 0.0);
         self.ends.clear();
         self.ends.resize(n, [1.0; 2]);
         for (group, bounds) in self.groups.bounds.iter().enumerate() {
@@ -213,10 +223,13 @@ impl Auto {
                 for (&p, sights) in members.iter().zip(&self.fill.sights) {
                     let (filled, ends) = (&mut self.filled[p as usize], &mut self.ends[p as usize]);
                     *filled += weight * sights.evidence;
+                    let slab = &mut self.slabs[p as usize];
+                    *slab = slab.max(sights.ends[0].min(sights.ends[1]));
                     *ends = [0, 1].map(|side| ends[side].min(sights.ends[side]));
                 }
             }
         }
+        self.graph.part_slabs(&self.slabs, SLAB_SLOPE);
         let (graph, all) = (&self.graph, (0..n).into_par_iter());
         all.map(|p| graph.sheet_evidence(p))
             .collect_into_vec(&mut self.sheets);
@@ -227,7 +240,8 @@ impl Auto {
             Reading::Careful => self.open(p),
             Reading::Bold => 1.0,
         };
-        let found = (self.filled[p] + SHEET * open * self.sheets[p]).clamp(-1.0, 1.0);
+        let found = self.filled[p] + SHEET * open * self.sheets[p] + self.slab_evidence(p);
+        let found = found.clamp(-1.0, 1.0);
         let seen = self.seen.get(p).copied().unwrap_or(0.0);
         seen + (1.0 - seen.abs()) * found
     }
@@ -236,6 +250,12 @@ impl Auto {
     fn open(&self, p: usize) -> f32 {
         let side = usize::from(self.sheets[p] < 0.0);
         (1.0 + self.ends[p][side]).clamp(0.0, 1.0)
+    }
+
+    /// Where noise has made one layer of the two sides of a thin body, which is seen by the open air on both
+    /// sides of it, a sample on one side of its middle belongs to that side.
+    fn slab_evidence(&self, p: usize) -> f32 {
+        SLAB * self.slabs[p] * (SLAB_SLOPE * self.graph.height[p]).tanh()
     }
 
     fn differs(&self, p: usize) -> bool {

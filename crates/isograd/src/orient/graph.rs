@@ -4,8 +4,9 @@ use std::f32::consts::PI;
 
 use rayon::prelude::*;
 
-use super::sheet;
+use super::{Axes, sheet};
 use crate::neighbors::Neighborhoods;
+use crate::normals::Plane;
 use crate::parallel::CHUNK;
 use crate::{Real, vector};
 
@@ -30,6 +31,9 @@ const APART: f32 = 3.0;
 const SAME_SHEET: f32 = 0.1;
 const LEAST_SHARE: f32 = 1.0 / 3.0;
 
+/// What the product of the spreads of two samples adds to the blur of their reflection.
+const NOISE: f32 = 4.0;
+
 /// Couplings are raised to this odd power: a half-hearted one, as between a sample of one sheet and one
 /// slantwise across on the other, is mostly wrong, and must not count for half.
 const TRUST: i32 = 5;
@@ -52,6 +56,11 @@ pub(super) struct Graph {
     pub scatter: Vec<f32>,
     /// The area of surface that this sample stands for.
     pub area: Vec<f32>,
+    /// How far samples lie off their common plane, where they scatter so much that the axis was sought in a
+    /// wider neighbourhood: root mean square; else 0.
+    pub spread: Vec<f32>,
+    /// How far along its axis such a sample lies off that plane, in spreads.
+    pub height: Vec<f32>,
     /// Scratch: distance to the last sample of the ring.
     ring: Vec<f32>,
     /// Scratch: typical distance of the nearest samples from the tangent plane.
@@ -59,14 +68,9 @@ pub(super) struct Graph {
 }
 
 impl Graph {
-    pub(super) fn build<T: Real>(&mut self, axes: &[[T; 3]], neighborhoods: &Neighborhoods<T>) {
+    pub(super) fn build<T: Real>(&mut self, axes: &Axes<'_, T>, neighborhoods: &Neighborhoods<T>) {
         let n = neighborhoods.index.len();
-        self.axis.clear();
-        let order = neighborhoods.index.order();
-        self.axis.extend(order.iter().map(|&i| {
-            let axis = vector::normalized(vector::to_f64(axes[i as usize]));
-            axis.unwrap_or([0.0; 3]).map(|a| a as f32)
-        }));
+        self.take_axes(axes, neighborhoods);
         self.near.resize(n, [0; NEIGHBORS]);
         self.offset.resize(n, [[0.0; 3]; NEIGHBORS]);
         self.coupling.resize(n, [0.0; NEIGHBORS]);
@@ -83,6 +87,31 @@ impl Graph {
         self.measure();
         self.couple();
         self.measure_areas();
+    }
+
+    fn take_axes<T: Real>(&mut self, axes: &Axes<'_, T>, neighborhoods: &Neighborhoods<T>) {
+        let order = neighborhoods.index.order();
+        self.axis.clear();
+        self.axis.extend(order.iter().map(|&i| {
+            let axis = vector::normalized(vector::to_f64(axes.normals[i as usize]));
+            axis.unwrap_or([0.0; 3]).map(|a| a as f32)
+        }));
+        let spacing = neighborhoods.spacing().f64();
+        let scatter = |&i: &u32| {
+            let i = i as usize;
+            let is_wide = axes
+                .radius
+                .get(i)
+                .is_some_and(|&r| r > neighborhoods.radius[i]);
+            match axes.planes.get(i) {
+                Some(plane) if is_wide => scatter(plane, axes.normals[i], spacing),
+                _ => [0.0; 2],
+            }
+        };
+        self.spread.clear();
+        self.spread.extend(order.iter().map(|i| scatter(i)[0]));
+        self.height.clear();
+        self.height.extend(order.iter().map(|i| scatter(i)[1]));
     }
 
     fn find_neighbors<T: Real>(&mut self, neighborhoods: &Neighborhoods<T>) {
@@ -174,9 +203,32 @@ impl Graph {
 
     fn tie(&self, p: usize, q: usize, slot: usize) -> f32 {
         let blunt = (BLUNT * self.reach[p]).powi(2);
-        let blur = blunt + self.thickness[p] * self.thickness[q];
         let gap = self.least_gap(p, q);
+        // Where sheets are told apart, it is not noise.
+        let noise = match gap.is_finite() {
+            true => 0.0,
+            false => NOISE * self.spread[p] * self.spread[q],
+        };
+        let blur = blunt + noise.max(self.thickness[p] * self.thickness[q]);
         coupled(self.axis[p], self.axis[q], self.offset[p][slot], blur, gap).powi(TRUST)
+    }
+
+    /// In layers with air on both sides, as far as they are that (`slab`, in 0..1), two samples hang together as
+    /// their heights say: on one side of the middle, or on both.
+    pub(super) fn part_slabs(&mut self, slab: &[f32], slope: f32) {
+        let (near, axis, height) = (&self.near, &self.axis, &self.height);
+        let side = |p: usize| (slope * height[p]).tanh();
+        let all = self.coupling.par_iter_mut().enumerate();
+        all.for_each(|(p, coupling)| {
+            for (coupling, &q) in coupling.iter_mut().zip(&near[p]) {
+                let q = q as usize;
+                let both = slab[p].min(slab[q]);
+                if both > 0.0 && height[p] != 0.0 && height[q] != 0.0 {
+                    let tie = vector::dot(axis[p], axis[q]) * side(p) * side(q);
+                    *coupling += both * (tie.powi(TRUST) - *coupling);
+                }
+            }
+        });
     }
 
     /// The square of the height from which on one of two samples lies off the sheet of the other; infinite
@@ -230,6 +282,16 @@ impl Graph {
         } else {
             0.0
         }
+    }
+}
+
+/// Spread, in spacings, and height, in spreads, of a sample over the plane round it.
+fn scatter<T: Real>(plane: &Plane<T>, axis: [T; 3], spacing: f64) -> [f32; 2] {
+    let spread = plane.eigenvalues[0].f64().sqrt();
+    let height = -vector::dot(plane.centroid, axis).f64();
+    match spread > 0.0 {
+        true => [spread / spacing, height / spread].map(|x| x as f32),
+        false => [0.0; 2],
     }
 }
 

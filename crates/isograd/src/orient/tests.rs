@@ -368,7 +368,7 @@ fn given_normals_are_made_unit_and_trusted() {
         let method = &Method::Given;
         forward(
             &points,
-            &[],
+            &Vec::new(),
             &neighborhoods,
             given,
             method,

@@ -71,7 +71,7 @@ impl<T: Real> Orienter<T> {
         let start = done(report, Stage::Normals, start);
         orient::forward(
             cloud.points(),
-            &axes.normals,
+            &*axes,
             neighborhoods,
             cloud,
             &self.method,

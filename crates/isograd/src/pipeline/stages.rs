@@ -46,7 +46,7 @@ impl<T: Real> Reconstructor<T> {
             normals,
             ..
         } = residuals;
-        let held = held.map(|held| &held.residuals.neighborhoods);
+        let held = held.map(|held| &held.residuals);
         let is_given = options.orientation == orient::Method::Given;
         find_axes(
             cloud,
@@ -85,7 +85,7 @@ impl<T: Real> Reconstructor<T> {
         }
         orient::forward(
             cloud.points(),
-            &residuals.normals.normals,
+            &residuals.normals,
             &residuals.neighborhoods,
             cloud,
             &options.orientation,
@@ -210,21 +210,21 @@ pub(super) fn find_axes<T: Real>(
     cloud: &PointCloud<T>,
     radius: Radius,
     is_given: bool,
-    held: Option<&Neighborhoods<T>>,
+    held: Option<&Residuals<T>>,
     neighborhoods: &mut Neighborhoods<T>,
     out: &mut normals::Residual<T>,
     report: &mut Report,
 ) -> Result<(), Error> {
     let points = cloud.points();
     match held {
-        Some(held) => neighbors::hold(points, held, neighborhoods)?,
+        Some(held) => neighbors::hold(points, &held.neighborhoods, neighborhoods)?,
         None if is_given => neighbors::forward(points, radius, neighborhoods)?,
         None => normals::forward_with_neighborhoods(points, radius, neighborhoods, out)?,
     }
-    if is_given {
-        out.clear();
-    } else if held.is_some() {
-        normals::forward(neighborhoods, out);
+    match held {
+        _ if is_given => out.clear(),
+        Some(held) => normals::hold(neighborhoods, &held.normals, out),
+        None => {}
     }
     report.radius = neighborhoods.common_radius.f64();
     report.sample_spacing = neighborhoods.spacing().f64();

@@ -105,7 +105,7 @@ pub fn pullback<T: Real>(
         )
     });
     let factors = &*factors;
-    neighborhoods.add_from_grown(points_bar, &|i, _, offset| {
+    neighborhoods.add_from_wide(&neighborhoods.radius, points_bar, &|i, _, offset| {
         let square = neighborhoods.radius[i] * neighborhoods.radius[i];
         let rise = T::one() - vector::norm_squared(offset) / square;
         vector::scale(offset, factors[i] * rise.max(T::zero()))
