@@ -6,6 +6,7 @@ mod errors;
 mod files;
 mod fit;
 mod grid;
+mod orient;
 mod plan;
 mod pool;
 mod pure;
@@ -29,6 +30,8 @@ mod _core {
     use fit::run_fit;
     #[pymodule_export]
     use grid::{check_grid, fit_grid};
+    #[pymodule_export]
+    use orient::orient;
     #[pymodule_export]
     use plan::Plan;
     #[pymodule_export]

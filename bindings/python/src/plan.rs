@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use isograd::data::Attribute;
-use isograd::{PointCloud, Reconstruction, Reconstructor};
+use isograd::{PointCloud, Reconstruction, Reconstructor, Sensors};
 use pyo3::prelude::*;
 
 use crate::arrays::{self, Dtype, Either, Number};
@@ -37,21 +37,24 @@ impl Plan {
         })
     }
 
-    /// Reconstructs a cloud: `points` and `normals` `(N, 3)` of one type.
-    #[pyo3(signature = (points, normals, attributes))]
+    /// Reconstructs a cloud: `points`, `normals` and `sensors` of one type.
+    #[pyo3(signature = (points, normals, sensors, attributes))]
     fn reconstruct(
         &self,
         points: &Bound<'_, PyAny>,
         normals: Option<&Bound<'_, PyAny>>,
+        sensors: Option<&Bound<'_, PyAny>>,
         attributes: Vec<AttributeArray<'_>>,
     ) -> PyResult<Outcome> {
         match arrays::dtype(points, "points")? {
             Dtype::F32 => {
-                let kept = self.run(&self.single, points, normals, attributes)?;
+                let cloud = seen(cloud(points, normals, attributes)?, sensors)?;
+                let kept = self.run(&self.single, points.py(), cloud)?;
                 Ok(Outcome(Either::F32(Arc::new(kept))))
             }
             Dtype::F64 => {
-                let kept = self.run(&self.double, points, normals, attributes)?;
+                let cloud = seen(cloud(points, normals, attributes)?, sensors)?;
+                let kept = self.run(&self.double, points.py(), cloud)?;
                 Ok(Outcome(Either::F64(Arc::new(kept))))
             }
         }
@@ -64,14 +67,12 @@ impl Plan {
     fn run<T: Number>(
         &self,
         place: &Mutex<Option<Reconstructor<T>>>,
-        points: &Bound<'_, PyAny>,
-        normals: Option<&Bound<'_, PyAny>>,
-        attributes: Vec<AttributeArray<'_>>,
+        py: Python<'_>,
+        cloud: PointCloud<T>,
     ) -> PyResult<Kept<T>> {
-        let cloud = cloud::<T>(points, normals, attributes)?;
         let waiting = place.lock().unwrap_or_else(PoisonError::into_inner).take();
         let settings = self.settings.clone();
-        let (plan, result) = background::run(points.py(), move |stop| {
+        let (plan, result) = background::run(py, move |stop| {
             let mut plan = match waiting {
                 Some(plan) => plan,
                 None => settings.plan()?,
@@ -115,4 +116,24 @@ pub fn cloud<T: Number>(
         cloud = cloud.with_attribute(attribute).map_err(value)?;
     }
     Ok(cloud)
+}
+
+/// The cloud with where it was seen from: `(N, 3)` is a place for each point, any other number of places is that
+/// of all.
+///
+/// # Errors
+/// Arrays of another type or shape, and places that are not finite.
+pub fn seen<T: Number>(
+    cloud: PointCloud<T>,
+    sensors: Option<&Bound<'_, PyAny>>,
+) -> PyResult<PointCloud<T>> {
+    let Some(sensors) = sensors else {
+        return Ok(cloud);
+    };
+    let places = arrays::vectors(sensors, "sensors")?;
+    let sensors = match places.len() == cloud.len() {
+        true => Sensors::Each(places),
+        false => Sensors::Any(places),
+    };
+    cloud.with_sensors(sensors).map_err(value)
 }

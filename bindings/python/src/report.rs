@@ -16,9 +16,27 @@ pub fn dict<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'py, PyDict
     dict.set_item("surface", surface(py, report)?)?;
     dict.set_item("sdf", sdf(py, report)?)?;
     dict.set_item("seconds", seconds(py, report)?)?;
-    let warnings: Vec<String> = report.warnings.iter().map(ToString::to_string).collect();
-    dict.set_item("warnings", warnings)?;
+    dict.set_item("warnings", warnings(report))?;
     Ok(dict)
+}
+
+/// The part of it that a cloud has without a grid; see `isograd.Oriented.report`.
+pub fn of_samples<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'py, PyDict>> {
+    let (dict, seconds) = (PyDict::new(py), PyDict::new(py));
+    for stage in [Stage::Normals, Stage::Orient, Stage::Checks] {
+        seconds.set_item(stage.name(), report.seconds.of(stage))?;
+    }
+    seconds.set_item("total", report.seconds.total())?;
+    dict.set_item("points", report.points)?;
+    dict.set_item("normals", normals(py, report)?)?;
+    dict.set_item("orientation", orientation(py, report)?)?;
+    dict.set_item("seconds", seconds)?;
+    dict.set_item("warnings", warnings(report))?;
+    Ok(dict)
+}
+
+fn warnings(report: &Report) -> Vec<String> {
+    report.warnings.iter().map(ToString::to_string).collect()
 }
 
 fn normals<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'py, PyDict>> {
@@ -47,7 +65,7 @@ fn orientation<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'py, PyD
 }
 
 /// Shares of the points that are doubtful: all, and by reason.
-pub fn doubtful<'py>(py: Python<'py>, doubt: &Doubt) -> PyResult<Bound<'py, PyDict>> {
+fn doubtful<'py>(py: Python<'py>, doubt: &Doubt) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("share", doubt.share())?;
     for reason in Reason::ALL {

@@ -22,13 +22,45 @@ pub struct Settings {
     checks: bool,
 }
 
+/// `isograd.Orient`.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(rename_all = "lowercase")]
-enum Orient {
+pub enum Orient {
+    /// From the points.
     Auto,
+    /// The paper's.
     Parity,
+    /// The normals that are given.
     Given,
+    /// Their sides.
     Signs,
+    /// The sides of the sensors.
+    Sensors,
+    /// The sides of the call before.
+    Previous,
+}
+
+impl Orient {
+    /// Reads the text of the enum.
+    ///
+    /// # Errors
+    /// A text that stands for none.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let text = serde_json::Value::from(text);
+        serde_json::from_value(text).map_err(|error| format!("orient: {error}"))
+    }
+
+    /// What it stands for.
+    pub fn method(self) -> orient::Method {
+        match self {
+            Self::Auto => orient::Method::Auto,
+            Self::Parity => orient::Method::Parity(orient::ParityOptions::default()),
+            Self::Given => orient::Method::Given,
+            Self::Signs => orient::Method::Signs,
+            Self::Sensors => orient::Method::Sensors,
+            Self::Previous => orient::Method::Previous,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
@@ -68,12 +100,7 @@ impl Settings {
     pub fn options(&self) -> Options {
         Options {
             radius: self.radius.map_or(Radius::Auto, Radius::Fixed),
-            orientation: match self.orient {
-                Orient::Auto => orient::Method::Auto,
-                Orient::Parity => orient::Method::Parity(orient::ParityOptions::default()),
-                Orient::Given => orient::Method::Given,
-                Orient::Signs => orient::Method::Signs,
-            },
+            orientation: self.orient.method(),
             weights: match self.splat {
                 Splat::Bspline => splat::Weights::BSpline,
                 Splat::Paper => splat::Weights::Paper,

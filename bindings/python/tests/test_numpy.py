@@ -379,3 +379,68 @@ def test_options_are_typed_and_strings_are_enum_values():
     assert isograd.Orient.SIGNS == "signs"
     result = isograd.reconstruct(SPHERE, GRID, normals=-SPHERE, orient=isograd.Orient.SIGNS)
     assert result.sdf[GRID.shape[0] // 2, GRID.shape[1] // 2, GRID.shape[2] // 2] > 0
+
+
+@pytest.mark.parametrize("dtype", TYPES)
+def test_normals_alone_are_those_of_a_reconstruction(dtype):
+    points = SPHERE.astype(dtype)
+    found = isograd.orient(points)
+    whole = isograd.reconstruct(points, GRID)
+    assert found.normals.dtype == dtype and found.confidence.dtype == dtype
+    assert bits(found.normals) == bits(whole.normals) and bits(found.confidence) == bits(whole.confidence)
+    assert found.report["orientation"] == whole.report["orientation"]
+    doubtful = found.report["orientation"]["doubtful"]
+    assert doubtful == dict.fromkeys(("share", "thin", "sparse", "open", "noisy", "unexplained"), 0.0)
+    assert found.warnings == []
+    inward = isograd.orient(points, normals=-points, orient="given")
+    assert np.einsum("ij,ij->i", inward.normals, points).max() < 0
+
+
+def test_a_doubtful_side_has_a_reason_in_the_warning():
+    sheet = np.random.default_rng(1).random((2000, 3)) * (1, 1, 0)
+    found = isograd.orient(sheet)
+    doubtful = found.report["orientation"]["doubtful"]
+    assert doubtful["open"] > 0.9 and doubtful["share"] == 1.0
+    assert any("close the gaps" in warning for warning in found.warnings)
+
+
+def test_sensors_are_one_for_all_one_for_each_or_any():
+    sheet = np.random.default_rng(2).random((500, 3)) * (1, 1, 0)
+    below = (0.5, 0.5, -2.0)
+    each = np.tile(below, (500, 1))
+    for sensors in (below, [below], np.array([below, (0, 0, -9)]), each):
+        found = isograd.orient(sheet, sensors=sensors, orient="sensors")
+        assert found.normals[:, 2].max() < 0
+    result = isograd.reconstruct(SPHERE, GRID, sensors=(0, 0, 5), orient=isograd.Orient.SENSORS)
+    assert result.report["orientation"]["method"] == "sensors"
+    with pytest.raises(ValueError, match="there are no sensors"):
+        isograd.orient(sheet, orient="sensors")
+    with pytest.raises(ValueError, match="does not use them"):
+        isograd.reconstruct(SPHERE, GRID, sensors=(0, 0, 5))
+    with pytest.raises(ValueError, match="sensor position 1 is not finite"):
+        isograd.orient(sheet, sensors=[below, (0, np.nan, 1)], orient="sensors")
+    with pytest.raises(ValueError, match="lies exactly at a sensor"):
+        isograd.orient(sheet, sensors=sheet[3], orient="sensors")
+    with pytest.raises(ValueError, match="sensors has the shape"):
+        isograd.orient(sheet, sensors=np.zeros((4, 2)), orient="sensors")
+
+
+def test_a_plan_follows_the_step_before():
+    plan = isograd.Reconstructor(GRID, orient="previous")
+    methods = []
+    for turn in (0.0, 0.1, 0.2):
+        c, s = np.cos(turn), np.sin(turn)
+        points = SPHERE @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]).T
+        result = plan(points)
+        assert np.einsum("ij,ij->i", result.normals, points).min() > 0.98
+        methods.append(result.report["orientation"]["method"])
+    assert methods == ["auto", "previous", "previous"]
+    assert plan(SPHERE[1:]).report["orientation"]["method"] == "auto"
+
+
+@pytest.mark.parametrize("orient", ["previous", "sensors"])
+def test_pure_functions_refuse_what_is_no_function_of_their_arguments(orient):
+    with pytest.raises(ValueError, match='with orient="signs"'):
+        _settings.encode_pure(GRID, isograd.Options(orient=orient), False)
+    with pytest.raises(ValueError, match='with orient="signs"'):
+        isograd.fit(SPHERE, GRID, points=SPHERE, options=isograd.Options(orient=orient))

@@ -7,10 +7,12 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 mod fit;
 mod gradcheck;
+mod orient;
 mod pipeline;
 
 pub use fit::{Decay, Fit, Method, OffOr, TargetKind};
 pub use gradcheck::Gradcheck;
+pub use orient::{OrientArgs, OrientCloud};
 pub use pipeline::{GridArgs, MethodArgs};
 
 /// Point cloud in, exact signed distance field out.
@@ -30,6 +32,8 @@ const STATUS: &str = "Exit status: 0 done, 1 the work failed, 2 the command line
 pub enum Command {
     /// Make the signed distance field and the surface of a point cloud
     Reconstruct(Box<Reconstruct>),
+    /// Give the points of a cloud their outward normals
+    Orient(Box<OrientCloud>),
     /// Sample a parametric body as a point cloud
     Sample(Sample),
     /// Signed distances at points, from a mesh or a field
@@ -183,6 +187,8 @@ pub enum Orient {
     Given,
     /// The directions found, each on the side of the cloud's own normal
     Signs,
+    /// The directions found, each on the side that was seen
+    Sensors,
 }
 
 /// See [`isograd::splat::Weights`].
@@ -339,7 +345,15 @@ mod tests {
             args.grid.bounds,
             Some(vec![-1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
         );
-        assert_eq!(args.method.radius, AutoOr::Value(0.2));
+        assert_eq!(args.method.normals.radius, AutoOr::Value(0.2));
+        let cli = parse("isograd orient a.ply -o b.ply --sensor -1,0,2e1 --sensor 3,-4,5");
+        let Ok(Cli {
+            command: Command::Orient(args),
+        }) = cli
+        else {
+            panic!("{cli:?}");
+        };
+        assert_eq!(args.normals.sensor, [[-1.0, 0.0, 20.0], [3.0, -4.0, 5.0]]);
         let cli = parse("isograd sample fish -n 5 -o a.ply --param time=-0.5");
         let Ok(Cli {
             command: Command::Sample(args),
@@ -367,6 +381,10 @@ mod tests {
             "isograd sample fish -o a.ply",
             "isograd sample fish -n 5 -o a.ply --param time",
             "isograd sample fish -n 5 -o a.ply --density w:3",
+            "isograd orient a.ply",
+            "isograd orient a.ply -o b.ply --sensor 1,2",
+            "isograd orient a.ply -o b.ply --sensor 1,2,inf",
+            "isograd orient a.ply -o b.ply --parity-gamma 0",
             "isograd query a.ply -o b.ply",
             "isograd gradcheck a.ply --step 0",
         ] {

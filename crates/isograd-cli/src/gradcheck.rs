@@ -31,7 +31,10 @@ pub fn run(args: &args::Gradcheck) -> Result<(), Error> {
         source,
     };
     let geometry = isograd_io::read_geometry(&args.cloud)?;
-    let cloud: PointCloud<f64> = geometry.cloud().map_err(cloud_error)?;
+    args.method.normals.check()?;
+    let cloud = geometry.cloud();
+    let cloud = cloud.and_then(|cloud| args.method.normals.with_sensors(cloud));
+    let cloud: PointCloud<f64> = cloud.map_err(cloud_error)?;
     let grid = args.grid.grid(&cloud).map_err(|source| Error::Grid {
         file: file.clone(),
         source,

@@ -8,6 +8,7 @@ pub mod gradcheck;
 pub mod info;
 mod interrupt;
 mod memory;
+pub mod orient;
 pub mod outputs;
 pub mod plot;
 pub mod progress;
@@ -56,6 +57,10 @@ fn dispatch(command: &Command) -> Result<(), Error> {
         Command::Reconstruct(args) => {
             start_threads(args.running)?;
             reconstruct::run(args)
+        }
+        Command::Orient(args) => {
+            start_threads(args.running)?;
+            orient::run(args)
         }
         Command::Sample(args) => {
             start_threads(args.running)?;

@@ -71,16 +71,10 @@ impl Outputs {
 
     fn check_names(&self, input: &Path) -> Result<(), Error> {
         let mut seen: Vec<PathBuf> = Vec::new();
-        let input = same_name(input);
         for (path, endings) in self.all() {
             check_ending(path, endings)?;
+            check_not_input(path, input)?;
             let name = same_name(path);
-            if name == input {
-                return Err(Error::Usage(format!(
-                    "{} is the input; write to another file or folder",
-                    path.display()
-                )));
-            }
             if seen.contains(&name) {
                 return Err(Error::Usage(format!(
                     "{} is to be written twice; give each output its own name",
@@ -140,6 +134,17 @@ pub fn check_ending(path: &Path, endings: &[&str]) -> Result<(), Error> {
         "{}: the name must end in .{}",
         path.display(),
         endings.join(" or .")
+    )))
+}
+
+/// Refuses to write over the input.
+pub fn check_not_input(path: &Path, input: &Path) -> Result<(), Error> {
+    if same_name(path) != same_name(input) {
+        return Ok(());
+    }
+    Err(Error::Usage(format!(
+        "{} is the input; write to another file or folder",
+        path.display()
     )))
 }
 

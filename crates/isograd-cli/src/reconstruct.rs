@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
-use isograd::{Attribute, Grid, PointCloud, Real, Reconstruction, Reconstructor, Stage};
+use isograd::{Grid, PointCloud, Real, Reconstruction, Reconstructor, Stage};
 use isograd_io::Geometry;
 
 use crate::args::{self, Precision};
@@ -13,7 +13,7 @@ use crate::outputs::{Outputs, write_report};
 use crate::plot;
 use crate::progress::Progress;
 use crate::report::Report;
-use crate::{memory, resample};
+use crate::{memory, orient, resample};
 
 /// Rounding of the coordinates, in cells, that single precision may add: above it the computation runs in
 /// double precision.
@@ -26,6 +26,7 @@ const TOLERATED_ROUNDING: f64 = 1e-2;
 pub fn run(args: &args::Reconstruct) -> Result<(), Error> {
     let start = Instant::now();
     let outputs = Outputs::new(args)?;
+    args.method.normals.check()?;
     // Reading, the stages, writing.
     let mut progress = Progress::new(2 + Stage::ALL.len(), args.running);
     progress.step("read");
@@ -75,14 +76,13 @@ struct Job<'a> {
 
 impl Job<'_> {
     fn file(&self) -> String {
-        match self.args.cloud.as_path() {
-            path if path == Path::new("-") => "standard input".into(),
-            path => path.display().to_string(),
-        }
+        orient::file_name(&self.args.cloud)
     }
 
     fn cloud<T: Real>(&self, geometry: &Geometry) -> Result<PointCloud<T>, Error> {
-        geometry.cloud().map_err(|source| Error::Cloud {
+        let cloud = geometry.cloud();
+        let cloud = cloud.and_then(|cloud| self.args.method.normals.with_sensors(cloud));
+        cloud.map_err(|source| Error::Cloud {
             file: self.file(),
             source,
         })
@@ -204,26 +204,12 @@ impl Job<'_> {
         cloud: &PointCloud<T>,
         result: &Reconstruction<T>,
     ) -> Result<PointCloud<T>, Error> {
-        let confidence = Attribute {
-            name: "confidence".into(),
-            components: 1,
-            values: result.confidence().to_vec(),
-        };
-        let kept = cloud
-            .attributes()
-            .iter()
-            .filter(|a| a.name != confidence.name);
-        let with_normals = PointCloud::new(cloud.points().to_vec())
-            .and_then(|cloud| cloud.with_normals(result.normals().to_vec()));
-        std::iter::once(&confidence)
-            .chain(kept)
-            .fold(with_normals, |cloud, attribute| {
-                cloud?.with_attribute(attribute.clone())
-            })
-            .map_err(|source| Error::Cloud {
+        orient::oriented(cloud, result.normals(), result.confidence()).map_err(|source| {
+            Error::Cloud {
                 file: self.file(),
                 source,
-            })
+            }
+        })
     }
 
     fn write_picture<T: Real>(

@@ -80,7 +80,7 @@ pub struct Neighbours {
 /// The signs of the normals.
 #[derive(Debug, Serialize)]
 pub struct Orientation {
-    /// `auto`, `parity`, `given` or `signs`.
+    /// `auto`, `parity`, `given`, `signs` or `sensors`.
     pub method: &'static str,
     /// Axes whose sign was changed.
     pub flipped: usize,
@@ -206,32 +206,16 @@ pub struct Seconds {
 impl Report {
     /// The report of a computation on `grid`; reading, writing and memory are still to be filled in.
     pub fn new<T: Real>(path: &Path, grid: &Grid<T>, report: &isograd::Report) -> Self {
-        let [min, median, max] = report.neighbours;
         Self {
             version: env!("CARGO_PKG_VERSION"),
-            input: Input {
-                path: path.display().to_string(),
-                points: report.points,
-            },
+            input: Input::new(path, report.points),
             grid: GridReport {
                 shape: grid.shape(),
                 origin: grid.center_f64([0; 3]),
                 spacing: grid.spacing().f64(),
             },
-            normals: Normals {
-                radius: report.radius,
-                neighbours: Neighbours { min, median, max },
-                guarded: report.guarded,
-            },
-            orientation: Orientation {
-                method: report.orientation,
-                flipped: report.flipped,
-                confidence: Confidence {
-                    p05: report.confidence_p05,
-                    median: report.confidence_median,
-                },
-                doubtful: Doubtful::new(&report.doubt),
-            },
+            normals: Normals::new(report),
+            orientation: Orientation::new(report),
             iso_value: report.iso_value,
             surface: Surface::new(&report.surface),
             sdf: Sdf {
@@ -245,6 +229,43 @@ impl Report {
             seconds: Seconds::of_stages(report),
             peak_memory_bytes: 0,
             warnings: report.warnings.iter().map(ToString::to_string).collect(),
+        }
+    }
+}
+
+impl Input {
+    /// A file, and how many points it has.
+    pub fn new(path: &Path, points: usize) -> Self {
+        Self {
+            path: path.display().to_string(),
+            points,
+        }
+    }
+}
+
+impl Normals {
+    /// What a report says of them.
+    pub fn new(report: &isograd::Report) -> Self {
+        let [min, median, max] = report.neighbours;
+        Self {
+            radius: report.radius,
+            neighbours: Neighbours { min, median, max },
+            guarded: report.guarded,
+        }
+    }
+}
+
+impl Orientation {
+    /// What a report says of it.
+    pub fn new(report: &isograd::Report) -> Self {
+        Self {
+            method: report.orientation,
+            flipped: report.flipped,
+            confidence: Confidence {
+                p05: report.confidence_p05,
+                median: report.confidence_median,
+            },
+            doubtful: Doubtful::new(&report.doubt),
         }
     }
 }

@@ -33,7 +33,8 @@ pub struct Options {
     /// rate has to fall first.
     pub patience: usize,
     /// Options of the reconstruction; its checks are left out. A shape knows its outside: with it the automatic
-    /// orientation becomes [`orient::Method::Signs`](isograd::orient::Method::Signs).
+    /// orientation becomes [`orient::Method::Signs`](isograd::orient::Method::Signs). Sensors are not passed on; and
+    /// with the signs of the call before the loss is no function of the variables alone.
     pub reconstruction: isograd::Options,
 }
 

@@ -19,6 +19,9 @@
 //! | VTP | points, mesh | mesh |
 //! | VTI | field | field |
 //!
+//! Columns or properties `sensor_x`, `sensor_y` and `sensor_z`, or an array `sensor` of three components, say where
+//! each point was seen from.
+//!
 //! What it guarantees:
 //! - No input makes it panic, and what it allocates is bounded by the size of the file, not by what a
 //!   header says.

@@ -279,7 +279,7 @@ fn remedy(reason: Reason) -> &'static str {
             "sample more densely there or remove outliers, or give sensor positions or normals"
         }
         Reason::Open => "close the gaps, or give sensor positions or normals",
-        Reason::Noisy => "use a larger radius, or give sensor positions or normals",
+        Reason::Noisy => "remove noise, or give sensor positions or normals",
         Reason::Unexplained => {
             "give sensor positions or normals, or look at the confidence in the output"
         }

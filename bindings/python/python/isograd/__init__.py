@@ -23,6 +23,7 @@ from ._fit import Fit, fit
 from ._grid import Grid
 from ._mesh import Hits, Mesh, query, query_pullback, signed_distance
 from ._options import Options, Orient, Splat
+from ._orient import Oriented, orient
 from ._reconstruction import Extension, Gradients, Reconstruction, Reconstructor, reconstruct
 from ._shapes import Coordinates, Parameter, Samples, Shape, sample, shapes
 
@@ -37,6 +38,7 @@ __all__ = [
     "Mesh",
     "Options",
     "Orient",
+    "Oriented",
     "Parameter",
     "Reconstruction",
     "Reconstructor",
@@ -45,6 +47,7 @@ __all__ = [
     "Splat",
     "__version__",
     "fit",
+    "orient",
     "query",
     "query_pullback",
     "read_mesh",

@@ -62,6 +62,22 @@ def indices(values: object, name: str, shape: tuple[int | None, ...]) -> np.ndar
     return np.require(array, dtype=np.uint32, requirements=["C", "A"])
 
 
+def known(
+    cloud: np.ndarray, normals: object | None, sensors: object | None
+) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """``(N, 3)`` normals and ``(M, 3)`` sensors for a cloud, in its type; one sensor may be ``(3,)``.
+
+    Raises:
+        TypeError, ValueError: as :func:`floats`.
+    """
+    if normals is not None:
+        normals = floats(normals, "normals", cloud.shape, cloud.dtype)
+    if sensors is not None:
+        sensors = [sensors] if np.ndim(sensors) == 1 else sensors
+        sensors = floats(sensors, "sensors", (None, 3), cloud.dtype)
+    return normals, sensors
+
+
 def _check_shape(found: tuple[int, ...], name: str, shape: tuple[int | None, ...]) -> None:
     fits = len(found) == len(shape) and all(n is None or n == m for n, m in zip(shape, found))
     if not fits:

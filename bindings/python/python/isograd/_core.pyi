@@ -26,6 +26,7 @@ __all__ = [
     "check_grid",
     "fit_grid",
     "forward_saved",
+    "orient",
     "pullback_saved",
     "query_mesh",
     "query_mesh_pullback",
@@ -98,9 +99,22 @@ class Plan:
 
     def __new__(cls, settings: str) -> Plan: ...
     def reconstruct(
-        self, points: _Floats, normals: _Floats | None, attributes: _Attributes
+        self,
+        points: _Floats,
+        normals: _Floats | None,
+        sensors: _Floats | None,
+        attributes: _Attributes,
     ) -> Result:
-        """Reconstructs a cloud: ``points`` and ``normals`` ``(N, 3)`` of one type."""
+        """Reconstructs a cloud: ``points``, ``normals`` and ``sensors`` of one type."""
+
+def orient(
+    points: _Floats,
+    normals: _Floats | None,
+    sensors: _Floats | None,
+    radius: float | None,
+    method: str,
+) -> tuple[_Floats, _Floats, dict[str, Any]]:
+    """Outward normals, confidence and report of a cloud: ``points``, ``normals`` and ``sensors`` of one type."""
 
 def forward_saved(
     settings: str, points: _Floats, normals: _Floats | None = None

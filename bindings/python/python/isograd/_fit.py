@@ -15,7 +15,7 @@ from ._grid import Grid
 from ._mesh import Mesh
 from ._numbers import number, whole
 from ._options import Options
-from ._settings import encode
+from ._settings import check_pure, encode
 from ._shapes import Shape
 
 if TYPE_CHECKING:
@@ -107,6 +107,7 @@ def fit(
         "random_start": None if random_start is None else number(random_start, "random_start"),
         "smoothness": number(smoothness, "smoothness"),
     }
+    check_pure(options or Options())
     found_kind, arrays = _target(target, grid, kind)
     start = None if points is None else floats(points, "points", (None, 3), np.float64)
     outcome, history, values, found, sdf, vertices, faces = _core.run_fit(

@@ -20,6 +20,10 @@ class Orient(str, Enum):
     """The normals that are given, as they are."""
     SIGNS = "signs"
     """The directions found, each on the side of the normal that is given."""
+    SENSORS = "sensors"
+    """The directions found, each on the side from which its point was seen."""
+    PREVIOUS = "previous"
+    """In a plan: the directions found, each on the side of the normal that the same point had in the call before."""
 
 
 class Splat(str, Enum):
@@ -31,7 +35,7 @@ class Splat(str, Enum):
     """The paper's weights."""
 
 
-OrientLike = Orient | Literal["auto", "parity", "given", "signs"]
+OrientLike = Orient | Literal["auto", "parity", "given", "signs", "sensors", "previous"]
 SplatLike = Splat | Literal["bspline", "paper"]
 
 
@@ -91,20 +95,24 @@ def resolve(options: Options | None, changes: dict[str, object]) -> Options:
     return Options(**{**values, **changes})
 
 
-def check_normals(options: Options, are_given: bool) -> None:
-    """Whether normals are there where they are used, and only there.
+def check_known(orient: OrientLike, normals: bool, sensors: bool = False) -> None:
+    """Whether normals and sensors are there where they are used, and only there.
 
     Raises:
         ValueError: where not.
     """
-    are_used = options.orient in (Orient.GIVEN, Orient.SIGNS)
-    if are_used and not are_given:
-        raise ValueError(f"orient is {Orient(options.orient).value!r} and there are no normals; give normals")
-    if are_given and not are_used:
-        raise ValueError(
-            f"normals are given and orient is {Orient(options.orient).value!r}, which does not use them; "
-            'give none, or options with orient="given" or "signs"'
-        )
+    orient = Orient(orient)
+    users = {"normals": (Orient.GIVEN, Orient.SIGNS), "sensors": (Orient.SENSORS,)}
+    for name, are_given in (("normals", normals), ("sensors", sensors)):
+        are_used = orient in users[name]
+        if are_used and not are_given:
+            raise ValueError(f"orient is {orient.value!r} and there are no {name}; give {name}")
+        if are_given and not are_used:
+            wanted = " or ".join(f'orient="{user.value}"' for user in users[name])
+            raise ValueError(
+                f"{name} are given and orient is {orient.value!r}, which does not use them; "
+                f"give none, or options with {wanted}"
+            )
 
 
 def _choice(kind: type[Enum], value: object, name: str) -> Enum:

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _core
-from ._arrays import floats
+from ._arrays import floats, known
 from ._grid import Grid
 from ._mesh import Mesh
 from ._numbers import number
-from ._options import Options, check_normals, resolve
+from ._options import Options, check_known, resolve
 from ._settings import encode
 
 if TYPE_CHECKING:
@@ -231,7 +231,8 @@ class Reconstructor:
     """A plan for one grid and one set of options: made once, used for every time step.
 
     Its memory is used again by every call. It may be called from several threads; they then wait for no one,
-    and each beyond the first makes a plan of its own.
+    and each beyond the first makes a plan of its own. With ``orient="previous"``, call it from one thread at a
+    time: each call follows the one before, and the result depends on them.
     """
 
     def __init__(self, grid: Grid, options: Options | None = None, **changes: Any) -> None:
@@ -246,14 +247,14 @@ class Reconstructor:
         points: ArrayLike,
         *,
         normals: ArrayLike | None = None,
+        sensors: ArrayLike | None = None,
         attributes: Mapping[str, ArrayLike] | None = None,
     ) -> Reconstruction:
         """See :func:`reconstruct`."""
         cloud = floats(points, "points", (None, 3))
-        if normals is not None:
-            normals = floats(normals, "normals", cloud.shape, cloud.dtype)
-        check_normals(self.options, normals is not None)
-        core = self._plan.reconstruct(cloud, normals, _attributes(attributes, cloud))
+        normals, sensors = known(cloud, normals, sensors)
+        check_known(self.options.orient, normals is not None, sensors is not None)
+        core = self._plan.reconstruct(cloud, normals, sensors, _attributes(attributes, cloud))
         return Reconstruction(core, self.grid, self.options, len(cloud), cloud.dtype)
 
     reconstruct = __call__
@@ -264,6 +265,7 @@ def reconstruct(
     grid: Grid | None = None,
     *,
     normals: ArrayLike | None = None,
+    sensors: ArrayLike | None = None,
     attributes: Mapping[str, ArrayLike] | None = None,
     options: Options | None = None,
     **changes: Any,
@@ -274,6 +276,9 @@ def reconstruct(
         points: ``(N, 3)`` samples of the surface; float32 or float64 decides the type of all results.
         grid: where φ is wanted; ``Grid.fit(points)`` unless given.
         normals: ``(N, 3)``, where ``orient`` is ``"given"`` or ``"signs"``, and only there.
+        sensors: where the points were seen from, where ``orient`` is ``"sensors"``, and only there: ``(N, 3)`` one
+            for each point, ``(3,)`` one for all, or ``(M, 3)`` with another ``M`` where it is not known which of
+            them saw a point.
         attributes: values of the samples, ``(N,)`` or ``(N, components)`` by name, for
             :meth:`Reconstruction.extend`.
         options: what to compute, and how.
@@ -285,7 +290,7 @@ def reconstruct(
     """
     cloud = floats(points, "points", (None, 3))
     plan = Reconstructor(Grid.fit(cloud) if grid is None else grid, options, **changes)
-    return plan(cloud, normals=normals, attributes=attributes)
+    return plan(cloud, normals=normals, sensors=sensors, attributes=attributes)
 
 
 def _attributes(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from ._grid import Grid
-from ._options import Options, Orient, Splat, check_normals, resolve
+from ._options import Options, Orient, Splat, check_known, resolve
 
 
 def encode(grid: Grid, options: Options | None = None) -> str:
@@ -40,8 +40,28 @@ def encode_pure(grid: Grid, options: Options | None, normals_are_given: bool) ->
 
     Raises:
         TypeError: for what is no grid or no options.
-        ValueError: for normals that are missing or not used.
+        ValueError: for normals that are missing or not used, and for ways to orient that are no function of the
+            points and normals alone.
     """
     options = resolve(options, {"checks": False})
-    check_normals(options, normals_are_given)
+    check_pure(options)
+    check_known(options.orient, normals_are_given)
     return encode(grid, options)
+
+
+def check_pure(options: Options) -> None:
+    """Whether the sides of the normals are a function of points and normals alone.
+
+    Raises:
+        ValueError: where not.
+    """
+    if options.orient is Orient.PREVIOUS:
+        raise ValueError(
+            'orient is "previous", which depends on the calls before, and this is a pure function; '
+            'give the normals of the step before, with orient="signs"'
+        )
+    if options.orient is Orient.SENSORS:
+        raise ValueError(
+            'orient is "sensors", and this function takes no sensors; '
+            'give isograd.orient(points, sensors=...).normals, with orient="signs"'
+        )

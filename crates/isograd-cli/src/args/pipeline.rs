@@ -2,10 +2,9 @@
 
 use clap::Args;
 use isograd::distance::lattice::Band;
-use isograd::neighbors::Radius;
-use isograd::{Grid, GridError, Options, PointCloud, Real, Resolution, orient, splat};
+use isograd::{Grid, GridError, Options, PointCloud, Real, Resolution, splat};
 
-use super::{AutoOr, FullOr, Orient, Splat, Switch, finite, not_negative, positive};
+use super::{FullOr, OrientArgs, Splat, Switch, finite, not_negative, positive};
 
 /// The grid.
 #[derive(Debug, Args)]
@@ -30,17 +29,9 @@ pub struct GridArgs {
 /// The method.
 #[derive(Debug, Args)]
 pub struct MethodArgs {
-    /// Neighbourhood radius of the normals, in the cloud's unit
-    #[arg(
-        long,
-        value_name = "R|auto",
-        default_value = "auto",
-        help_heading = "Method"
-    )]
-    pub radius: AutoOr,
-    /// How the side of the surface is found
-    #[arg(long, default_value = "auto", help_heading = "Method")]
-    pub orient: Orient,
+    /// The normals.
+    #[command(flatten)]
+    pub normals: OrientArgs,
     /// How a sample is spread over the cells round it
     #[arg(long, default_value = "bspline", help_heading = "Method")]
     pub splat: Splat,
@@ -85,16 +76,8 @@ impl MethodArgs {
     /// The options of a pipeline with cells of `spacing`.
     pub fn options(&self, spacing: f64) -> Options {
         Options {
-            radius: match self.radius {
-                AutoOr::Auto => Radius::Auto,
-                AutoOr::Value(r) => Radius::Fixed(r),
-            },
-            orientation: match self.orient {
-                Orient::Auto => orient::Method::Auto,
-                Orient::Parity => orient::Method::Parity(Default::default()),
-                Orient::Given => orient::Method::Given,
-                Orient::Signs => orient::Method::Signs,
-            },
+            radius: self.normals.radius(),
+            orientation: self.normals.method(),
             weights: match self.splat {
                 Splat::Bspline => splat::Weights::BSpline,
                 Splat::Paper => splat::Weights::Paper,

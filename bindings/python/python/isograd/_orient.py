@@ -1,0 +1,66 @@
+"""Outward normals of a cloud, without a grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from . import _core
+from ._arrays import floats, known
+from ._options import Options, Orient, OrientLike, check_known
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+
+@dataclass(frozen=True, eq=False)
+class Oriented:
+    """Outward normals, in the order and the type of the points.
+
+    Attributes:
+        normals: ``(N, 3)`` unit vectors.
+        confidence: ``(N,)`` how sure the side of each is, 0 to 1.
+        report: numbers, with the names of :attr:`Reconstruction.report`; ``report["orientation"]["doubtful"]`` has
+            the shares of the points whose side is doubtful, by reason.
+    """
+
+    normals: np.ndarray
+    confidence: np.ndarray
+    report: dict[str, Any]
+
+    @property
+    def warnings(self) -> list[str]:
+        """What to know before trusting the normals."""
+        return self.report["warnings"]
+
+
+def orient(
+    points: ArrayLike,
+    *,
+    normals: ArrayLike | None = None,
+    sensors: ArrayLike | None = None,
+    radius: float | Literal["auto"] = "auto",
+    orient: OrientLike = Orient.AUTO,
+) -> Oriented:
+    """Outward unit normals of a cloud, and how sure the side of each is.
+
+    Args:
+        points: ``(N, 3)`` samples of a surface; float32 or float64 decides the type of the result.
+        normals: as :func:`reconstruct` takes them.
+        sensors: as :func:`reconstruct` takes them.
+        radius: of the neighbourhoods, in the unit of the points, or ``"auto"``.
+        orient: how the sides are found; ``"previous"`` needs a plan, and is ``"auto"`` here.
+
+    Raises:
+        TypeError, ValueError: points that are no samples of a surface, with the reason and the remedy.
+        KeyboardInterrupt: at once, where Ctrl-C is pressed.
+    """
+    cloud = floats(points, "points", (None, 3))
+    options = Options(radius=radius, orient=orient)
+    normals, sensors = known(cloud, normals, sensors)
+    check_known(options.orient, normals is not None, sensors is not None)
+    chosen = None if options.radius == "auto" else options.radius
+    method = Orient(options.orient).value
+    return Oriented(*_core.orient(cloud, normals, sensors, chosen, method))

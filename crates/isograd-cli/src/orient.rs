@@ -1,0 +1,204 @@
+//! `isograd orient`: points in, the same points with outward normals and confidence out.
+
+use std::path::Path;
+use std::time::Instant;
+
+use isograd::orient::doubt::Doubt;
+use isograd::{Attribute, Orienter, PointCloud, PointCloudError, Real, Stage};
+use isograd_io::{CLOUD_ENDINGS, Dtype, Geometry};
+use serde::Serialize;
+
+use crate::args;
+use crate::error::Error;
+use crate::outputs::{check_ending, check_not_input, write_report};
+use crate::progress::Progress;
+use crate::report::{Input, Normals, Orientation};
+
+/// Runs the command, in the number type that the file has, if that holds all its numbers.
+///
+/// # Errors
+/// See [`Error`]; then no file has been left incomplete.
+pub fn run(args: &args::OrientCloud) -> Result<(), Error> {
+    let start = Instant::now();
+    check(args)?;
+    let mut progress = Progress::new(3, args.running);
+    progress.step("read");
+    let geometry = isograd_io::read_geometry(&args.cloud)?;
+    progress.detail(&format!(
+        "{} points, stored as {}",
+        geometry.points.len(),
+        geometry.dtype.name()
+    ));
+    let job = Job {
+        args,
+        start,
+        read_seconds: start.elapsed().as_secs_f64(),
+    };
+    match is_single(&geometry) {
+        true => job.run::<f32>(&geometry, &mut progress),
+        false => job.run::<f64>(&geometry, &mut progress),
+    }
+}
+
+fn check(args: &args::OrientCloud) -> Result<(), Error> {
+    args.normals.check()?;
+    check_ending(&args.output, CLOUD_ENDINGS)?;
+    check_not_input(&args.output, &args.cloud)?;
+    isograd_io::check_output(&args.output, CLOUD_ENDINGS)?;
+    if let Some(report) = &args.report {
+        check_ending(report, &["json"])?;
+        check_not_input(report, &args.cloud)?;
+        isograd_io::check_output(report, &["json"])?;
+    }
+    Ok(())
+}
+
+/// Whether single precision holds every number of a file: a time stamp may have more digits than a coordinate.
+fn is_single(geometry: &Geometry) -> bool {
+    let fits = |&value: &f64| f64::from(value as f32) == value || value.is_nan();
+    let mut attributes = geometry.attributes.iter();
+    geometry.dtype == Dtype::F32 && attributes.all(|attribute| attribute.values.iter().all(fits))
+}
+
+/// A file as messages name it.
+pub(crate) fn file_name(path: &Path) -> String {
+    match path {
+        path if path == Path::new("-") => "standard input".into(),
+        path => path.display().to_string(),
+    }
+}
+
+/// A cloud with the normals that were found, the confidence of each, and all attributes that it had.
+pub(crate) fn oriented<T: Real>(
+    cloud: &PointCloud<T>,
+    normals: &[[T; 3]],
+    confidence: &[T],
+) -> Result<PointCloud<T>, PointCloudError> {
+    let confidence = Attribute {
+        name: "confidence".into(),
+        components: 1,
+        values: confidence.to_vec(),
+    };
+    let kept = cloud.attributes().iter();
+    let kept = kept.filter(|attribute| attribute.name != confidence.name);
+    let with_normals = PointCloud::new(cloud.points().to_vec())
+        .and_then(|cloud| cloud.with_normals(normals.to_vec()));
+    std::iter::once(&confidence)
+        .chain(kept)
+        .fold(with_normals, |cloud, attribute| {
+            cloud?.with_attribute(attribute.clone())
+        })
+}
+
+/// `report.json`. Scripts depend on these names, which are those of a reconstruction's report.
+#[derive(Debug, Serialize)]
+struct Report {
+    version: &'static str,
+    input: Input,
+    normals: Normals,
+    orientation: Orientation,
+    seconds: Seconds,
+    peak_memory_bytes: usize,
+    warnings: Vec<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct Seconds {
+    read: f64,
+    normals: f64,
+    orient: f64,
+    checks: f64,
+    write: f64,
+    total: f64,
+}
+
+/// One run, apart from its number type.
+struct Job<'a> {
+    args: &'a args::OrientCloud,
+    start: Instant,
+    read_seconds: f64,
+}
+
+impl Job<'_> {
+    fn run<T: Real>(&self, geometry: &Geometry, progress: &mut Progress) -> Result<(), Error> {
+        let refused = |source| Error::Cloud {
+            file: file_name(&self.args.cloud),
+            source,
+        };
+        let cloud = geometry.cloud::<T>();
+        let cloud = cloud.and_then(|cloud| self.args.normals.with_sensors(cloud));
+        let cloud = cloud.map_err(refused)?;
+        progress.step("orient");
+        let mut plan = Orienter::new(self.args.normals.radius(), self.args.normals.method());
+        plan.orient(&cloud).map_err(|source| Error::Reconstruct {
+            file: file_name(&self.args.cloud),
+            source,
+        })?;
+        let (found, report) = plan.into_parts();
+        for warning in &report.warnings {
+            progress.warn(&warning.to_string());
+        }
+        progress.step("write");
+        let begin = Instant::now();
+        let out = oriented(&cloud, &found.normals, &found.confidence).map_err(refused)?;
+        isograd_io::write_cloud(&self.args.output, &out)?;
+        progress.say(&format!("wrote {}", self.args.output.display()));
+        if let Some(path) = &self.args.report {
+            write_report(path, &self.report(&report, begin))?;
+            progress.say(&format!("wrote {}", path.display()));
+        }
+        progress.finish();
+        self.say(progress, &report);
+        Ok(())
+    }
+
+    fn report(&self, report: &isograd::Report, begin: Instant) -> Report {
+        let of = |stage| report.seconds.of(stage);
+        Report {
+            version: env!("CARGO_PKG_VERSION"),
+            input: Input::new(&self.args.cloud, report.points),
+            normals: Normals::new(report),
+            orientation: Orientation::new(report),
+            seconds: Seconds {
+                read: self.read_seconds,
+                normals: of(Stage::Normals),
+                orient: of(Stage::Orient),
+                checks: of(Stage::Checks),
+                write: begin.elapsed().as_secs_f64(),
+                total: self.start.elapsed().as_secs_f64(),
+            },
+            peak_memory_bytes: crate::ALLOCATOR.peak_usage(),
+            warnings: report.warnings.iter().map(ToString::to_string).collect(),
+        }
+    }
+
+    /// The result in a few lines.
+    fn say(&self, progress: &Progress, report: &isograd::Report) {
+        progress.say(&format!(
+            "{} points, radius {:.4e} with {} neighbours at the median, {:.2} s",
+            report.points,
+            report.radius,
+            report.neighbours[1],
+            self.start.elapsed().as_secs_f64()
+        ));
+        progress.say(&format!(
+            "orientation: {}, {} axes turned, confidence {:.2} at the median and {:.2} at 5 %",
+            report.orientation, report.flipped, report.confidence_median, report.confidence_p05
+        ));
+        progress.say(&doubtful(&report.doubt));
+    }
+}
+
+/// The doubtful share, and its reasons.
+fn doubtful(doubt: &Doubt) -> String {
+    let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+    let reasons = doubt.by_frequency().into_iter();
+    let reasons: Vec<String> = reasons
+        .map(|reason| format!("{} {}", reason.name(), percent(doubt.share_of(reason))))
+        .collect();
+    let of = match reasons.is_empty() {
+        true => String::new(),
+        false => format!(" ({})", reasons.join(", ")),
+    };
+    format!("doubtful: {} of the points{of}", percent(doubt.share()))
+}

@@ -1,0 +1,187 @@
+//! `isograd orient`, run as a user runs it.
+
+mod common;
+
+use common::Bench;
+use isograd::vector::{dot, norm};
+use isograd_io::{Dtype, Geometry};
+use serde_json::Value;
+
+fn read(bench: &Bench, name: &str) -> Geometry {
+    isograd_io::read_geometry(&bench.path(name)).expect("reads")
+}
+
+fn names(geometry: &Geometry) -> Vec<&str> {
+    let attributes = geometry.attributes.iter();
+    attributes.map(|a| a.name.as_str()).collect()
+}
+
+#[test]
+fn points_come_out_with_outward_normals_confidence_and_all_that_they_had() {
+    let bench = Bench::new();
+    bench.done("sample fish -n 3000 -o cloud.npz --param amplitude=0.1");
+    let before = read(&bench, "cloud.npz");
+    for out in ["out.npz", "out.ply"] {
+        let run = bench.done(&format!("orient cloud.npz -o {out}"));
+        for part in ["wrote ", "3000 points", "orientation: auto", "doubtful: "] {
+            assert!(run.stdout.contains(part), "'{part}' is missing: {run:?}");
+        }
+        let after = read(&bench, out);
+        assert_eq!(after.points, before.points, "{out}");
+        assert_eq!((after.dtype, names(&after)[0]), (Dtype::F32, "confidence"));
+        let normals = after.normals.expect("normals");
+        let truth = before.normals.as_ref().expect("normals");
+        let pairs = normals.iter().zip(truth);
+        let wrong = pairs.filter(|&(&n, &t)| dot(n, t) < 0.0).count();
+        // Of so few samples the rim of the tail is less than a spacing thick.
+        assert!(wrong < 90, "{wrong}");
+        assert!(normals.iter().all(|&n| (norm(n) - 1.0).abs() < 1e-5));
+    }
+    assert_eq!(names(&read(&bench, "out.npz")), ["confidence", "velocity"]);
+    let rerun = bench.done("orient out.ply -o again.ply -q");
+    assert_eq!(rerun.stdout, "");
+    assert_eq!(bench.read("again.ply"), bench.read("out.ply"));
+}
+
+#[test]
+fn numbers_keep_the_type_that_holds_them() {
+    let bench = Bench::new();
+    bench.done("sample sphere -n 500 -o double.ply --precision f64");
+    bench.done("orient double.ply -o out.ply");
+    assert_eq!(read(&bench, "out.ply").dtype, Dtype::F64);
+    // Coordinates in single precision, but a time that is not.
+    let mut file = b"ply\nformat binary_little_endian 1.0\nelement vertex 200\n".to_vec();
+    for property in ["float x", "float y", "float z", "double time"] {
+        file.extend(format!("property {property}\n").bytes());
+    }
+    file.extend(b"end_header\n");
+    for i in 0..200 {
+        let (z, turn) = (f64::from(2 * i + 1) / 200.0 - 1.0, f64::from(i) * 2.4);
+        let r = (1.0 - z * z).sqrt();
+        for x in [r * turn.cos(), r * turn.sin(), z] {
+            file.extend((x as f32).to_le_bytes());
+        }
+        file.extend((1.7e9 + f64::from(i) / 1024.0).to_le_bytes());
+    }
+    bench.write("times.ply", file);
+    bench.done("orient times.ply -o times.npz");
+    let after = read(&bench, "times.npz");
+    assert_eq!(after.dtype, Dtype::F64);
+    assert_eq!(after.attributes[1].values[199], 1.7e9 + 199.0 / 1024.0);
+}
+
+#[test]
+fn the_report_has_the_names_of_a_reconstruction() {
+    let bench = Bench::new();
+    bench.done("sample torus -n 2000 -o cloud.ply");
+    bench.done("orient cloud.ply -o o.ply --report o.json --orient parity --parity-gamma 3");
+    bench.done("reconstruct cloud.ply --resolution 24 --report r.json --orient parity");
+    let [orient, whole] = ["o.json", "r.json"].map(|name| {
+        let report: Value = serde_json::from_slice(&bench.read(name)).expect("JSON");
+        report
+    });
+    for (key, value) in orient.as_object().expect("an object") {
+        let other = &whole[key];
+        assert!(!other.is_null(), "{key}");
+        if key != "seconds" && value.is_object() {
+            let keys = |of: &Value| -> Vec<String> {
+                of.as_object().expect("an object").keys().cloned().collect()
+            };
+            assert_eq!(keys(value), keys(other), "{key}");
+        }
+    }
+    assert_eq!(orient["orientation"]["method"], "parity");
+}
+
+#[test]
+fn sensors_come_from_the_command_line_or_from_columns() {
+    let bench = Bench::new();
+    // A flat sheet, of which nobody can tell the side.
+    let mut rows = String::from("x,y,z,sensor_x,sensor_y,sensor_z\n");
+    let mut bare = String::new();
+    for i in 0..400 {
+        let (x, y) = (i % 20, i / 20);
+        rows += &format!("{x},{y},0,{x},5,-30\n");
+        bare += &format!("{x} {y} 0\n");
+    }
+    bench.write("seen.csv", rows);
+    bench.write("bare.xyz", bare);
+    let sides = |line: &str| {
+        bench.done(&format!("orient {line} -o out.npz --orient sensors"));
+        let normals = read(&bench, "out.npz").normals.expect("normals");
+        let up = normals.iter().filter(|n| n[2] > 0.0).count();
+        assert!(up == 0 || up == 400, "{up}");
+        up > 0
+    };
+    assert!(!sides("seen.csv"));
+    assert!(sides("seen.csv --sensor 0,0,9"), "instead of the columns");
+    assert!(sides("bare.xyz --sensor 0,0,9 --sensor 20,20,9"));
+    assert!(!sides("bare.xyz --sensor 0,0,-9"));
+    assert_eq!(
+        names(&{
+            bench.done("orient seen.csv -o kept.npz");
+            read(&bench, "kept.npz")
+        }),
+        ["confidence", "sensor_x", "sensor_y", "sensor_z"]
+    );
+    bench
+        .run("orient bare.xyz -o out.ply --orient sensors")
+        .says(1, &["bare.xyz", "no sensor positions"]);
+    bench
+        .run("orient bare.xyz -o out.ply --orient sensors --sensor 3,0,0")
+        .says(1, &["point 3 lies exactly at a sensor"]);
+    bench.write(
+        "nan.csv",
+        "x,y,z,sensor_x,sensor_y,sensor_z\n1,2,3,nan,0,0\n",
+    );
+    bench
+        .run("orient nan.csv -o out.ply --orient sensors")
+        .says(1, &["nan.csv", "sensor position 0 is not finite"]);
+}
+
+#[test]
+fn a_wrong_command_line_is_refused_before_the_work() {
+    let bench = Bench::new();
+    bench.done("sample torus -n 400 -o cloud.ply");
+    for (line, says) in [
+        ("orient cloud.ply -o cloud.ply", "is the input"),
+        ("orient cloud.ply -o out.obj", "must end in .ply or"),
+        ("orient cloud.ply -o out.ply --report r.txt", ".json"),
+        (
+            "orient cloud.ply -o out.ply --sensor 1,2,3",
+            "--sensor is not used without --orient sensors",
+        ),
+        (
+            "reconstruct cloud.ply -o out --sensor 1,2,3",
+            "--sensor is not used without --orient sensors",
+        ),
+        (
+            "orient cloud.ply -o out.ply --parity-tolerance 3",
+            "without --orient parity",
+        ),
+    ] {
+        bench.run(line).says(2, &[says]);
+    }
+    assert_eq!(bench.files(), ["cloud.ply"]);
+    bench
+        .run("orient missing.ply -o out.ply")
+        .says(1, &["missing.ply"]);
+    bench.write(
+        "line.xyz",
+        (0..50).map(|i| format!("{i} 0 0\n")).collect::<String>(),
+    );
+    bench
+        .run("orient line.xyz -o out.ply")
+        .says(1, &["line.xyz", "so there is no surface"]);
+}
+
+#[test]
+fn a_reconstruction_takes_sensors_too() {
+    let bench = Bench::new();
+    bench.done("sample sphere -n 2000 -o cloud.ply");
+    bench.done(
+        "reconstruct cloud.ply --resolution 24 --orient sensors --sensor 0,0,5 --report r.json",
+    );
+    let report: Value = serde_json::from_slice(&bench.read("r.json")).expect("JSON");
+    assert_eq!(report["orientation"]["method"], "sensors");
+}
