@@ -33,10 +33,12 @@ Checks
 
 Figures and pages
   docs             every page and picture below docs/ that a command makes: accuracy, gradients,
-                   gallery, fit
+                   orientation, gallery, fit
   accuracy         docs/accuracy.md: errors against bodies with a closed form
   gradients        docs/gradients.md: the pullback against differences and closed forms, and its
                    cost; compares times, so leave the machine alone meanwhile
+  orientation      docs/orientation.md: wrong signs on many clouds, and their doubt; with real shapes
+                   where ../shared/data is there
   gallery          docs/images/: pictures of the clouds in examples/clouds
   fit              docs/fit.md: a fish found from its signed distance field
   bench [ARGS]     the benchmarks, every stage and the whole; --quick for a short run,
@@ -79,6 +81,7 @@ fn run(command: &str, rest: &[String]) -> Option<Outcome> {
         ("docs", []) => Some(pages::all()),
         ("accuracy", []) => Some(pages::accuracy()),
         ("gradients", []) => Some(pages::gradients()),
+        ("orientation", []) => Some(pages::orientation()),
         ("gallery", []) => Some(pages::gallery()),
         ("fit", []) => Some(fit::run()),
         ("bench", _) => Some(bench::run(rest)),

@@ -9,6 +9,7 @@ use crate::process::{self, Outcome};
 pub fn all() -> Outcome {
     accuracy()?;
     gradients()?;
+    orientation()?;
     gallery()?;
     crate::fit::run()
 }
@@ -21,6 +22,11 @@ pub fn accuracy() -> Outcome {
 /// `docs/gradients.md`, with its numbers and pictures.
 pub fn gradients() -> Outcome {
     program("isograd-gradients")
+}
+
+/// `docs/orientation.md`, with its numbers and pictures.
+pub fn orientation() -> Outcome {
+    program("isograd-orientation")
 }
 
 /// Runs the program of a package, which writes its page.

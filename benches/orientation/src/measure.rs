@@ -1,0 +1,235 @@
+//! How one method does on one cloud.
+
+use std::time::Instant;
+
+use isograd::neighbors::{self, CellIndex, Neighborhoods, Radius};
+use isograd::orient::doubt::{Doubt, Reason, reasons};
+use isograd::orient::{self, Known, Method, Orientation};
+use isograd::{normals, vector};
+use serde::Serialize;
+
+use crate::body::{Body, Clean};
+
+/// Least cosine, up to its sign, between an axis and the true normal for its sign to be judged: 60 degrees.
+const JUDGED: f64 = 0.5;
+
+/// Errors of one method on one cloud; shares and angles are in per cent and degrees.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Errors {
+    /// Wrong signs, of those that are judged.
+    pub wrong: f64,
+    /// The same by one who knows the surface, and has to tell from a noisy sample which side of it that was.
+    pub least: Option<f64>,
+    /// Samples whose axis is within 60 degrees of the truth, of those that have one: only these are judged.
+    pub judged: f64,
+    /// Median angle between axis and true normal.
+    pub axis_median: f64,
+    /// Mean angle.
+    pub axis_mean: f64,
+    /// Mean angle where no neighbourhood is wider than the common radius.
+    pub axis_mean_narrow: f64,
+    /// Doubtful samples, of all.
+    pub doubtful: f64,
+    /// The same by reason.
+    pub reasons: Vec<(&'static str, f64)>,
+    /// Wrong signs that are doubtful, of all wrong ones; nothing where none is wrong.
+    pub caught: Option<f64>,
+}
+
+/// What one method does on one cloud.
+#[derive(Clone, Debug)]
+pub struct Measured {
+    /// Number of points.
+    pub points: usize,
+    /// Its errors.
+    pub errors: Errors,
+    /// Seconds for neighbourhoods and axes, and for the signs.
+    pub seconds: [f64; 2],
+    /// Normals and confidence.
+    pub orientation: Orientation<f32>,
+}
+
+/// A cloud with neighbourhoods and axes, in single precision, as a user has it.
+pub struct Prepared {
+    /// `(N, 3)`.
+    pub points: Vec<[f32; 3]>,
+    /// Round each point.
+    pub neighborhoods: Neighborhoods<f32>,
+    /// The axis of each.
+    pub axes: normals::Residual<f32>,
+    /// The axes with the common radius for all.
+    pub narrow: Vec<[f32; 3]>,
+    /// What neighbourhoods and axes took.
+    pub seconds: f64,
+}
+
+impl Prepared {
+    /// Neighbourhoods and axes of points.
+    ///
+    /// # Panics
+    /// A cloud that has none: those of the suite have.
+    pub fn new(points: &[[f64; 3]]) -> Self {
+        let points: Vec<[f32; 3]> = points.iter().map(|&p| vector::of_f64(p)).collect();
+        let start = Instant::now();
+        let mut neighborhoods = Neighborhoods::default();
+        neighbors::forward(&points, Radius::Auto, &mut neighborhoods).expect("neighbourhoods");
+        let mut axes = normals::Residual::default();
+        normals::forward(&neighborhoods, &mut axes);
+        let seconds = start.elapsed().as_secs_f64();
+        let common = Radius::Fixed(f64::from(neighborhoods.common_radius));
+        let (mut fixed, mut narrow) = (Neighborhoods::default(), normals::Residual::default());
+        neighbors::forward(&points, common, &mut fixed).expect("neighbourhoods");
+        normals::forward(&fixed, &mut narrow);
+        Self {
+            points,
+            neighborhoods,
+            axes,
+            narrow: narrow.normals,
+            seconds,
+        }
+    }
+
+    /// Chooses signs, and says how long that took.
+    ///
+    /// # Panics
+    /// A method that can't: those of the page can.
+    pub fn orient(
+        &self,
+        known: Known<'_, f32>,
+        method: &Method,
+        scratch: &mut orient::Scratch,
+    ) -> (Orientation<f32>, f64) {
+        let mut out = Orientation::default();
+        let start = Instant::now();
+        orient::forward(
+            &self.points,
+            &self.axes,
+            &self.neighborhoods,
+            known,
+            method,
+            scratch,
+            &mut out,
+        )
+        .expect("signs");
+        (out, start.elapsed().as_secs_f64())
+    }
+}
+
+/// Runs a method on a cloud. What makes it is not timed, nor is the first of `runs` if there are more: the
+/// fastest counts.
+pub fn measure(body: &Body, method: &Method, runs: usize) -> Measured {
+    let prepared = Prepared::new(&body.points);
+    let mut scratch = orient::Scratch::default();
+    let known = || Known::from(None);
+    let (orientation, mut seconds) = prepared.orient(known(), method, &mut scratch);
+    for _ in 1..runs {
+        seconds = seconds.min(prepared.orient(known(), method, &mut scratch).1);
+    }
+    Measured {
+        points: body.points.len(),
+        errors: judge(body, &prepared, &orientation),
+        seconds: [prepared.seconds, seconds],
+        orientation,
+    }
+}
+
+fn judge(body: &Body, prepared: &Prepared, out: &Orientation<f32>) -> Errors {
+    let known = body.normals.iter().enumerate();
+    let known = known.filter(|(_, truth)| vector::norm(**truth) > 0.0);
+    let cosines: Vec<(usize, f64)> = known
+        .map(|(i, &truth)| (i, vector::dot(vector::to_f64(out.normals[i]), truth)))
+        .collect();
+    let is_judged = |cosine: f64| cosine.abs() > JUDGED;
+    let judged = cosines.iter().filter(|c| is_judged(c.1)).count();
+    let wrong: Vec<usize> = cosines
+        .iter()
+        .filter(|c| is_judged(c.1) && c.1 < 0.0)
+        .map(|c| c.0)
+        .collect();
+    let angles_of_narrow = angles(body, &prepared.narrow);
+    let mut angles = angles(body, &out.normals);
+    angles.sort_by(f64::total_cmp);
+    let why = reasons(&prepared.points, out, &prepared.neighborhoods);
+    let is_doubtful = |i: &&usize| why.binary_search_by_key(*i, |f| f.0 as usize).is_ok();
+    let caught = wrong.iter().filter(is_doubtful).count();
+    let doubt = Doubt::count(body.points.len(), &why);
+    let share = |part: usize, whole: usize| 100.0 * part as f64 / whole.max(1) as f64;
+    Errors {
+        wrong: share(wrong.len(), judged),
+        least: body.clean.as_ref().map(|clean| {
+            let judged = cosines.iter().filter(|c| is_judged(c.1)).map(|c| c.0);
+            100.0 * least_wrong(body, clean, &judged.collect::<Vec<_>>())
+        }),
+        judged: share(judged, cosines.len()),
+        axis_median: angles.get(angles.len() / 2).copied().unwrap_or(0.0),
+        axis_mean: mean(&angles),
+        axis_mean_narrow: mean(&angles_of_narrow),
+        doubtful: 100.0 * doubt.share(),
+        reasons: Reason::ALL
+            .map(|reason| (reason.name(), 100.0 * doubt.share_of(reason)))
+            .to_vec(),
+        caught: (!wrong.is_empty()).then(|| share(caught, wrong.len())),
+    }
+}
+
+/// Share of these samples whose true side is not that of the surface round them: of the normals of the 64 nearest
+/// samples of the surface itself, weighed by how probable it is that noise has moved them here.
+fn least_wrong(body: &Body, clean: &Clean, judged: &[usize]) -> f64 {
+    let surface = CellIndex::new(&clean.body.points);
+    let (mut nearest, mut wrong) = (Vec::new(), 0);
+    for &i in judged {
+        surface.nearest(body.points[i], 64, &mut nearest);
+        let expected = nearest.iter().fold([0.0; 3], |sum, &(j, d2)| {
+            let probable = (-0.5 * d2 / (clean.deviation * clean.deviation)).exp();
+            vector::add(sum, vector::scale(clean.body.normals[j as usize], probable))
+        });
+        wrong += usize::from(vector::dot(expected, body.normals[i]) < 0.0);
+    }
+    wrong as f64 / judged.len().max(1) as f64
+}
+
+/// Angles in degrees between axes and true normals, of the samples that have one.
+fn angles(body: &Body, axes: &[[f32; 3]]) -> Vec<f64> {
+    let pairs = axes.iter().zip(&body.normals);
+    let known = pairs.filter(|(_, truth)| vector::norm(**truth) > 0.0);
+    let cosine = |(&axis, &truth): (&[f32; 3], &[f64; 3])| {
+        vector::dot(vector::to_f64(axis), truth).abs().min(1.0)
+    };
+    known.map(|pair| cosine(pair).acos().to_degrees()).collect()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_wrong_is_counted_among_what_is_judged() {
+        // Given signs come back as they were: a tenth inward, and half of the rest not judged.
+        let body = Body::sphere(1.0, 2_000, 3);
+        let mut shown = body.clone();
+        for (i, n) in shown.normals.iter_mut().enumerate() {
+            match i % 10 {
+                0 => *n = n.map(|x| -x),
+                5.. => *n = [0.0; 3],
+                _ => {}
+            }
+        }
+        let measured = measure(&shown, &Method::Auto, 1);
+        let Errors {
+            wrong,
+            judged,
+            caught,
+            ..
+        } = measured.errors;
+        assert!(
+            (wrong - 20.0).abs() < 1e-9 && judged > 99.9,
+            "{wrong} {judged}"
+        );
+        assert_eq!(caught, Some(0.0));
+        assert!(measured.errors.axis_median < 3.0);
+    }
+}
