@@ -35,6 +35,8 @@ def main() -> None:
                 # The programs of one case are gone before the next begins.
                 with ExitStack() as stack:
                     case = build(stack, options.stage_times, Path(folder))
+                    if case is None:
+                        continue
                     case.measure(options.repeats)
                 show(case)
                 cases.append(case)
@@ -61,7 +63,7 @@ def jobs(options) -> dict:
         "normals": [job(normals.case, n) for n in (count, 10 * count)],
         "orientation": [job(orientation.case, count)],
         "isosurface": [job(isosurface.case, n) for n in (cells, 2 * cells)],
-        "distance": [job(distance.case, cells)],
+        "distance": [job(distance.case, cells), job(distance.band, cells)],
         "whole": [job(whole.case, count, cells)],
     }
 

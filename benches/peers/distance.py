@@ -1,4 +1,8 @@
-"""Signed distance from one mesh at every centre of a grid: isograd, libigl, Open3D, Warp."""
+"""Signed distance from one mesh at every centre of a grid: isograd, libigl, Open3D, Warp, pysdf; and in a band
+of 3 cells: isograd, OpenVDB."""
+
+import subprocess
+from pathlib import Path
 
 import igl
 import numpy as np
@@ -7,6 +11,12 @@ import warp as wp
 
 import torus
 from case import Case, peer
+
+try:
+    import pysdf
+except ImportError:
+    # It is built where it is installed, and needs the headers of Eigen.
+    pysdf = None
 from stage import Stage, write_input
 
 
@@ -41,6 +51,9 @@ def case(stack, program, folder, cells: int, threads: int) -> Case:
         peer("Open3D RaycastingScene", "float32", threads, open3d(centres, vertices, faces, threads)),
         peer("Warp mesh query, CPU", "float32", 1, warp(centres, vertices, faces)),
     ]
+    if pysdf:
+        work = nearby(centres, vertices, faces, threads)
+        peers.append(peer("pysdf (faces of the nearest vertex)", "float32", threads, work))
     spacing = 2 * torus.HALF / cells
 
     def check() -> list[str]:
@@ -50,6 +63,46 @@ def case(stack, program, folder, cells: int, threads: int) -> Case:
     title = f"Distance, {cells}³ cells"
     what = f"signed distance from {len(faces):,} triangles at every cell centre, tree included"
     return Case(title, what, ("cell", cells**3), ours + peers, check)
+
+
+def band(stack, program, folder, cells: int, threads: int) -> Case | None:
+    """Only within 3 cells of the surface. `None` where OpenVDB's Python module is not installed."""
+    python = "/usr/bin/python3"
+    if not has_openvdb(python):
+        print("no band: install Debian's python3-openvdb to compare with OpenVDB", flush=True)
+        return None
+    folder = folder / "band"
+    field = torus.distance(torus.centres(cells)).astype(np.float32)
+    write_input(folder, torus.grid(cells), chi=field)
+    counts = sorted({1, threads})
+    stages = [Stage(program, "band", folder, np.float32, count) for count in counts]
+    ours = [stack.enter_context(stage).entry("phi") for stage in stages]
+    # Saves the mesh that OpenVDB reads.
+    stages[-1].run()
+    faces = len(stages[-1].result("faces", np.uint32)) // 3
+    script = [python, Path(__file__).with_name("vdb.py")]
+    vdb = stack.enter_context(Stage(script, "band", folder, np.float32, threads))
+    peers = [vdb.entry("phi", "OpenVDB createLevelSetFromPolygons")]
+    spacing = 2 * torus.HALF / cells
+
+    def check() -> list[str]:
+        # Both save to the same file, so one after the other; OpenVDB's band ends a little before 3 cells.
+        mine, theirs = ours[-1].result(), peers[0].result()
+        inside = np.abs(mine) < 2.9 * spacing
+        apart = np.abs(mine - theirs)[inside].max() / spacing
+        return [f"φ of OpenVDB within {apart:.1e} cell of isograd, where |φ| < 2.9 cells"]
+
+    title = f"Distance in a band, {cells}³ cells"
+    what = f"signed distance from {faces:,} triangles within 3 cells, tree included"
+    return Case(title, what, ("cell", cells**3), ours + peers, check)
+
+
+def has_openvdb(python: str) -> bool:
+    try:
+        found = subprocess.run([python, "-c", "import pyopenvdb"], capture_output=True)
+    except OSError:
+        return False
+    return found.returncode == 0
 
 
 def agreement(entry, exact: np.ndarray, spacing: float) -> str:
@@ -94,3 +147,11 @@ def warp(centres, vertices, faces):
         return out.numpy()
 
     return work
+
+
+def nearby(centres, vertices, faces, threads):
+    """pysdf: positive inside."""
+    points = centres.astype(np.float32)
+    positions = vertices.astype(np.float32)
+    triangles = faces.astype(np.uint32)
+    return lambda: -pysdf.SDF(positions, triangles)(points, n_threads=threads)

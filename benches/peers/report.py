@@ -3,7 +3,7 @@
 import json
 import os
 import platform
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import matplotlib
@@ -16,6 +16,7 @@ PACKAGES = [
     "open3d-cpu",
     "warp-lang",
     "pymeshlab",
+    "pysdf",
     "scikit-image",
     "jax",
     "scipy",
@@ -30,8 +31,19 @@ def machine() -> dict:
         "cores": os.cpu_count(),
         "system": f"{platform.system()} {platform.machine()}",
         "load_average": os.getloadavg()[0],
-        "versions": {"Python": platform.python_version()} | {p: version(p) for p in PACKAGES},
+        "versions": {"Python": platform.python_version()} | installed(),
     }
+
+
+def installed() -> dict:
+    """Versions of the packages that are there."""
+    versions = {}
+    for package in PACKAGES:
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return versions
 
 
 def processor() -> str:

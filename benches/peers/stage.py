@@ -1,4 +1,4 @@
-"""The timing program of isograd, as a process that stays alive between runs."""
+"""The timing program of isograd, or of a peer, as a process that stays alive between runs."""
 
 import json
 import subprocess
@@ -22,9 +22,10 @@ def write_input(folder: Path, settings: dict, **arrays: np.ndarray) -> None:
 class Stage:
     """`stage-times STAGE FOLDER TYPE THREADS`: each `run()` is one forward pass."""
 
-    def __init__(self, program: Path, name: str, folder: Path, dtype, threads: int):
+    def __init__(self, program: Path | list, name: str, folder: Path, dtype, threads: int):
         self.folder, self.dtype, self.threads = folder, np.dtype(dtype), threads
-        command = [program, name, folder, SUFFIX[self.dtype], threads]
+        program = program if isinstance(program, list) else [program]
+        command = [*program, name, folder, SUFFIX[self.dtype], threads]
         self.process = subprocess.Popen(
             [str(part) for part in command],
             stdin=subprocess.PIPE,
@@ -37,10 +38,11 @@ class Stage:
         """Seconds of one forward pass."""
         return float(self._ask("run"))
 
-    def entry(self, output: str) -> Entry:
+    def entry(self, output: str, name: str = "isograd") -> Entry:
         """It as an entry of a comparison, whose result is the array `output`."""
         result = lambda: self.result(output)  # noqa: E731
-        return Entry("isograd", str(self.dtype), self.threads, self.run, True, result)
+        ours = name == "isograd"
+        return Entry(name, str(self.dtype), self.threads, self.run, ours, result)
 
     def result(self, name: str, dtype=None) -> np.ndarray:
         """An output of the last run, as a flat array."""

@@ -44,7 +44,8 @@ Figures and pages
   bench [ARGS]     the benchmarks, every stage and the whole; --quick for a short run,
                    a stage's name for that stage; other arguments go to criterion
   peers [ARGS]     docs/peers.md: isograd beside other libraries, measured in one
-                   run (needs Python 3 and PyPI); --quick for a short run
+                   run (needs Python 3 and PyPI; OpenVDB is compared where Debian's
+                   python3-openvdb is installed); --quick for a short run
 
 Exit status: 0 done, 1 a step failed, 2 the command line is wrong.";
 

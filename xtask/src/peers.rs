@@ -11,6 +11,7 @@ pub fn run(arguments: &[String]) -> Outcome {
     let target = Workspace::load()?.target;
     let folder = process::root().join("benches").join("peers");
     let python = environment(&target.join("peers"), &folder.join("requirements.txt"))?;
+    optional(&python, &folder.join("optional.txt"));
     build()?;
     let program = format!("stage-times{}", std::env::consts::EXE_SUFFIX);
     process::run(
@@ -32,6 +33,18 @@ fn build() -> Outcome {
         "--bin",
         "stage-times",
     ]))
+}
+
+/// Installs what can be done without; what fails is said and left out.
+fn optional(python: &Path, requirements: &Path) {
+    let mut pip = Command::new(python);
+    pip.args(["-m", "pip", "install", "--quiet", "--requirement"]);
+    // Where Debian has Eigen.
+    pip.arg(requirements)
+        .env("CPLUS_INCLUDE_PATH", "/usr/include/eigen3");
+    if let Err(failure) = process::run(&mut pip) {
+        eprintln!("left out: {failure}");
+    }
 }
 
 /// The Python of a virtual environment that holds what `requirements` lists.

@@ -1,5 +1,6 @@
 //! The stages, each with its input in memory, its scratch warm, and its output kept.
 
+use isograd::distance::Band;
 use isograd::{
     Field, Mesh, Options, PointCloud, Real, Reconstructor, distance, isosurface, poisson,
 };
@@ -21,7 +22,8 @@ pub trait Stage: Send {
 /// Reads the input of a stage.
 pub fn by_name<T: Real + Number>(name: &str, folder: &Folder) -> Outcome<Box<dyn Stage>> {
     Ok(match name {
-        "distance" => Box::new(Distance::<T>::open(folder)?),
+        "distance" => Box::new(Distance::<T>::open(folder, Band::Full)?),
+        "band" => Box::new(Distance::<T>::open(folder, Band::Cells(3.0))?),
         "whole" => Box::new(Whole::<T>::open(folder)?),
         "normals" => Box::new(Normals::<T>::open(folder)?),
         "orient" => Box::new(Oriented::<T>::open(folder)?),
@@ -98,6 +100,7 @@ impl<T: Real + Number> Stage for Isosurface<T> {
 
 /// A mesh and the field that made it → `φ`. The mesh is made before, by marching cubes at 0.
 struct Distance<T: Real> {
+    band: Band,
     mesh: Mesh<T>,
     chi: Field<T>,
     phi: Field<T>,
@@ -106,11 +109,12 @@ struct Distance<T: Real> {
 }
 
 impl<T: Real + Number> Distance<T> {
-    fn open(folder: &Folder) -> Outcome<Self> {
+    fn open(folder: &Folder, band: Band) -> Outcome<Self> {
         let chi = Field::new(folder.grid()?, folder.read("chi")?)?;
         let mut mesh = Mesh::default();
         isosurface::forward(&chi, T::zero(), &mut Default::default(), &mut mesh)?;
         Ok(Self {
+            band,
             mesh,
             phi: chi.clone(),
             chi,
@@ -126,7 +130,7 @@ impl<T: Real + Number> Stage for Distance<T> {
             &self.mesh,
             &self.chi,
             T::zero(),
-            distance::Band::Full,
+            self.band,
             &mut self.scratch,
             &mut self.phi,
             &mut self.closest,

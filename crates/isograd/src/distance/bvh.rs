@@ -42,15 +42,10 @@ pub(super) struct Found {
 }
 
 impl Found {
-    pub(super) const NOTHING: Self = Self::within(f64::INFINITY);
-
-    /// Nothing yet, and only what is closer than this (squared) is wanted.
-    pub(super) const fn within(squared: f64) -> Self {
-        Self {
-            squared: [squared; LANES],
-            triangle: [NOWHERE; LANES],
-        }
-    }
+    pub(super) const NOTHING: Self = Self {
+        squared: [f64::INFINITY; LANES],
+        triangle: [NOWHERE; LANES],
+    };
 }
 
 /// The place of a triangle that was not found.
