@@ -107,18 +107,6 @@ pub enum Error {
         /// The checkpoint.
         file: String,
     },
-    /// The grid needs more memory than there is.
-    #[error(
-        "a grid of {shape:?} cells needs about {needed:.1} GiB, and {available:.1} GiB are free; use a lower resolution, a larger spacing or tighter bounds"
-    )]
-    Memory {
-        /// Cells along each axis.
-        shape: [usize; 3],
-        /// GiB.
-        needed: f64,
-        /// GiB.
-        available: f64,
-    },
     /// The threads could not be started.
     #[error("the threads could not be started: {0}; use fewer")]
     Threads(#[from] rayon::ThreadPoolBuildError),

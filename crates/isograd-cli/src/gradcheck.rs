@@ -8,7 +8,6 @@ use serde::Serialize;
 
 use crate::args;
 use crate::error::Error;
-use crate::memory;
 use crate::outputs::{check_ending, write_report};
 use crate::progress::{Progress, to_stdout};
 
@@ -39,7 +38,6 @@ pub fn run(args: &args::Gradcheck) -> Result<(), Error> {
         file: file.clone(),
         source,
     })?;
-    memory::check(grid.shape(), std::mem::size_of::<f64>())?;
     let options = Options {
         reconstruction: args.method.options(grid.spacing()),
         step: args.step,

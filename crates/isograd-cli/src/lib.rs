@@ -7,7 +7,6 @@ pub mod fit;
 pub mod gradcheck;
 pub mod info;
 mod interrupt;
-mod memory;
 pub mod orient;
 pub mod outputs;
 pub mod plot;

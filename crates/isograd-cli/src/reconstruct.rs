@@ -13,7 +13,7 @@ use crate::outputs::{Outputs, write_report};
 use crate::plot;
 use crate::progress::Progress;
 use crate::report::Report;
-use crate::{memory, orient, resample};
+use crate::{orient, resample};
 
 /// Rounding of the coordinates, in cells, that single precision may add: above it the computation runs in
 /// double precision.
@@ -125,7 +125,6 @@ impl Job<'_> {
     ) -> Result<(), Error> {
         let cloud = self.cloud::<T>(geometry)?;
         let grid = self.grid(&cloud)?;
-        memory::check(grid.shape(), std::mem::size_of::<T>())?;
         progress.detail(&format!(
             "grid {:?}, cells of {}",
             grid.shape(),

@@ -180,6 +180,12 @@ fn grids_that_no_memory_holds_are_refused() {
     bench
         .run("reconstruct a.ply --resolution 65535")
         .says(1, &["coarser"]);
+    // 69 GiB.
+    if isograd::available_memory().is_some_and(|free| free < 64e9) {
+        bench
+            .run("reconstruct a.ply --resolution 1600")
+            .says(1, &["a.ply", "GiB are free; use a lower resolution"]);
+    }
     bench
         .run("reconstruct a.ply --spacing 1e-30")
         .says(1, &["a.ply"]);

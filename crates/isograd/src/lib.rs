@@ -34,7 +34,8 @@ pub use data::{
 };
 pub use pipeline::{
     CloudCotangent, Cotangent, Error, ExtensionCotangent, Options, Orienter, PullbackError,
-    PullbackScratch, Reconstruction, Reconstructor, RestoreError, Saved,
+    PullbackScratch, Reconstruction, Reconstructor, RestoreError, Saved, available_memory,
+    check_memory,
 };
 pub use real::Real;
 pub use report::{Report, Seconds, Stage, Warning};

@@ -19,6 +19,7 @@ use crate::report::{Report, Stage};
 use crate::{Real, distance, isosurface, neighbors, normals, orient, poisson, splat};
 
 pub use cotangent::{CloudCotangent, Cotangent, ExtensionCotangent, PullbackError};
+pub use memory::{available_memory, check_memory};
 pub use options::{Error, Options};
 pub use orienter::Orienter;
 pub use pullback::PullbackScratch;
@@ -48,9 +49,11 @@ impl<T: Real> Reconstructor<T> {
     /// A plan for clouds that lie on `grid`, at least 2 cells off its walls.
     ///
     /// # Errors
+    /// [`Error::Memory`] for a grid that needs more memory than is free, where the system tells (Linux).
     /// [`Error::Smoothing`] for a smoothing that is negative or not finite. Other options are checked by
     /// the stages that use them.
     pub fn new(grid: Grid<T>, options: Options) -> Result<Self, Error> {
+        check_memory(&grid)?;
         if !(options.smoothing >= 0.0) || !options.smoothing.is_finite() {
             return Err(Error::Smoothing(options.smoothing));
         }

@@ -10,7 +10,6 @@ use isograd_shapes::{Sampling, Shape};
 
 use crate::args::{self, FullOr, Method, TargetKind};
 use crate::error::Error;
-use crate::memory;
 
 /// Samples that tell where a shape is.
 const SCOUTS: usize = 4000;
@@ -26,7 +25,7 @@ impl Inputs {
     pub fn read(args: &args::Fit) -> Result<Self, Error> {
         let variables = variables(args)?;
         let target = target(args, &variables)?;
-        memory::check(target.grid().shape(), size_of::<f64>())?;
+        check_memory(args, target.grid())?;
         Ok(Self {
             target,
             variables,
@@ -132,6 +131,14 @@ fn only(args: &args::Fit, shape: &Shape) -> Result<Option<Vec<String>>, Error> {
     Ok(Some(names))
 }
 
+/// Before anything of the size of the grid is made.
+fn check_memory(args: &args::Fit, grid: &Grid<f64>) -> Result<(), Error> {
+    isograd::check_memory(grid).map_err(|source| Error::Reconstruct {
+        file: args.target.display().to_string(),
+        source,
+    })
+}
+
 fn target(args: &args::Fit, variables: &Variables) -> Result<Target, Error> {
     let file = || args.target.display().to_string();
     let refused = |source: TargetError| Error::Target {
@@ -156,7 +163,7 @@ fn target(args: &args::Fit, variables: &Variables) -> Result<Target, Error> {
         Content::Geometry(geometry) => geometry,
     };
     let grid = grid(args, &geometry, variables)?;
-    memory::check(grid.shape(), size_of::<f64>())?;
+    check_memory(args, &grid)?;
     let as_cloud = args.target_kind == TargetKind::Cloud || geometry.faces.is_empty();
     if as_cloud {
         let cloud = geometry.cloud::<f64>().map_err(|source| Error::Cloud {

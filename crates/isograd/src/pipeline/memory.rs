@@ -1,7 +1,39 @@
-//! How much a reconstruction keeps for its pullback.
+//! How much memory a reconstruction takes, and whether there is so much; and what it keeps for its pullback.
 
-use super::Reconstruction;
-use crate::Real;
+use super::{Error, Reconstruction};
+use crate::{Grid, Real};
+
+/// Values for each cell that are held at once, at most: φ, χ, the closest triangles, and the work space of the
+/// Fourier transform and of the distance. The scaling page has what was measured.
+const VALUES: f64 = 4.5;
+
+const GIB: f64 = (1u64 << 30) as f64;
+
+/// Refuses a grid whose reconstruction needs more memory than is free, where the system says how much that is.
+///
+/// # Errors
+/// [`Error::Memory`].
+pub fn check_memory<T: Real>(grid: &Grid<T>) -> Result<(), Error> {
+    let cells: f64 = grid.shape().iter().map(|&n| n as f64).product();
+    let needed = cells * VALUES * size_of::<T>() as f64;
+    match available_memory() {
+        Some(available) if needed > available => Err(Error::Memory {
+            shape: grid.shape(),
+            needed: needed / GIB,
+            available: available / GIB,
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// Free memory in bytes, as Linux tells it; `None` elsewhere.
+pub fn available_memory() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let mut lines = text.lines();
+    let line = lines.find(|line| line.starts_with("MemAvailable:"))?;
+    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kib * 1024.0)
+}
 
 impl<T: Real> Reconstruction<T> {
     /// Bytes that are kept for the pullback beside φ, the mesh and the oriented normals: the indicator and the
@@ -27,5 +59,27 @@ impl<T: Real> Reconstruction<T> {
     fn of_samples(&self) -> [[usize; 2]; 2] {
         let residuals = &self.residuals;
         [residuals.neighborhoods.bytes(), residuals.normals.bytes()]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Options, Reconstructor};
+
+    #[test]
+    fn a_grid_that_memory_can_not_hold_is_refused_with_what_it_would_take() {
+        if available_memory().is_none_or(|free| free > 130.0 * GIB) {
+            println!("SKIPPED: 130 GiB are free, or this system does not say how much is");
+            return;
+        }
+        // About as many cells as can be indexed, each of 4.5 values of 8 bytes.
+        let grid = Grid::<f64>::new([0.0; 3], 1.0, [1600; 3]).expect("a grid");
+        let Err(error) = Reconstructor::new(grid, Options::default()) else {
+            panic!("a plan of 137 GiB");
+        };
+        let text = error.to_string();
+        assert!(text.contains("needs about 137.3 GiB"), "{text}");
+        assert!(text.contains("lower resolution"), "{text}");
     }
 }

@@ -54,6 +54,18 @@ pub enum Error {
         /// Number of points.
         points: usize,
     },
+    /// The grid needs more memory than there is.
+    #[error(
+        "a grid of {shape:?} cells needs about {needed:.1} GiB, and {available:.1} GiB are free; use a lower resolution, a larger spacing or tighter bounds"
+    )]
+    Memory {
+        /// Cells along each axis.
+        shape: [usize; 3],
+        /// GiB.
+        needed: f64,
+        /// GiB.
+        available: f64,
+    },
     /// Orientation.
     #[error(transparent)]
     Orient(#[from] orient::Error),
