@@ -33,12 +33,14 @@ Checks
 
 Figures and pages
   docs             every page and picture below docs/ that a command makes: accuracy, gradients,
-                   orientation, gallery, fit
+                   orientation, scaling, gallery, fit
   accuracy         docs/accuracy.md: errors against bodies with a closed form
   gradients        docs/gradients.md: the pullback against differences and closed forms, and its
                    cost; compares times, so leave the machine alone meanwhile
   orientation      docs/orientation.md: wrong signs on many clouds, and their doubt; with real shapes
                    where ../shared/data is there
+  scaling          docs/scaling.md: time and memory against cells and points; leave the machine
+                   alone meanwhile
   gallery          docs/images/: pictures of the clouds in examples/clouds
   fit              docs/fit.md: a fish found from its signed distance field
   bench [ARGS]     the benchmarks, every stage and the whole; --quick for a short run,
@@ -83,6 +85,7 @@ fn run(command: &str, rest: &[String]) -> Option<Outcome> {
         ("accuracy", []) => Some(pages::accuracy()),
         ("gradients", []) => Some(pages::gradients()),
         ("orientation", []) => Some(pages::orientation()),
+        ("scaling", []) => Some(pages::scaling()),
         ("gallery", []) => Some(pages::gallery()),
         ("fit", []) => Some(fit::run()),
         ("bench", _) => Some(bench::run(rest)),

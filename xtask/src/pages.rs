@@ -10,6 +10,7 @@ pub fn all() -> Outcome {
     accuracy()?;
     gradients()?;
     orientation()?;
+    scaling()?;
     gallery()?;
     crate::fit::run()
 }
@@ -27,6 +28,11 @@ pub fn gradients() -> Outcome {
 /// `docs/orientation.md`, with its numbers and pictures.
 pub fn orientation() -> Outcome {
     program("isograd-orientation")
+}
+
+/// `docs/scaling.md`, with its numbers and picture.
+pub fn scaling() -> Outcome {
+    program("isograd-scaling")
 }
 
 /// Runs the program of a package, which writes its page.
