@@ -42,7 +42,8 @@ const CHOICE: &str = "\
 
 const METHOD: &str = "\
 Where samples scatter, from noise or because they lie on both sides of a thin body, the axis is that of a wider
-neighbourhood, as far as that is smoother. Then five kinds of evidence are summed for each point, from −1 (the axis points inward) to 1 (outward):
+neighbourhood, as far as that is smoother. Then five kinds of evidence are summed for each point, from −1 (the axis
+points inward) to 1 (outward):
 
 - *Enclosure.* The samples are drawn on a grid as discs in their tangent planes. What they close off from the outside is
   matter, a cavity inside matter is air again, and so on. Two grids of different cells look at this.
@@ -58,8 +59,8 @@ neighbourhood, as far as that is smoother. Then five kinds of evidence are summe
 What a point knows spreads over the graph of its neighbours. Points that agree make domains; between domains that
 contradict each other the *winding number* decides: the right signs are those with which it is ½ on the surface. A thin
 body and a narrow gap look alike from near; where that matters, both readings are tried, and the winding number chooses.
-Far parts of a cloud get grids of their own, so that an outlier makes none of them coarse. Time and memory
-are bounded by the number of points; the bits are the same for any number of threads.
+Far parts of a cloud get grids of their own, so that an outlier makes none of them coarse. Time and memory are bounded by
+the number of points; the bits are the same for any number of threads.
 
 ";
 
@@ -122,11 +123,11 @@ fn summary(results: &Results) -> String {
 ## How often it is wrong
 
 Wrong signs in per cent of those that are judged, by `auto` and by `parity`; the rest of a row is of `auto`. *Least* is
-what one gets wrong who knows the clean surface: noise throws samples of a thin body to its other side. *Axis* is
-the mean angle between axis and truth in degrees, *narrow* the same with one radius for all, *caught* the share of the wrong signs that are doubtful, *time* that
-for a point over that of the cloud in the middle. A number after a name is the distance of two sheets in spacings, the
-thickness of a wing in chords, or the deviation of the noise in longest sides. Where boxes touch, samples of two faces
-that look at each other lie in one place; nothing can part them, and they are not judged.{real}
+what one gets wrong who knows the clean surface: noise throws samples of a thin body to its other side. *Axis* is the mean
+angle between axis and truth in degrees, *narrow* the same with one radius for all, *caught* the share of the wrong signs
+that are doubtful, *time* that for a point over that of the cloud in the middle. A number after a name is the distance of
+two sheets in spacings, the thickness of a wing in chords, or the deviation of the noise in longest sides. Where boxes
+touch, samples of two faces that look at each other lie in one place; nothing can part them, and they are not judged.{real}
 
 At most 0.5 % are wrong on {right} of {} clouds (`parity`: {parity}). The slowest cloud takes {} times as long for a point
 as that in the middle.
