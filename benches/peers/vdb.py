@@ -22,7 +22,7 @@ def main() -> None:
     faces = np.fromfile(folder / "faces.u32", np.uint32).reshape(-1, 3)
     spacing, lower, shape = settings["spacing"], settings["lower"], settings["shape"]
     transform = vdb.createLinearTransform(voxelSize=spacing)
-    transform.postTranslate([low + 0.5 * spacing for low in lower])
+    transform.translate([low + 0.5 * spacing for low in lower])
     grid = None
     print("ready", flush=True)
     for request in sys.stdin:
