@@ -39,8 +39,8 @@ fn slopes(results: &Results) -> String {
     let points = |size: &Size| size.points as f64;
     format!(
         "\
-- Time grows as cells to the power of {} forward and {} backward, and as points to the power of {} and {}: fitted over
-  all sizes below, small ones included, whose fixed cost of the other kind makes the power smaller.
+- Time grows as cells to the power of {} forward and {} backward, and as points to the power of {} and {}:
+  fitted over all sizes below, small ones included, whose fixed cost of the other kind makes the power smaller.
 - Between the two largest sizes, forward: {} and {}.
 - Memory: {} bytes a cell forward, {} with the pullback; {} bytes a point, {} with the pullback (from the two largest
   sizes). The field itself has 4 bytes a cell. A grid that needs more than is free is refused before work starts.
@@ -136,10 +136,10 @@ fn limit(results: &Results) -> String {
         "\
 ## How far from the limit of memory
 
-The paper's fish, {nx}×{ny}×{nz} cells and {} samples, takes {} s forward and {} s backward. A copy of a large array moves
-{} GB/s here, measured in the same run. What a stage must at least read and write (points, normals and fields, once) would
-take the time of the fourth column at that speed; the last column says how many times that it takes. Normals, orientation
-and distance are bound by arithmetic, not by memory.
+The paper's fish, {nx}×{ny}×{nz} cells and {} samples, takes {} s forward and {} s backward. A copy of a
+large array moves {} GB/s here, measured in the same run. What a stage must at least read and write (points, normals and
+fields, once) would take the time of the fourth column at that speed; the last column says how many times that it takes.
+Normals, orientation and distance are bound by arithmetic, not by memory.
 
 {table}",
         thousands(fish.points),

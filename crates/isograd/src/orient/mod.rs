@@ -1,7 +1,7 @@
 //! The sign of every normal: outward, away from matter.
 //!
 //! # Map
-//! Axes `(N, 3)` of unit length and arbitrary sign (from [`normals`](crate::normals)), or the cloud's
+//! Axes `(N, 3)` of unit length and arbitrary sign (from [`normals`]), or the cloud's
 //! own normals → unit normals `(N, 3)` that point outward, with a confidence for each. Six methods:
 //!
 //! - [`Method::Auto`], the default, weighs evidence of five kinds. *Enclosure*: the samples are drawn on a
@@ -342,7 +342,7 @@ pub enum Error {
 
 /// Chooses the sign of every axis, or takes the given normals; see the [module](self) for the map.
 ///
-/// `axes` are those of [`normals`](crate::normals), or `(N, 3)` bare unit vectors of any sign (not read by
+/// `axes` are those of [`normals`], or `(N, 3)` bare unit vectors of any sign (not read by
 /// [`Method::Given`], and may then be empty); `neighborhoods` must be those of `points` `(N, 3)`; `known` are the cloud's own normals, and where it was
 /// seen from. The memory of `scratch` and `out` is used again; for [`Method::Previous`], `scratch` holds the
 /// call before. The same input gives the same bits on any number of threads.
