@@ -5,12 +5,12 @@ use std::time::Instant;
 use isograd::{
     CloudCotangent, Cotangent, Options, PullbackScratch, Real, Reconstructor, Seconds, Stage,
 };
+use isograd_page::statistics::median;
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 
 use crate::Outcome;
 use crate::body::{Body, Sampled, narrowed, points_alone};
-use crate::parameters::median;
 
 /// Threads that are measured with.
 pub const THREADS: [usize; 2] = [1, 2];

@@ -6,6 +6,7 @@ use isograd::{
     CloudCotangent, Cotangent, Field, Options, PullbackScratch, Reconstruction, Reconstructor,
     vector,
 };
+use isograd_page::statistics::median;
 use isograd_shapes::Shape;
 use serde::Serialize;
 
@@ -326,12 +327,6 @@ pub fn flipped(a: &[[f64; 3]], b: &[[f64; 3]]) -> usize {
     pairs.filter(|(a, b)| vector::dot(**a, **b) < 0.0).count()
 }
 
-/// The one in the middle; NaN of none.
-pub fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -342,11 +337,5 @@ mod tests {
         let off = factors.iter().map(|f| (f - 1.0).abs());
         let most = off.fold(0.0, f64::max);
         assert!(most <= OFF && most > 0.5 * OFF, "{factors:?}");
-    }
-
-    #[test]
-    fn the_middle_is_the_middle() {
-        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
-        assert!(median(vec![]).is_nan());
     }
 }

@@ -57,8 +57,6 @@ pub struct Prepared {
     pub neighborhoods: Neighborhoods<f32>,
     /// The axis of each.
     pub axes: normals::Residual<f32>,
-    /// The axes with the common radius for all.
-    pub narrow: Vec<[f32; 3]>,
     /// What neighbourhoods and axes took.
     pub seconds: f64,
 }
@@ -75,17 +73,11 @@ impl Prepared {
         neighbors::forward(&points, Radius::Auto, &mut neighborhoods).expect("neighbourhoods");
         let mut axes = normals::Residual::default();
         normals::forward(&neighborhoods, &mut axes);
-        let seconds = start.elapsed().as_secs_f64();
-        let common = Radius::Fixed(f64::from(neighborhoods.common_radius));
-        let (mut fixed, mut narrow) = (Neighborhoods::default(), normals::Residual::default());
-        neighbors::forward(&points, common, &mut fixed).expect("neighbourhoods");
-        normals::forward(&fixed, &mut narrow);
         Self {
             points,
             neighborhoods,
             axes,
-            narrow: narrow.normals,
-            seconds,
+            seconds: start.elapsed().as_secs_f64(),
         }
     }
 
@@ -146,7 +138,7 @@ fn judge(body: &Body, prepared: &Prepared, out: &Orientation<f32>) -> Errors {
         .filter(|c| is_judged(c.1) && c.1 < 0.0)
         .map(|c| c.0)
         .collect();
-    let angles_of_narrow = angles(body, &prepared.narrow);
+    let angles_of_narrow = angles(body, &narrow_axes(prepared));
     let mut angles = angles(body, &out.normals);
     angles.sort_by(f64::total_cmp);
     let why = reasons(&prepared.points, out, &prepared.neighborhoods);
@@ -170,6 +162,15 @@ fn judge(body: &Body, prepared: &Prepared, out: &Orientation<f32>) -> Errors {
             .to_vec(),
         caught: (!wrong.is_empty()).then(|| share(caught, wrong.len())),
     }
+}
+
+/// The axes with the common radius for all.
+fn narrow_axes(prepared: &Prepared) -> Vec<[f32; 3]> {
+    let common = Radius::Fixed(f64::from(prepared.neighborhoods.common_radius));
+    let (mut fixed, mut narrow) = (Neighborhoods::default(), normals::Residual::default());
+    neighbors::forward(&prepared.points, common, &mut fixed).expect("neighbourhoods");
+    normals::forward(&fixed, &mut narrow);
+    narrow.normals
 }
 
 /// Share of these samples whose true side is not that of the surface round them: of the normals of the 64 nearest

@@ -1,5 +1,6 @@
 //! The page.
 
+use isograd_page::statistics::median;
 use isograd_page::table::{Table, significant};
 use isograd_page::text::thousands;
 
@@ -178,9 +179,7 @@ fn moving(steps: &[Step]) -> String {
     let following: Vec<&Step> = steps.iter().filter(|step| step.follows).collect();
     let worst = steps.iter().map(|step| step.wrong).fold(0.0, f64::max);
     let turned = following.iter().map(|step| step.turned).max().unwrap_or(0);
-    let mut times: Vec<f64> = following.iter().map(|step| step.time).collect();
-    times.sort_by(f64::total_cmp);
-    let time = times.get(times.len() / 2).copied().unwrap_or(f64::NAN);
+    let time = median(following.iter().map(|step| step.time).collect());
     format!(
         "\
 ## Bodies that move

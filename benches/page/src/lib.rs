@@ -4,5 +4,6 @@ pub mod bars;
 pub mod chart;
 pub mod layout;
 pub mod program;
+pub mod statistics;
 pub mod table;
 pub mod text;

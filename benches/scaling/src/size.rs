@@ -7,6 +7,7 @@ use isograd::{
     Resolution, Stage, vector,
 };
 use isograd_page::program::Outcome;
+use isograd_page::statistics::median;
 use isograd_shapes::{Layout, Sampling, by_name};
 use peak_alloc::PeakAlloc;
 use serde::Serialize;
@@ -157,12 +158,6 @@ impl Problem {
             }
         }
     }
-}
-
-/// The upper median; `NaN` of nothing.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]

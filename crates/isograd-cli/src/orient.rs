@@ -42,13 +42,11 @@ pub fn run(args: &args::OrientCloud) -> Result<(), Error> {
 
 fn check(args: &args::OrientCloud) -> Result<(), Error> {
     args.normals.check()?;
-    check_ending(&args.output, CLOUD_ENDINGS)?;
-    check_not_input(&args.output, &args.cloud)?;
-    isograd_io::check_output(&args.output, CLOUD_ENDINGS)?;
-    if let Some(report) = &args.report {
-        check_ending(report, &["json"])?;
-        check_not_input(report, &args.cloud)?;
-        isograd_io::check_output(report, &["json"])?;
+    let report = args.report.iter().map(|path| (path, &["json"][..]));
+    for (path, endings) in [(&args.output, CLOUD_ENDINGS)].into_iter().chain(report) {
+        check_ending(path, endings)?;
+        check_not_input(path, &args.cloud)?;
+        isograd_io::check_output(path, endings)?;
     }
     Ok(())
 }

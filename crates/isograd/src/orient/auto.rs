@@ -27,10 +27,8 @@ const FINE: f64 = 1.1;
 /// What the evidence of a second sheet weighs.
 const SHEET: f32 = 4.0;
 
-/// What the side weighs on which a sample lies in a layer that scatters; and how soon it is clear, by the height
-/// in spreads.
+/// What the side weighs on which a sample lies in a layer that scatters.
 const SLAB: f32 = 2.0;
-const SLAB_SLOPE: f32 = 2.0;
 
 /// What a sample at which the winding number is wrong by 1 weighs, beside evidence of 1.
 const WINDING: f64 = 4.0;
@@ -229,7 +227,7 @@ impl Auto {
                 }
             }
         }
-        self.graph.part_slabs(&self.slabs, SLAB_SLOPE);
+        self.graph.part_slabs(&self.slabs);
         let (graph, all) = (&self.graph, (0..n).into_par_iter());
         all.map(|p| graph.sheet_evidence(p))
             .collect_into_vec(&mut self.sheets);
@@ -255,7 +253,7 @@ impl Auto {
     /// Where noise has made one layer of the two sides of a thin body, which is seen by the open air on both
     /// sides of it, a sample on one side of its middle belongs to that side.
     fn slab_evidence(&self, p: usize) -> f32 {
-        SLAB * self.slabs[p] * (SLAB_SLOPE * self.graph.height[p]).tanh()
+        SLAB * self.slabs[p] * self.graph.side[p]
     }
 
     fn differs(&self, p: usize) -> bool {

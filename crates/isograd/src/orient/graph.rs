@@ -34,6 +34,9 @@ const LEAST_SHARE: f32 = 1.0 / 3.0;
 /// What the product of the spreads of two samples adds to the blur of their reflection.
 const NOISE: f32 = 4.0;
 
+/// How soon it is clear on which side of a plane a sample lies, by its height in spreads.
+const SIDE: f32 = 2.0;
+
 /// Couplings are raised to this odd power: a half-hearted one, as between a sample of one sheet and one
 /// slantwise across on the other, is mostly wrong, and must not count for half.
 const TRUST: i32 = 5;
@@ -59,8 +62,8 @@ pub(super) struct Graph {
     /// How far samples lie off their common plane, where they scatter so much that the axis was sought in a
     /// wider neighbourhood: root mean square; else 0.
     pub spread: Vec<f32>,
-    /// How far along its axis such a sample lies off that plane, in spreads.
-    pub height: Vec<f32>,
+    /// In −1..1: how clearly such a sample lies on the side of that plane that its axis points to; else 0.
+    pub side: Vec<f32>,
     /// Scratch: distance to the last sample of the ring.
     ring: Vec<f32>,
     /// Scratch: typical distance of the nearest samples from the tangent plane.
@@ -105,13 +108,15 @@ impl Graph {
                 .is_some_and(|&r| r > neighborhoods.radius[i]);
             match axes.planes.get(i) {
                 Some(plane) if is_wide => scatter(plane, axes.normals[i], spacing),
-                _ => [0.0; 2],
+                _ => (0.0, 0.0),
             }
         };
         self.spread.clear();
-        self.spread.extend(order.iter().map(|i| scatter(i)[0]));
-        self.height.clear();
-        self.height.extend(order.iter().map(|i| scatter(i)[1]));
+        self.side.clear();
+        for (spread, side) in order.iter().map(scatter) {
+            self.spread.push(spread);
+            self.side.push(side);
+        }
     }
 
     fn find_neighbors<T: Real>(&mut self, neighborhoods: &Neighborhoods<T>) {
@@ -214,17 +219,16 @@ impl Graph {
     }
 
     /// In layers with air on both sides, as far as they are that (`slab`, in 0..1), two samples hang together as
-    /// their heights say: on one side of the middle, or on both.
-    pub(super) fn part_slabs(&mut self, slab: &[f32], slope: f32) {
-        let (near, axis, height) = (&self.near, &self.axis, &self.height);
-        let side = |p: usize| (slope * height[p]).tanh();
+    /// they lie: on one side of the middle, or on both.
+    pub(super) fn part_slabs(&mut self, slab: &[f32]) {
+        let (near, axis, side) = (&self.near, &self.axis, &self.side);
         let all = self.coupling.par_iter_mut().enumerate();
         all.for_each(|(p, coupling)| {
             for (coupling, &q) in coupling.iter_mut().zip(&near[p]) {
                 let q = q as usize;
                 let both = slab[p].min(slab[q]);
-                if both > 0.0 && height[p] != 0.0 && height[q] != 0.0 {
-                    let tie = vector::dot(axis[p], axis[q]) * side(p) * side(q);
+                if both > 0.0 && side[p] != 0.0 && side[q] != 0.0 {
+                    let tie = vector::dot(axis[p], axis[q]) * side[p] * side[q];
                     *coupling += both * (tie.powi(TRUST) - *coupling);
                 }
             }
@@ -285,13 +289,16 @@ impl Graph {
     }
 }
 
-/// Spread, in spacings, and height, in spreads, of a sample over the plane round it.
-fn scatter<T: Real>(plane: &Plane<T>, axis: [T; 3], spacing: f64) -> [f32; 2] {
+/// Spread of the samples about the plane round one of them, in spacings, and the side of it on which that one lies.
+fn scatter<T: Real>(plane: &Plane<T>, axis: [T; 3], spacing: f64) -> (f32, f32) {
     let spread = plane.eigenvalues[0].f64().sqrt();
     let height = -vector::dot(plane.centroid, axis).f64();
     match spread > 0.0 {
-        true => [spread / spacing, height / spread].map(|x| x as f32),
-        false => [0.0; 2],
+        true => (
+            (spread / spacing) as f32,
+            (SIDE * (height / spread) as f32).tanh(),
+        ),
+        false => (0.0, 0.0),
     }
 }
 
