@@ -2,9 +2,12 @@
 
 use std::fmt;
 
-use isograd::{Options, distance, orient, splat};
+use isograd::poisson::Smoothing;
+use isograd::{Options, distance, isosurface, orient, splat};
 use isograd_shapes::{Density, Layout, Sampling};
 use serde::Serialize;
+
+use crate::measure::BAND;
 
 /// How the samples lie on the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -92,6 +95,25 @@ impl fmt::Display for Splat {
     }
 }
 
+/// Which value of the indicator the surface is at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Level {
+    /// What it is at the samples near by: the default.
+    Local,
+    /// The mean at all samples.
+    Mean,
+}
+
+impl fmt::Display for Level {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Local => "local",
+            Self::Mean => "mean",
+        })
+    }
+}
+
 /// The number type of the whole pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -119,8 +141,12 @@ pub struct Case {
     pub splat: Splat,
     /// Whether samples count by the area they stand for.
     pub area_weights: bool,
-    /// Width of the smoothing, in cells.
-    pub smoothing: f64,
+    /// Width of the smoothing, in cells; automatic where there is none.
+    pub smoothing: Option<f64>,
+    /// `α` of the screened equation.
+    pub screening: f64,
+    /// Level of the surface.
+    pub level: Level,
     /// Number type.
     pub precision: Precision,
 }
@@ -136,13 +162,15 @@ impl Case {
             normals: Normals::Estimated,
             splat: Splat::Bspline,
             area_weights: true,
-            smoothing: 0.0,
+            smoothing: None,
+            screening: 0.0,
+            level: Level::Local,
             precision: Precision::F32,
         }
     }
 
-    /// Whether nothing is known but the points and no option was changed: such a case is measured in
-    /// full, φ and its gradient included; of the others only the surface is.
+    /// Whether nothing is known but the points and no option was changed: of such a case the gradient of φ is
+    /// measured too, everywhere; of the others only the surface and φ near it are.
     pub fn is_default(&self) -> bool {
         let Self {
             body,
@@ -172,11 +200,16 @@ impl Case {
                 Splat::Paper => splat::Weights::Paper,
             },
             area_weights: self.area_weights,
-            smoothing: self.smoothing,
+            smoothing: self.smoothing.map_or(Smoothing::Auto, Smoothing::Cells),
+            screening: self.screening,
+            level: match self.level {
+                Level::Local => isosurface::Level::Local,
+                Level::Mean => isosurface::Level::Mean,
+            },
             band: if self.is_default() {
                 distance::Band::Full
             } else {
-                distance::Band::Cells(1.0)
+                distance::Band::Cells(BAND + 1.0)
             },
             checks: false,
             ..Options::default()

@@ -61,11 +61,9 @@ pub struct Slope {
     pub shares: Vec<f64>,
 }
 
-/// Errors of the field.
+/// Errors of the gradient of the field.
 #[derive(Clone, Debug, Serialize)]
 pub struct FieldErrors {
-    /// |Error of φ| where the exact |φ| is below 3 cells, in cells.
-    pub band: Spread,
     /// Angle between ∇φ and the exact normal, at the samples, in degrees.
     pub gradient: Spread,
     /// `|∇φ|` over all cells.
@@ -83,9 +81,11 @@ pub struct Measured {
     pub sample_spacing: f64,
     /// The zero set.
     pub surface: Surface,
+    /// |Error of φ| where the exact |φ| is below 3 cells, in cells.
+    pub band: Spread,
     /// The normals, where they were estimated.
     pub normals: Option<NormalErrors>,
-    /// The field, where it was computed everywhere.
+    /// The slope of the field, where it was computed everywhere.
     pub field: Option<FieldErrors>,
 }
 
@@ -109,11 +109,12 @@ pub fn measure<T: Real>(
         (case.normals == Normals::Estimated).then(|| normal_errors(result.normals(), truth));
     let field = case
         .is_default()
-        .then(|| field_errors(result, exact, cloud.points(), truth));
+        .then(|| field_errors(result, cloud.points(), truth));
     Ok(Measured {
         cell,
         sample_spacing: result.report().sample_spacing / cell,
         surface: surface_errors(result.mesh(), shape, cell),
+        band: band_errors(result.sdf(), exact),
         normals,
         field: field.transpose()?,
     })
@@ -151,21 +152,21 @@ fn normal_errors<T: Real>(found: &[[T; 3]], truth: &[[T; 3]]) -> NormalErrors {
     }
 }
 
+fn band_errors<T: Real>(phi: &Field<T>, exact: &Exact) -> Spread {
+    let (near, cell) = (exact.near(), phi.grid().spacing().f64());
+    Spread::of(near.len(), |i| {
+        (phi.values()[near[i]].f64() - exact.at(near[i])) / cell
+    })
+}
+
 fn field_errors<T: Real>(
     result: &Reconstruction<T>,
-    exact: &Exact,
     points: &[[T; 3]],
     truth: &[[T; 3]],
 ) -> Outcome<FieldErrors> {
     let phi = result.sdf();
-    let cell = phi.grid().spacing().f64();
-    let near = exact.near();
-    let band = Spread::of(near.len(), |i| {
-        (phi.values()[near[i]].f64() - exact.at(near[i])) / cell
-    });
     let [slope_all, slope_near] = slopes(phi)?;
     Ok(FieldErrors {
-        band,
         gradient: gradient_errors(phi, points, truth)?,
         slope_all,
         slope_near,

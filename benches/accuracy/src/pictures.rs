@@ -11,7 +11,7 @@ use isograd_page::text::thousands;
 use crate::Outcome;
 use crate::case::{Case, Draw, Normals, Splat};
 use crate::measure::{BINS, Slope};
-use crate::study::{Results, Study};
+use crate::study::{Results, SMOOTHINGS, Study};
 
 /// Writes all of them into `folder`.
 ///
@@ -149,15 +149,15 @@ fn lengths(
 fn in_cells(study: &Study, results: &Results) -> Outcome<Vec<Line>> {
     let mut lines = Vec::new();
     for (color, draw) in Draw::ALL.into_iter().enumerate() {
-        for smoothing in [0.0, 1.0] {
-            let smoothed = smoothing > 0.0;
-            let name = if smoothed {
-                "… smoothed by 1 cell".into()
+        for smoothing in SMOOTHINGS {
+            let plain = smoothing == Some(0.0);
+            let name = if plain {
+                "… not smoothed".into()
             } else {
                 draw.to_string()
             };
             let stroke = Stroke {
-                dashed: smoothed,
+                dashed: plain,
                 ..solid(color)
             };
             lines.push(over_cells(study, &name, stroke, |cells| {

@@ -7,7 +7,7 @@ use isograd_shapes::{Shape, by_name};
 use serde::Serialize;
 
 use crate::Outcome;
-use crate::case::{Case, Draw, Normals, Precision, Splat};
+use crate::case::{Case, Draw, Level, Normals, Precision, Splat};
 use crate::exact::{Exact, widened};
 use crate::measure::{BAND, Measured, Surface, measure, surface_errors};
 
@@ -17,6 +17,39 @@ const SEED: u64 = 1;
 const PADDING: f64 = 0.1;
 /// On finer grids than this, in a series that keeps the samples per cell, there are more samples.
 const REFERENCE_CELLS: usize = 128;
+
+/// Widths of the smoothing that are compared: none, and automatic.
+pub const SMOOTHINGS: [Option<f64>; 2] = [None, Some(0.0)];
+
+/// A way to the level of the surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Way {
+    /// Local or not.
+    pub level: Level,
+    /// Width of the smoothing, in cells.
+    pub smoothing: Option<f64>,
+    /// `α`.
+    pub screening: f64,
+}
+
+/// The ways that are compared: the plain one first, the default second.
+pub const WAYS: [Way; 7] = [
+    way(Level::Mean, Some(0.0), 0.0),
+    way(Level::Local, None, 0.0),
+    way(Level::Mean, None, 0.0),
+    way(Level::Local, Some(0.0), 0.0),
+    way(Level::Mean, Some(0.0), 1.0),
+    way(Level::Mean, Some(0.0), 4.0),
+    way(Level::Local, None, 4.0),
+];
+
+const fn way(level: Level, smoothing: Option<f64>, screening: f64) -> Way {
+    Way {
+        level,
+        smoothing,
+        screening,
+    }
+}
 
 /// How much is measured.
 #[derive(Clone, Debug)]
@@ -97,7 +130,7 @@ impl Study {
         &self,
         draw: Draw,
         normals: Normals,
-        smoothing: f64,
+        smoothing: Option<f64>,
         cells: usize,
     ) -> Case {
         Case {
@@ -113,7 +146,20 @@ impl Study {
         Case {
             splat,
             area_weights,
-            ..self.sampling_case(draw, Normals::Exact, 0.0, cells)
+            // The weights alone: a local level would mend what they do.
+            level: Level::Mean,
+            smoothing: Some(0.0),
+            ..self.sampling_case(draw, Normals::Exact, None, cells)
+        }
+    }
+
+    /// The first body with random samples, exact normals, and one way to the level.
+    pub fn level_case(&self, way: &Way, cells: usize) -> Case {
+        Case {
+            level: way.level,
+            smoothing: way.smoothing,
+            screening: way.screening,
+            ..self.sampling_case(Draw::Random, Normals::Exact, None, cells)
         }
     }
 
@@ -151,7 +197,7 @@ impl Study {
             }
             for draw in Draw::ALL {
                 for normals in [Normals::Exact, Normals::Estimated] {
-                    cases.extend([0.0, 1.0].map(|s| self.sampling_case(draw, normals, s, cells)));
+                    cases.extend(SMOOTHINGS.map(|s| self.sampling_case(draw, normals, s, cells)));
                 }
                 for splat in Splat::ALL {
                     cases.extend(
@@ -159,6 +205,7 @@ impl Study {
                     );
                 }
             }
+            cases.extend(WAYS.iter().map(|way| self.level_case(way, cells)));
             cases.push(self.proportional_case(self.first(), Draw::Even, cells));
         }
         for &body in &self.bodies {

@@ -1,9 +1,11 @@
 //! The local derivative over the slope across half a cell to either side: what an optimiser that takes real
 //! steps meets.
 
+use isograd::poisson::Smoothing;
 use isograd::vector::dot;
 use isograd::{
-    Cotangent, Options, PointCloud, Reconstruction, Reconstructor, distance, orient, splat,
+    Cotangent, Options, PointCloud, Reconstruction, Reconstructor, distance, isosurface, orient,
+    splat,
 };
 use serde::Serialize;
 
@@ -75,6 +77,17 @@ impl Choice {
                 splat::Weights::BSpline
             },
             area_weights: self.area_weights,
+            // The paper's weights with all that goes with them there.
+            level: if self.paper_weights {
+                isosurface::Level::Mean
+            } else {
+                isosurface::Level::Local
+            },
+            smoothing: if self.paper_weights {
+                Smoothing::Cells(0.0)
+            } else {
+                Smoothing::Auto
+            },
             // The functionals look no further.
             band: distance::Band::Cells(LAYER + 1.0),
             checks: false,

@@ -12,6 +12,7 @@ pub fn dict<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'py, PyDict
     dict.set_item("points", report.points)?;
     dict.set_item("normals", normals(py, report)?)?;
     dict.set_item("orientation", orientation(py, report)?)?;
+    dict.set_item("smoothing", report.smoothing)?;
     dict.set_item("iso_value", report.iso_value)?;
     dict.set_item("surface", surface(py, report)?)?;
     dict.set_item("sdf", sdf(py, report)?)?;

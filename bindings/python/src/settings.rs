@@ -3,7 +3,8 @@
 
 use isograd::distance::Band;
 use isograd::neighbors::Radius;
-use isograd::{Grid, GridError, Options, Real, Reconstructor, orient, splat, vector};
+use isograd::poisson::Smoothing;
+use isograd::{Grid, GridError, Options, Real, Reconstructor, isosurface, orient, splat, vector};
 use serde::Deserialize;
 
 /// What `isograd._settings.encode` writes.
@@ -17,7 +18,9 @@ pub struct Settings {
     orient: Orient,
     splat: Splat,
     area: bool,
-    smoothing: f64,
+    smoothing: Option<f64>,
+    screening: f64,
+    level: Level,
     band: Option<f64>,
     checks: bool,
 }
@@ -65,6 +68,14 @@ impl Orient {
 
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(rename_all = "lowercase")]
+enum Level {
+    Local,
+    Thin,
+    Mean,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "lowercase")]
 enum Splat {
     Bspline,
     Paper,
@@ -106,7 +117,13 @@ impl Settings {
                 Splat::Paper => splat::Weights::Paper,
             },
             area_weights: self.area,
-            smoothing: self.smoothing,
+            smoothing: self.smoothing.map_or(Smoothing::Auto, Smoothing::Cells),
+            screening: self.screening,
+            level: match self.level {
+                Level::Local => isosurface::Level::Local,
+                Level::Thin => isosurface::Level::Thin,
+                Level::Mean => isosurface::Level::Mean,
+            },
             band: self.band.map_or(Band::Full, Band::Cells),
             checks: self.checks,
         }

@@ -201,6 +201,8 @@ def test_bad_arguments_are_refused_with_a_reason():
         (ValueError, "normals", lambda: isograd.reconstruct(SPHERE, GRID, orient="given")),
         (ValueError, "does not use", lambda: isograd.reconstruct(SPHERE, GRID, normals=SPHERE)),
         (ValueError, "smoothing", lambda: isograd.Options(smoothing=-1)),
+        (ValueError, "screening", lambda: isograd.Options(screening=float("inf"))),
+        (ValueError, "'local'", lambda: isograd.Options(level="median")),
         (ValueError, "radius", lambda: isograd.Options(radius=0)),
         (ValueError, "band", lambda: isograd.Options(band=float("nan"))),
         (TypeError, "Grid", lambda: isograd.reconstruct(SPHERE, (1, 2, 3))),
@@ -376,6 +378,7 @@ def test_options_are_typed_and_strings_are_enum_values():
     options = isograd.Options(orient="signs", splat="paper", radius=0.2)
     assert options.orient is isograd.Orient.SIGNS and options.splat is isograd.Splat.PAPER
     assert dataclasses.replace(options, band=3).band == 3.0
+    assert options.smoothing == "auto" and options.level is isograd.Level.LOCAL
     assert isograd.Orient.SIGNS == "signs"
     result = isograd.reconstruct(SPHERE, GRID, normals=-SPHERE, orient=isograd.Orient.SIGNS)
     assert result.sdf[GRID.shape[0] // 2, GRID.shape[1] // 2, GRID.shape[2] // 2] > 0
@@ -444,3 +447,20 @@ def test_pure_functions_refuse_what_is_no_function_of_their_arguments(orient):
         _settings.encode_pure(GRID, isograd.Options(orient=orient), False)
     with pytest.raises(ValueError, match='with orient="signs"'):
         isograd.fit(SPHERE, GRID, points=SPHERE, options=isograd.Options(orient=orient))
+
+
+def test_every_way_to_the_level_has_a_gradient_that_agrees_with_differences():
+    grid = isograd.Grid.fit(SPHERE, 24)
+    weight = np.linspace(-1, 1, grid.shape[0] * grid.shape[1] * grid.shape[2]).reshape(grid.shape)
+    direction = SPHERE[:, ::-1].copy()
+    for options in [{"level": "mean", "smoothing": 0}, {"screening": 2.0}, {"smoothing": "auto", "level": "local"}]:
+        # Signs and areas change with the points in every other way; what is held is tested in Rust.
+        options = isograd.Options(orient="given", area=False, **options)
+        call = lambda points: isograd.reconstruct(points, grid, normals=SPHERE, options=options)  # noqa: E731
+        result = call(SPHERE)
+        pulled = (result.pullback(indicator=weight).points * direction).sum()
+        step = 1e-6
+        values = [(call(SPHERE + s * direction).indicator * weight).sum() for s in (step, -step)]
+        difference = (values[0] - values[1]) / (2 * step)
+        # The gains of the local level change with the points, and are held.
+        assert abs(pulled - difference) < 2e-2 * abs(difference), (options, pulled, difference)

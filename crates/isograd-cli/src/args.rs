@@ -200,6 +200,17 @@ pub enum Splat {
     Paper,
 }
 
+/// See [`isograd::isosurface::Level`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Level {
+    /// What it is at the samples near by
+    Local,
+    /// The same, also where the body is thinner than a cell, and made a cell thick; gradients go up and down there
+    Thin,
+    /// The mean at all samples
+    Mean,
+}
+
 /// On or off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Switch {
@@ -236,6 +247,15 @@ pub enum AutoOr {
     Value(f64),
 }
 
+/// A number that is 0 or more, or `auto`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AutoOrZero {
+    /// Chosen by the program.
+    Auto,
+    /// This.
+    Value(f64),
+}
+
 /// A positive number, or `full`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FullOr {
@@ -261,6 +281,17 @@ impl FromStr for AutoOr {
         match text {
             "auto" => Ok(Self::Auto),
             _ => positive(text).map(Self::Value),
+        }
+    }
+}
+
+impl FromStr for AutoOrZero {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            _ => not_negative(text).map(Self::Value),
         }
     }
 }
@@ -373,6 +404,9 @@ mod tests {
             "isograd reconstruct a.ply --resolution 64 --spacing 0.1",
             "isograd reconstruct a.ply --spacing -1",
             "isograd reconstruct a.ply --radius wide",
+            "isograd reconstruct a.ply --smooth -1",
+            "isograd reconstruct a.ply --screening -0.5",
+            "isograd reconstruct a.ply --level global",
             "isograd reconstruct a.ply --padding nan",
             "isograd reconstruct a.ply --bounds 0 0 0 1 1",
             "isograd reconstruct a.ply --orient guess",

@@ -21,6 +21,8 @@ pub struct Report {
     pub normals: Normals,
     /// Their signs.
     pub orientation: Orientation,
+    /// Width of the smoothing of the indicator, in cells.
+    pub smoothing: f64,
     /// The level of the surface.
     pub iso_value: f64,
     /// The surface.
@@ -216,6 +218,7 @@ impl Report {
             },
             normals: Normals::new(report),
             orientation: Orientation::new(report),
+            smoothing: report.smoothing,
             iso_value: report.iso_value,
             surface: Surface::new(&report.surface),
             sdf: Sdf {

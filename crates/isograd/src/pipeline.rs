@@ -40,6 +40,8 @@ struct Scratch<T: Real> {
     orient: orient::Scratch,
     splat: splat::Scratch,
     poisson: poisson::Scratch<T>,
+    screened: poisson::screened::Scratch<T>,
+    level: isosurface::local_level::Scratch<T>,
     isosurface: isosurface::Scratch,
     measure: measure::Scratch,
     distance: distance::Scratch<T>,
@@ -50,12 +52,15 @@ impl<T: Real> Reconstructor<T> {
     ///
     /// # Errors
     /// [`Error::Memory`] for a grid that needs more memory than is free, where the system tells (Linux).
-    /// [`Error::Smoothing`] for a smoothing that is negative or not finite. Other options are checked by
-    /// the stages that use them.
+    /// [`Error::Smoothing`] and [`Error::Screening`] for what is negative or not finite. Other options are
+    /// checked by the stages that use them.
     pub fn new(grid: Grid<T>, options: Options) -> Result<Self, Error> {
         check_memory(&grid)?;
-        if !(options.smoothing >= 0.0) || !options.smoothing.is_finite() {
+        if !options.smoothing.is_valid() {
             return Err(Error::Smoothing(options.smoothing));
+        }
+        if !(options.screening >= 0.0) || !options.screening.is_finite() {
+            return Err(Error::Screening(options.screening));
         }
         Ok(Self {
             result: Reconstruction::empty(grid, options),
@@ -94,10 +99,10 @@ impl<T: Real> Reconstructor<T> {
         self.run_all(cloud, None, observer)
     }
 
-    /// Runs all stages but the checks on a cloud of as many points, with the radii and the signs of the
-    /// normals that `held` has: the map that [`Reconstruction::pullback`] differentiates, for those who
-    /// compare it with differences. Neighbourhoods are those of the moved points; a sample that enters one
-    /// or leaves it still makes the normal jump.
+    /// Runs all stages but the checks on a cloud of as many points, with the radii, the signs of the normals, the
+    /// smoothing, and the gains, trust and shifts of the local iso-value that `held` has: the map that
+    /// [`Reconstruction::pullback`] differentiates, for those who compare it with differences. Neighbourhoods are
+    /// those of the moved points; a sample that enters one or leaves it still makes the normal jump.
     ///
     /// # Errors
     /// As [`reconstruct`](Self::reconstruct).
@@ -160,7 +165,10 @@ struct Residuals<T> {
     neighborhoods: neighbors::Neighborhoods<T>,
     normals: normals::Residual<T>,
     splat: splat::Residual,
-    iso_value: isosurface::iso_value::Residual,
+    /// `σ` of the smoothing, in cells.
+    smoothing: f64,
+    iso_value: isosurface::iso_value::Residual<T>,
+    local_level: isosurface::local_level::Residual<T>,
 }
 
 impl<T: Real> Reconstruction<T> {
@@ -190,8 +198,9 @@ impl<T: Real> Reconstruction<T> {
         &self.sdf
     }
 
-    /// The indicator χ at every cell centre: below the iso-value inside, above it outside. It has no unit;
-    /// without area weights also no scale.
+    /// The indicator χ at every cell centre: below the iso-value inside, above it outside, what the
+    /// [local iso-value](isosurface::local_level) takes off included. It has no unit; without area weights also no
+    /// scale.
     pub fn indicator(&self) -> &Field<T> {
         &self.indicator
     }

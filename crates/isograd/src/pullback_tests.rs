@@ -310,16 +310,19 @@ fn iso_value_to_indicator_samples_and_grid() {
     let v = Direction::new(700, &mut random);
     let chi = indicator(setting.grid);
     let along = numbers(chi.values().len(), &mut random);
-    let (_, residual) = iso_value::forward(&chi, &setting.points, &setting.areas).expect("a level");
+    let mut residual = iso_value::Residual::default();
+    iso_value::forward(&chi, &setting.points, &setting.areas, &mut residual).expect("a level");
+    let values_bar = numbers(700, &mut random);
     let order = setting.splat(Weights::BSpline).1;
     let (mut out, mut chi_bar) = (setting.zeros(), vec![0.0; along.len()]);
     let samples = setting.samples();
     iso_value::pullback(
-        &chi,
+        chi.grid(),
         samples,
         &residual,
         &order,
         2.5,
+        &values_bar,
         &mut chi_bar,
         &mut out,
     );
@@ -329,9 +332,10 @@ fn iso_value_to_indicator_samples_and_grid() {
         let at = setting.moved(&v, s);
         let values = chi.values().iter().zip(&along).map(|(c, v)| c + s * v);
         let chi = Field::new(at.grid, values.collect()).expect("sizes match");
-        2.5 * iso_value::forward(&chi, &at.points, &at.areas)
-            .expect("a level")
-            .0
+        let mut residual = iso_value::Residual::default();
+        let c = iso_value::forward(&chi, &at.points, &at.areas, &mut residual).expect("a level");
+        let values: Vec<f64> = residual.at_samples.iter().map(|at| at.value).collect();
+        2.5 * c + product(&values, &values_bar)
     });
 }
 

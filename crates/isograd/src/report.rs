@@ -90,6 +90,8 @@ pub struct Report {
     pub neighbours: [u32; 3],
     /// Points whose normal is not well defined (equal eigenvalues): its derivative is bounded by a guard.
     pub guarded: usize,
+    /// Width of the smoothing of the indicator, in cells.
+    pub smoothing: f64,
     /// Name of the way the signs were found.
     pub orientation: &'static str,
     /// Axes whose sign was changed.
@@ -208,7 +210,7 @@ impl fmt::Display for Warning {
                 spacing,
             } => write!(
                 f,
-                "samples are {:.1} cells apart (spacing {sample_spacing:.3e}, cells {spacing:.3e}); use a coarser grid, more samples or some smoothing",
+                "samples are {:.1} cells apart (spacing {sample_spacing:.3e}, cells {spacing:.3e}); use a coarser grid or more samples",
                 sample_spacing / spacing
             ),
             Self::Open { samples } => write!(
@@ -224,7 +226,7 @@ impl fmt::Display for Warning {
             }
             Self::Missed { share } => write!(
                 f,
-                "{} of the samples lie more than one cell from the surface (parts thinner than a cell, outliers or wrong normals)",
+                "{} of the samples lie more than one cell from the surface (parts thinner than a cell, which the level 'thin' finds; outliers or wrong normals)",
                 percent(*share)
             ),
             Self::DoubtfulSigns { doubt } => f.write_str(&doubtful_signs(doubt)),

@@ -4,7 +4,12 @@
 //! (its even reflection): the value is that of the nearest point between the cell centres, and the
 //! gradient has no component across the wall. The gradient jumps at the planes through cell centres.
 
-use crate::{Field, Grid, Real};
+use rayon::prelude::*;
+
+use crate::{Field, Grid, Real, splat};
+
+/// Planes across x that one task of [`spread`] owns.
+const SLAB: usize = 8;
 
 /// The eight cells round a point and where the point is between them.
 #[derive(Clone, Copy, Debug)]
@@ -86,6 +91,35 @@ impl<T: Real> Cube<T> {
         };
         (lerp(low, high, x), std::array::from_fn(across))
     }
+}
+
+/// Adds `value(i)` at every sample to the eight cells round it, in memory order: the transpose of
+/// [`Cube::value`]. Each task owns some planes; `order` lists the samples by plane.
+pub(crate) fn spread<T: Real>(
+    grid: &Grid<T>,
+    points: &[[T; 3]],
+    order: &splat::Residual,
+    value: impl Fn(usize) -> T + Sync,
+    out: &mut [T],
+) {
+    let plane = grid.strides()[0];
+    let slabs = out.par_chunks_mut(SLAB * plane).enumerate();
+    slabs.for_each(|(task, slab)| {
+        let first = task * SLAB * plane;
+        let planes = task * SLAB..task * SLAB + slab.len() / plane;
+        // The eight cells reach one plane beyond that of the sample's own cell.
+        let near = planes.start.saturating_sub(1)..planes.end + 1;
+        for &i in order.in_planes(points, grid, near) {
+            let i = i as usize;
+            let cube = Cube::new(grid, grid.to_index(points[i]));
+            let part = value(i);
+            for (cell, weight) in cube.cells().into_iter().zip(cube.weights()) {
+                if let Some(sum) = cell.checked_sub(first).and_then(|at| slab.get_mut(at)) {
+                    *sum += part * weight;
+                }
+            }
+        }
+    });
 }
 
 impl<T: Real> Field<T> {

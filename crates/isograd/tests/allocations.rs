@@ -65,6 +65,7 @@ fn second_pullback() {
     }
     let fields = grown.map(|bytes| bytes as f64 / field_bytes as f64);
     println!("first and second call: {fields:?} fields");
-    // χ̄ and an index for each cell, and what belongs to samples and faces.
-    assert!(fields[0] < 3.0 && fields[1] < 0.25, "{fields:?}");
+    // χ̄ and an index for each cell, three numbers for each cell in a block near the samples, and what belongs
+    // to samples and faces.
+    assert!(fields[0] < 3.2 && fields[1] < 0.25, "{fields:?}");
 }

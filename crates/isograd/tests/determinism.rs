@@ -4,6 +4,7 @@ mod common;
 
 use common::TORUS;
 use isograd::orient::{Method, ParityOptions};
+use isograd::poisson::Smoothing;
 use isograd::{Grid, Options, PointCloud, Real, Reconstruction, Reconstructor, Resolution};
 
 fn with_threads<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
@@ -86,7 +87,7 @@ fn the_papers_choices_give_the_same_bits_too() {
         orientation: Method::Parity(ParityOptions::default()),
         weights: isograd::splat::Weights::Paper,
         area_weights: false,
-        smoothing: 1.0,
+        smoothing: Smoothing::Cells(1.0),
         band: isograd::distance::Band::Cells(3.0),
         ..Options::default()
     };

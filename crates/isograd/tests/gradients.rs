@@ -5,8 +5,10 @@ mod common;
 
 use common::{TORUS, Uniform};
 use isograd::distance::extend;
+use isograd::isosurface::Level;
 use isograd::neighbors::Radius;
 use isograd::orient::Method;
+use isograd::poisson::Smoothing;
 use isograd::splat::Weights;
 use isograd::{
     Attribute, CloudCotangent, Cotangent, ExtensionCotangent, Grid, Options, PointCloud,
@@ -245,14 +247,19 @@ fn all_results_are_pulled_back_to_all_inputs() {
     let plain = Options {
         area_weights: false,
         weights: Weights::Paper,
-        smoothing: 0.7,
+        smoothing: Smoothing::Cells(0.7),
+        level: Level::Mean,
         ..estimated.clone()
     };
     let signs = Options {
         orientation: Method::Signs,
         ..estimated.clone()
     };
-    for options in [estimated, given, signs, plain] {
+    let screened = Options {
+        screening: 2.0,
+        ..estimated.clone()
+    };
+    for options in [estimated, given, signs, plain, screened] {
         let cloud = cloud::<f64>();
         let mut plan = Reconstructor::new(grid(), options.clone()).expect("options");
         let base = plan.reconstruct(&cloud).expect("a torus").clone();
@@ -436,7 +443,8 @@ fn a_restored_result_pulls_back_to_the_same_bits() {
     assert_restored::<f64>(&Options {
         orientation: Method::Given,
         weights: Weights::Paper,
-        smoothing: 0.7,
+        smoothing: Smoothing::Cells(0.7),
+        level: Level::Mean,
         ..Options::default()
     });
 }

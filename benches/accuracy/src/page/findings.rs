@@ -8,7 +8,7 @@ use crate::case::{Draw, Normals, Precision, Splat};
 use crate::measure::Measured;
 use crate::page::sections::order;
 use crate::spread::pair;
-use crate::study::{Results, Study};
+use crate::study::{Results, Study, WAYS};
 
 /// The short answer.
 pub fn findings(study: &Study, results: &Results) -> Outcome<String> {
@@ -17,6 +17,7 @@ pub fn findings(study: &Study, results: &Results) -> Outcome<String> {
         convergence(study, results)?,
         normals(study, results)?,
         weights(study, results)?,
+        level(study, results)?,
         smoothing(study, results)?,
         thin(study, results)?,
         precision(study, results)?,
@@ -27,7 +28,7 @@ pub fn findings(study: &Study, results: &Results) -> Outcome<String> {
 
 fn surface(study: &Study, results: &Results) -> Outcome<String> {
     let cells = study.middle_cells();
-    let of = |draw| results.row(&study.sampling_case(draw, Normals::Exact, 0.0, cells));
+    let of = |draw| results.row(&study.sampling_case(draw, Normals::Exact, None, cells));
     let floor = results.floor(study.first(), cells)?;
     Ok(format!(
         "**{body}, {cells} cells, exact normals**: the zero set is off by {} cells (mean / maximum) with random \
@@ -52,9 +53,8 @@ fn convergence(study: &Study, results: &Results) -> Outcome<String> {
     let fixed = results.row(&study.default_case(body, finest))?;
     Ok(format!(
         "**Order**: with as many samples per cell on every grid the mean falls from {} to {} cells between {coarsest} \
-         and {finest} cells; as a length, with orders {}. On coarse grids the splat rounds what is curved, which is of second \
-         order; on fine ones noise of samples and cells is left, of first order. {} samples are {} cells apart at \
-         {finest} cells, and leave {}: {} are better there.",
+         and {finest} cells; as a length, with orders {}. {} samples are {} cells apart at \
+         {finest} cells, and leave {}; {} leave {}.",
         mean(growing(coarsest)?),
         mean(growing(finest)?),
         orders.join(", "),
@@ -62,12 +62,13 @@ fn convergence(study: &Study, results: &Results) -> Outcome<String> {
         number(fixed.sample_spacing),
         mean(fixed),
         thousands(study.proportional_samples(finest)),
+        mean(growing(finest)?),
     ))
 }
 
 fn normals(study: &Study, results: &Results) -> Outcome<String> {
     let cells = study.middle_cells();
-    let of = |normals| results.row(&study.sampling_case(Draw::Random, normals, 0.0, cells));
+    let of = |normals| results.row(&study.sampling_case(Draw::Random, normals, None, cells));
     let (exact, estimated) = (of(Normals::Exact)?, of(Normals::Estimated)?);
     let degrees = estimated
         .normals
@@ -101,6 +102,27 @@ fn weights(study: &Study, results: &Results) -> Outcome<String> {
     ))
 }
 
+fn level(study: &Study, results: &Results) -> Outcome<String> {
+    let cells = study.middle_cells();
+    let of = |way: usize| results.row(&study.level_case(&WAYS[way], cells));
+    let (plain, local) = (of(0)?, of(1)?);
+    let (screened, floor) = (of(5)?, results.floor(study.first(), cells)?);
+    Ok(format!(
+        "**The local level** and the smoothing that goes with it take the error at the vertices from {} to {}, and that of \
+         φ within 3 cells from {} to {} ({cells} cells, exact normals). The screened equation with α = 4 leaves {} and {}. \
+         Marching cubes of the exact φ, whose triangles cut below what is curved, leaves {} at the middles of faces, and \
+         the default {}: its vertices lie a little outside, as samples lie anywhere in their cells.",
+        pair(&plain.surface.vertices),
+        pair(&local.surface.vertices),
+        pair(&plain.band),
+        pair(&local.band),
+        pair(&screened.surface.vertices),
+        pair(&screened.band),
+        pair(&floor.surface.faces),
+        pair(&local.surface.faces),
+    ))
+}
+
 fn smoothing(study: &Study, results: &Results) -> Outcome<String> {
     let (coarsest, finest) = (study.cells[0], study.cells[study.cells.len() - 1]);
     let of = |smoothing, cells| {
@@ -109,12 +131,12 @@ fn smoothing(study: &Study, results: &Results) -> Outcome<String> {
         Ok::<_, Box<dyn std::error::Error>>(number(row.surface.vertices.mean))
     };
     Ok(format!(
-        "**Smoothing** by one cell averages noise and rounds what is curved: at {finest} cells, where samples are few, \
-         it turns {} into {}, at {coarsest} cells {} into {}.",
-        of(0.0, finest)?,
-        of(1.0, finest)?,
-        of(0.0, coarsest)?,
-        of(1.0, coarsest)?,
+        "**Smoothing** by 0.8 of the distance between samples averages what is between them: at {finest} cells, where \
+         samples are few, it turns {} into {}, at {coarsest} cells {} into {}.",
+        of(Some(0.0), finest)?,
+        of(None, finest)?,
+        of(Some(0.0), coarsest)?,
+        of(None, coarsest)?,
     ))
 }
 

@@ -22,6 +22,7 @@ pub fn page(study: &Study, results: &Results) -> Outcome<String> {
         sections::fields(study, results)?,
         sections::normals(study, results)?,
         sections::sampling(study, results)?,
+        sections::levels(study, results)?,
         sections::weights(study, results)?,
         sections::gradient(study, results)?,
         sections::precision(study, results)?,

@@ -7,7 +7,7 @@ use crate::Outcome;
 use crate::case::{Case, Draw, Normals, Precision, Splat};
 use crate::measure::{FieldErrors, Measured, Slope};
 use crate::spread::{pair, triple};
-use crate::study::{Results, Study};
+use crate::study::{Results, SMOOTHINGS, Study, WAYS};
 
 /// The grids of a body at the defaults, the finest once more with as many samples per cell as on the
 /// middle one.
@@ -107,7 +107,7 @@ pub fn fields(study: &Study, results: &Results) -> Outcome<String> {
                 .map(|&cells| study.default_case(body, cells))
         };
         for case in cases() {
-            row.push(pair(&field(results, &case)?.band));
+            row.push(pair(&results.row(&case)?.band));
         }
         for case in cases() {
             row.push(pair(&field(results, &case)?.gradient));
@@ -174,8 +174,8 @@ pub fn sampling(study: &Study, results: &Results) -> Outcome<String> {
     let mut table = over_grids(study, &["samples", "normals", "smoothing"]);
     for draw in Draw::ALL {
         for normals in [Normals::Exact, Normals::Estimated] {
-            for smoothing in [0.0, 1.0] {
-                let labels = vec![draw.to_string(), normals.to_string(), smoothing.to_string()];
+            for smoothing in SMOOTHINGS {
+                let labels = vec![draw.to_string(), normals.to_string(), width(smoothing)];
                 let case = |cells| study.sampling_case(draw, normals, smoothing, cells);
                 table.row(row_over_grids(study, results, labels, case)?);
             }
@@ -186,7 +186,7 @@ pub fn sampling(study: &Study, results: &Results) -> Outcome<String> {
         let labels = vec![
             format!("{draw}, as many per cell"),
             "estimated".into(),
-            "0".into(),
+            width(None),
         ];
         let case = |cells| study.proportional_case(study.first(), draw, cells);
         table.row(row_over_grids(study, results, labels, case)?);
@@ -200,12 +200,51 @@ pub fn sampling(study: &Study, results: &Results) -> Outcome<String> {
         "## Samples, normals and smoothing
 
 The {body}: error of the zero set at the vertices, in cells. *10:1 density*: ten times as many samples per area at
-one end as at the other. *Smoothing*: width of the Gaussian in the Poisson solve, in cells. *As many per cell*:
-{counts} samples.
+one end as at the other. *Smoothing*: width of the Gaussian in the Poisson solve, in cells; auto is 0.8 of the distance
+between samples. *As many per cell*: {counts} samples.
 
 {table}",
         body = study.first(),
         counts = counts.join(", "),
+    ))
+}
+
+/// The width of the smoothing, as it stands in a table.
+fn width(smoothing: Option<f64>) -> String {
+    smoothing.map_or("auto".into(), |cells| cells.to_string())
+}
+
+/// Ways to the level of the surface.
+pub fn levels(study: &Study, results: &Results) -> Outcome<String> {
+    let mut columns: Vec<String> = study
+        .cells
+        .iter()
+        .map(|cells| format!("{cells} cells"))
+        .collect();
+    columns.extend(study.cells.iter().map(|cells| format!("φ, {cells} cells")));
+    let mut table = Table::new(&["level", "smoothing", "screening"], columns);
+    for way in &WAYS {
+        let labels = vec![
+            way.level.to_string(),
+            width(way.smoothing),
+            way.screening.to_string(),
+        ];
+        let case = |cells| study.level_case(way, cells);
+        let mut row = row_over_grids(study, results, labels, case)?;
+        for &cells in &study.cells {
+            row.push(pair(&results.row(&case(cells))?.band));
+        }
+        table.row(row);
+    }
+    Ok(format!(
+        "## Level, smoothing and screening
+
+The {body}, random samples, exact normals: error of the zero set at the vertices, and of φ within 3 cells, in cells.
+*Level*: the value of the indicator that the surface is at, one for all of it (the mean at the samples) or what it is
+at the samples near by. *Screening*: α of the screened equation.
+
+{table}",
+        body = study.first()
     ))
 }
 
@@ -225,8 +264,8 @@ pub fn weights(study: &Study, results: &Results) -> Outcome<String> {
     Ok(format!(
         "## Splat and area weights
 
-The {body}, exact normals: error of the zero set at the vertices, in cells. The paper's choice is `paper` without
-area weights.
+The {body}, exact normals, one level for the whole surface, no smoothing: error of the zero set at the vertices, in
+cells. The paper's choice is `paper` without area weights.
 
 ![Mean error for each choice of the weights](images/accuracy-weights.png)
 
@@ -286,7 +325,7 @@ pub fn precision(study: &Study, results: &Results) -> Outcome<String> {
             name.into(),
             pair(&row.surface.vertices),
             pair(&row.surface.faces),
-            pair(&field.band),
+            pair(&row.band),
             pair(&field.gradient),
             pair(&normals.degrees),
             percent(row.surface.area),

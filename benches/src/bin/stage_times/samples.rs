@@ -103,6 +103,7 @@ pub struct Indicator<T: Real> {
     bar: Vec<T>,
     chi: Field<T>,
     level: T,
+    residual: iso_value::Residual<T>,
     chi_bar: Field<T>,
     plan: poisson::Plan<T>,
     poisson: poisson::Scratch<T>,
@@ -124,6 +125,7 @@ impl<T: Real + Number> Indicator<T> {
             bar: folder.read("bar")?,
             chi: Field::zeros(grid),
             level: T::zero(),
+            residual: iso_value::Residual::default(),
             chi_bar: Field::zeros(grid),
             plan: poisson::Plan::new(grid.shape()),
             poisson: poisson::Scratch::default(),
@@ -144,8 +146,8 @@ impl<T: Real + Number> Indicator<T> {
         let (chi, order) = (&mut self.chi, &mut self.order);
         splat::forward(samples, weights, &mut self.splat, order, chi)?;
         self.plan.solve(chi.values_mut(), 0.0, &mut self.poisson)?;
-        let (level, residual) = iso_value::forward(chi, &self.points, &self.areas)?;
-        self.level = level;
+        self.level = iso_value::forward(chi, &self.points, &self.areas, &mut self.residual)?;
+        let grid = *chi.grid();
 
         let bars = &mut self.samples_bar;
         bars.points.fill([T::zero(); 3]);
@@ -157,7 +159,17 @@ impl<T: Real + Number> Indicator<T> {
         let chi_bar = self.chi_bar.values_mut();
         chi_bar.copy_from_slice(&self.bar);
         let level_bar = -T::of(self.bar.iter().map(|x| x.f64()).sum());
-        iso_value::pullback(chi, samples, &residual, order, level_bar, chi_bar, bars);
+        let residual = &self.residual;
+        iso_value::pullback(
+            &grid,
+            samples,
+            residual,
+            order,
+            level_bar,
+            &[],
+            chi_bar,
+            bars,
+        );
         self.plan.solve(chi_bar, 0.0, &mut self.poisson)?;
         splat::pullback(samples, order, &self.chi_bar, &mut self.pullback, bars);
         Ok(())

@@ -22,7 +22,7 @@ from ._files import (
 from ._fit import Fit, fit
 from ._grid import Grid
 from ._mesh import Hits, Mesh, query, query_pullback, signed_distance
-from ._options import Options, Orient, Splat
+from ._options import Level, Options, Orient, Splat
 from ._orient import Oriented, orient
 from ._reconstruction import Extension, Gradients, Reconstruction, Reconstructor, reconstruct
 from ._shapes import Coordinates, Parameter, Samples, Shape, sample, shapes
@@ -35,6 +35,7 @@ __all__ = [
     "Gradients",
     "Grid",
     "Hits",
+    "Level",
     "Mesh",
     "Options",
     "Orient",

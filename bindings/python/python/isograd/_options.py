@@ -35,8 +35,20 @@ class Splat(str, Enum):
     """The paper's weights."""
 
 
+class Level(str, Enum):
+    """Which value of the indicator the surface is at."""
+
+    LOCAL = "local"
+    """What it is at the samples near by."""
+    THIN = "thin"
+    """The same, also where the body is thinner than a cell, and made a cell thick; gradients go up and down there."""
+    MEAN = "mean"
+    """The mean at all samples, as in the paper."""
+
+
 OrientLike = Orient | Literal["auto", "parity", "given", "signs", "sensors", "previous"]
 SplatLike = Splat | Literal["bspline", "paper"]
+LevelLike = Level | Literal["local", "thin", "mean"]
 
 
 @dataclass(frozen=True)
@@ -48,7 +60,10 @@ class Options:
         orient: see :class:`Orient`.
         splat: see :class:`Splat`.
         area: whether a sample counts by the area that it stands for.
-        smoothing: width of the smoothing of the indicator, in cells; 0 for none.
+        smoothing: width of the smoothing of the indicator, in cells; 0 for none, ``"auto"`` for 0.8 of the
+            typical distance between samples.
+        screening: how strongly the indicator is drawn to one value at the samples; 1 to 4 are usual, 0 is off.
+        level: see :class:`Level`.
         band: how far from the surface φ is computed, in cells; ``None`` for everywhere.
         checks: whether to measure the result and look for reasons not to trust it.
 
@@ -60,7 +75,9 @@ class Options:
     orient: OrientLike = Orient.AUTO
     splat: SplatLike = Splat.BSPLINE
     area: bool = True
-    smoothing: float = 0.0
+    smoothing: float | Literal["auto"] = "auto"
+    screening: float = 0.0
+    level: LevelLike = Level.LOCAL
     band: float | None = None
     checks: bool = True
 
@@ -71,10 +88,10 @@ class Options:
             object.__setattr__(self, "radius", _above_zero(self.radius, "radius", '"auto"'))
         if self.band is not None:
             object.__setattr__(self, "band", _above_zero(self.band, "band", "None"))
-        smoothing = number(self.smoothing, "smoothing")
-        if not 0.0 <= smoothing < float("inf"):
-            raise ValueError(f"smoothing is {smoothing}; give 0 or more cells")
-        object.__setattr__(self, "smoothing", smoothing)
+        object.__setattr__(self, "level", _choice(Level, self.level, "level"))
+        if not isinstance(self.smoothing, str) or self.smoothing != "auto":
+            object.__setattr__(self, "smoothing", _not_negative(self.smoothing, "smoothing", '0 or more cells, or "auto"'))
+        object.__setattr__(self, "screening", _not_negative(self.screening, "screening", "0 or more"))
         object.__setattr__(self, "area", bool(self.area))
         object.__setattr__(self, "checks", bool(self.checks))
 
@@ -121,6 +138,13 @@ def _choice(kind: type[Enum], value: object, name: str) -> Enum:
     except ValueError:
         choices = ", ".join(repr(choice.value) for choice in kind)
         raise ValueError(f"{name} is {value!r}; give one of {choices}") from None
+
+
+def _not_negative(value: object, name: str, wanted: str) -> float:
+    found = number(value, name)
+    if not 0.0 <= found < float("inf"):
+        raise ValueError(f"{name} is {value!r}; give {wanted}")
+    return found
 
 
 def _above_zero(value: object, name: str, other: str) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from ._grid import Grid
-from ._options import Options, Orient, Splat, check_known, resolve
+from ._options import Level, Options, Orient, Splat, check_known, resolve
 
 
 def encode(grid: Grid, options: Options | None = None) -> str:
@@ -28,7 +28,9 @@ def encode(grid: Grid, options: Options | None = None) -> str:
             "orient": Orient(options.orient).value,
             "splat": Splat(options.splat).value,
             "area": options.area,
-            "smoothing": options.smoothing,
+            "smoothing": None if options.smoothing == "auto" else options.smoothing,
+            "screening": options.screening,
+            "level": Level(options.level).value,
             "band": options.band,
             "checks": options.checks,
         }

@@ -2,9 +2,10 @@
 
 use clap::Args;
 use isograd::distance::lattice::Band;
-use isograd::{Grid, GridError, Options, PointCloud, Real, Resolution, splat};
+use isograd::poisson::Smoothing;
+use isograd::{Grid, GridError, Options, PointCloud, Real, Resolution, isosurface, splat};
 
-use super::{FullOr, OrientArgs, Splat, Switch, finite, not_negative, positive};
+use super::{AutoOrZero, FullOr, Level, OrientArgs, Splat, Switch, finite, not_negative, positive};
 
 /// The grid.
 #[derive(Debug, Args)]
@@ -38,10 +39,21 @@ pub struct MethodArgs {
     /// Whether a sample counts by the area that it stands for
     #[arg(long, default_value = "on", help_heading = "Method")]
     pub area: Switch,
-    /// Width of the smoothing of the indicator, in cells
-    #[arg(long, value_name = "CELLS", default_value = "0", value_parser = not_negative,
+    /// Width of the smoothing of the indicator, in cells; auto: 0.8 of the distance between samples
+    #[arg(
+        long,
+        value_name = "CELLS|auto",
+        default_value = "auto",
+        help_heading = "Method"
+    )]
+    pub smooth: AutoOrZero,
+    /// How strongly the indicator is drawn to one value at the samples; 1 to 4 are usual, 0 is off
+    #[arg(long, value_name = "ALPHA", default_value = "0", value_parser = not_negative,
         help_heading = "Method")]
-    pub smooth: f64,
+    pub screening: f64,
+    /// Which value of the indicator the surface is at: that at the samples near by, or their mean
+    #[arg(long, default_value = "local", help_heading = "Method")]
+    pub level: Level,
     /// How far from the surface φ is computed, in the cloud's unit
     #[arg(
         long,
@@ -83,7 +95,16 @@ impl MethodArgs {
                 Splat::Paper => splat::Weights::Paper,
             },
             area_weights: self.area == Switch::On,
-            smoothing: self.smooth,
+            smoothing: match self.smooth {
+                AutoOrZero::Auto => Smoothing::Auto,
+                AutoOrZero::Value(cells) => Smoothing::Cells(cells),
+            },
+            screening: self.screening,
+            level: match self.level {
+                Level::Local => isosurface::Level::Local,
+                Level::Thin => isosurface::Level::Thin,
+                Level::Mean => isosurface::Level::Mean,
+            },
             band: match self.band {
                 FullOr::Full => Band::Full,
                 FullOr::Value(h) => Band::Cells(h / spacing),

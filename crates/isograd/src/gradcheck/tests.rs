@@ -41,6 +41,9 @@ fn a_wrong_pullback_would_be_seen() {
     let paper = Options {
         reconstruction: crate::Options {
             weights: crate::splat::Weights::Paper,
+            // It would mend what the weights do.
+            level: crate::isosurface::Level::Mean,
+            smoothing: crate::poisson::Smoothing::Cells(0.0),
             ..crate::Options::default()
         },
         motions: vec![Motion::Growth, Motion::Noise],

@@ -7,11 +7,11 @@
 //! surface, whatever the density of the samples. Sums are in double precision, in one fixed order.
 //!
 //! # Residual
-//! `Σ a_i` and `c`. The inputs are not copied: the pullback takes them again.
+//! `Σ a_i`, `c`, and `χ` and `∇χ` at every sample: the field itself need not be kept.
 //!
 //! # Pullback
 //! With `w_i` the trilinear weights at `x_i` and `s_i = c̄ a_i / Σ a`: `χ̄ += s_i w_i`, `x̄_i += s_i ∇χ(x_i)`,
-//! `ā_i += c̄ (χ(x_i) − c) / Σ a`: [`pullback`].
+//! `ā_i += c̄ (χ(x_i) − c) / Σ a`: [`pullback`]. Whoever used `χ(x_i)` besides adds its cotangents to `s_i`.
 //!
 //! # Not differentiable
 //! `∇χ` jumps where a sample crosses a plane through cell centres; the gradient on its side is used.
@@ -20,19 +20,27 @@ use rayon::prelude::*;
 
 use crate::data::GridCotangent;
 use crate::splat::{self, SampleCotangent, Samples};
-use crate::trilinear::Cube;
+use crate::trilinear::{self, Cube};
 use crate::{Field, Grid, Real, parallel, vector};
 
-/// Planes across x that one task of the pullback owns.
-const SLAB: usize = 8;
-
 /// What the pullback needs besides the inputs.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Residual {
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Residual<T> {
     /// `Σ a_i`.
     pub area: f64,
     /// `c`, before rounding to the type of the field.
     pub value: f64,
+    /// `(N,)` the indicator at the samples, in input order.
+    pub at_samples: Vec<AtSample<T>>,
+}
+
+/// The indicator at a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AtSample<T> {
+    /// `χ(x_i)`.
+    pub value: T,
+    /// `∇χ(x_i)`, per cell.
+    pub gradient: [T; 3],
 }
 
 /// Why there is no iso-value.
@@ -66,12 +74,13 @@ pub enum Error {
 /// The iso-value `c` of `chi` for `(N, 3)` samples `points` in the user's unit and their `(N,)` areas.
 ///
 /// # Errors
-/// As [`Error`] lists.
+/// As [`Error`] lists; `residual` is then not to be used.
 pub fn forward<T: Real>(
     chi: &Field<T>,
     points: &[[T; 3]],
     areas: &[T],
-) -> Result<(T, Residual), Error> {
+    residual: &mut Residual<T>,
+) -> Result<T, Error> {
     if points.len() != areas.len() {
         return Err(Error::Count {
             points: points.len(),
@@ -79,9 +88,15 @@ pub fn forward<T: Real>(
         });
     }
     let (grid, values) = (chi.grid(), chi.values());
+    let at = |&point: &[T; 3]| {
+        let (value, gradient) = Cube::new(grid, grid.to_index(point)).value_and_gradient(values);
+        AtSample { value, gradient }
+    };
+    let at_samples = points.par_iter().map(at);
+    at_samples.collect_into_vec(&mut residual.at_samples);
     let [sum, area] = parallel::sum_array(points.len(), |i| {
-        let (x, a) = (grid.to_index(points[i]), areas[i].f64());
-        [a * Cube::new(grid, x).value(values).f64(), a]
+        let a = areas[i].f64();
+        [a * residual.at_samples[i].value.f64(), a]
     });
     if !(area > 0.0) || !area.is_finite() {
         return Err(Error::Area {
@@ -89,80 +104,54 @@ pub fn forward<T: Real>(
             area,
         });
     }
-    let value = sum / area;
-    let c = T::of(value);
+    (residual.area, residual.value) = (area, sum / area);
+    let c = T::of(residual.value);
     if !c.is_finite() {
         return Err(Error::NotFinite);
     }
-    Ok((c, Residual { area, value }))
+    Ok(c)
 }
 
-/// Adds to `chi_bar` (in memory order) and to `out` what the cotangent `bar` of the iso-value means for the
-/// indicator, the samples and the grid. All else is as it was in [`forward`]; `order` lists the samples by
-/// plane of the grid, as the splat's [`Residual`](splat::Residual) does.
+/// Adds to `chi_bar` (in memory order, on `grid`) and to `out` what the cotangent `bar` of the iso-value, and
+/// the cotangents `values_bar` `(N,)` of `χ(x_i)` (empty for none), mean for the indicator, the samples and the
+/// grid. All else is as it was in [`forward`]; `order` lists the samples by plane of the grid, as the splat's
+/// [`Residual`](splat::Residual) does.
+#[allow(clippy::too_many_arguments)]
 pub fn pullback<T: Real>(
-    chi: &Field<T>,
+    grid: &Grid<T>,
     samples: Samples<'_, T>,
-    residual: &Residual,
+    residual: &Residual<T>,
     order: &splat::Residual,
     bar: T,
+    values_bar: &[T],
     chi_bar: &mut [T],
     out: &mut SampleCotangent<T>,
 ) {
     let Samples { points, areas, .. } = samples;
-    let (grid, values) = (chi.grid(), chi.values());
     let share = bar.f64() / residual.area;
-    let h = grid.spacing();
-    // Value at a sample, and the cotangent of its point.
-    let at = |i: usize| {
-        let (value, gradient) =
-            Cube::new(grid, grid.to_index(points[i])).value_and_gradient(values);
-        let slope = T::of(share * areas[i].f64()) / h;
-        (value, vector::scale(gradient, slope))
+    // Cotangent of the value at a sample, and that of its point.
+    let value_bar = |i: usize| {
+        let given = values_bar.get(i).copied().unwrap_or(T::zero());
+        T::of(share * areas[i].f64()) + given
+    };
+    let point_bar = |i: usize| {
+        let slope = value_bar(i) / grid.spacing();
+        vector::scale(residual.at_samples[i].gradient, slope)
     };
     let bars = out.points.par_iter_mut().zip(&mut out.areas);
-    bars.enumerate().for_each(|(i, (point_bar, area_bar))| {
-        let (value, bar) = at(i);
-        *point_bar = vector::add(*point_bar, bar);
-        *area_bar += T::of(share * (value.f64() - residual.value));
+    bars.enumerate().for_each(|(i, (point, area))| {
+        *point = vector::add(*point, point_bar(i));
+        *area += T::of(share * (residual.at_samples[i].value.f64() - residual.value));
     });
     let [x, y, z, spacing] = parallel::sum_array(points.len(), |i| {
         let mut part = GridCotangent::default();
-        part.subtract_point(grid, points[i], at(i).1);
+        part.subtract_point(grid, points[i], point_bar(i));
         let [x, y, z] = part.lower;
         [x, y, z, part.spacing]
     });
     out.grid.lower = vector::add(out.grid.lower, [x, y, z]);
     out.grid.spacing += spacing;
-    spread(grid, samples, order, share, chi_bar);
-}
-
-/// Adds `share a_i` at every sample to the eight cells round it; each task owns some planes.
-fn spread<T: Real>(
-    grid: &Grid<T>,
-    Samples { points, areas, .. }: Samples<'_, T>,
-    order: &splat::Residual,
-    share: f64,
-    chi_bar: &mut [T],
-) {
-    let plane = grid.strides()[0];
-    let slabs = chi_bar.par_chunks_mut(SLAB * plane).enumerate();
-    slabs.for_each(|(task, slab)| {
-        let first = task * SLAB * plane;
-        let planes = task * SLAB..task * SLAB + slab.len() / plane;
-        // The eight cells reach one plane beyond that of the sample's own cell.
-        let near = planes.start.saturating_sub(1)..planes.end + 1;
-        for &i in order.in_planes(points, grid, near) {
-            let i = i as usize;
-            let cube = Cube::new(grid, grid.to_index(points[i]));
-            let part = T::of(share * areas[i].f64());
-            for (cell, weight) in cube.cells().into_iter().zip(cube.weights()) {
-                if let Some(value) = cell.checked_sub(first).and_then(|at| slab.get_mut(at)) {
-                    *value += part * weight;
-                }
-            }
-        }
-    });
+    trilinear::spread(grid, points, order, value_bar, chi_bar);
 }
 
 #[cfg(test)]
@@ -183,7 +172,8 @@ mod tests {
     fn value_is_the_weighted_mean_at_the_samples() {
         let points = [[1001.0, 1.0, 0.0], [1003.3, 2.2, 1.7], [1002.0, 3.0, 2.0]];
         let areas = [1.0, 0.5, 2.5];
-        let (c, residual) = forward(&linear(), &points, &areas).expect("valid");
+        let mut residual = Residual::default();
+        let c = forward(&linear(), &points, &areas, &mut residual).expect("valid");
         let at = |p: [f64; 3]| 2.0 * p[0] - p[1] + 3.0 * p[2];
         let expected = (at(points[0]) + 0.5 * at(points[1]) + 2.5 * at(points[2])) / 4.0;
         // Rounding of numbers near 2000.
@@ -194,8 +184,11 @@ mod tests {
     #[test]
     fn sample_counted_twice_is_a_sample_of_twice_the_area() {
         let (p, q) = ([1001.0, 1.0, 0.0], [1003.3, 2.2, 1.7]);
-        let twice = forward(&linear(), &[p, q, q], &[1.0; 3]).expect("valid").0;
-        let once = forward(&linear(), &[p, q], &[1.0, 2.0]).expect("valid").0;
+        let level = |points: &[[f64; 3]], areas: &[f64]| {
+            forward(&linear(), points, areas, &mut Residual::default()).expect("valid")
+        };
+        let twice = level(&[p, q, q], &[1.0; 3]);
+        let once = level(&[p, q], &[1.0, 2.0]);
         assert!((twice - once).abs() < 1e-11);
     }
 
@@ -214,8 +207,11 @@ mod tests {
         let areas: Vec<f64> = points.iter().map(|p| p[1]).collect();
         let run = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            pool.expect("threads")
-                .install(|| forward(&linear(), &points, &areas).expect("valid"))
+            pool.expect("threads").install(|| {
+                let mut residual = Residual::default();
+                let c = forward(&linear(), &points, &areas, &mut residual).expect("valid");
+                (c, residual)
+            })
         };
         let one = run(1);
         assert!(one == run(2) && one == run(5));
@@ -224,7 +220,7 @@ mod tests {
     #[test]
     fn bad_input_is_refused_with_a_reason() {
         let refused = |field: &Field<f64>, points: &[[f64; 3]], areas: &[f64]| {
-            forward(field, points, areas)
+            forward(field, points, areas, &mut Residual::default())
                 .expect_err("refused")
                 .to_string()
         };

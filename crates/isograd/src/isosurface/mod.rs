@@ -38,6 +38,7 @@
 //! computed, not copied.
 
 pub mod iso_value;
+pub mod local_level;
 mod march;
 pub mod measure;
 mod measure_pullback;
@@ -53,6 +54,19 @@ pub use march::{Scratch, crossing, forward};
 pub use measure::Measures;
 pub use measure_pullback::pullback as measure_pullback;
 pub use pullback::{LevelCotangent, pullback};
+
+/// Which value of the indicator the surface is at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Level {
+    /// The mean at all samples: [`iso_value`], as in the paper.
+    Mean,
+    /// What it is at the samples near by: [`local_level`].
+    #[default]
+    Local,
+    /// The same, also on parts that are thinner than a cell, which are made about a cell thick. Hardly any of them is
+    /// missed; but how they lie on the grid shows, so that derivatives go up and down within a cell there.
+    Thin,
+}
 
 /// What the stage has to say about a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -100,6 +100,9 @@ pub enum PullbackError {
     /// The adjoint solve.
     #[error(transparent)]
     Poisson(#[from] poisson::Error),
+    /// The adjoint solve of the screened equation.
+    #[error(transparent)]
+    Screened(#[from] poisson::screened::Error),
 }
 
 impl<T: Real> Cotangent<'_, T> {

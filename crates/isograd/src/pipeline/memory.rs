@@ -38,7 +38,8 @@ pub fn available_memory() -> Option<f64> {
 impl<T: Real> Reconstruction<T> {
     /// Bytes that are kept for the pullback beside φ, the mesh and the oriented normals: the indicator and the
     /// closest face of every cell, the edges of the vertices, the areas, and what the stages keep of the samples
-    /// (search tree, radii, fitted planes, order).
+    /// (search tree, radii, fitted planes, order, the indicator there, and
+    /// what the local iso-value made of it).
     pub fn residual_bytes(&self) -> usize {
         let [[neighbours, _], [normals, _]] = self.of_samples();
         size_of_val(self.indicator.values())
@@ -46,6 +47,8 @@ impl<T: Real> Reconstruction<T> {
             + size_of_val(self.mesh.edges())
             + size_of_val(self.areas.as_slice())
             + size_of_val(self.residuals.splat.order.as_slice())
+            + size_of_val(self.residuals.iso_value.at_samples.as_slice())
+            + self.residuals.local_level.bytes()
             + neighbours
             + normals
     }

@@ -3,7 +3,9 @@
 use super::{CloudCotangent, Cotangent, PullbackError, Reconstruction, Residuals};
 use crate::data::{Field, GridCotangent, PointCloud};
 use crate::distance::{extend, lattice};
+use crate::isosurface::{Level, local_level};
 use crate::orient::Method;
+use crate::poisson::screened;
 use crate::splat::{SampleCotangent, Samples};
 use crate::{Real, isosurface, normals, orient, poisson, splat, vector};
 
@@ -19,6 +21,10 @@ pub struct PullbackScratch<T: Real> {
     distance: lattice::PullbackScratch<T>,
     extension: extend::Cotangent<T>,
     poisson: poisson::Scratch<T>,
+    screened: screened::Scratch<T>,
+    level: local_level::PullbackScratch<T>,
+    /// Cotangents of the indicator at the samples.
+    values: Vec<T>,
     splat: splat::PullbackScratch<T>,
     areas: splat::area::PullbackScratch<T>,
     normals: normals::Scratch<T>,
@@ -171,21 +177,53 @@ impl<T: Real> Reconstruction<T> {
             normals: &self.orientation.normals,
             areas: &self.areas,
         };
+        let mut level_bar = cotangent.iso_value.f64() + found.level;
+        scratch.values.clear();
+        if self.options.level != Level::Mean {
+            level_bar += local_level::pullback(
+                chi.grid(),
+                given,
+                self.options.area_weights,
+                &residuals.splat,
+                &residuals.local_level,
+                field.values(),
+                &mut scratch.level,
+                &mut scratch.values,
+                samples,
+            );
+        }
         isosurface::iso_value::pullback(
-            chi,
+            chi.grid(),
             given,
             &residuals.iso_value,
             &residuals.splat,
-            T::of(cotangent.iso_value.f64() + found.level),
+            T::of(level_bar),
+            &scratch.values,
             field.values_mut(),
             samples,
         );
-        let smoothing = self.options.smoothing;
+        if self.options.screening > 0.0 {
+            let equation = self.screened_equation(given);
+            let (level, scratch) = (&residuals.iso_value, &mut scratch.screened);
+            screened::pullback(&equation, level, field.values_mut(), scratch, samples)?;
+        }
+        let smoothing = residuals.smoothing;
         self.poisson
             .solve(field.values_mut(), smoothing, &mut scratch.poisson)?;
         splat::pullback(given, &residuals.splat, &field, &mut scratch.splat, samples);
         scratch.field = Some(field);
         Ok(())
+    }
+
+    fn screened_equation<'a>(&'a self, samples: Samples<'a, T>) -> screened::Equation<'a, T> {
+        screened::Equation {
+            plan: &self.poisson,
+            grid: self.indicator.grid(),
+            samples,
+            area_weights: self.options.area_weights,
+            order: &self.residuals.splat,
+            screening: self.options.screening,
+        }
     }
 
     /// From points, normals and areas to the points alone, or the given normals.

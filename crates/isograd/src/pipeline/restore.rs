@@ -4,7 +4,6 @@
 use super::{Error, Reconstruction, Reconstructor};
 use crate::data::PointCloud;
 use crate::distance::NO_TRIANGLE;
-use crate::isosurface::iso_value;
 use crate::report::Report;
 use crate::{Real, isosurface};
 
@@ -86,25 +85,21 @@ impl<T: Real> Reconstructor<T> {
             .orientation
             .normals
             .extend_from_slice(saved.normals);
-        // Writes its right-hand side where the indicator will be.
         self.normals(cloud, None)?;
         self.splat(cloud)?;
+        // What the pullback wants of the indicator is what it was before the local iso-value was taken off.
+        self.solve(cloud, None)?;
         let Reconstruction {
             sdf,
             indicator,
             iso_value,
             mesh,
             closest,
-            areas,
-            residuals,
             ..
         } = &mut self.result;
         sdf.values_mut().copy_from_slice(saved.sdf);
-        indicator.values_mut().copy_from_slice(saved.indicator);
         closest.clear();
         closest.extend_from_slice(saved.closest);
-        let level = iso_value::forward(indicator, cloud.points(), areas).map_err(Error::from)?;
-        (*iso_value, residuals.iso_value) = level;
         isosurface::forward(indicator, *iso_value, &mut self.scratch.isosurface, mesh)
             .map_err(Error::from)?;
         let faces = mesh.faces().len();

@@ -2,9 +2,10 @@
 
 use super::{Error, Reconstruction, Reconstructor, Residuals};
 use crate::data::PointCloud;
-use crate::isosurface::measure;
+use crate::isosurface::{Level, local_level, measure};
 use crate::neighbors::{Neighborhoods, Radius};
 use crate::orient::Orientation;
+use crate::poisson::screened;
 use crate::report::{Report, Stage, Warning};
 use crate::{Real, checks, distance, isosurface, neighbors, normals, orient, splat};
 
@@ -20,7 +21,7 @@ impl<T: Real> Reconstructor<T> {
             Stage::Normals => self.normals(cloud, held)?,
             Stage::Orient => self.orient(cloud, held)?,
             Stage::Splat => self.splat(cloud)?,
-            Stage::Poisson => self.solve(cloud)?,
+            Stage::Poisson => self.solve(cloud, held)?,
             Stage::Isosurface => self.isosurface()?,
             Stage::Distance => self.distance()?,
             Stage::Checks if held.is_some() => (),
@@ -121,10 +122,16 @@ impl<T: Real> Reconstructor<T> {
         Ok(())
     }
 
-    fn solve(&mut self, cloud: &PointCloud<T>) -> Result<(), Error> {
+    /// The indicator, plain or screened, and the level of its surface.
+    pub(super) fn solve(
+        &mut self,
+        cloud: &PointCloud<T>,
+        held: Option<&Reconstruction<T>>,
+    ) -> Result<(), Error> {
         let Reconstruction {
             options,
             poisson,
+            orientation,
             areas,
             indicator,
             iso_value,
@@ -132,12 +139,50 @@ impl<T: Real> Reconstructor<T> {
             report,
             ..
         } = &mut self.result;
+        let grid = *indicator.grid();
+        let cells_apart = residuals.neighborhoods.spacing() / grid.spacing();
+        residuals.smoothing = match held {
+            Some(held) => held.residuals.smoothing,
+            None => options.smoothing.cells(cells_apart.f64()),
+        };
+        report.smoothing = residuals.smoothing;
         let values = indicator.values_mut();
-        poisson.solve(values, options.smoothing, &mut self.scratch.poisson)?;
-        let (level, residual) = isosurface::iso_value::forward(indicator, cloud.points(), areas)?;
-        *iso_value = level;
-        residuals.iso_value = residual;
-        report.iso_value = level.f64();
+        poisson.solve(values, residuals.smoothing, &mut self.scratch.poisson)?;
+        let samples = splat::Samples {
+            points: cloud.points(),
+            normals: &orientation.normals,
+            areas,
+        };
+        if options.screening > 0.0 {
+            let equation = screened::Equation {
+                plan: poisson,
+                grid: &grid,
+                samples,
+                area_weights: options.area_weights,
+                order: &residuals.splat,
+                screening: options.screening,
+            };
+            screened::forward(&equation, values, &mut self.scratch.screened)?;
+        }
+        let level = &mut residuals.iso_value;
+        *iso_value = isosurface::iso_value::forward(indicator, samples.points, areas, level)?;
+        report.iso_value = iso_value.f64();
+        if options.level != Level::Mean {
+            local_level::forward(
+                indicator,
+                samples,
+                local_level::Choice {
+                    area_weights: options.area_weights,
+                    smoothing: residuals.smoothing,
+                    thin: options.level == Level::Thin,
+                },
+                level,
+                &residuals.splat,
+                held.map(|held| &held.residuals.local_level),
+                &mut self.scratch.level,
+                &mut residuals.local_level,
+            );
+        }
         Ok(())
     }
 

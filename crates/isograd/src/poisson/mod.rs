@@ -37,6 +37,8 @@
 mod axis;
 mod passes;
 mod scratch;
+pub mod screened;
+mod smoothing;
 #[cfg(test)]
 mod tests;
 
@@ -46,6 +48,7 @@ use rustfft::FftPlanner;
 
 use crate::Real;
 pub use scratch::Scratch;
+pub use smoothing::Smoothing;
 
 /// Why an equation was not solved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -53,6 +53,17 @@ fn apply_stencil(chi: &[f64], shape: [usize; 3]) -> Vec<f64> {
     out
 }
 
+/// `A` as a dense matrix: it is symmetric, so columns are rows.
+pub(super) fn stiffness(shape: [usize; 3]) -> Vec<Vec<f64>> {
+    let cells: usize = shape.iter().product();
+    let unit = |i: usize| {
+        let mut unit = vec![0.0; cells];
+        unit[i] = 1.0;
+        apply_stencil(&unit, shape)
+    };
+    (0..cells).map(unit).collect()
+}
+
 fn norm(a: &[f64]) -> f64 {
     a.iter().map(|v| v * v).sum::<f64>().sqrt()
 }
@@ -79,7 +90,7 @@ fn backward_error<T: Real>(shape: [usize; 3], seed: u64) -> f64 {
 }
 
 /// Solves `matrix x = rhs` by elimination with row pivoting.
-fn eliminate(mut matrix: Vec<Vec<f64>>, mut rhs: Vec<f64>) -> Vec<f64> {
+pub(super) fn eliminate(mut matrix: Vec<Vec<f64>>, mut rhs: Vec<f64>) -> Vec<f64> {
     let n = rhs.len();
     for c in 0..n {
         let pivot = (c..n)
@@ -106,14 +117,8 @@ fn eliminate(mut matrix: Vec<Vec<f64>>, mut rhs: Vec<f64>) -> Vec<f64> {
 fn solution_is_that_of_the_dense_matrix() {
     for shape in [[5, 5, 5], [4, 5, 6], [2, 3, 7]] {
         let cells: usize = shape.iter().product();
-        let mut matrix: Vec<Vec<f64>> = (0..cells)
-            .map(|i| {
-                let mut unit = vec![0.0; cells];
-                unit[i] = 1.0;
-                apply_stencil(&unit, shape)
-            })
-            .collect();
-        // A is symmetric, so columns are rows. Adding 1 everywhere fixes the mean of χ at 0.
+        let mut matrix = stiffness(shape);
+        // Adding 1 everywhere fixes the mean of χ at 0.
         matrix.iter_mut().flatten().for_each(|v| *v += 1.0);
         let b = right_hand_side(cells, 3);
         let expected = eliminate(matrix, b.clone());

@@ -37,9 +37,10 @@ use rayon::prelude::*;
 
 use crate::{Field, Grid, Real, simd, vector};
 pub use order::Scratch;
-use order::central_cell;
+pub(crate) use order::central_cell;
 pub use pullback::{PullbackScratch, SampleCotangent, pullback};
 use stencil::{REACH, Term, WIDTH};
+pub(crate) use stencil::{quadratic_bspline, quadratic_bspline_slope};
 
 /// Planes across x that one task owns.
 const SLAB: usize = 8;

@@ -110,7 +110,7 @@ impl Residual {
 /// The cell that holds the point of index coordinates `x`; `None` nearer than 2 cells to a wall, or
 /// for NaN. A point exactly 2 cells from the far wall counts to the cell before it.
 #[inline(always)]
-pub(super) fn central_cell<T: Real>(shape: [usize; 3], x: [T; 3]) -> Option<[usize; 3]> {
+pub(crate) fn central_cell<T: Real>(shape: [usize; 3], x: [T; 3]) -> Option<[usize; 3]> {
     let mut cell = [0; 3];
     for axis in 0..3 {
         let last = shape[axis].checked_sub(REACH + 1)?;

@@ -180,7 +180,7 @@ fn along<T: Real>(row: &[T; WIDTH], weight: &[T; WIDTH]) -> T {
 
 /// Weights of the quadratic B-spline on the cell below, the central cell and the cell above.
 #[inline(always)]
-pub(super) fn quadratic_bspline<T: Real>(f: T) -> [T; 3] {
+pub(crate) fn quadratic_bspline<T: Real>(f: T) -> [T; 3] {
     let half = T::of(0.5);
     let (below, above) = (half - f, half + f);
     [
@@ -192,7 +192,7 @@ pub(super) fn quadratic_bspline<T: Real>(f: T) -> [T; 3] {
 
 /// Derivatives of [`quadratic_bspline`].
 #[inline(always)]
-pub(super) fn quadratic_bspline_slope<T: Real>(f: T) -> [T; 3] {
+pub(crate) fn quadratic_bspline_slope<T: Real>(f: T) -> [T; 3] {
     let half = T::of(0.5);
     [f - half, -(f + f), half + f]
 }

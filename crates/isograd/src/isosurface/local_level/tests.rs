@@ -1,0 +1,401 @@
+//! The oracle is plain: every sum over all samples at every cell, and the sample left out in fact.
+
+use super::*;
+use crate::isosurface::iso_value;
+use crate::neighbors::tests::{Random, torus};
+use crate::splat::{self, SampleCotangent, Samples, Weights};
+use crate::{Field, Grid, Real, vector};
+
+/// Samples of a torus, their areas, and an indicator that is a little off on it.
+struct Setting<T> {
+    points: Vec<[T; 3]>,
+    normals: Vec<[T; 3]>,
+    areas: Vec<T>,
+    chi: Field<T>,
+}
+
+fn grid<T: Real>(lower: [f64; 3], spacing: f64) -> Grid<T> {
+    Grid::new(lower.map(T::of), T::of(spacing), [28, 27, 16]).expect("a grid")
+}
+
+impl<T: Real> Setting<T> {
+    /// `noise` moves the samples along their normals, in cells.
+    fn new(n: usize, noise: f64) -> Self {
+        let mut random = Random::new(3);
+        let samples = torus(n, 2);
+        let at = |&(x, normal): &([f64; 3], [f64; 3]), random: &mut Random| {
+            let along = 0.1 * noise * (2.0 * random.uniform() - 1.0);
+            vector::of_f64(vector::add(x, vector::scale(normal, along)))
+        };
+        Self {
+            points: samples.iter().map(|s| at(s, &mut random)).collect(),
+            normals: samples.iter().map(|s| vector::of_f64(s.1)).collect(),
+            areas: (0..n)
+                .map(|_| T::of(7.0 / n as f64 * (0.5 + random.uniform())))
+                .collect(),
+            chi: indicator(grid([-1.41, -1.36, -0.83], 0.1)),
+        }
+    }
+
+    fn samples(&self) -> Samples<'_, T> {
+        Samples {
+            points: &self.points,
+            normals: &self.normals,
+            areas: &self.areas,
+        }
+    }
+
+    fn level(&self) -> (iso_value::Residual<T>, splat::Residual) {
+        let mut level = iso_value::Residual::default();
+        iso_value::forward(&self.chi, &self.points, &self.areas, &mut level).expect("a level");
+        let mut order = splat::Residual::default();
+        let mut b = Field::zeros(*self.chi.grid());
+        let scratch = &mut Default::default();
+        splat::forward(
+            self.samples(),
+            Weights::BSpline,
+            scratch,
+            &mut order,
+            &mut b,
+        )
+        .expect("inside");
+        (level, order)
+    }
+
+    /// What comes out, and the level it is for.
+    fn run(
+        &self,
+        area_weights: bool,
+        thin: bool,
+        held: Option<&Residual<T>>,
+    ) -> (Field<T>, iso_value::Residual<T>, Residual<T>) {
+        let (mut chi, (level, order)) = (self.chi.clone(), self.level());
+        let mut residual = Residual::default();
+        forward(
+            &mut chi,
+            self.samples(),
+            Choice {
+                area_weights,
+                smoothing: 0.5,
+                thin,
+            },
+            &level,
+            &order,
+            held,
+            &mut Scratch::default(),
+            &mut residual,
+        );
+        (chi, level, residual)
+    }
+}
+
+/// A step through the torus of radii 0.7 and 0.25, and a wave.
+fn indicator<T: Real>(grid: Grid<T>) -> Field<T> {
+    let value = |cell: usize| {
+        let [x, y, z] = grid.center_f64(grid.cell(cell));
+        let distance = (x.hypot(y) - 0.7).hypot(z) - 0.25;
+        T::of(0.5 * (7.0 * distance).tanh() + 0.04 * (5.0 * x - 3.0 * y).sin() * (4.0 * z).cos())
+    };
+    let values = (0..grid.cells()).map(value).collect();
+    Field::new(grid, values).expect("sizes match")
+}
+
+fn hat(x: f64) -> f64 {
+    (1.0 - x.abs()).max(0.0)
+}
+
+fn bspline(x: f64) -> f64 {
+    match x.abs() {
+        x if x < 0.5 => 0.75 - x * x,
+        x if x < 1.5 => 0.5 * (1.5 - x).powi(2),
+        _ => 0.0,
+    }
+}
+
+/// The product over the axes of `f` between a cell centre and index coordinates.
+fn weight(f: fn(f64) -> f64, cell: [usize; 3], x: [f64; 3]) -> f64 {
+    (0..3).map(|a| f(cell[a] as f64 + 0.5 - x[a])).product()
+}
+
+/// `e` at every cell, for these samples of these `r` and areas in cells.
+fn means(grid: &Grid<f64>, places: &[[f64; 3]], areas: &[f64], r: &[f64]) -> Vec<f64> {
+    let at = |cell: usize| {
+        let cell = grid.cell(cell);
+        let (mut sum, mut area) = (0.0, LEAST_AREA);
+        for i in 0..places.len() {
+            let part = areas[i] * weight(bspline, cell, places[i]);
+            sum += part * r[i];
+            area += part;
+        }
+        sum / area
+    };
+    (0..grid.cells()).map(at).collect()
+}
+
+/// The trilinear interpolant at index coordinates, or its gradient by differences within the cube.
+fn interpolate(grid: &Grid<f64>, field: &[f64], x: [f64; 3]) -> f64 {
+    let cells = (0..grid.cells()).filter(|&c| field[c] != 0.0);
+    cells.map(|c| field[c] * weight(hat, grid.cell(c), x)).sum()
+}
+
+fn slope(grid: &Grid<f64>, field: &[f64], x: [f64; 3]) -> [f64; 3] {
+    let step = 1e-6;
+    std::array::from_fn(|a| {
+        let at = |s: f64| {
+            let mut x = x;
+            x[a] += s;
+            interpolate(grid, field, x)
+        };
+        (at(step) - at(-step)) / (2.0 * step)
+    })
+}
+
+/// The slope along `n` of what quadratic B-splines make of a field.
+fn smooth_slope(grid: &Grid<f64>, field: &[f64], x: [f64; 3], n: [f64; 3]) -> f64 {
+    let step = 1e-5;
+    let at = |s: f64| {
+        let x = vector::add(x, vector::scale(n, s));
+        let cells = (0..grid.cells()).map(|c| field[c] * weight(bspline, grid.cell(c), x));
+        cells.sum::<f64>()
+    };
+    (at(step) - at(-step)) / (2.0 * step)
+}
+
+/// `ω` and `δ` of every sample.
+fn trust_and_shifts(slopes: &[f64], areas: &[f64], thin: bool) -> (Vec<f64>, Vec<f64>) {
+    let squares = slopes.iter().zip(areas).map(|(s, a)| a * s * s);
+    let usual = (squares.sum::<f64>() / areas.iter().sum::<f64>()).sqrt();
+    let [low, high] = if thin { FOLLOWED_THIN } else { FOLLOWED };
+    let w2 = 0.75 + 0.25;
+    let of = |slope: &f64| {
+        let q = (slope / usual).clamp(0.0, 0.999);
+        let thickness = (-2.0 * w2 * (1.0 - q).ln()).sqrt();
+        let t = ((thickness - low) / (high - low)).clamp(0.0, 1.0);
+        let rise = (-thickness * thickness / (8.0 * w2)).exp() - (-0.125 / w2).exp();
+        let shift = if thin {
+            usual * thickness * rise.max(0.0)
+        } else {
+            0.0
+        };
+        (t * t * (3.0 - 2.0 * t), shift)
+    };
+    slopes.iter().map(of).unzip()
+}
+
+#[test]
+fn cells_lose_the_means_of_the_samples_near_by() {
+    for thin in [false, true] {
+        assert_means_are_lost(thin);
+    }
+}
+
+fn assert_means_are_lost(thin: bool) {
+    let mut setting = Setting::<f64>::new(60, 0.2);
+    // Normals anywhere: the indicator is as flat along some of them as it is on thin parts.
+    let mut random = Random::new(7);
+    for normal in setting.normals.iter_mut().step_by(4) {
+        let turned = [0; 3].map(|_| 2.0 * random.uniform() - 1.0);
+        *normal = vector::scale(turned, 1.0 / vector::norm(turned));
+    }
+    let (got, level, residual) = setting.run(true, thin, None);
+    let grid = *setting.chi.grid();
+    let places: Vec<[f64; 3]> = setting.points.iter().map(|&p| grid.to_index(p)).collect();
+    let areas: Vec<f64> = setting.areas.iter().map(|a| a / 0.01).collect();
+    let n = places.len();
+    let mut chi = setting.chi.values().to_vec();
+    let slopes = places.iter().zip(&setting.normals);
+    let slopes: Vec<f64> = slopes
+        .map(|(&x, &n)| smooth_slope(&grid, &chi, x, n).max(0.0))
+        .collect();
+    let (trust, shifts) = trust_and_shifts(&slopes, &areas, thin);
+    assert!(trust.contains(&1.0) && trust.iter().any(|&t| t < 0.9));
+    assert!(shifts.iter().any(|&s| s > 0.0) == thin);
+    let mut flattened = 0.0;
+    assert!(residual.passes.len() > 1);
+    for pass in &residual.passes {
+        let r: Vec<f64> = places
+            .iter()
+            .zip(trust.iter().zip(&shifts))
+            .map(|(&x, (t, shift))| t * (interpolate(&grid, &chi, x) + shift - level.value))
+            .collect();
+        let e = means(&grid, &places, &areas, &r);
+        let [mut rise, mut steep, mut rp, mut rr, mut pp] = [0.0; 5];
+        for i in 0..n {
+            let mut others = areas.clone();
+            others[i] = 0.0;
+            let without = means(&grid, &places, &others, &r);
+            let p = interpolate(&grid, &without, places[i]);
+            let (of_mean, of_chi) = (slope(&grid, &e, places[i]), slope(&grid, &chi, places[i]));
+            rise += areas[i] * vector::dot(of_mean, of_chi);
+            steep += areas[i] * vector::norm_squared(of_chi);
+            rp += areas[i] * r[i] * p;
+            rr += areas[i] * r[i] * r[i];
+            pp += areas[i] * p * p;
+        }
+        let share = (rise / steep).max(0.0);
+        let fit = (rp - share * rr) / (pp - 2.0 * share * rp + share * share * rr);
+        let gain = fit.min(1.0) * (1.0 - (flattened + share) / FLATTENED);
+        flattened += gain * share;
+        // Slopes by differences are good to 1e-9.
+        assert!((pass.gain - gain).abs() < 1e-8, "{} {gain}", pass.gain);
+        for (chi, e) in chi.iter_mut().zip(e) {
+            *chi -= pass.gain * e;
+        }
+    }
+    let errors = got.values().iter().zip(&chi).map(|(a, b)| (a - b).abs());
+    // Slopes by differences again.
+    assert!(errors.fold(0.0, f64::max) < 1e-8);
+}
+
+#[test]
+fn samples_come_to_lie_at_the_level() {
+    let setting = Setting::<f32>::new(4000, 0.0);
+    let (chi, level, residual) = setting.run(true, false, None);
+    assert!(residual.gains().all(|gain| gain > 0.5));
+    let rms = |chi: &Field<f32>| {
+        let squares = setting.points.iter().map(|&p| {
+            let r = f64::from(chi.interpolate(p)) - level.value;
+            r * r
+        });
+        (squares.sum::<f64>() / 4000.0).sqrt()
+    };
+    let (before, after) = (rms(&setting.chi), rms(&chi));
+    // What is left varies within a cell.
+    assert!(after < 0.2 * before, "{before} {after}");
+}
+
+#[test]
+fn samples_scattered_over_a_thick_layer_are_not_followed() {
+    let setting = Setting::<f64>::new(4000, 1.5);
+    let (chi, _, residual) = setting.run(true, false, None);
+    let slope = |chi: &Field<f64>| {
+        let at = |&p: &[f64; 3]| vector::norm(chi.interpolate_with_gradient(p).1);
+        setting.points.iter().map(at).sum::<f64>()
+    };
+    let kept = slope(&chi) / slope(&setting.chi);
+    println!(
+        "{:?}, {kept} of the slope",
+        residual.gains().collect::<Vec<_>>()
+    );
+    assert!(kept > 0.7, "{kept} of the slope is left");
+}
+
+fn numbers(n: usize, random: &mut Random) -> Vec<f64> {
+    (0..n).map(|_| 2.0 * random.uniform() - 1.0).collect()
+}
+
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[test]
+fn pullback_is_the_transpose_for_areas_and_for_counts() {
+    for area_weights in [true, false] {
+        let setting = Setting::<f64>::new(900, 0.0);
+        // Shifts with areas, none with counts.
+        let thin = area_weights;
+        let (_, level, residual) = setting.run(area_weights, thin, None);
+        assert!(residual.passes.len() > 1);
+        let mut random = Random::new(4);
+        let cells = setting.chi.values().len();
+        let (w, along) = (numbers(cells, &mut random), numbers(cells, &mut random));
+        let v: Vec<[f64; 3]> = (0..900)
+            .map(|_| [0; 3].map(|_| 2.0 * random.uniform() - 1.0))
+            .collect();
+        let rates = numbers(900, &mut random);
+        let (lower, spacing) = ([0.3, -0.2, 0.5], 0.04);
+
+        let mut out = SampleCotangent {
+            points: vec![[0.0; 3]; 900],
+            normals: vec![[0.0; 3]; 900],
+            areas: vec![0.0; 900],
+            ..SampleCotangent::default()
+        };
+        let (mut values_bar, mut chi_bar) = (Vec::new(), w.clone());
+        let (order, grid_here) = (setting.level().1, *setting.chi.grid());
+        let level_bar = pullback(
+            &grid_here,
+            setting.samples(),
+            area_weights,
+            &order,
+            &residual,
+            &w,
+            &mut PullbackScratch::default(),
+            &mut values_bar,
+            &mut out,
+        );
+        iso_value::pullback(
+            &grid_here,
+            setting.samples(),
+            &level,
+            &order,
+            level_bar,
+            &values_bar,
+            &mut chi_bar,
+            &mut out,
+        );
+        let points = out.points.iter().zip(&v);
+        let pulled = points.map(|(a, b)| vector::dot(*a, *b)).sum::<f64>()
+            + product(&out.areas, &rates) * 1e-3
+            + product(&chi_bar, &along)
+            + vector::dot(out.grid.lower, lower)
+            + out.grid.spacing * spacing;
+
+        // No sample may cross a plane through cell centres, where slopes jump.
+        let step = 1e-7;
+        let at = |s: f64| {
+            let moved = |(p, v): (&[f64; 3], &[f64; 3])| vector::add(*p, vector::scale(*v, s));
+            let places = vector::add([-1.41, -1.36, -0.83], vector::scale(lower, s));
+            let values = setting.chi.values().iter().zip(&along);
+            let values = values.map(|(c, a)| c + s * a).collect();
+            let areas = setting.areas.iter().zip(&rates);
+            let moved = Setting {
+                points: setting.points.iter().zip(&v).map(moved).collect(),
+                normals: setting.normals.clone(),
+                areas: areas.map(|(a, r)| a + 1e-3 * s * r).collect(),
+                chi: Field::new(grid(places, 0.1 + s * spacing), values).expect("sizes match"),
+            };
+            let (chi, ..) = moved.run(area_weights, thin, Some(&residual));
+            product(chi.values(), &w)
+        };
+        let difference = (at(step) - at(-step)) / (2.0 * step);
+        let error = (pulled / difference - 1.0).abs();
+        assert!(error < 1e-6, "{pulled}, not {difference} ({error:e})");
+    }
+}
+
+fn same_bits<T: Real>() {
+    let setting = Setting::<T>::new(5000, 0.1);
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.expect("threads").install(|| {
+            let (chi, _, residual) = setting.run(true, true, None);
+            (chi.values().to_vec(), residual)
+        })
+    };
+    let one = run(1);
+    assert!(one == run(2) && one == run(5));
+}
+
+#[test]
+fn threads_do_not_change_a_bit() {
+    same_bits::<f32>();
+    same_bits::<f64>();
+}
+
+/// Samples of no area, all at one place, and an indicator without slope: nothing to follow, and no harm.
+#[test]
+fn degenerate_samples_leave_finite_numbers() {
+    let mut setting = Setting::<f32>::new(50, 0.0);
+    setting.areas[..49].fill(0.0);
+    let (chi, ..) = setting.run(true, false, None);
+    assert!(chi.values().iter().all(|v| v.is_finite()));
+    let first = setting.points[0];
+    setting.points.fill(first);
+    let (chi, ..) = setting.run(false, true, None);
+    assert!(chi.values().iter().all(|v| v.is_finite()));
+    setting.chi.values_mut().fill(1.0);
+    let (chi, ..) = setting.run(true, false, None);
+    // The mean of ones is one to rounding.
+    assert!(chi.values().iter().all(|v| (v - 1.0).abs() < 1e-6));
+}

@@ -1,0 +1,175 @@
+//! Conjugate gradients over the samples.
+
+use rayon::prelude::*;
+
+use super::{Equation, Error, MOST_ITERATIONS};
+use crate::trilinear::{self, Cube};
+use crate::{Real, parallel, poisson};
+
+/// Memory that a second call uses again: a field, and five numbers a sample.
+#[derive(Default)]
+pub struct Scratch<T> {
+    /// A right-hand side, then its solution.
+    pub(super) field: Vec<T>,
+    /// `√â_i`.
+    roots: Vec<T>,
+    /// `u`.
+    pub(super) solution: Vec<T>,
+    rest: Vec<T>,
+    direction: Vec<T>,
+    /// The matrix times the direction.
+    image: Vec<T>,
+    pub(super) poisson: poisson::Scratch<T>,
+}
+
+/// Turns the plain solution `chi` (in memory order) into the screened one, and returns the iterations it took.
+///
+/// # Errors
+/// [`Error::NotConverged`]; `chi` is then as it was.
+pub fn forward<T: Real>(
+    equation: &Equation<'_, T>,
+    chi: &mut [T],
+    scratch: &mut Scratch<T>,
+) -> Result<usize, Error> {
+    scratch.start(equation);
+    if !(scratch.total_area() > 0.0) {
+        return Ok(0);
+    }
+    let Scratch { roots, rest, .. } = &mut *scratch;
+    let at = |(i, &root): (usize, &T)| root * equation.at_sample(chi, i);
+    let values = roots.par_iter().enumerate().map(at);
+    values.collect_into_vec(rest);
+    let iterations = scratch.solve(equation)?;
+    scratch.spread_solution(equation)?;
+    let alpha = T::of(equation.screening);
+    let cells = chi.par_iter_mut().zip(&scratch.field);
+    cells.for_each(|(chi, &change)| *chi -= alpha * change);
+    Ok(iterations)
+}
+
+impl<T: Real> Equation<'_, T> {
+    /// The value of a field at a sample.
+    pub(super) fn at_sample(&self, field: &[T], i: usize) -> T {
+        Cube::new(self.grid, self.grid.to_index(self.samples.points[i])).value(field)
+    }
+}
+
+impl<T: Real> Scratch<T> {
+    pub(super) fn start(&mut self, equation: &Equation<'_, T>) {
+        let samples = (0..equation.samples.points.len()).into_par_iter();
+        let root = |i| equation.area(i).sqrt();
+        samples.map(root).collect_into_vec(&mut self.roots);
+        self.field.resize(equation.grid.cells(), T::zero());
+    }
+
+    /// `√â_i`.
+    pub(super) fn root(&self, i: usize) -> T {
+        self.roots[i]
+    }
+
+    /// `Σ â_i`.
+    pub(super) fn total_area(&self) -> f64 {
+        dot(&self.roots, &self.roots)
+    }
+
+    /// Fills `rest` with numbers of the samples.
+    pub(super) fn set_right_hand_side(&mut self, value: impl Fn(usize, T) -> T + Sync) {
+        let roots = self.roots.par_iter().enumerate();
+        let values = roots.map(|(i, &root)| value(i, root));
+        values.collect_into_vec(&mut self.rest);
+    }
+
+    /// `field = A⁺ Sᵀ u` for the solution `u`.
+    fn spread_solution(&mut self, equation: &Equation<'_, T>) -> Result<(), Error> {
+        let Self {
+            field,
+            roots,
+            solution,
+            poisson,
+            ..
+        } = self;
+        green(equation, roots, solution, field, poisson)
+    }
+
+    /// From the right-hand side in `rest` to the solution.
+    pub(super) fn solve(&mut self, equation: &Equation<'_, T>) -> Result<usize, Error> {
+        let Self {
+            field,
+            roots,
+            solution,
+            rest,
+            direction,
+            image,
+            poisson,
+        } = self;
+        let alpha = T::of(equation.screening);
+        project(rest, roots);
+        solution.clear();
+        solution.resize(rest.len(), T::zero());
+        direction.clone_from(rest);
+        let start = dot(rest, rest);
+        // The square of what the residual may be.
+        let goal = start * T::epsilon().f64().powf(1.4);
+        let mut now = start;
+        for iteration in 0..MOST_ITERATIONS {
+            if !(now > goal) {
+                return Ok(iteration);
+            }
+            green(equation, roots, direction, field, poisson)?;
+            let samples = roots.par_iter().zip(&*direction).enumerate();
+            let row = |(i, (&root, &u)): (usize, (&T, &T))| {
+                u + alpha * root * equation.at_sample(field, i)
+            };
+            samples.map(row).collect_into_vec(image);
+            project(image, roots);
+            let step = now / dot(direction, image);
+            add(solution, direction, step);
+            add(rest, image, -step);
+            let before = std::mem::replace(&mut now, dot(rest, rest));
+            let share = T::of(now / before);
+            let along = direction.par_iter_mut().zip(&*rest);
+            along.for_each(|(p, &r)| *p = r + share * *p);
+        }
+        Err(Error::NotConverged {
+            iterations: MOST_ITERATIONS,
+            residual: (now / start).sqrt(),
+        })
+    }
+}
+
+/// `field = A⁺ Sᵀ u`.
+fn green<T: Real>(
+    equation: &Equation<'_, T>,
+    roots: &[T],
+    u: &[T],
+    field: &mut [T],
+    scratch: &mut poisson::Scratch<T>,
+) -> Result<(), Error> {
+    let Equation {
+        plan,
+        grid,
+        samples,
+        order,
+        ..
+    } = *equation;
+    field.par_iter_mut().for_each(|value| *value = T::zero());
+    trilinear::spread(grid, samples.points, order, |i| roots[i] * u[i], field);
+    Ok(plan.solve(field, 0.0, scratch)?)
+}
+
+fn dot<T: Real>(a: &[T], b: &[T]) -> f64 {
+    let [sum] = parallel::sum_array(a.len(), |i| [a[i].f64() * b[i].f64()]);
+    sum
+}
+
+/// `a += s b`.
+fn add<T: Real>(a: &mut [T], b: &[T], s: f64) {
+    let s = T::of(s);
+    let pairs = a.par_iter_mut().zip(b);
+    pairs.for_each(|(a, &b)| *a += s * b);
+}
+
+/// Takes off the part along `d = √â`.
+fn project<T: Real>(v: &mut [T], roots: &[T]) {
+    add(v, roots, -dot(v, roots) / dot(roots, roots));
+}

@@ -1,0 +1,101 @@
+//! The adjoint solve, and the derivative of the matrix.
+
+use rayon::prelude::*;
+
+use super::{Equation, Error, Scratch};
+use crate::data::GridCotangent;
+use crate::isosurface::iso_value;
+use crate::splat::SampleCotangent;
+use crate::trilinear::{self, Cube};
+use crate::{Real, parallel, vector};
+
+/// Turns the cotangents `chi_bar` (in memory order) of the screened solution into those of the plain one, adds
+/// what they mean for points, areas and grid to `out`, and returns the iterations it took. `level` is what the
+/// iso-value kept of `χ`; all else is as it was in [`forward`](super::forward).
+///
+/// # Errors
+/// [`Error::NotConverged`]; `chi_bar` is then as it was.
+pub fn pullback<T: Real>(
+    equation: &Equation<'_, T>,
+    level: &iso_value::Residual<T>,
+    chi_bar: &mut [T],
+    scratch: &mut Scratch<T>,
+    out: &mut SampleCotangent<T>,
+) -> Result<usize, Error> {
+    let Equation {
+        plan,
+        grid,
+        samples,
+        order,
+        ..
+    } = *equation;
+    scratch.start(equation);
+    if !(scratch.total_area() > 0.0) {
+        return Ok(0);
+    }
+    let alpha = T::of(equation.screening);
+    let green = |chi_bar: &[T], scratch: &mut Scratch<T>| {
+        scratch.field.copy_from_slice(chi_bar);
+        plan.solve(&mut scratch.field, 0.0, &mut scratch.poisson)
+    };
+    green(chi_bar, scratch)?;
+    let field = std::mem::take(&mut scratch.field);
+    scratch.set_right_hand_side(|i, root| -alpha * root * equation.at_sample(&field, i));
+    scratch.field = field;
+    let iterations = scratch.solve(equation)?;
+    let added = |i: usize| scratch.root(i) * scratch.solution[i];
+    trilinear::spread(grid, samples.points, order, added, chi_bar);
+    green(chi_bar, scratch)?;
+    equation.pull_matrix(&scratch.field, level, out);
+    Ok(iterations)
+}
+
+impl<T: Real> Equation<'_, T> {
+    /// The derivative of the matrix; `adjoint` is `Λ` up to a constant.
+    fn pull_matrix(
+        &self,
+        adjoint: &[T],
+        level: &iso_value::Residual<T>,
+        out: &mut SampleCotangent<T>,
+    ) {
+        let (grid, points) = (self.grid, self.samples.points);
+        let at = |i: usize| Cube::new(grid, grid.to_index(points[i])).value_and_gradient(adjoint);
+        let [sum, total] = parallel::sum_array(points.len(), |i| {
+            let a = self.area(i).f64();
+            [a * at(i).0.f64(), a]
+        });
+        let (mean, c) = (T::of(sum / total), T::of(level.value));
+        let (h, alpha) = (grid.spacing(), T::of(self.screening));
+        // Cotangents of a point and of `â`.
+        let of_sample = |i: usize| {
+            let (value, gradient) = at(i);
+            let (value, chi) = (value - mean, level.at_samples[i]);
+            let offset = chi.value - c;
+            let both = vector::add(
+                vector::scale(chi.gradient, value),
+                vector::scale(gradient, offset),
+            );
+            let point = vector::scale(both, -alpha * self.area(i) / h);
+            (point, -alpha * value * offset)
+        };
+        let unit = if self.area_weights { h } else { T::one() };
+        let bars = out.points.par_iter_mut().zip(&mut out.areas).enumerate();
+        bars.for_each(|(i, (point_bar, area_bar))| {
+            let (point, area) = of_sample(i);
+            *point_bar = vector::add(*point_bar, point);
+            *area_bar += area / unit / unit;
+        });
+        let [x, y, z, spacing] = parallel::sum_array(points.len(), |i| {
+            let (point, area) = of_sample(i);
+            let mut part = GridCotangent::default();
+            part.subtract_point(grid, points[i], point);
+            if self.area_weights {
+                part.spacing -= 2.0 * (area * self.area(i) / h).f64();
+            }
+            let [x, y, z] = part.lower;
+            [x, y, z, part.spacing]
+        });
+        out.grid.lower = vector::add(out.grid.lower, [x, y, z]);
+        out.grid.spacing += spacing;
+    }
+}

@@ -1,0 +1,66 @@
+//! Parts thinner than a cell: cut off by default, kept by `Level::Thin`.
+
+mod common;
+
+use common::Uniform;
+use isograd::isosurface::Level;
+use isograd::orient::Method;
+use isograd::{Grid, Options, PointCloud, Reconstructor, Resolution, vector};
+
+/// A lens of radius 1, `thickness` in its middle, and a ball beside it, with exact normals.
+fn lens_and_ball(count: usize, thickness: f64) -> PointCloud<f64> {
+    let mut random = Uniform::new(11);
+    let flat = 0.5 * thickness;
+    let (mut points, mut normals) = (Vec::new(), Vec::new());
+    while points.len() < count {
+        let u: [f64; 3] = std::array::from_fn(|_| 2.0 * random.next() - 1.0);
+        let length = vector::norm(u);
+        if !(0.1..=1.0).contains(&length) {
+            continue;
+        }
+        let [x, y, z] = vector::scale(u, 1.0 / length);
+        if points.len() % 2 == 1 {
+            let [x, y, z] = [x, y, z].map(|x| 0.4 * x);
+            points.push([x - 0.72, y, z + 0.96]);
+            normals.push([x, y, z].map(|x| x / 0.4));
+            continue;
+        }
+        // Tilted, so that it lies in every way between the cell centres.
+        let tilted = |[x, y, z]: [f64; 3]| [0.8 * x - 0.6 * z, y, 0.6 * x + 0.8 * z];
+        let normal = [x, y, z / flat];
+        points.push(tilted([x, y, flat * z]));
+        normals.push(tilted(vector::scale(normal, 1.0 / vector::norm(normal))));
+    }
+    let cloud = PointCloud::new(points).expect("finite");
+    cloud.with_normals(normals).expect("one each")
+}
+
+/// Share of the samples of the lens that are further than a cell from the surface.
+fn missed(level: Level) -> f64 {
+    let cells = 48;
+    // The longest side is some 2, and the grid 1.2 times that: cells of 0.05.
+    let cloud = lens_and_ball(30_000, 0.03);
+    let grid = Grid::fit(&cloud, Resolution::Cells(cells), 0.1).expect("a grid");
+    let options = Options {
+        orientation: Method::Given,
+        level,
+        ..Options::default()
+    };
+    let mut plan = Reconstructor::new(grid, options).expect("options");
+    let result = plan.reconstruct(&cloud).expect("a surface");
+    let far = cloud.points().iter().step_by(2).filter(|&&x| {
+        let phi = result.sdf().interpolate(x);
+        phi.abs() > grid.spacing()
+    });
+    far.count() as f64 / (cloud.len() / 2) as f64
+}
+
+#[test]
+fn a_lens_half_a_cell_thick_is_found_where_it_is_asked_for() {
+    let [local, thin] = [Level::Local, Level::Thin].map(missed);
+    println!("missed: {local} by default, {thin} with the level for thin parts");
+    // 0.92 and 0.07. What has a tenth of a cell or less, at the rim, is not
+    // followed; near it the surface is in islands.
+    assert!(local > 0.5, "{local}");
+    assert!(thin < 0.1, "{thin}");
+}
