@@ -186,7 +186,7 @@ impl<T: Real> Reconstruction<T> {
                 self.options.area_weights,
                 &residuals.splat,
                 &residuals.local_level,
-                field.values(),
+                field.values_mut(),
                 &mut scratch.level,
                 &mut scratch.values,
                 samples,

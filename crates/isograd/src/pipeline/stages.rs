@@ -178,7 +178,6 @@ impl<T: Real> Reconstructor<T> {
                 },
                 level,
                 &residuals.splat,
-                held.map(|held| &held.residuals.local_level),
                 &mut self.scratch.level,
                 &mut residuals.local_level,
             );

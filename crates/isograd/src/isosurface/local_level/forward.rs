@@ -4,9 +4,11 @@ use pulp::Arch;
 use rayon::prelude::*;
 
 use super::blocks::{Blocks, NODES, Overlap};
+use super::gain::Sums;
 use super::stencil::Stencil;
-use super::{FLATTENED, LEAST_AREA, PASSES, Pass, Residual};
-use crate::isosurface::iso_value::{self, AtSample};
+use super::trust::Edge;
+use super::{LEAST_AREA, PASSES, Pass, Residual};
+use crate::isosurface::iso_value;
 use crate::splat::{self, Samples};
 use crate::{Field, Grid, Real, parallel, simd, vector};
 
@@ -19,11 +21,9 @@ pub struct Scratch<T> {
     nodes: Vec<Node<T>>,
     /// `Σ λ e`.
     total: Vec<T>,
-    /// `r` and `∇χ` at the samples, as they are now.
-    now: Vec<AtSample<T>>,
-    /// `ω r`.
-    offsets: Vec<T>,
-    /// `e` and `∇e` at the samples, and `e` found without the sample.
+    /// `r` at the samples, as it is now.
+    now: Vec<T>,
+    /// What the pass says at the samples.
     seen: Vec<Seen<T>>,
 }
 
@@ -49,68 +49,52 @@ pub(super) struct Node<T> {
 
 /// What a pass says at a sample.
 #[derive(Clone, Copy, Debug, Default)]
-struct Seen<T> {
-    mean: T,
-    gradient: [T; 3],
-    without_it: T,
+pub(super) struct Seen<T> {
+    /// `m`: `e`, trilinear.
+    pub(super) mean: T,
+    /// `w`: the slope of `e` along the normal, per cell.
+    pub(super) slope: T,
+    /// `p`: `e`, trilinear, found without the sample.
+    pub(super) without_it: T,
 }
 
 /// Takes the local part of the iso-value off `chi`, so that the surface is where it equals the global one. `level`
 /// is what [`iso_value::forward`] kept of `chi`, and `order` lists the samples as the splat's
-/// [`Residual`](splat::Residual) does. Gains, trust and shifts are those of `held`, where it is given. The same bits for
-/// any number of threads.
-#[allow(clippy::too_many_arguments)]
+/// [`Residual`](splat::Residual) does. The same bits for any number of threads.
 pub fn forward<T: Real>(
     chi: &mut Field<T>,
     samples: Samples<'_, T>,
     choice: Choice,
     level: &iso_value::Residual<T>,
     order: &splat::Residual,
-    held: Option<&Residual<T>>,
     scratch: &mut Scratch<T>,
     residual: &mut Residual<T>,
 ) {
     let grid = *chi.grid();
     let near = Near::new(&grid, samples, choice.area_weights);
-    scratch.blocks.build(&grid, samples.points, &order.order);
-    scratch.total.clear();
-    scratch
-        .total
-        .resize(scratch.blocks.len() * NODES, T::zero());
-    match held {
-        Some(held) => {
-            residual.trust.clone_from(&held.trust);
-            residual.shifts.clone_from(&held.shifts);
-        }
-        None => near.trust(chi, choice.smoothing, choice.thin, residual),
-    }
-    scratch.begin(level, residual);
+    scratch.start(&near, order, level);
+    near.trust(chi, choice, &mut scratch.now, residual);
     let mut flattened = 0.0;
     let mut made = 0;
-    for pass in 0..held.map_or(PASSES, |held| held.passes.len()) {
-        scratch.weigh(residual);
-        near.average(&scratch.blocks, |i| scratch.offsets[i], &mut scratch.nodes);
-        near.see(
-            &scratch.blocks,
-            &scratch.nodes,
-            &scratch.offsets,
-            &mut scratch.seen,
-        );
-        let gain = match held {
-            Some(held) => held.passes[pass].gain,
-            None => T::of(scratch.gain(&near, &mut flattened)),
-        };
-        if !(gain > T::zero()) {
+    while made < PASSES {
+        if residual.passes.len() == made {
+            residual.passes.push(Pass::default());
+        }
+        let (before, pass) = residual.passes.split_at_mut(made);
+        let pass = &mut pass[0];
+        pass.flattened = flattened;
+        scratch.weigh(&residual.trust, &mut pass.offsets);
+        scratch.follow_slopes(&residual.edges, before.last(), &near, &mut pass.slopes);
+        near.average(&scratch.blocks, &pass.offsets, &mut scratch.nodes);
+        let (blocks, seen) = (&scratch.blocks, &mut scratch.seen);
+        near.see(blocks, &scratch.nodes, &pass.offsets, seen);
+        pass.sums = near.sums(seen, &pass.offsets, &pass.slopes);
+        [pass.gain, flattened] = pass.sums.gain(flattened);
+        if pass.gain == 0.0 {
             break;
         }
-        residual
-            .passes
-            .resize_with(residual.passes.len().max(pass + 1), Pass::default);
-        let kept = &mut residual.passes[pass];
-        kept.gain = gain;
-        kept.offsets.clone_from(&scratch.offsets);
-        scratch.apply(gain);
-        made = pass + 1;
+        scratch.apply(T::of(pass.gain));
+        made += 1;
     }
     residual.passes.truncate(made);
     let blocks = &scratch.blocks;
@@ -122,46 +106,42 @@ pub fn forward<T: Real>(
 }
 
 impl<T: Real> Scratch<T> {
-    /// The `r` before the first pass.
-    fn begin(&mut self, level: &iso_value::Residual<T>, residual: &Residual<T>) {
+    /// The blocks, and `χ(x_i) − c`.
+    fn start(
+        &mut self,
+        near: &Near<'_, T>,
+        order: &splat::Residual,
+        level: &iso_value::Residual<T>,
+    ) {
+        self.blocks
+            .build(near.grid, near.samples.points, &order.order);
+        self.total.clear();
+        self.total.resize(self.blocks.len() * NODES, T::zero());
         let c = T::of(level.value);
-        self.now.clone_from(&level.at_samples);
-        let now = self.now.par_iter_mut().enumerate();
-        now.for_each(|(i, now)| now.value += residual.shift(i) - c);
+        let values = level.at_samples.par_iter().map(|at| at.value - c);
+        values.collect_into_vec(&mut self.now);
     }
 
-    fn weigh(&mut self, residual: &Residual<T>) {
-        let now = self.now.par_iter().enumerate();
-        let offsets = now.map(|(i, now)| residual.trust(i) * now.value);
-        offsets.collect_into_vec(&mut self.offsets);
+    /// `ω r`.
+    fn weigh(&self, trust: &[T], offsets: &mut Vec<T>) {
+        let now = self.now.par_iter().zip(trust).map(|(&r, &trust)| trust * r);
+        now.collect_into_vec(offsets);
     }
 
-    /// `λ` of a pass, from what it says at the samples. `flattened` is the share of the slope that the passes took.
-    fn gain(&self, near: &Near<'_, T>, flattened: &mut f64) -> f64 {
-        let (now, offsets, seen) = (&self.now, &self.offsets, &self.seen);
-        let [rise, slope, rp, rr, pp] = parallel::sum_array(now.len(), |i| {
-            let a = near.area(i).f64();
-            let (r, p) = (offsets[i].f64(), seen[i].without_it.f64());
-            let [of_mean, of_chi] = [seen[i].gradient, now[i].gradient].map(vector::to_f64);
-            [
-                a * vector::dot(of_mean, of_chi),
-                a * vector::norm_squared(of_chi),
-                a * r * p,
-                a * r * r,
-                a * p * p,
-            ]
-        });
-        let share = (rise / slope).max(0.0);
-        // Of r by p − share · r.
-        let fit = (rp - share * rr) / (pp - 2.0 * share * rp + share * share * rr);
-        let left = 1.0 - (*flattened + share) / FLATTENED;
-        // Neither bound is met by what is not a number.
-        let gain = fit.min(1.0) * left;
-        if !(gain > 0.0) || !(left > 0.0) {
-            return 0.0;
-        }
-        *flattened += gain * share;
-        gain
+    /// `u`: slopes of `χ` along the normals, as they are after the pass `before`.
+    fn follow_slopes(
+        &self,
+        edges: &[Edge<T>],
+        before: Option<&Pass<T>>,
+        near: &Near<'_, T>,
+        slopes: &mut Vec<T>,
+    ) {
+        let at = |i: usize| match before {
+            None => vector::dot(edges[i].gradient, near.samples.normals[i]),
+            Some(pass) => pass.slopes[i] - T::of(pass.gain) * self.seen[i].slope,
+        };
+        let samples = 0..edges.len();
+        samples.into_par_iter().map(at).collect_into_vec(slopes);
     }
 
     /// Takes `λ e` off the samples, and adds it to the cells' total.
@@ -169,10 +149,7 @@ impl<T: Real> Scratch<T> {
         let nodes = self.total.par_iter_mut().zip(&self.nodes);
         nodes.for_each(|(total, node)| *total += gain * node.mean);
         let samples = self.now.par_iter_mut().zip(&self.seen);
-        samples.for_each(|(now, seen)| {
-            now.value -= gain * seen.mean;
-            now.gradient = vector::sub(now.gradient, vector::scale(seen.gradient, gain));
-        });
+        samples.for_each(|(now, seen)| *now -= gain * seen.mean);
     }
 }
 
@@ -211,38 +188,27 @@ impl<'a, T: Real> Near<'a, T> {
     }
 
     /// Fills the nodes of the blocks with `D` and `e` for these `ω r`.
-    pub(super) fn average(
-        &self,
-        blocks: &Blocks,
-        offset: impl Fn(usize) -> T + Sync,
-        nodes: &mut Vec<Node<T>>,
-    ) {
+    pub(super) fn average(&self, blocks: &Blocks, offsets: &[T], nodes: &mut Vec<Node<T>>) {
         nodes.resize(blocks.len() * NODES, Node::default());
         let work = nodes.par_chunks_exact_mut(NODES).enumerate();
         work.for_each(|(block, nodes)| {
             simd::dispatch(
                 self.arch,
                 #[inline(always)]
-                || self.average_block(blocks, block, &offset, nodes),
+                || self.average_block(blocks, block, offsets, nodes),
             );
         });
     }
 
     #[inline(always)]
-    fn average_block(
-        &self,
-        blocks: &Blocks,
-        block: usize,
-        offset: &(impl Fn(usize) -> T + Sync),
-        nodes: &mut [Node<T>],
-    ) {
+    fn average_block(&self, blocks: &Blocks, block: usize, offsets: &[T], nodes: &mut [Node<T>]) {
         nodes.fill(Node::default());
         let corner = blocks.corner(block);
         for i in blocks.samples(block) {
             let Some(stencil) = self.stencil(i) else {
                 continue;
             };
-            let (area, r) = (self.area(i), offset(i));
+            let (area, r) = (self.area(i), offsets[i]);
             let [x, y, z] = stencil.weights();
             Overlap::new(stencil.corner, 3, corner).for_each(
                 #[inline(always)]
@@ -260,7 +226,13 @@ impl<'a, T: Real> Near<'a, T> {
     }
 
     /// What the nodes say at the samples.
-    fn see(&self, blocks: &Blocks, nodes: &[Node<T>], offsets: &[T], seen: &mut Vec<Seen<T>>) {
+    pub(super) fn see(
+        &self,
+        blocks: &Blocks,
+        nodes: &[Node<T>],
+        offsets: &[T],
+        seen: &mut Vec<Seen<T>>,
+    ) {
         seen.resize(offsets.len(), Seen::default());
         let chunks = seen.par_chunks_mut(parallel::CHUNK).enumerate();
         chunks.for_each(|(chunk, seen)| {
@@ -278,35 +250,43 @@ impl<'a, T: Real> Near<'a, T> {
     }
 
     #[inline(always)]
-    fn see_at(&self, blocks: &Blocks, nodes: &[Node<T>], i: usize, r: T) -> Seen<T> {
+    fn see_at(&self, blocks: &Blocks, nodes: &[Node<T>], i: usize, s: T) -> Seen<T> {
         let Some(stencil) = self.stencil(i) else {
             return Seen::default();
         };
-        let (area, corners) = (self.area(i), stencil.corners());
-        let weights = corners.products();
-        let around: [[[Node<T>; 2]; 2]; 2] = blocks.read(nodes, corners.corner);
-        // Where the 2³ cells are among the 3³.
-        let shift: [usize; 3] = std::array::from_fn(|a| corners.corner[a] - stencil.corner[a]);
-        let own = stencil.weights();
-        let mut means = [T::zero(); 8];
+        let near: [[[Node<T>; 3]; 3]; 3] = blocks.read(nodes, stencil.corner);
+        let (area, corners, [x, y, z]) = (self.area(i), stencil.corners(), stencil.weights());
         let (mut mean, mut without_it) = (T::zero(), T::zero());
-        for c in 0..8 {
-            let place = [c >> 2, c >> 1 & 1, c & 1];
-            let Node { area: d, mean: e } = around[place[0]][place[1]][place[2]];
-            let mine = area
-                * own[0][place[0] + shift[0]]
-                * own[1][place[1] + shift[1]]
-                * own[2][place[2] + shift[2]];
-            means[c] = e;
-            mean += weights[c] * e;
-            // D without it is at least ε, but for rounding.
-            let others = (d - mine).max(T::of(0.5 * LEAST_AREA));
-            without_it += weights[c] * (e * d - mine * r) / others;
+        for ([i, j, k], at) in corners.cells() {
+            let (weight, _) = corners.weight_and_slope(at);
+            let node = near[i][j][k];
+            mean += weight * node.mean;
+            without_it += weight * node.without(area * x[i] * y[j] * z[k], s)[0];
         }
+        let derivatives = stencil.derivatives(|i, j| near[i][j].map(|node| node.mean));
         Seen {
             mean,
-            gradient: corners.gradient(means),
+            slope: vector::dot(derivatives.gradient, self.samples.normals[i]),
             without_it,
         }
+    }
+
+    /// What the gain of a pass is made of.
+    fn sums(&self, seen: &[Seen<T>], offsets: &[T], slopes: &[T]) -> Sums {
+        Sums::new(parallel::sum_array(seen.len(), |i| {
+            let [a, s, u] = [self.area(i), offsets[i], slopes[i]].map(Real::f64);
+            let [w, p] = [seen[i].slope, seen[i].without_it].map(Real::f64);
+            [a * w * u, a * u * u, a * s * p, a * s * s, a * p * p]
+        }))
+    }
+}
+
+impl<T: Real> Node<T> {
+    /// `e` without a sample of this weight and offset, and `D` without it.
+    #[inline(always)]
+    pub(super) fn without(self, weight: T, offset: T) -> [T; 2] {
+        // At least ε, but for rounding.
+        let others = (self.area - weight).max(T::of(0.5 * LEAST_AREA));
+        [(self.mean * self.area - weight * offset) / others, others]
     }
 }

@@ -14,40 +14,51 @@
 //! Hoppe, *Screened Poisson surface reconstruction*, ACM TOG 2013), as a few weighted means: no further solve.
 //!
 //! **Samples that are off the surface** must not be followed. Two tests see them, and set the gain `λ`:
-//! - does `e` at a sample, found without that sample, foretell `r`? `λ` is the coefficient of the linear fit of
-//!   `r` by it, from 0 to 1: 0 for noise that has nothing to do with that of its neighbours;
-//! - does `e` rise across the surface, `ρ = Σ a ∇e·∇χ / Σ a |∇χ|²`? What samples on one surface say does not,
-//!   but samples scattered over a layer as thick as a cell would flatten `χ`. `ρ r_i` is taken off the forecast,
-//!   and `λ` falls to 0 where the passes together would take half of the slope.
+//! - does `p`, which is `e` at a sample, found without that sample, foretell `s = ω r`? `λ` is the coefficient of the
+//!   linear fit of `s` by it, from 0 to 1: 0 for noise that has nothing to do with that of its neighbours;
+//! - does `e` rise across the surface, `ρ = Σ â w u / Σ â u²`, with the slopes `w` of `e` and `u` of `χ` along the
+//!   normals? What samples on one surface say does not, but samples scattered over a layer as thick as a cell would
+//!   flatten `χ`. `ρ s` is taken off the forecast, and `λ` falls to 0 where the passes together would take half of the
+//!   slope.
+//!
+//! Slopes are those of quadratic B-splines, which have no seams between cells.
 //!
 //! **Thin parts** hardly show in `χ`: the steps of their two faces cancel. A plate of thickness `t` has on its faces
-//! the share `q = 1 − exp(−t²/2w²)` of the slope `s` of a thick body, with `w` the width of the step; `s` is the root
-//! mean square over the samples of `n·∇χ`, which is taken with B-splines, and so `t` is known. Lattice points miss what
-//! is thinner than a cell: a surface that follows it is full of holes, and jumps when anything moves. `ω_i` rises from
-//! 0 to 1 for `t` from 1 to 1.6 cells, and `δ = 0`. [`Level::Thin`](super::Level::Thin) has the rise from 0.1 to 0.3
-//! cells, and makes thicker what is left: `δ_i = s t (exp(−t²/8w²) − exp(−1/8w²))`, if that is more than 0, is how much
-//! `χ` rises from the face to where that of a plate of one cell would be.
+//! the share `q = 1 − exp(−t²/2w²)` of the slope `U` of a thick body, with `w` the width of the step; `U` is the root
+//! mean square of `u` over the samples, and so `t` is known. Lattice points miss what is thinner than a cell: a surface
+//! that follows it is full of holes, and jumps when anything moves. `ω_i` rises from 0 to 1 for `t` from 1 to 1.6 cells,
+//! and `δ = 0`. [`Level::Thin`](super::Level::Thin) has the rise from 0.1 to 0.3 cells, and makes thicker what is left:
+//! `δ_i = U t (exp(−t²/8w²) − exp(−1/8w²))`, if that is more than 0, is how much `χ` rises from the face to where that
+//! of a plate of one cell would be.
 //!
 //! # Residual
-//! `ω_i`, `δ_i`, and of each pass `λ` and `ω_i r_i`. The sums over cells are computed again.
+//! `ω_i`; `∇χ` and `∇(n·∇χ)` at the samples; of each pass the sums that `λ` is made of, `s_i` and `u_i`. The sums over
+//! cells are computed again.
 //!
 //! # Pullback
-//! Given `χ̄` of what came out; `T_o(x)` are the trilinear weights, and `Ē = −χ̄`. Backwards through the passes,
-//! from `r̄ = 0`, with `e`, `D`, `r` those of the pass, and `s = ω r`:
+//! Given `χ̄` of what came out; `T_o(x)` are the trilinear weights, `Ē = −χ̄`, `M_o = D_o e_o`. Backwards through the
+//! passes, from `r̄ = ū = 0`, with the cotangents of `ρ`, of the fit and of the five sums from
+//! `λ̄ = Σ Ē_o e_o − Σ r̄_i m_i − Σ ū_i w_i` (`gain`), where `m = (Te)(x)`, `v_o = (M_o − â B_o s)/(D_o − â B_o)` is what
+//! a cell says without the sample and `p = Σ T_o v_o`:
 //! ```text
-//! ē_o = λ (Ē_o − Σ_i T_o(x_i) r̄_i)        R̄_o = ē_o / D_o        D̄_o = −R̄_o e_o
-//! x̂̄_i −= λ r̄_i ∇(Te)(x_i)                  x̂̄_i += â_i Σ_o ∇B_o(x_i) (s_i R̄_o + D̄_o)
-//! â̄_i += Σ_o B_o(x_i) (s_i R̄_o + D̄_o)      r̄_i += â_i ω_i Σ_o B_o(x_i) R̄_o
+//! m̄ = −λ r̄          w̄ = −λ ū + …          p̄ = …          y_o = T_o p̄ / (D_o − â B_o)
+//! ē_o = λ Ē_o + Σ_i (T_o m̄ + n·∇B_o w̄)    M̄_o = ē_o / D_o + Σ_i y_o    D̄_o = −e_o ē_o / D_o − Σ_i y_o v_o
+//! B̄_o = s M̄_o + D̄_o + y_o (v_o − s)        s̄ = … + â Σ_o B_o M̄_o − â Σ_o B_o y_o
+//! x̂̄ += m̄ ∇Te + p̄ Σ_o v_o ∇T_o + w̄ ∇(n·∇e) + â Σ_o ∇B_o B̄_o
+//! n̄ += w̄ ∇e          â̄ += … + Σ_o B_o B̄_o          r̄ += ω s̄          ω̄ += r s̄
 //! ```
-//! In the end `r̄_i` is the cotangent of `χ(x_i)`, and `c̄ −= Σ r̄_i`; `χ̄` of what went in is that of what came
-//! out, and what [`iso_value::pullback`](super::iso_value::pullback) adds to it for `r̄`.
+//! where dots are what the sums add. In the end `r̄_i` is the cotangent of `χ(x_i)` and of `δ_i`, and `c̄ −= Σ r̄_i`; `ω̄`
+//! and `δ̄` become parts of `ū` and, by `U`, of `â̄` (`trust`); and of `ū`, `n̄ += ū ∇χ`, `x̂̄ += ū ∇(n·∇χ)` and
+//! `χ̄_o += Σ_i ū_i n_i·∇B_o`. `χ̄` of what went in is that of what came out, with this and what
+//! [`iso_value::pullback`](super::iso_value::pullback) adds for `r̄`. It was compared with differences of the map.
 //!
 //! # Not differentiable
-//! The gains `λ`, the trust `ω` and the shifts `δ`, which are held. `∇(Te)` jumps where a sample crosses a plane
-//! through cell centres.
+//! `∇(Te)` jumps where a sample crosses a plane through cell centres. `λ` has kinks where the fit is 1, where `ρ` or `λ`
+//! is 0. The smoothing `σ` is held.
 
 mod blocks;
 mod forward;
+mod gain;
 mod pullback;
 mod stencil;
 #[cfg(test)]
@@ -82,8 +93,11 @@ const FLATTENED: f64 = 0.5;
 pub struct Residual<T> {
     /// `(N,)` `ω_i`.
     trust: Vec<T>,
-    /// `(N,)` `δ_i`; empty where all are 0.
-    shifts: Vec<T>,
+    /// `(N,)`
+    edges: Vec<trust::Edge<T>>,
+    step: trust::Step,
+    /// `Σ â_i`.
+    area: f64,
     passes: Vec<Pass<T>>,
 }
 
@@ -91,35 +105,26 @@ pub struct Residual<T> {
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Pass<T> {
     /// `λ`.
-    gain: T,
-    /// `(N,)` `ω_i r_i` before it.
+    gain: f64,
+    sums: gain::Sums,
+    /// Share of the slope of `χ` that was gone before it.
+    flattened: f64,
+    /// `(N,)` `s_i` before it.
     offsets: Vec<T>,
+    /// `(N,)` `u_i` before it.
+    slopes: Vec<T>,
 }
 
 impl<T: crate::Real> Residual<T> {
     /// `λ` of each pass that was made; none where the samples were not followed.
     pub fn gains(&self) -> impl Iterator<Item = f64> + '_ {
-        self.passes.iter().map(|pass| pass.gain.f64())
+        self.passes.iter().map(|pass| pass.gain)
     }
 
     /// Bytes that are kept.
     pub fn bytes(&self) -> usize {
-        let passes = self.passes.iter();
-        let offsets = passes.map(|pass| size_of_val(pass.offsets.as_slice()));
-        offsets.sum::<usize>()
-            + size_of_val(self.trust.as_slice())
-            + size_of_val(self.shifts.as_slice())
-    }
-
-    /// `ω_i`.
-    #[inline(always)]
-    fn trust(&self, i: usize) -> T {
-        self.trust.get(i).copied().unwrap_or(T::zero())
-    }
-
-    /// `δ_i`.
-    #[inline(always)]
-    fn shift(&self, i: usize) -> T {
-        self.shifts.get(i).copied().unwrap_or(T::zero())
+        let of_pass = |pass: &Pass<T>| [&pass.offsets, &pass.slopes].map(|v| size_of_val(&v[..]));
+        let passes = self.passes.iter().flat_map(of_pass);
+        passes.sum::<usize>() + size_of_val(&self.trust[..]) + size_of_val(&self.edges[..])
     }
 }

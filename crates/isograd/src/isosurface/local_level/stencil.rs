@@ -1,6 +1,7 @@
 //! What a sample has to do with the cells round it: small pure functions.
 
-use crate::{Grid, Real, splat, vector};
+use crate::vector::dot;
+use crate::{Grid, Real, splat};
 
 /// A sample among its 3³ cells.
 #[derive(Clone, Copy)]
@@ -14,8 +15,8 @@ pub(super) struct Stencil<T> {
 /// The 2³ cell centres round a sample and its trilinear weights.
 #[derive(Clone, Copy)]
 pub(super) struct Corners<T> {
-    /// The lowest of the cells.
-    pub(super) corner: [usize; 3],
+    /// Place of the lowest of them in the 3³.
+    pub(super) place: [usize; 3],
     /// Distance from its centre, per axis, 0 to 1.
     fraction: [T; 3],
 }
@@ -48,18 +49,71 @@ impl<T: Real> Stencil<T> {
         self.offset.map(splat::quadratic_bspline_slope)
     }
 
+    /// First and second derivatives of `Σ_o B_o v_o`; `row(i, j)` has the 3 values along z of row `(i, j)` of the 3³.
+    #[inline(always)]
+    pub(super) fn derivatives(&self, row: impl Fn(usize, usize) -> [T; 3]) -> Derivatives<T> {
+        let ([x, y, z], [dx, dy, dz]) = (self.weights(), self.slopes());
+        let bends = [T::one(), -T::of(2.0), T::one()];
+        let zero = T::zero();
+        let (mut gradient, mut same, mut mixed) = ([zero; 3], [zero; 3], [zero; 3]);
+        for i in 0..3 {
+            for j in 0..3 {
+                let row = row(i, j);
+                let (along, slope, bend) = (dot(z, row), dot(dz, row), dot(bends, row));
+                gradient[0] += dx[i] * y[j] * along;
+                gradient[1] += x[i] * dy[j] * along;
+                gradient[2] += x[i] * y[j] * slope;
+                same[0] += bends[i] * y[j] * along;
+                same[1] += x[i] * bends[j] * along;
+                same[2] += x[i] * y[j] * bend;
+                mixed[0] += x[i] * dy[j] * slope;
+                mixed[1] += dx[i] * y[j] * slope;
+                mixed[2] += dx[i] * dy[j] * along;
+            }
+        }
+        Derivatives {
+            gradient,
+            same,
+            mixed,
+        }
+    }
+
     /// The cell centres round the point, which are among the 3³.
     #[inline(always)]
     pub(super) fn corners(&self) -> Corners<T> {
-        let (mut corner, mut fraction) = (self.corner, self.offset);
+        let (mut place, mut fraction) = ([0; 3], self.offset);
         for a in 0..3 {
             if fraction[a] < T::zero() {
                 fraction[a] += T::one();
             } else {
-                corner[a] += 1;
+                place[a] = 1;
             }
         }
-        Corners { corner, fraction }
+        Corners { place, fraction }
+    }
+}
+
+/// What quadratic B-splines make of values at cells: derivatives per cell, at a sample.
+#[derive(Clone, Copy)]
+pub(super) struct Derivatives<T> {
+    /// `∇`.
+    pub(super) gradient: [T; 3],
+    /// `∂²/∂x²` and so on.
+    same: [T; 3],
+    /// `∂²/∂y∂z`, `∂²/∂x∂z`, `∂²/∂x∂y`.
+    mixed: [T; 3],
+}
+
+impl<T: Real> Derivatives<T> {
+    /// `∇(n·∇)`: how the slope along `n` changes with the place.
+    #[inline(always)]
+    pub(super) fn bend(&self, [x, y, z]: [T; 3]) -> [T; 3] {
+        let ([xx, yy, zz], [yz, xz, xy]) = (self.same, self.mixed);
+        [
+            xx * x + xy * y + xz * z,
+            xy * x + yy * y + yz * z,
+            xz * x + yz * y + zz * z,
+        ]
     }
 }
 
@@ -70,29 +124,25 @@ impl<T: Real> Corners<T> {
         self.fraction.map(|f| [T::one() - f, f])
     }
 
-    /// Weights of the 2³ cells, the last axis fastest.
+    /// The weight of each cell and its derivatives, by place among the 2³.
     #[inline(always)]
-    pub(super) fn products(&self) -> [T; 8] {
+    pub(super) fn weight_and_slope(&self, [i, j, k]: [usize; 3]) -> (T, [T; 3]) {
         let [x, y, z] = self.weights();
-        std::array::from_fn(|c| x[c >> 2] * y[c >> 1 & 1] * z[c & 1])
+        let sign = |n: usize| T::of(2.0 * n as f64 - 1.0);
+        let slope = [
+            sign(i) * y[j] * z[k],
+            x[i] * sign(j) * z[k],
+            x[i] * y[j] * sign(k),
+        ];
+        (x[i] * y[j] * z[k], slope)
     }
 
-    /// `∇` of the trilinear interpolant of 2³ values.
+    /// Places in the 3³ of the 2³ cells, and among these.
     #[inline(always)]
-    pub(super) fn gradient(&self, v: [T; 8]) -> [T; 3] {
-        let [x, y, z] = self.weights();
-        let mut sum = [T::zero(); 3];
-        for i in 0..2 {
-            for j in 0..2 {
-                let [a, b, c] = [
-                    v[4 + 2 * i + j] - v[2 * i + j],
-                    v[4 * i + 2 + j] - v[4 * i + j],
-                    v[4 * i + 2 * j + 1] - v[4 * i + 2 * j],
-                ];
-                let across = [y[i] * z[j] * a, x[i] * z[j] * b, x[i] * y[j] * c];
-                sum = vector::add(sum, across);
-            }
-        }
-        sum
+    pub(super) fn cells(&self) -> [([usize; 3], [usize; 3]); 8] {
+        std::array::from_fn(|c| {
+            let at = [c >> 2, c >> 1 & 1, c & 1];
+            (std::array::from_fn(|a| self.place[a] + at[a]), at)
+        })
     }
 }

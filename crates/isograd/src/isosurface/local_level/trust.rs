@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::forward::Near;
+use super::forward::{Choice, Near};
 use super::{FOLLOWED, FOLLOWED_THIN, LEAST_THICKNESS, Residual};
 use crate::{Field, Real, parallel, vector};
 
@@ -13,73 +13,106 @@ const STEP: f64 = 0.75;
 /// Share of the usual slope above which the body counts as thick.
 const STEEPEST: f64 = 0.999;
 
+/// What quadratic B-splines, which have no seams between cells, make of the indicator at a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Edge<T> {
+    /// `∇χ`, per cell.
+    pub(super) gradient: [T; 3],
+    /// `∇(n·∇χ)`, per cell².
+    pub(super) bend: [T; 3],
+}
+
 impl<T: Real> Near<'_, T> {
-    /// Fills `ω_i` and `δ_i`, from the slope of `chi`, smoothed by `smoothing` cells, along the normals.
+    /// Fills `ω_i` from the slope of `chi` along the normals, and adds `δ_i` to `now`.
     pub(super) fn trust(
         &self,
         chi: &Field<T>,
-        smoothing: f64,
-        thin: bool,
+        choice: Choice,
+        now: &mut [T],
         residual: &mut Residual<T>,
     ) {
-        // In place of the shifts, which are made of them.
-        let slopes = &mut residual.shifts;
         let samples = 0..self.samples.points.len();
-        let slope = |i: usize| self.slope(chi, i);
-        samples.into_par_iter().map(slope).collect_into_vec(slopes);
-        let [sum, area] = parallel::sum_array(slopes.len(), |i| {
-            let a = self.area(i).f64();
-            [a * slopes[i].f64().powi(2), a]
+        let edges = samples.into_par_iter().map(|i| self.edge(chi, i));
+        edges.collect_into_vec(&mut residual.edges);
+        let edges = &residual.edges;
+        let [sum, area] = parallel::sum_array(edges.len(), |i| {
+            let (a, slope) = (self.area(i).f64(), self.slope(edges, i));
+            [a * slope * slope, a]
         });
-        let step = Step {
+        residual.step = Step {
             usual: (sum / area).sqrt(),
-            width: (STEP + smoothing * smoothing).sqrt(),
+            width: (STEP + choice.smoothing * choice.smoothing).sqrt(),
+            thin: choice.thin,
         };
-        let range = if thin { FOLLOWED_THIN } else { FOLLOWED };
-        let trust = slopes.par_iter().map(|slope| {
-            let thickness = step.thickness(slope.f64());
-            T::of(rise(thickness, range))
+        residual.area = area;
+        let step = residual.step;
+        let trust = now.par_iter_mut().enumerate().map(|(i, now)| {
+            let slope = self.slope(edges, i);
+            *now += T::of(step.shift(slope));
+            T::of(step.trust(slope))
         });
         trust.collect_into_vec(&mut residual.trust);
-        if thin {
-            let shift = |slope: &mut T| *slope = T::of(step.shift(slope.f64()));
-            slopes.par_iter_mut().for_each(shift);
-        } else {
-            slopes.clear();
+    }
+
+    /// `n·∇χ` at sample `i`, per cell; 0 where it falls instead.
+    #[inline(always)]
+    fn slope(&self, edges: &[Edge<T>], i: usize) -> f64 {
+        let slope = vector::dot(edges[i].gradient, self.samples.normals[i]);
+        slope.f64().max(0.0)
+    }
+
+    fn edge(&self, chi: &Field<T>, i: usize) -> Edge<T> {
+        let Some(stencil) = self.stencil(i) else {
+            return Edge::default();
+        };
+        let [_, ny, nz] = self.grid.shape();
+        let [x, y, z] = stencil.corner;
+        let derivatives = stencil.derivatives(|i, j| {
+            let start = ((x + i) * ny + y + j) * nz + z;
+            std::array::from_fn(|k| chi.values()[start + k])
+        });
+        Edge {
+            gradient: derivatives.gradient,
+            bend: derivatives.bend(self.samples.normals[i]),
         }
     }
 
-    /// `n·∇χ` at sample `i`, per cell, with quadratic B-splines, which have no seams between cells; 0 where it falls
-    /// instead.
-    fn slope(&self, chi: &Field<T>, i: usize) -> T {
-        let Some(stencil) = self.stencil(i) else {
-            return T::zero();
+    /// Fills `bars` with the cotangents of `u` and `â` of every sample; `found(i)` has those of its `ω` and `δ`.
+    pub(super) fn pull_trust(
+        &self,
+        residual: &Residual<T>,
+        found: impl Fn(usize) -> [f64; 2] + Sync,
+        bars: &mut Vec<[f64; 2]>,
+    ) {
+        let (edges, step) = (&residual.edges, residual.step);
+        let samples = 0..edges.len();
+        let direct = samples.into_par_iter().map(|i| {
+            let [trust_bar, shift_bar] = found(i);
+            step.pullback(self.slope(edges, i), trust_bar, shift_bar)
+        });
+        direct.collect_into_vec(bars);
+        let [usual_bar] = parallel::sum_array(edges.len(), |i| [bars[i][1]]);
+        let share = match usual_bar == 0.0 {
+            true => 0.0,
+            false => usual_bar / (step.usual * residual.area),
         };
-        let ([x, y, z], [dx, dy, dz]) = (stencil.weights(), stencil.slopes());
-        let [_, ny, nz] = self.grid.shape();
-        let [cx, cy, cz] = stencil.corner;
-        let mut gradient = [T::zero(); 3];
-        for i in 0..3 {
-            for j in 0..3 {
-                let start = ((cx + i) * ny + cy + j) * nz + cz;
-                for (k, &value) in chi.values()[start..start + 3].iter().enumerate() {
-                    gradient[0] += dx[i] * y[j] * z[k] * value;
-                    gradient[1] += x[i] * dy[j] * z[k] * value;
-                    gradient[2] += x[i] * y[j] * dz[k] * value;
-                }
-            }
-        }
-        vector::dot(gradient, self.samples.normals[i]).max(T::zero())
+        bars.par_iter_mut().enumerate().for_each(|(i, bars)| {
+            let (a, slope) = (self.area(i).f64(), self.slope(edges, i));
+            bars[0] += share * a * slope;
+            bars[1] = 0.5 * share * (slope * slope - step.usual * step.usual);
+        });
     }
 }
 
 /// The step of `χ` through the surface of a thick body: a Gaussian one.
-#[derive(Clone, Copy, Debug)]
-struct Step {
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Step {
     /// Its slope at the surface, per cell.
     usual: f64,
     /// Its standard deviation, in cells.
     width: f64,
+    /// Whether parts thinner than a cell are followed and made thicker.
+    thin: bool,
 }
 
 impl Step {
@@ -98,19 +131,65 @@ impl Step {
         self.width * (-2.0 * (-self.share(slope)).ln_1p()).sqrt()
     }
 
+    /// `ω`.
+    fn trust(self, slope: f64) -> f64 {
+        let t = self.followed(slope);
+        t * t * (3.0 - 2.0 * t)
+    }
+
+    /// From 0 to 1 as the thickness goes from where nothing is followed to where all is.
+    fn followed(self, slope: f64) -> f64 {
+        let [low, high] = self.range();
+        ((self.thickness(slope) - low) / (high - low)).clamp(0.0, 1.0)
+    }
+
+    fn range(self) -> [f64; 2] {
+        match self.thin {
+            true => FOLLOWED_THIN,
+            false => FOLLOWED,
+        }
+    }
+
     /// `δ`: how much more `χ` is at the faces of a plate of the least thickness than at those of this one. A thin
     /// plate is the dip `−t s exp(−x²/2w²)` of a step of slope `s`.
     fn shift(self, slope: f64) -> f64 {
-        let thickness = self.thickness(slope);
-        let depth = |t: f64| (-0.125 * (t / self.width).powi(2)).exp();
-        self.usual * thickness * (depth(thickness) - depth(LEAST_THICKNESS)).max(0.0)
+        match self.thin {
+            true => self.usual * self.thickness(slope) * self.rise(self.thickness(slope)),
+            false => 0.0,
+        }
     }
-}
 
-/// From 0 at the lower end to 1 at the upper one, with no slope at both.
-fn rise(x: f64, [low, high]: [f64; 2]) -> f64 {
-    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
+    /// How much less the dip is at the faces of the plate of least thickness, of its depth, if it is less.
+    fn rise(self, thickness: f64) -> f64 {
+        (self.depth(thickness) - self.depth(LEAST_THICKNESS)).max(0.0)
+    }
+
+    fn depth(self, thickness: f64) -> f64 {
+        (-0.125 * (thickness / self.width).powi(2)).exp()
+    }
+
+    /// Cotangents of the slope and of the usual slope, for those of `ω` and `δ`.
+    fn pullback(self, slope: f64, trust_bar: f64, shift_bar: f64) -> [f64; 2] {
+        let (share, thickness) = (self.share(slope), self.thickness(slope));
+        if !(share > 0.0 && share < STEEPEST) || (trust_bar, shift_bar) == (0.0, 0.0) {
+            return [0.0; 2];
+        }
+        let ([low, high], t) = (self.range(), self.followed(slope));
+        let mut thickness_bar = trust_bar * 6.0 * t * (1.0 - t) / (high - low);
+        let mut usual_bar = 0.0;
+        let rise = self.rise(thickness);
+        if self.thin && rise > 0.0 {
+            let w = self.width;
+            let fall = thickness * thickness / (4.0 * w * w) * self.depth(thickness);
+            thickness_bar += shift_bar * self.usual * (rise - fall);
+            usual_bar += shift_bar * thickness * rise;
+        }
+        let share_bar = thickness_bar * self.width * self.width / (thickness * (1.0 - share));
+        [
+            share_bar / self.usual,
+            usual_bar - share_bar * share / self.usual,
+        ]
+    }
 }
 
 #[cfg(test)]
@@ -133,6 +212,7 @@ mod tests {
             let step = Step {
                 usual: 1.0 / (width * std::f64::consts::TAU.sqrt()),
                 width,
+                thin: true,
             };
             for t in [0.05, 0.3, 0.7, 0.95, 2.0] {
                 let at = |x: f64| plate(x, t, width);
@@ -152,9 +232,36 @@ mod tests {
         let step = Step {
             usual: 0.0,
             width: 1.0,
+            thin: true,
         };
         assert_eq!(step.thickness(0.0), 0.0);
         assert_eq!(step.shift(f64::NAN), 0.0);
         assert!(step.thickness(1.0).is_finite() && step.shift(f64::INFINITY) == 0.0);
+    }
+
+    #[test]
+    fn pullback_is_the_derivative_of_trust_and_shift() {
+        for thin in [false, true] {
+            for slope in [-0.1, 0.003, 0.02, 0.1, 0.17, 0.21, 0.25, 0.45] {
+                let (usual, width) = (0.4, 0.95);
+                let (trust_bar, shift_bar) = (0.8, 1.7);
+                let value = |slope: f64, usual: f64| {
+                    let step = Step { usual, width, thin };
+                    trust_bar * step.trust(slope) + shift_bar * step.shift(slope)
+                };
+                let step = Step { usual, width, thin };
+                let [slope_bar, usual_bar] = step.pullback(slope, trust_bar, shift_bar);
+                let h = 1e-6;
+                let along_slope = (value(slope + h, usual) - value(slope - h, usual)) / (2.0 * h);
+                let along_usual = (value(slope, usual + h) - value(slope, usual - h)) / (2.0 * h);
+                for (got, expected) in [(slope_bar, along_slope), (usual_bar, along_usual)] {
+                    let scale = expected.abs().max(1.0);
+                    assert!(
+                        (got - expected).abs() < 1e-6 * scale,
+                        "{slope}: {got} {expected}"
+                    );
+                }
+            }
+        }
     }
 }
