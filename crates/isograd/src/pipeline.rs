@@ -99,8 +99,8 @@ impl<T: Real> Reconstructor<T> {
         self.run_all(cloud, None, observer)
     }
 
-    /// Runs all stages but the checks on a cloud of as many points, with the radii, the signs of the normals, the
-    /// smoothing, and the gains, trust and shifts of the local iso-value that `held` has: the map that
+    /// Runs all stages but the checks on a cloud of as many points, with the radii and the signs of the normals that
+    /// `held` has, and with its automatic smoothing where that does not go with the areas: the map that
     /// [`Reconstruction::pullback`] differentiates, for those who compare it with differences. Neighbourhoods are
     /// those of the moved points; a sample that enters one or leaves it still makes the normal jump.
     ///

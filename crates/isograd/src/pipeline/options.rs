@@ -43,6 +43,15 @@ impl Default for Options {
     }
 }
 
+impl Options {
+    /// Whether the smoothing follows the areas of the samples, and has a derivative: of a screened solution, what the
+    /// smoothing was done to is not kept.
+    pub(super) fn smoothing_follows(&self) -> bool {
+        let automatic = self.smoothing == poisson::Smoothing::Auto;
+        automatic && self.area_weights && self.screening == 0.0
+    }
+}
+
 /// Why a reconstruction failed: which stage, and its own reason.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]

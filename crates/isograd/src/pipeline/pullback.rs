@@ -1,5 +1,7 @@
 //! The reverse of the pipeline: cotangents of its results → cotangents of its inputs.
 
+use rayon::prelude::*;
+
 use super::{CloudCotangent, Cotangent, PullbackError, Reconstruction, Residuals};
 use crate::data::{Field, GridCotangent, PointCloud};
 use crate::distance::{extend, lattice};
@@ -178,9 +180,10 @@ impl<T: Real> Reconstruction<T> {
             areas: &self.areas,
         };
         let mut level_bar = cotangent.iso_value.f64() + found.level;
+        let mut smoothing_bar = 0.0;
         scratch.values.clear();
         if self.options.level != Level::Mean {
-            level_bar += local_level::pullback(
+            let found = local_level::pullback(
                 chi.grid(),
                 given,
                 self.options.area_weights,
@@ -191,6 +194,8 @@ impl<T: Real> Reconstruction<T> {
                 &mut scratch.values,
                 samples,
             );
+            level_bar += found.level;
+            smoothing_bar = found.smoothing;
         }
         isosurface::iso_value::pullback(
             chi.grid(),
@@ -208,11 +213,41 @@ impl<T: Real> Reconstruction<T> {
             screened::pullback(&equation, level, field.values_mut(), scratch, samples)?;
         }
         let smoothing = residuals.smoothing;
+        if self.options.smoothing_follows() {
+            smoothing_bar += self.smoothing_bar(field.values(), &scratch.level);
+            self.pull_smoothing(smoothing_bar, samples);
+        }
         self.poisson
             .solve(field.values_mut(), smoothing, &mut scratch.poisson)?;
         splat::pullback(given, &residuals.splat, &field, &mut scratch.splat, samples);
         scratch.field = Some(field);
         Ok(())
+    }
+
+    /// The cotangent of the smoothing for that of the indicator before anything was taken off it.
+    fn smoothing_bar(&self, bars: &[T], level: &local_level::PullbackScratch<T>) -> f64 {
+        let (chi, smoothing) = (&self.indicator, self.residuals.smoothing);
+        let shape = chi.grid().shape();
+        let whole = poisson::smoothing::pullback(smoothing, shape, chi.values(), bars);
+        if self.options.level == Level::Mean {
+            return whole;
+        }
+        let taken = level.sum_of_taken(chi.grid(), |start, taken| {
+            poisson::smoothing::laplacian_dot(bars, shape, start, taken)
+        });
+        whole + smoothing * taken
+    }
+
+    /// From the smoothing, which goes with the root of the mean area, to areas and cell size.
+    fn pull_smoothing(&self, bar: f64, samples: &mut SampleCotangent<T>) {
+        let (mean, count) = splat::area::mean(&self.areas);
+        let by_logarithm = bar * self.residuals.smoothing;
+        if !(mean > 0.0) {
+            return;
+        }
+        let share = T::of(0.5 * by_logarithm / (mean * count as f64));
+        samples.areas.par_iter_mut().for_each(|area| *area += share);
+        samples.grid.spacing -= by_logarithm / self.indicator.grid().spacing().f64();
     }
 
     fn screened_equation<'a>(&'a self, samples: Samples<'a, T>) -> screened::Equation<'a, T> {

@@ -140,10 +140,16 @@ impl<T: Real> Reconstructor<T> {
             ..
         } = &mut self.result;
         let grid = *indicator.grid();
-        let cells_apart = residuals.neighborhoods.spacing() / grid.spacing();
+        let held = held.filter(|_| !options.smoothing_follows());
         residuals.smoothing = match held {
             Some(held) => held.residuals.smoothing,
-            None => options.smoothing.cells(cells_apart.f64()),
+            None => {
+                let apart = match options.area_weights {
+                    true => splat::area::mean(areas).0.sqrt(),
+                    false => residuals.neighborhoods.spacing().f64(),
+                };
+                options.smoothing.cells(apart / grid.spacing().f64())
+            }
         };
         report.smoothing = residuals.smoothing;
         let values = indicator.values_mut();

@@ -73,12 +73,12 @@ impl<T: Real> Axis<T> {
         }
     }
 
-    /// Writes `G_k = exp(−½(σθ_k)²)` for all `k`.
+    /// Writes `G_k = exp(−σ²(1 − cos θ_k))` for all `k`.
     pub(super) fn gaussian(&self, sigma: f64, out: &mut Vec<T>) {
         out.clear();
         out.extend((0..self.n).map(|k| {
-            let theta = PI * k as f64 / self.n as f64;
-            T::of((-0.5 * (sigma * theta).powi(2)).exp())
+            let half = 0.5 * PI * k as f64 / self.n as f64;
+            T::of((-2.0 * (sigma * half.sin()).powi(2)).exp())
         }));
     }
 

@@ -13,19 +13,21 @@
 //!
 //! `χ = IDCT( G/λ · DCT(b) )`, `λ_k = K_x M_y M_z + M_x K_y M_z + M_x M_y K_z`,
 //!
-//! with the constant mode set to 0: the mean of `b` is ignored, and `χ` has mean 0. `G = exp(−½(σθ)²)` per
-//! axis is a Gaussian smoothing of `χ` by `σ` cells; `σ = 0` is the plain equation `Aχ = b − mean(b)`.
-//! No iteration, no tolerance: the relative residual is a few units of rounding.
+//! with the constant mode set to 0: the mean of `b` is ignored, and `χ` has mean 0. `G = exp(−σ²(1 − cos θ))` per
+//! axis is the smoothing of `χ` by the Gaussian of lattices, of `σ` cells: diffusion for the time `σ²/2`, with the second
+//! differences of the cells as Laplacian (T. Lindeberg, *Scale-space for discrete signals*, IEEE TPAMI 12, 1990). `σ = 0`
+//! is the plain equation `Aχ = b − mean(b)`. No iteration, no tolerance: the relative residual is a few units of rounding.
 //!
 //! # Residual
 //! None: the map is linear and constant. The plan and `σ` are all that the pullback needs.
 //!
 //! # Pullback
 //! `b̄ = IDCT( G/λ · DCT(χ̄) )`: the operator is symmetric, so the pullback is [`Plan::solve`] itself,
-//! applied to `χ̄` with the same `σ` (the paper's adjoint solve).
+//! applied to `χ̄` with the same `σ` (the paper's adjoint solve). With `L` the sum of second differences along the axes,
+//! `∂χ/∂σ = σ L χ` and `σ̄ = σ χ̄·Lχ`: [`smoothing`].
 //!
 //! # Not differentiable
-//! Nothing: the map is linear. `σ` is held constant.
+//! Nothing: the map is linear.
 //!
 //! # Reproducibility
 //! The same bits for any number of threads. The Fourier transforms (`rustfft`) are chosen by the
@@ -38,7 +40,7 @@ mod axis;
 mod passes;
 mod scratch;
 pub mod screened;
-mod smoothing;
+pub mod smoothing;
 #[cfg(test)]
 mod tests;
 

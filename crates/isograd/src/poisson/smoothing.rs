@@ -1,4 +1,9 @@
-//! How much the indicator is smoothed.
+//! How much the indicator is smoothed, and what more of it would do.
+
+use pulp::Arch;
+use rayon::prelude::*;
+
+use crate::{Real, simd};
 
 /// Cells of smoothing for each cell of distance between samples. Errors of the vertices of a torus, in cells, mean
 /// and maximum, with the local iso-value:
@@ -12,10 +17,14 @@
 /// More would smooth thin parts away where noise keeps the iso-value from following the samples.
 const PER_SPACING: f64 = 0.8;
 
+/// Cells handled together by [`laplacian_dot`].
+const CELLS: usize = 64;
+
 /// Width `σ` of the Gaussian that the indicator is smoothed with.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Smoothing {
     /// 0.8 of the typical distance between samples: what is between them is not known, and ripples otherwise.
+    /// Where samples count by their areas, that distance is the root of their mean, and has a derivative.
     #[default]
     Auto,
     /// This many cells; 0 for none.
@@ -37,6 +46,129 @@ impl Smoothing {
         match self {
             Self::Auto => true,
             Self::Cells(cells) => cells >= 0.0 && cells.is_finite(),
+        }
+    }
+}
+
+/// `σ χ·Lχ̄`, which is `σ̄` for cotangents `chi_bar` of `chi`, both `(nx, ny, nz)` in C order and `L` the sum of second
+/// differences along the axes. The same bits for any number of threads.
+pub fn pullback<T: Real>(smoothing: f64, shape: [usize; 3], chi: &[T], chi_bar: &[T]) -> f64 {
+    let [_, ny, nz] = shape;
+    let plane = |(i, plane): (usize, &[T])| {
+        let rows = plane.chunks_exact(nz).enumerate();
+        rows.map(|(j, row)| laplacian_dot(chi_bar, shape, (i * ny + j) * nz, row))
+            .sum()
+    };
+    let planes = chi.par_chunks_exact(ny * nz).enumerate();
+    smoothing * planes.map(plane).collect::<Vec<f64>>().iter().sum::<f64>()
+}
+
+/// `Σ_k part_k (Lv)_k` over cells along z from place `start` in memory on.
+pub(crate) fn laplacian_dot<T: Real>(
+    values: &[T],
+    shape: [usize; 3],
+    start: usize,
+    part: &[T],
+) -> f64 {
+    let mut sum = 0.0;
+    simd::dispatch(
+        Arch::new(),
+        #[inline(always)]
+        || {
+            let mut room = [T::zero(); CELLS];
+            for (n, part) in part.chunks(CELLS).enumerate() {
+                let differences = &mut room[..part.len()];
+                laplacian(values, shape, start + n * CELLS, differences);
+                let products = differences.iter().zip(part);
+                sum += products.map(|(l, p)| (*l * *p).f64()).sum::<f64>();
+            }
+        },
+    );
+    sum
+}
+
+/// Second differences, summed, of cells along z from place `start` in memory on; even reflection at the walls.
+#[inline(always)]
+fn laplacian<T: Real>(values: &[T], [nx, ny, nz]: [usize; 3], start: usize, out: &mut [T]) {
+    let (i, j, first) = (start / (ny * nz), start / nz % ny, start % nz);
+    let count = out.len();
+    let row = |i: usize, j: usize| {
+        let start = (i * ny + j) * nz + first;
+        &values[start..start + count]
+    };
+    let [a, b, c, d] = [
+        row(i.saturating_sub(1), j),
+        row((i + 1).min(nx - 1), j),
+        row(i, j.saturating_sub(1)),
+        row(i, (j + 1).min(ny - 1)),
+    ];
+    let (here, four) = (row(i, j), T::of(4.0));
+    for k in 0..count {
+        out[k] = a[k] + b[k] + (c[k] + d[k]) - four * here[k];
+    }
+    let line = &values[start - first..start - first + nz];
+    for k in first.max(1)..first + count {
+        out[k - first] += line[k - 1] - line[k];
+    }
+    for k in first..(first + count).min(nz - 1) {
+        out[k - first] += line[k + 1] - line[k];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::neighbors::tests::Random;
+    use crate::poisson::{Plan, Scratch};
+
+    #[test]
+    fn pullback_is_the_derivative_of_a_solve_in_its_smoothing() {
+        let shape = [9, 1, 7];
+        let mut random = Random::new(5);
+        let mut numbers = || {
+            (0..63)
+                .map(|_| random.uniform() - 0.5)
+                .collect::<Vec<f64>>()
+        };
+        let (b, chi_bar) = (numbers(), numbers());
+        let plan = Plan::new(shape);
+        let solve = |smoothing: f64| {
+            let mut chi = b.clone();
+            let solved = plan.solve(&mut chi, smoothing, &mut Scratch::default());
+            solved.expect("sizes match");
+            chi
+        };
+        let value = |smoothing| {
+            let products = solve(smoothing);
+            products
+                .iter()
+                .zip(&chi_bar)
+                .map(|(c, b)| c * b)
+                .sum::<f64>()
+        };
+        let (sigma, step) = (0.7, 1e-5);
+        let difference = (value(sigma + step) - value(sigma - step)) / (2.0 * step);
+        let pulled = pullback(sigma, shape, &solve(sigma), &chi_bar);
+        assert!(
+            (pulled / difference - 1.0).abs() < 1e-8,
+            "{pulled} {difference}"
+        );
+    }
+
+    #[test]
+    fn parts_of_rows_have_the_differences_of_the_rows() {
+        let shape = [3, 4, 11];
+        let mut random = Random::new(6);
+        let values: Vec<f64> = (0..132).map(|_| random.uniform()).collect();
+        let one = |at: usize| laplacian_dot(&values, shape, at, &[1.0]);
+        for row in [0, 11 * 5, 11 * 11] {
+            for (first, count) in [(0, 11), (0, 4), (3, 5), (7, 4)] {
+                let part: Vec<f64> = (0..count).map(|k| k as f64 - 1.7).collect();
+                let start = row + first;
+                let sum = laplacian_dot(&values, shape, start, &part);
+                let plain = (0..count).map(|k| part[k] * one(start + k)).sum::<f64>();
+                assert!((sum - plain).abs() < 1e-13);
+            }
         }
     }
 }

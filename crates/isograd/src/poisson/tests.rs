@@ -196,7 +196,7 @@ fn waves_are_scaled_by_gaussian_over_eigenvalue() {
     for smoothing in [0.0, sigma] {
         let gaussian: f64 = theta
             .iter()
-            .map(|t| (-0.5 * (smoothing * t).powi(2)).exp())
+            .map(|t| (-smoothing * smoothing * (1.0 - t.cos())).exp())
             .product();
         let expected: Vec<f64> = b.iter().map(|v| v * gaussian / eigenvalue).collect();
         // Rounding in f64, with two digits of slack.

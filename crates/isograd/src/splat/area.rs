@@ -28,7 +28,7 @@
 use rayon::prelude::*;
 
 use crate::neighbors::{Candidates, LANES, Neighborhoods};
-use crate::{Real, vector};
+use crate::{Real, parallel, vector};
 
 /// Writes the `(N,)` areas `a_i`, in input order and the unit of the points squared; positive, and 0
 /// for isolated samples.
@@ -51,6 +51,15 @@ pub fn forward<T: Real>(neighborhoods: &Neighborhoods<T>, areas: &mut Vec<T>) {
         }
     };
     samples.map(area).collect_into_vec(areas);
+}
+
+/// The mean of areas that are not 0, and how many those are.
+pub fn mean<T: Real>(areas: &[T]) -> (f64, usize) {
+    let [sum, count] = parallel::sum_array(areas.len(), |i| {
+        let area = areas[i].f64();
+        [area, f64::from(u8::from(area > 0.0))]
+    });
+    (sum / count, count as usize)
 }
 
 /// `a_i` from `Σ_j (1 − r_j²/R_i²)²`, which is at least 1, the sample's own part.

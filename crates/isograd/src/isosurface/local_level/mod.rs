@@ -50,11 +50,11 @@
 //! where dots are what the sums add. In the end `r̄_i` is the cotangent of `χ(x_i)` and of `δ_i`, and `c̄ −= Σ r̄_i`; `ω̄`
 //! and `δ̄` become parts of `ū` and, by `U`, of `â̄` (`trust`); and of `ū`, `n̄ += ū ∇χ`, `x̂̄ += ū ∇(n·∇χ)` and
 //! `χ̄_o += Σ_i ū_i n_i·∇B_o`. `χ̄` of what went in is that of what came out, with this and what
-//! [`iso_value::pullback`](super::iso_value::pullback) adds for `r̄`. It was compared with differences of the map.
+//! [`iso_value::pullback`](super::iso_value::pullback) adds for `r̄`. `σ̄` is that of the width of the step.
 //!
 //! # Not differentiable
 //! `∇(Te)` jumps where a sample crosses a plane through cell centres. `λ` has kinks where the fit is 1, where `ρ` or `λ`
-//! is 0. The smoothing `σ` is held.
+//! is 0.
 
 mod blocks;
 mod forward;
@@ -66,7 +66,7 @@ mod tests;
 mod trust;
 
 pub use forward::{Choice, Scratch, forward};
-pub use pullback::{PullbackScratch, pullback};
+pub use pullback::{Found, PullbackScratch, pullback};
 
 /// Passes; fewer where the samples say no more. The third takes the missed part of a thin trailing edge from
 /// 0.05 to 0.03 cells in the mean, a fourth to 0.029.

@@ -22,12 +22,23 @@ pub struct PullbackScratch<T> {
     node_bars: Vec<NodeBars<T>>,
     /// `Ē`; in the end what is added to `χ̄`.
     total: Vec<T>,
+    /// `Σ λ e`.
+    taken: Vec<T>,
     /// What the pass said at the samples, and the cotangents of that.
     seen: Vec<Seen<T>>,
     seen_bars: Vec<Seen<T>>,
     samples: Vec<Bars<T>>,
     /// Cotangents of slopes and areas for those of trust and shifts.
-    trust: Vec<[f64; 2]>,
+    trust: Vec<[f64; 3]>,
+}
+
+/// Cotangents of what the stage is given besides the samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Found {
+    /// Of the iso-value `c`.
+    pub level: f64,
+    /// Of the smoothing `σ`, in cells, as far as trust and shifts depend on it.
+    pub smoothing: f64,
 }
 
 /// Cotangents at a sample.
@@ -57,8 +68,7 @@ struct NodeBars<T> {
 
 /// Writes into `values_bar` `(N,)` the cotangents of `χ(x_i)`, and adds to `out` what the cotangents `chi_bar` of
 /// the indicator that came out mean for points, normals, areas and grid. `chi_bar` becomes that of the indicator that
-/// went in, but for what `values_bar` means for it. All else is as it was in [`forward`](super::forward). Returns the
-/// cotangent of the iso-value.
+/// went in, but for what `values_bar` means for it. All else is as it was in [`forward`](super::forward).
 #[allow(clippy::too_many_arguments)]
 pub fn pullback<T: Real>(
     grid: &Grid<T>,
@@ -70,14 +80,14 @@ pub fn pullback<T: Real>(
     scratch: &mut PullbackScratch<T>,
     values_bar: &mut Vec<T>,
     out: &mut SampleCotangent<T>,
-) -> f64 {
+) -> Found {
     let near = Near::new(grid, samples, area_weights);
     scratch.start(grid, samples.points, order, chi_bar);
     let mut flattened_bar = 0.0;
     for pass in residual.passes.iter().rev() {
         flattened_bar = scratch.pull_pass(&near, pass, &residual.trust, flattened_bar);
     }
-    scratch.pull_trust(&near, residual);
+    let smoothing = scratch.pull_trust(&near, residual);
     near.spread_slopes(&scratch.blocks, &scratch.samples, &mut scratch.total);
     let blocks = &scratch.blocks;
     blocks.zip_rows(&scratch.total, grid.shape(), chi_bar, |part, bars| {
@@ -90,7 +100,10 @@ pub fn pullback<T: Real>(
     values.collect_into_vec(values_bar);
     near.add(found, out);
     let [sum] = parallel::sum_array(found.len(), |i| [found[i].value.f64()]);
-    -sum
+    Found {
+        level: -sum,
+        smoothing,
+    }
 }
 
 impl<T: Real> PullbackScratch<T> {
@@ -101,6 +114,8 @@ impl<T: Real> PullbackScratch<T> {
         self.seen_bars.resize(points.len(), Seen::default());
         self.total.clear();
         self.total.resize(self.blocks.len() * NODES, T::zero());
+        self.taken.clear();
+        self.taken.resize(self.total.len(), T::zero());
         let blocks = &self.blocks;
         let work = self.total.par_chunks_exact_mut(NODES).enumerate();
         work.for_each(|(block, total)| {
@@ -125,6 +140,9 @@ impl<T: Real> PullbackScratch<T> {
     ) -> f64 {
         near.average(&self.blocks, &pass.offsets, &mut self.nodes);
         near.see(&self.blocks, &self.nodes, &pass.offsets, &mut self.seen);
+        let gain = T::of(pass.gain);
+        let taken = self.taken.par_iter_mut().zip(&self.nodes);
+        taken.for_each(|(taken, node)| *taken += gain * node.mean);
         let gain_bar = self.gain_bar();
         let (sums_bar, before_bar) = pass.sums.pullback(pass.flattened, gain_bar, flattened_bar);
         self.pull_seen(near, pass, sums_bar);
@@ -215,15 +233,15 @@ impl<T: Real> PullbackScratch<T> {
     }
 
     /// From trust and shifts to slopes and areas, and from slopes to places and normals.
-    fn pull_trust(&mut self, near: &Near<'_, T>, residual: &Residual<T>) {
+    fn pull_trust(&mut self, near: &Near<'_, T>, residual: &Residual<T>) -> f64 {
         let samples = &self.samples;
         let found = |i: usize| [samples[i].trust.f64(), samples[i].value.f64()];
-        near.pull_trust(residual, found, &mut self.trust);
+        let smoothing_bar = near.pull_trust(residual, found, &mut self.trust);
         let samples = self.samples.par_iter_mut();
         let parts = self.trust.par_iter().zip(&residual.edges);
         samples
             .zip(parts)
-            .for_each(|(found, (&[slope, area], edge))| {
+            .for_each(|(found, (&[slope, area, _], edge))| {
                 found.slope += T::of(slope);
                 found.area += T::of(area);
                 let [of_normal, of_place] =
@@ -231,6 +249,25 @@ impl<T: Real> PullbackScratch<T> {
                 found.normal = vector::add(found.normal, of_normal);
                 found.place = vector::add(found.place, of_place);
             });
+        smoothing_bar
+    }
+
+    /// `Σ f(row)` over the rows of cells along z near the samples: `f` is given the place of the first in memory and,
+    /// for each, what [`forward`](super::forward) took off `χ`. In one fixed order.
+    pub(crate) fn sum_of_taken(
+        &self,
+        grid: &Grid<T>,
+        f: impl Fn(usize, &[T]) -> f64 + Sync,
+    ) -> f64 {
+        let of_block = |(block, taken): (usize, &[T])| {
+            let rows = self.blocks.rows(block, grid.shape());
+            let rows = rows.zip(taken.chunks_exact(EDGE));
+            let rows = rows.filter_map(|(row, taken)| Some((row?, taken)));
+            rows.map(|((start, count), taken)| f(start, &taken[..count]))
+                .sum()
+        };
+        let blocks = self.taken.par_chunks_exact(NODES).enumerate();
+        blocks.map(of_block).collect::<Vec<f64>>().iter().sum()
     }
 }
 

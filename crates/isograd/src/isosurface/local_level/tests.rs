@@ -12,6 +12,7 @@ struct Setting<T> {
     normals: Vec<[T; 3]>,
     areas: Vec<T>,
     chi: Field<T>,
+    smoothing: f64,
 }
 
 fn grid<T: Real>(lower: [f64; 3], spacing: f64) -> Grid<T> {
@@ -34,6 +35,7 @@ impl<T: Real> Setting<T> {
                 .map(|_| T::of(7.0 / n as f64 * (0.5 + random.uniform())))
                 .collect(),
             chi: indicator(grid([-1.41, -1.36, -0.83], 0.1)),
+            smoothing: 0.5,
         }
     }
 
@@ -75,7 +77,7 @@ impl<T: Real> Setting<T> {
             self.samples(),
             Choice {
                 area_weights,
-                smoothing: 0.5,
+                smoothing: self.smoothing,
                 thin,
             },
             &level,
@@ -287,6 +289,7 @@ struct Rates {
     chi: Vec<f64>,
     lower: [f64; 3],
     spacing: f64,
+    smoothing: f64,
 }
 
 impl Rates {
@@ -302,6 +305,7 @@ impl Rates {
             chi: numbers(cells, random),
             lower: [0.3, -0.2, 0.5],
             spacing: 0.04,
+            smoothing: 0.4,
         }
     }
 }
@@ -326,6 +330,7 @@ impl Setting<f64> {
             normals: vectors(&self.normals, &rates.normals),
             areas: numbers(&self.areas, &rates.areas),
             chi: Field::new(grid, chi).expect("sizes match"),
+            smoothing: self.smoothing + s * rates.smoothing,
         }
     }
 
@@ -342,7 +347,7 @@ impl Setting<f64> {
         };
         let (mut values_bar, mut chi_bar) = (Vec::new(), w.to_vec());
         let (order, grid, samples) = (self.level().1, self.chi.grid(), self.samples());
-        let level_bar = pullback(
+        let found = pullback(
             grid,
             samples,
             area_weights,
@@ -358,7 +363,7 @@ impl Setting<f64> {
             samples,
             &level,
             &order,
-            level_bar,
+            found.level,
             &values_bar,
             &mut chi_bar,
             &mut out,
@@ -373,6 +378,7 @@ impl Setting<f64> {
             + product(&chi_bar, &rates.chi)
             + vector::dot(out.grid.lower, rates.lower)
             + out.grid.spacing * rates.spacing
+            + found.smoothing * rates.smoothing
     }
 }
 

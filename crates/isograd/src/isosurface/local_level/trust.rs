@@ -42,6 +42,7 @@ impl<T: Real> Near<'_, T> {
         residual.step = Step {
             usual: (sum / area).sqrt(),
             width: (STEP + choice.smoothing * choice.smoothing).sqrt(),
+            smoothing: choice.smoothing,
             thin: choice.thin,
         };
         residual.area = area;
@@ -77,13 +78,14 @@ impl<T: Real> Near<'_, T> {
         }
     }
 
-    /// Fills `bars` with the cotangents of `u` and `â` of every sample; `found(i)` has those of its `ω` and `δ`.
+    /// Fills `bars` with the cotangents of `u` and `â` of every sample; `found(i)` has those of its `ω` and `δ`. Returns
+    /// that of the smoothing.
     pub(super) fn pull_trust(
         &self,
         residual: &Residual<T>,
         found: impl Fn(usize) -> [f64; 2] + Sync,
-        bars: &mut Vec<[f64; 2]>,
-    ) {
+        bars: &mut Vec<[f64; 3]>,
+    ) -> f64 {
         let (edges, step) = (&residual.edges, residual.step);
         let samples = 0..edges.len();
         let direct = samples.into_par_iter().map(|i| {
@@ -91,7 +93,7 @@ impl<T: Real> Near<'_, T> {
             step.pullback(self.slope(edges, i), trust_bar, shift_bar)
         });
         direct.collect_into_vec(bars);
-        let [usual_bar] = parallel::sum_array(edges.len(), |i| [bars[i][1]]);
+        let [usual_bar, width_bar] = parallel::sum_array(edges.len(), |i| [bars[i][1], bars[i][2]]);
         let share = match usual_bar == 0.0 {
             true => 0.0,
             false => usual_bar / (step.usual * residual.area),
@@ -101,6 +103,7 @@ impl<T: Real> Near<'_, T> {
             bars[0] += share * a * slope;
             bars[1] = 0.5 * share * (slope * slope - step.usual * step.usual);
         });
+        width_bar * step.smoothing / step.width
     }
 }
 
@@ -109,8 +112,9 @@ impl<T: Real> Near<'_, T> {
 pub(super) struct Step {
     /// Its slope at the surface, per cell.
     usual: f64,
-    /// Its standard deviation, in cells.
+    /// Its standard deviation, in cells, and what the smoothing has of it.
     width: f64,
+    smoothing: f64,
     /// Whether parts thinner than a cell are followed and made thicker.
     thin: bool,
 }
@@ -168,26 +172,30 @@ impl Step {
         (-0.125 * (thickness / self.width).powi(2)).exp()
     }
 
-    /// Cotangents of the slope and of the usual slope, for those of `ω` and `δ`.
-    fn pullback(self, slope: f64, trust_bar: f64, shift_bar: f64) -> [f64; 2] {
+    /// Cotangents of the slope, the usual slope and the width, for those of `ω` and `δ`.
+    fn pullback(self, slope: f64, trust_bar: f64, shift_bar: f64) -> [f64; 3] {
         let (share, thickness) = (self.share(slope), self.thickness(slope));
         if !(share > 0.0 && share < STEEPEST) || (trust_bar, shift_bar) == (0.0, 0.0) {
-            return [0.0; 2];
+            return [0.0; 3];
         }
         let ([low, high], t) = (self.range(), self.followed(slope));
         let mut thickness_bar = trust_bar * 6.0 * t * (1.0 - t) / (high - low);
-        let mut usual_bar = 0.0;
-        let rise = self.rise(thickness);
+        let (mut usual_bar, mut width_bar) = (0.0, 0.0);
+        let (rise, w) = (self.rise(thickness), self.width);
         if self.thin && rise > 0.0 {
-            let w = self.width;
-            let fall = thickness * thickness / (4.0 * w * w) * self.depth(thickness);
-            thickness_bar += shift_bar * self.usual * (rise - fall);
+            // How much a depth grows with the logarithm of the width.
+            let growth = |t: f64| 0.25 * (t / w).powi(2) * self.depth(t);
+            thickness_bar += shift_bar * self.usual * (rise - growth(thickness));
             usual_bar += shift_bar * thickness * rise;
+            let growth = growth(thickness) - growth(LEAST_THICKNESS);
+            width_bar += shift_bar * self.usual * thickness * growth / w;
         }
+        width_bar += thickness_bar * thickness / w;
         let share_bar = thickness_bar * self.width * self.width / (thickness * (1.0 - share));
         [
             share_bar / self.usual,
             usual_bar - share_bar * share / self.usual,
+            width_bar,
         ]
     }
 }
@@ -212,6 +220,7 @@ mod tests {
             let step = Step {
                 usual: 1.0 / (width * std::f64::consts::TAU.sqrt()),
                 width,
+                smoothing: 0.0,
                 thin: true,
             };
             for t in [0.05, 0.3, 0.7, 0.95, 2.0] {
@@ -232,6 +241,7 @@ mod tests {
         let step = Step {
             usual: 0.0,
             width: 1.0,
+            smoothing: 0.0,
             thin: true,
         };
         assert_eq!(step.thickness(0.0), 0.0);
@@ -245,16 +255,25 @@ mod tests {
             for slope in [-0.1, 0.003, 0.02, 0.1, 0.17, 0.21, 0.25, 0.45] {
                 let (usual, width) = (0.4, 0.95);
                 let (trust_bar, shift_bar) = (0.8, 1.7);
-                let value = |slope: f64, usual: f64| {
-                    let step = Step { usual, width, thin };
+                let step = |usual: f64, width: f64| Step {
+                    usual,
+                    width,
+                    smoothing: 0.0,
+                    thin,
+                };
+                let value = |slope: f64, usual: f64, width: f64| {
+                    let step = step(usual, width);
                     trust_bar * step.trust(slope) + shift_bar * step.shift(slope)
                 };
-                let step = Step { usual, width, thin };
-                let [slope_bar, usual_bar] = step.pullback(slope, trust_bar, shift_bar);
-                let h = 1e-6;
-                let along_slope = (value(slope + h, usual) - value(slope - h, usual)) / (2.0 * h);
-                let along_usual = (value(slope, usual + h) - value(slope, usual - h)) / (2.0 * h);
-                for (got, expected) in [(slope_bar, along_slope), (usual_bar, along_usual)] {
+                let bars = step(usual, width).pullback(slope, trust_bar, shift_bar);
+                for (input, got) in bars.into_iter().enumerate() {
+                    let at = |h: f64| {
+                        let mut inputs = [slope, usual, width];
+                        inputs[input] += h;
+                        let [slope, usual, width] = inputs;
+                        value(slope, usual, width)
+                    };
+                    let expected = (at(1e-6) - at(-1e-6)) / 2e-6;
                     let scale = expected.abs().max(1.0);
                     assert!(
                         (got - expected).abs() < 1e-6 * scale,
