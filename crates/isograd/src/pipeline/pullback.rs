@@ -184,7 +184,7 @@ impl<T: Real> Reconstruction<T> {
         scratch.values.clear();
         if self.options.level != Level::Mean {
             let found = local_level::pullback(
-                chi.grid(),
+                chi,
                 given,
                 self.options.area_weights,
                 &residuals.splat,

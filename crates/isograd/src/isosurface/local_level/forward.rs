@@ -6,7 +6,6 @@ use rayon::prelude::*;
 use super::blocks::{Blocks, NODES, Overlap};
 use super::gain::Sums;
 use super::stencil::Stencil;
-use super::trust::Edge;
 use super::{LEAST_AREA, PASSES, Pass, Residual};
 use crate::isosurface::iso_value;
 use crate::splat::{self, Samples};
@@ -73,7 +72,9 @@ pub fn forward<T: Real>(
     let grid = *chi.grid();
     let near = Near::new(&grid, samples, choice.area_weights);
     scratch.start(&near, order, level);
-    near.trust(chi, choice, &mut scratch.now, residual);
+    let mut slopes = std::mem::take(residual.slopes());
+    near.trust(chi, choice, &mut scratch.now, &mut slopes, residual);
+    *residual.slopes() = slopes;
     let mut flattened = 0.0;
     let mut made = 0;
     while made < PASSES {
@@ -84,7 +85,9 @@ pub fn forward<T: Real>(
         let pass = &mut pass[0];
         pass.flattened = flattened;
         scratch.weigh(&residual.trust, &mut pass.offsets);
-        scratch.follow_slopes(&residual.edges, before.last(), &near, &mut pass.slopes);
+        if let Some(before) = before.last() {
+            scratch.follow_slopes(before, &mut pass.slopes);
+        }
         near.average(&scratch.blocks, &pass.offsets, &mut scratch.nodes);
         let (blocks, seen) = (&scratch.blocks, &mut scratch.seen);
         near.see(blocks, &scratch.nodes, &pass.offsets, seen);
@@ -129,19 +132,11 @@ impl<T: Real> Scratch<T> {
     }
 
     /// `u`: slopes of `χ` along the normals, as they are after the pass `before`.
-    fn follow_slopes(
-        &self,
-        edges: &[Edge<T>],
-        before: Option<&Pass<T>>,
-        near: &Near<'_, T>,
-        slopes: &mut Vec<T>,
-    ) {
-        let at = |i: usize| match before {
-            None => vector::dot(edges[i].gradient, near.samples.normals[i]),
-            Some(pass) => pass.slopes[i] - T::of(pass.gain) * self.seen[i].slope,
-        };
-        let samples = 0..edges.len();
-        samples.into_par_iter().map(at).collect_into_vec(slopes);
+    fn follow_slopes(&self, before: &Pass<T>, slopes: &mut Vec<T>) {
+        let gain = T::of(before.gain);
+        let samples = before.slopes.par_iter().zip(&self.seen);
+        let now = samples.map(|(&slope, seen)| slope - gain * seen.slope);
+        now.collect_into_vec(slopes);
     }
 
     /// Takes `λ e` off the samples, and adds it to the cells' total.

@@ -32,8 +32,8 @@
 //! of a plate of one cell would be.
 //!
 //! # Residual
-//! `ω_i`; `∇χ` and `∇(n·∇χ)` at the samples; of each pass the sums that `λ` is made of, `s_i` and `u_i`. The sums over
-//! cells are computed again.
+//! `ω_i`; of each pass the sums that `λ` is made of, `s_i` and `u_i`. The sums over cells are computed again, and with
+//! them `χ` as it was.
 //!
 //! # Pullback
 //! Given `χ̄` of what came out; `T_o(x)` are the trilinear weights, `Ē = −χ̄`, `M_o = D_o e_o`. Backwards through the
@@ -59,6 +59,7 @@
 mod blocks;
 mod forward;
 mod gain;
+mod pull_cells;
 mod pullback;
 mod stencil;
 #[cfg(test)]
@@ -93,8 +94,6 @@ const FLATTENED: f64 = 0.5;
 pub struct Residual<T> {
     /// `(N,)` `ω_i`.
     trust: Vec<T>,
-    /// `(N,)`
-    edges: Vec<trust::Edge<T>>,
     step: trust::Step,
     /// `Σ â_i`.
     area: f64,
@@ -125,6 +124,14 @@ impl<T: crate::Real> Residual<T> {
     pub fn bytes(&self) -> usize {
         let of_pass = |pass: &Pass<T>| [&pass.offsets, &pass.slopes].map(|v| size_of_val(&v[..]));
         let passes = self.passes.iter().flat_map(of_pass);
-        passes.sum::<usize>() + size_of_val(&self.trust[..]) + size_of_val(&self.edges[..])
+        passes.sum::<usize>() + size_of_val(&self.trust[..])
+    }
+
+    /// `u_i` before the first pass, made or not.
+    fn slopes(&mut self) -> &mut Vec<T> {
+        if self.passes.is_empty() {
+            self.passes.push(Pass::default());
+        }
+        &mut self.passes[0].slopes
     }
 }

@@ -3,30 +3,30 @@
 
 use rayon::prelude::*;
 
-use super::blocks::{Blocks, EDGE, NODES, Overlap};
+use super::blocks::{Blocks, EDGE, NODES};
 use super::forward::{Near, Node, Seen};
 use super::gain::Sums;
-use super::stencil::Stencil;
+use super::pull_cells::NodeBars;
 use super::{Pass, Residual};
 use crate::data::GridCotangent;
 use crate::splat::{self, SampleCotangent, Samples};
-use crate::{Grid, Real, parallel, simd, vector};
+use crate::{Field, Grid, Real, parallel, simd, vector};
 
 /// Memory of the pullback, kept between calls.
 #[derive(Clone, Debug, Default)]
 pub struct PullbackScratch<T> {
-    blocks: Blocks,
+    pub(super) blocks: Blocks,
     /// `D` and `e` at the cells of the blocks.
-    nodes: Vec<Node<T>>,
+    pub(super) nodes: Vec<Node<T>>,
     /// `M̄` and `D̄` there.
-    node_bars: Vec<NodeBars<T>>,
+    pub(super) node_bars: Vec<NodeBars<T>>,
     /// `Ē`; in the end what is added to `χ̄`.
-    total: Vec<T>,
+    pub(super) total: Vec<T>,
     /// `Σ λ e`.
     taken: Vec<T>,
     /// What the pass said at the samples, and the cotangents of that.
     seen: Vec<Seen<T>>,
-    seen_bars: Vec<Seen<T>>,
+    pub(super) seen_bars: Vec<Seen<T>>,
     samples: Vec<Bars<T>>,
     /// Cotangents of slopes and areas for those of trust and shifts.
     trust: Vec<[f64; 3]>,
@@ -43,35 +43,27 @@ pub struct Found {
 
 /// Cotangents at a sample.
 #[derive(Clone, Copy, Debug, Default)]
-struct Bars<T> {
+pub(super) struct Bars<T> {
     /// `r̄`.
-    value: T,
+    pub(super) value: T,
     /// `ū`.
-    slope: T,
+    pub(super) slope: T,
     /// `ω̄`.
-    trust: T,
+    pub(super) trust: T,
     /// Of the index coordinates.
-    place: [T; 3],
-    normal: [T; 3],
+    pub(super) place: [T; 3],
+    pub(super) normal: [T; 3],
     /// Of `â`.
-    area: T,
-}
-
-/// Cotangents at a cell.
-#[derive(Clone, Copy, Debug, Default)]
-struct NodeBars<T> {
-    /// `M̄`.
-    sum: T,
-    /// `D̄`.
-    area: T,
+    pub(super) area: T,
 }
 
 /// Writes into `values_bar` `(N,)` the cotangents of `χ(x_i)`, and adds to `out` what the cotangents `chi_bar` of
 /// the indicator that came out mean for points, normals, areas and grid. `chi_bar` becomes that of the indicator that
-/// went in, but for what `values_bar` means for it. All else is as it was in [`forward`](super::forward).
+/// went in, but for what `values_bar` means for it. `chi` is what came out; all else is as it was in
+/// [`forward`](super::forward).
 #[allow(clippy::too_many_arguments)]
 pub fn pullback<T: Real>(
-    grid: &Grid<T>,
+    chi: &Field<T>,
     samples: Samples<'_, T>,
     area_weights: bool,
     order: &splat::Residual,
@@ -81,6 +73,7 @@ pub fn pullback<T: Real>(
     values_bar: &mut Vec<T>,
     out: &mut SampleCotangent<T>,
 ) -> Found {
+    let grid = chi.grid();
     let near = Near::new(grid, samples, area_weights);
     scratch.start(grid, samples.points, order, chi_bar);
     let mut flattened_bar = 0.0;
@@ -88,6 +81,7 @@ pub fn pullback<T: Real>(
         flattened_bar = scratch.pull_pass(&near, pass, &residual.trust, flattened_bar);
     }
     let smoothing = scratch.pull_trust(&near, residual);
+    scratch.pull_slopes(&near, chi);
     near.spread_slopes(&scratch.blocks, &scratch.samples, &mut scratch.total);
     let blocks = &scratch.blocks;
     blocks.zip_rows(&scratch.total, grid.shape(), chi_bar, |part, bars| {
@@ -232,24 +226,37 @@ impl<T: Real> PullbackScratch<T> {
         });
     }
 
-    /// From trust and shifts to slopes and areas, and from slopes to places and normals.
+    /// From trust and shifts to slopes and areas. Returns the cotangent of the smoothing.
     fn pull_trust(&mut self, near: &Near<'_, T>, residual: &Residual<T>) -> f64 {
+        // Where no pass was made there is nothing to pull.
+        let Some(first) = residual.passes.first() else {
+            return 0.0;
+        };
         let samples = &self.samples;
         let found = |i: usize| [samples[i].trust.f64(), samples[i].value.f64()];
-        let smoothing_bar = near.pull_trust(residual, found, &mut self.trust);
-        let samples = self.samples.par_iter_mut();
-        let parts = self.trust.par_iter().zip(&residual.edges);
-        samples
-            .zip(parts)
-            .for_each(|(found, (&[slope, area, _], edge))| {
-                found.slope += T::of(slope);
-                found.area += T::of(area);
-                let [of_normal, of_place] =
-                    [edge.gradient, edge.bend].map(|v| vector::scale(v, found.slope));
-                found.normal = vector::add(found.normal, of_normal);
-                found.place = vector::add(found.place, of_place);
-            });
+        let smoothing_bar = near.pull_trust(&first.slopes, residual, found, &mut self.trust);
+        let samples = self.samples.par_iter_mut().zip(&self.trust);
+        samples.for_each(|(found, &[slope, area, _])| {
+            found.slope += T::of(slope);
+            found.area += T::of(area);
+        });
         smoothing_bar
+    }
+
+    /// From the slopes before the first pass to places and normals.
+    fn pull_slopes(&mut self, near: &Near<'_, T>, chi: &Field<T>) {
+        let (blocks, taken) = (&self.blocks, &self.taken);
+        let samples = self.samples.par_iter_mut().enumerate();
+        samples.for_each(|(i, found)| {
+            let Some(edge) = near.edge(chi, i, |corner| blocks.read(taken, corner)) else {
+                return;
+            };
+            let bend = edge.bend(near.samples.normals[i]);
+            let [of_normal, of_place] =
+                [edge.gradient, bend].map(|v| vector::scale(v, found.slope));
+            found.normal = vector::add(found.normal, of_normal);
+            found.place = vector::add(found.place, of_place);
+        });
     }
 
     /// `Σ f(row)` over the rows of cells along z near the samples: `f` is given the place of the first in memory and,
@@ -284,170 +291,7 @@ fn offset_bar<T: Real>(
     near.area(i) * (T::of(bars.agreement) * p + T::of(2.0 * bars.offset) * s)
 }
 
-/// Adds `v·∇B` to the cells of a block.
-#[inline(always)]
-fn spread_slope<T: Real>(stencil: &Stencil<T>, v: [T; 3], block: [usize; 3], nodes: &mut [T]) {
-    let ([x, y, z], [dx, dy, dz]) = (stencil.weights(), stencil.slopes());
-    Overlap::new(stencil.corner, 3, block).for_each(
-        #[inline(always)]
-        |i, j, k, at| {
-            let flat = v[0] * dx[i] * y[j] + v[1] * x[i] * dy[j];
-            nodes[at] += flat * z[k] + v[2] * x[i] * y[j] * dz[k];
-        },
-    );
-}
-
 impl<T: Real> Near<'_, T> {
-    /// Writes `M̄` and `D̄` at every node.
-    fn pull_nodes(&self, scratch: &mut PullbackScratch<T>, pass: &Pass<T>) {
-        let PullbackScratch {
-            blocks,
-            nodes,
-            node_bars,
-            total,
-            seen_bars,
-            ..
-        } = scratch;
-        let gain = T::of(pass.gain);
-        node_bars.resize(nodes.len(), NodeBars::default());
-        let work = node_bars.par_chunks_exact_mut(NODES).enumerate();
-        work.for_each(|(block, bars)| {
-            simd::dispatch(
-                self.arch,
-                #[inline(always)]
-                || {
-                    let cells = block * NODES..(block + 1) * NODES;
-                    let (nodes, total) = (&nodes[cells.clone()], &total[cells]);
-                    let mut means = [T::zero(); NODES];
-                    for (mean, &total) in means.iter_mut().zip(total) {
-                        *mean = gain * total;
-                    }
-                    bars.fill(NodeBars::default());
-                    for i in blocks.samples(block) {
-                        let bar = (&seen_bars[i], pass.offsets[i]);
-                        self.pull_to_nodes(i, bar, blocks.corner(block), nodes, &mut means, bars);
-                    }
-                    for ((bars, node), mean) in bars.iter_mut().zip(nodes).zip(means) {
-                        let sum = mean / node.area;
-                        bars.sum += sum;
-                        bars.area -= sum * node.mean;
-                    }
-                },
-            );
-        });
-    }
-
-    /// Adds what sample `i` says of the cells of a block: `ē`, and `M̄` and `D̄` of the forecast without it.
-    #[inline(always)]
-    fn pull_to_nodes(
-        &self,
-        i: usize,
-        (bar, s): (&Seen<T>, T),
-        block: [usize; 3],
-        nodes: &[Node<T>],
-        means: &mut [T; NODES],
-        bars: &mut [NodeBars<T>],
-    ) {
-        let Some(stencil) = self.stencil(i) else {
-            return;
-        };
-        let slope = vector::scale(self.samples.normals[i], bar.slope);
-        spread_slope(&stencil, slope, block, means);
-        let ([x, y, z], area, corners) = (stencil.weights(), self.area(i), stencil.corners());
-        let [px, py, pz] = corners.place;
-        let lowest = std::array::from_fn(|a| stencil.corner[a] + corners.place[a]);
-        Overlap::new(lowest, 2, block).for_each(
-            #[inline(always)]
-            |i, j, k, at| {
-                let (weight, _) = corners.weight_and_slope([i, j, k]);
-                means[at] += weight * bar.mean;
-                let mine = area * x[px + i] * y[py + j] * z[pz + k];
-                let [without, others] = nodes[at].without(mine, s);
-                let part = weight * bar.without_it / others;
-                bars[at].sum += part;
-                bars[at].area -= part * without;
-            },
-        );
-    }
-
-    /// From the nodes to sample `i`, whose `ω r` before the pass is `s`. Returns `s̄`, but for that in the sums.
-    #[inline(always)]
-    fn pull_sample(
-        &self,
-        blocks: &Blocks,
-        (nodes, node_bars): (&[Node<T>], &[NodeBars<T>]),
-        i: usize,
-        s: T,
-        bar: &Seen<T>,
-        found: &mut Bars<T>,
-    ) -> T {
-        let Some(stencil) = self.stencil(i) else {
-            return T::zero();
-        };
-        let ([x, y, z], [dx, dy, dz]) = (stencil.weights(), stencil.slopes());
-        let (area, corners) = (self.area(i), stencil.corners());
-        let near: [[[Node<T>; 3]; 3]; 3] = blocks.read(nodes, stencil.corner);
-        let bars: [[[NodeBars<T>; 3]; 3]; 3] = blocks.read(node_bars, stencil.corner);
-        // s M̄ + D̄, and the cotangents of the weights that the sample is left out with.
-        let mut weights_bar = bars.map(|plane| plane.map(|row| row.map(|b| s * b.sum + b.area)));
-        let (mut s_bar, mut place) = (T::zero(), [T::zero(); 3]);
-        for ([i, j, k], at) in corners.cells() {
-            let (weight, slope) = corners.weight_and_slope(at);
-            let mine = area * x[i] * y[j] * z[k];
-            let [without, others] = near[i][j][k].without(mine, s);
-            let part = weight * bar.without_it / others;
-            weights_bar[i][j][k] += part * (without - s);
-            s_bar -= part * mine;
-            let value_bar = bar.mean * near[i][j][k].mean + bar.without_it * without;
-            place = vector::add(place, vector::scale(slope, value_bar));
-        }
-        let mut both = T::zero();
-        let mut gradient = [T::zero(); 3];
-        for i in 0..3 {
-            for j in 0..3 {
-                for k in 0..3 {
-                    let bar = weights_bar[i][j][k];
-                    let weight = x[i] * y[j] * z[k];
-                    s_bar += area * weight * bars[i][j][k].sum;
-                    both += weight * bar;
-                    gradient[0] += dx[i] * y[j] * z[k] * bar;
-                    gradient[1] += x[i] * dy[j] * z[k] * bar;
-                    gradient[2] += x[i] * y[j] * dz[k] * bar;
-                }
-            }
-        }
-        let of_mean = stencil.derivatives(|i, j| near[i][j].map(|node| node.mean));
-        place = vector::add(place, vector::scale(gradient, area));
-        let bend = of_mean.bend(self.samples.normals[i]);
-        place = vector::add(place, vector::scale(bend, bar.slope));
-        found.place = vector::add(found.place, place);
-        let normal = vector::scale(of_mean.gradient, bar.slope);
-        found.normal = vector::add(found.normal, normal);
-        found.area += both;
-        s_bar
-    }
-
-    /// Writes into `nodes` what the slopes `u` before the first pass mean for the cells.
-    fn spread_slopes(&self, blocks: &Blocks, found: &[Bars<T>], nodes: &mut [T]) {
-        let work = nodes.par_chunks_exact_mut(NODES).enumerate();
-        work.for_each(|(block, nodes)| {
-            simd::dispatch(
-                self.arch,
-                #[inline(always)]
-                || {
-                    nodes.fill(T::zero());
-                    for i in blocks.samples(block) {
-                        let Some(stencil) = self.stencil(i) else {
-                            continue;
-                        };
-                        let slope = vector::scale(self.samples.normals[i], found[i].slope);
-                        spread_slope(&stencil, slope, blocks.corner(block), nodes);
-                    }
-                },
-            );
-        });
-    }
-
     /// From index coordinates and areas in cells to those of the user.
     fn add(&self, found: &[Bars<T>], out: &mut SampleCotangent<T>) {
         let h = self.grid.spacing();

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::forward::{Choice, Near};
+use super::stencil::Derivatives;
 use super::{FOLLOWED, FOLLOWED_THIN, LEAST_THICKNESS, Residual};
 use crate::{Field, Real, parallel, vector};
 
@@ -13,30 +14,26 @@ const STEP: f64 = 0.75;
 /// Share of the usual slope above which the body counts as thick.
 const STEEPEST: f64 = 0.999;
 
-/// What quadratic B-splines, which have no seams between cells, make of the indicator at a sample.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Edge<T> {
-    /// `∇χ`, per cell.
-    pub(super) gradient: [T; 3],
-    /// `∇(n·∇χ)`, per cell².
-    pub(super) bend: [T; 3],
-}
-
 impl<T: Real> Near<'_, T> {
-    /// Fills `ω_i` from the slope of `chi` along the normals, and adds `δ_i` to `now`.
+    /// Fills `slopes` with the `u_i` of `chi` and `ω_i`, and adds `δ_i` to `now`.
     pub(super) fn trust(
         &self,
         chi: &Field<T>,
         choice: Choice,
         now: &mut [T],
+        slopes: &mut Vec<T>,
         residual: &mut Residual<T>,
     ) {
         let samples = 0..self.samples.points.len();
-        let edges = samples.into_par_iter().map(|i| self.edge(chi, i));
-        edges.collect_into_vec(&mut residual.edges);
-        let edges = &residual.edges;
-        let [sum, area] = parallel::sum_array(edges.len(), |i| {
-            let (a, slope) = (self.area(i).f64(), self.slope(edges, i));
+        let slope = |i: usize| {
+            let edge = self.edge(chi, i, |_| [[[T::zero(); 3]; 3]; 3]);
+            edge.map_or(T::zero(), |edge| {
+                vector::dot(edge.gradient, self.samples.normals[i])
+            })
+        };
+        samples.into_par_iter().map(slope).collect_into_vec(slopes);
+        let [sum, area] = parallel::sum_array(slopes.len(), |i| {
+            let (a, slope) = (self.area(i).f64(), rising(slopes[i]));
             [a * slope * slope, a]
         });
         residual.step = Step {
@@ -47,64 +44,66 @@ impl<T: Real> Near<'_, T> {
         };
         residual.area = area;
         let step = residual.step;
-        let trust = now.par_iter_mut().enumerate().map(|(i, now)| {
-            let slope = self.slope(edges, i);
+        let trust = now.par_iter_mut().zip(slopes).map(|(now, slope)| {
+            let slope = rising(*slope);
             *now += T::of(step.shift(slope));
             T::of(step.trust(slope))
         });
         trust.collect_into_vec(&mut residual.trust);
     }
 
-    /// `n·∇χ` at sample `i`, per cell; 0 where it falls instead.
+    /// What B-splines make of `chi` at sample `i`, with what is added to the 3³ cells that begin at a corner.
     #[inline(always)]
-    fn slope(&self, edges: &[Edge<T>], i: usize) -> f64 {
-        let slope = vector::dot(edges[i].gradient, self.samples.normals[i]);
-        slope.f64().max(0.0)
-    }
-
-    fn edge(&self, chi: &Field<T>, i: usize) -> Edge<T> {
-        let Some(stencil) = self.stencil(i) else {
-            return Edge::default();
-        };
+    pub(super) fn edge(
+        &self,
+        chi: &Field<T>,
+        i: usize,
+        added: impl Fn([usize; 3]) -> [[[T; 3]; 3]; 3],
+    ) -> Option<Derivatives<T>> {
+        let stencil = self.stencil(i)?;
         let [_, ny, nz] = self.grid.shape();
         let [x, y, z] = stencil.corner;
-        let derivatives = stencil.derivatives(|i, j| {
+        let added = added(stencil.corner);
+        Some(stencil.derivatives(|i, j| {
             let start = ((x + i) * ny + y + j) * nz + z;
-            std::array::from_fn(|k| chi.values()[start + k])
-        });
-        Edge {
-            gradient: derivatives.gradient,
-            bend: derivatives.bend(self.samples.normals[i]),
-        }
+            std::array::from_fn(|k| chi.values()[start + k] + added[i][j][k])
+        }))
     }
 
     /// Fills `bars` with the cotangents of `u` and `â` of every sample; `found(i)` has those of its `ω` and `δ`. Returns
     /// that of the smoothing.
     pub(super) fn pull_trust(
         &self,
+        slopes: &[T],
         residual: &Residual<T>,
         found: impl Fn(usize) -> [f64; 2] + Sync,
         bars: &mut Vec<[f64; 3]>,
     ) -> f64 {
-        let (edges, step) = (&residual.edges, residual.step);
-        let samples = 0..edges.len();
+        let step = residual.step;
+        let samples = 0..slopes.len();
         let direct = samples.into_par_iter().map(|i| {
             let [trust_bar, shift_bar] = found(i);
-            step.pullback(self.slope(edges, i), trust_bar, shift_bar)
+            step.pullback(rising(slopes[i]), trust_bar, shift_bar)
         });
         direct.collect_into_vec(bars);
-        let [usual_bar, width_bar] = parallel::sum_array(edges.len(), |i| [bars[i][1], bars[i][2]]);
+        let [usual_bar, width_bar] =
+            parallel::sum_array(slopes.len(), |i| [bars[i][1], bars[i][2]]);
         let share = match usual_bar == 0.0 {
             true => 0.0,
             false => usual_bar / (step.usual * residual.area),
         };
         bars.par_iter_mut().enumerate().for_each(|(i, bars)| {
-            let (a, slope) = (self.area(i).f64(), self.slope(edges, i));
+            let (a, slope) = (self.area(i).f64(), rising(slopes[i]));
             bars[0] += share * a * slope;
             bars[1] = 0.5 * share * (slope * slope - step.usual * step.usual);
         });
         width_bar * step.smoothing / step.width
     }
+}
+
+/// A slope, or 0 where `χ` falls instead.
+fn rising<T: Real>(slope: T) -> f64 {
+    slope.f64().max(0.0)
 }
 
 /// The step of `χ` through the surface of a thick body: a Gaussian one.
