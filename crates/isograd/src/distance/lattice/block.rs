@@ -10,8 +10,11 @@ pub(super) const BLOCK: usize = 16;
 /// Blocks that a block is cut into.
 pub(super) const CHILDREN: usize = 8;
 
-/// Sides of a packet, which is measured at once.
-pub(super) const PACKET: [usize; 3] = [2, 2, 4];
+/// Cells along a side of a block whose cells are measured.
+const SIDE: usize = 4;
+
+/// Packets in a block of side 4: columns of 2×2×4 cells.
+pub(super) const PACKETS: usize = 4;
 
 /// A box of cells, clipped to the grid.
 #[derive(Clone, Copy, Debug)]
@@ -36,30 +39,52 @@ impl Block {
         let start = std::array::from_fn(|a| self.start[a] + half * bit(index, a));
         Self::new(start, half, self.end)
     }
+}
 
-    /// The packets of a block of side 4 that are in the grid, with their numbers: children `2 i` and `2 i + 1`
-    /// are the halves of packet `i`.
-    pub(super) fn packets(&self) -> impl Iterator<Item = (usize, Self)> {
-        (0..4)
-            .map(|index| {
-                let start = [
-                    self.start[0] + 2 * (index >> 1),
-                    self.start[1] + 2 * (index & 1),
-                    self.start[2],
-                ];
-                (index, Self { start, ..*self })
-            })
-            .filter(|(_, packet)| !packet.is_empty())
+/// The cells of a block of side 4.
+pub(super) struct Cells {
+    /// Their centres along each axis, in the user's unit; that of the last cell inside the grid for those outside.
+    pub centres: [[f64; SIDE]; 3],
+    /// Cells inside the grid along each axis.
+    pub count: [usize; 3],
+}
+
+impl Cells {
+    pub(super) fn new<T: Real>(grid: &Grid<T>, block: &Block) -> Self {
+        let mut centres = [[0.0; SIDE]; 3];
+        for step in 0..SIDE {
+            let cell = std::array::from_fn(|a| (block.start[a] + step).min(block.end[a] - 1));
+            let centre = grid.center_f64(cell);
+            for a in 0..3 {
+                centres[a][step] = centre[a];
+            }
+        }
+        Self {
+            centres,
+            count: std::array::from_fn(|a| block.end[a] - block.start[a]),
+        }
+    }
+
+    /// The first cell of a packet, from that of the block. The halves of packet `i` are children `2 i` and `2 i + 1`.
+    pub(super) fn packet(index: usize) -> [usize; 3] {
+        [2 * (index >> 1), 2 * (index & 1), 0]
     }
 
     /// Whether a cell, from the first one, is in the grid.
-    pub(super) fn contains(&self, offset: [usize; 3]) -> bool {
-        (0..3).all(|a| self.start[a] + offset[a] < self.end[a])
+    pub(super) fn contain(&self, [x, y, z]: [usize; 3]) -> bool {
+        x < self.count[0] && y < self.count[1] && z < self.count[2]
     }
 
-    /// A cell of the block, from its first one; the last one inside the grid for those outside.
-    pub(super) fn clipped(&self, offset: [usize; 3]) -> [usize; 3] {
-        std::array::from_fn(|a| (self.start[a] + offset[a]).min(self.end[a] - 1))
+    /// Centres of the children of the block.
+    pub(super) fn centres_of_children(&self) -> Points {
+        let mut points = [[0.0; LANES]; 3];
+        for l in 0..LANES {
+            for a in 0..3 {
+                let first = 2 * bit(l, a);
+                points[a][l] = 0.5 * (self.centres[a][first] + self.centres[a][first + 1]);
+            }
+        }
+        points
     }
 }
 

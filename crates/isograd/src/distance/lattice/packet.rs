@@ -2,13 +2,12 @@
 //!
 //! Single precision finds out which triangles come into question; they are measured in double precision.
 
-use super::block::{Block, PACKET};
+use super::block::Cells;
 use super::facet::Facet;
 use super::site_list::Site;
 use super::sites::Sites;
 use super::workspace::Measured;
 use crate::distance::bvh::{Bvh, Found, LANES, Points};
-use crate::{Grid, Real};
 
 /// Cells of a packet, in halves of [`LANES`].
 pub(super) const CELLS: usize = 2 * LANES;
@@ -30,21 +29,20 @@ pub(super) struct Packet {
 }
 
 impl Packet {
-    pub(super) fn new<T: Real>(grid: &Grid<T>, block: &Block, origin: [f64; 3]) -> Self {
-        let per_cell = 1.0 / grid.spacing().f64();
+    /// A packet of the cells of a block, in a frame with this origin.
+    #[inline(always)]
+    pub(super) fn new(cells: &Cells, index: usize, origin: [f64; 3], per_cell: f64) -> Self {
+        let first = Cells::packet(index);
         let mut packet = Self {
             points: [[[0.0; LANES]; 3]; 2],
             local: [[0.0; CELLS]; 3],
         };
-        let longest = PACKET.into_iter().fold(0, usize::max);
-        for step in 0..longest {
-            let centre = grid.center_f64(block.clipped([step; 3]));
-            for a in 0..3 {
-                let local = ((centre[a] - origin[a]) * per_cell) as f32;
-                for l in (0..CELLS).filter(|&l| offset(l)[a] == step) {
-                    packet.points[l / LANES][a][l % LANES] = centre[a];
-                    packet.local[a][l] = local;
-                }
+        for a in 0..3 {
+            let local = cells.centres[a].map(|centre| ((centre - origin[a]) * per_cell) as f32);
+            for l in 0..CELLS {
+                let step = first[a] + offset(l)[a];
+                packet.points[l / LANES][a][l % LANES] = cells.centres[a][step];
+                packet.local[a][l] = local[step];
             }
         }
         packet
@@ -52,6 +50,7 @@ impl Packet {
 }
 
 /// Where in its packet a cell is.
+#[inline(always)]
 pub(super) fn offset(lane: usize) -> [usize; 3] {
     [
         lane >> 2 & 1,

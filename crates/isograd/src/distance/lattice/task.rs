@@ -7,7 +7,7 @@
 use pulp::Arch;
 
 use super::NO_TRIANGLE;
-use super::block::{BLOCK, Block, CHILDREN, Extent, centres, children};
+use super::block::{BLOCK, Block, CHILDREN, Cells, Extent, PACKETS, children};
 use super::kernels;
 use super::packet::{self, CELLS, Packet, Search};
 use super::site_list::Site;
@@ -208,34 +208,43 @@ impl<T: Real> Task<'_, T> {
             per_cell,
             width: (width * width) as f32,
         };
-        let centres = centres(&children(self.grid, block), local.centre);
-        let seeds = self.closest_sites(local, lists, &centres);
-        for (index, packet) in block.packets() {
+        let cells = Cells::new(self.grid, block);
+        let seeds = self.closest_sites(local, lists, &cells.centres_of_children());
+        for index in (0..PACKETS).filter(|&index| cells.contain(Cells::packet(index))) {
             let seeds = [seeds[2 * index], seeds[2 * index + 1]];
-            let cells = Packet::new(self.grid, &packet, local.centre);
             let mut found = [Found::NOTHING; 2];
+            let mut packet = None;
             dispatch(
                 self.arch,
                 #[inline(always)]
-                || search.closest(&cells, seeds, measured, &mut found),
+                || {
+                    let points = packet.insert(Packet::new(&cells, index, local.centre, per_cell));
+                    search.closest(points, seeds, measured, &mut found);
+                },
             );
-            self.write(local, &packet, &cells, &found, output);
+            if let Some(packet) = &packet {
+                let first = Cells::packet(index);
+                self.write(local, block, &cells, (first, packet), &found, output);
+            }
         }
     }
 
+    /// Writes what was found in a packet whose first cell is `first`, from that of the block.
     fn write(
         &self,
         local: &Local,
         block: &Block,
-        packet: &Packet,
+        cells: &Cells,
+        (first, packet): ([usize; 3], &Packet),
         found: &[Found; 2],
         output: &mut Output<T>,
     ) {
+        let at: [usize; 3] = std::array::from_fn(|a| block.start[a] - local.origin[a] + first[a]);
         for lane in 0..CELLS {
             let (half, l) = (lane / LANES, lane % LANES);
             let (place, squared) = (found[half].triangle[l], found[half].squared[l]);
-            let offset = packet::offset(lane);
-            if place == NOWHERE || !block.contains(offset) {
+            let [x, y, z] = packet::offset(lane);
+            if place == NOWHERE || !cells.contain([first[0] + x, first[1] + y, z]) {
                 continue;
             }
             let distance = if squared > self.near {
@@ -244,11 +253,9 @@ impl<T: Real> Task<'_, T> {
                 self.measure(packet.points[half].map(|x| x[l]), place, squared)
             };
             if distance <= self.width {
-                let at: [usize; 3] =
-                    std::array::from_fn(|a| block.start[a] + offset[a] - local.origin[a]);
-                let index = (at[0] * BLOCK + at[1]) * BLOCK + at[2];
+                let index = ((at[0] + x) * BLOCK + at[1] + y) * BLOCK + at[2] + z;
                 output.distance[index] = T::of(distance);
-                output.closest[index] = self.sites.facet(place).face;
+                output.closest[index] = self.bvh.face(place);
             }
         }
     }
