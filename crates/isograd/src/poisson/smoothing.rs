@@ -10,9 +10,9 @@ use crate::{Real, simd};
 ///
 /// | samples apart | no smoothing | 0.8 of that | 1.2 of that |
 /// |---|---|---|---|
-/// | 0.32 cells | 0.0097, 0.036 | 0.0092, 0.032 | 0.0086, 0.028 |
-/// | 0.64 cells | 0.0081, 0.062 | 0.0061, 0.044 | 0.0050, 0.032 |
-/// | 1.28 cells | 0.0147, 0.144 | 0.0045, 0.041 | 0.0031, 0.046 |
+/// | 0.31 cells | 0.0099, 0.037 | 0.0095, 0.036 | 0.0091, 0.034 |
+/// | 0.63 cells | 0.0085, 0.049 | 0.0066, 0.037 | 0.0054, 0.029 |
+/// | 1.25 cells | 0.0135, 0.108 | 0.0049, 0.053 | 0.0032, 0.056 |
 ///
 /// More would smooth thin parts away where noise keeps the iso-value from following the samples.
 const PER_SPACING: f64 = 0.8;

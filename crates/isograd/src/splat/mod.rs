@@ -40,7 +40,7 @@ pub use order::Scratch;
 pub(crate) use order::central_cell;
 pub use pullback::{PullbackScratch, SampleCotangent, pullback};
 use stencil::{REACH, Term, WIDTH};
-pub(crate) use stencil::{quadratic_bspline, quadratic_bspline_slope};
+pub(crate) use stencil::{bspline_slopes, bspline_weights};
 
 /// Planes across x that one task owns.
 const SLAB: usize = 8;

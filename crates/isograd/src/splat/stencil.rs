@@ -51,7 +51,7 @@ pub(super) fn for_each_term<T: Real>(
     mut visit: impl FnMut(Term<T>),
 ) {
     match weights {
-        Weights::BSpline => visit(Term::new(vector, f.map(quadratic_bspline))),
+        Weights::BSpline => visit(Term::new(vector, bspline_weights(f))),
         Weights::Paper => {
             // The weights as printed are a product, but for ½ in the central cell: a product, and a
             // second one that is zero elsewhere.
@@ -92,12 +92,7 @@ pub(super) fn gather<T: Real>(
     block: &Block<T>,
 ) -> Gathered<T> {
     match weights {
-        Weights::BSpline => gather_product(
-            vector,
-            f.map(quadratic_bspline),
-            f.map(quadratic_bspline_slope),
-            block,
-        ),
+        Weights::BSpline => gather_product(vector, bspline_weights(f), bspline_slopes(f), block),
         Weights::Paper => gather_paper(vector, f, block),
     }
 }
@@ -187,6 +182,26 @@ pub(crate) fn quadratic_bspline<T: Real>(f: T) -> [T; 3] {
         half * below * below,
         T::of(0.75) - f * f,
         half * above * above,
+    ]
+}
+
+/// [`quadratic_bspline`] along each axis. By name: mapped over an array, it is not inlined.
+#[inline(always)]
+pub(crate) fn bspline_weights<T: Real>([x, y, z]: [T; 3]) -> [[T; 3]; 3] {
+    [
+        quadratic_bspline(x),
+        quadratic_bspline(y),
+        quadratic_bspline(z),
+    ]
+}
+
+/// Derivatives of [`bspline_weights`].
+#[inline(always)]
+pub(crate) fn bspline_slopes<T: Real>([x, y, z]: [T; 3]) -> [[T; 3]; 3] {
+    [
+        quadratic_bspline_slope(x),
+        quadratic_bspline_slope(y),
+        quadratic_bspline_slope(z),
     ]
 }
 

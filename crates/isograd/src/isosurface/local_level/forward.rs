@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::blocks::{Blocks, NODES, Overlap};
 use super::gain::Sums;
-use super::stencil::Stencil;
+use super::stencil::{CUBE, Stencil};
 use super::{LEAST_AREA, PASSES, Pass, Residual};
 use crate::isosurface::iso_value;
 use crate::splat::{self, Samples};
@@ -96,7 +96,7 @@ pub fn forward<T: Real>(
         if pass.gain == 0.0 {
             break;
         }
-        scratch.apply(T::of(pass.gain));
+        scratch.apply(&near, T::of(pass.gain));
         made += 1;
     }
     residual.passes.truncate(made);
@@ -140,9 +140,8 @@ impl<T: Real> Scratch<T> {
     }
 
     /// Takes `λ e` off the samples, and adds it to the cells' total.
-    fn apply(&mut self, gain: T) {
-        let nodes = self.total.par_iter_mut().zip(&self.nodes);
-        nodes.for_each(|(total, node)| *total += gain * node.mean);
+    fn apply(&mut self, near: &Near<'_, T>, gain: T) {
+        near.accumulate(&self.nodes, gain, &mut self.total);
         let samples = self.now.par_iter_mut().zip(&self.seen);
         samples.for_each(|(now, seen)| *now -= gain * seen.mean);
     }
@@ -220,6 +219,39 @@ impl<'a, T: Real> Near<'a, T> {
         }
     }
 
+    /// Adds `λ e` to the cells' total.
+    pub(super) fn accumulate(&self, nodes: &[Node<T>], gain: T, total: &mut [T]) {
+        let blocks = total.par_chunks_mut(NODES).zip(nodes.par_chunks(NODES));
+        blocks.for_each(|(total, nodes)| {
+            simd::dispatch(
+                self.arch,
+                #[inline(always)]
+                || {
+                    for (total, node) in total.iter_mut().zip(nodes) {
+                        *total += gain * node.mean;
+                    }
+                },
+            );
+        });
+    }
+
+    /// Runs `f` on what belongs to each sample, compiled for the processor's instruction set.
+    #[inline(always)]
+    pub(super) fn for_each<E: Send>(&self, items: &mut [E], f: impl Fn(usize, &mut E) + Sync) {
+        let chunks = items.par_chunks_mut(parallel::CHUNK).enumerate();
+        chunks.for_each(|(chunk, items)| {
+            simd::dispatch(
+                self.arch,
+                #[inline(always)]
+                || {
+                    for (n, item) in items.iter_mut().enumerate() {
+                        f(chunk * parallel::CHUNK + n, item);
+                    }
+                },
+            );
+        });
+    }
+
     /// What the nodes say at the samples.
     pub(super) fn see(
         &self,
@@ -229,19 +261,11 @@ impl<'a, T: Real> Near<'a, T> {
         seen: &mut Vec<Seen<T>>,
     ) {
         seen.resize(offsets.len(), Seen::default());
-        let chunks = seen.par_chunks_mut(parallel::CHUNK).enumerate();
-        chunks.for_each(|(chunk, seen)| {
-            simd::dispatch(
-                self.arch,
-                #[inline(always)]
-                || {
-                    for (n, seen) in seen.iter_mut().enumerate() {
-                        let i = chunk * parallel::CHUNK + n;
-                        *seen = self.see_at(blocks, nodes, i, offsets[i]);
-                    }
-                },
-            );
-        });
+        self.for_each(
+            seen,
+            #[inline(always)]
+            |i, seen| *seen = self.see_at(blocks, nodes, i, offsets[i]),
+        );
     }
 
     #[inline(always)]
@@ -252,13 +276,17 @@ impl<'a, T: Real> Near<'a, T> {
         let near: [[[Node<T>; 3]; 3]; 3] = blocks.read(nodes, stencil.corner);
         let (area, corners, [x, y, z]) = (self.area(i), stencil.corners(), stencil.weights());
         let (mut mean, mut without_it) = (T::zero(), T::zero());
-        for ([i, j, k], at) in corners.cells() {
+        for at in CUBE {
+            let [i, j, k] = corners.cell(at);
             let (weight, _) = corners.weight_and_slope(at);
             let node = near[i][j][k];
             mean += weight * node.mean;
             without_it += weight * node.without(area * x[i] * y[j] * z[k], s)[0];
         }
-        let derivatives = stencil.derivatives(|i, j| near[i][j].map(|node| node.mean));
+        let derivatives = stencil.derivatives(
+            #[inline(always)]
+            |i, j| means(&near[i][j]),
+        );
         Seen {
             mean,
             slope: vector::dot(derivatives.gradient, self.samples.normals[i]),
@@ -269,11 +297,17 @@ impl<'a, T: Real> Near<'a, T> {
     /// What the gain of a pass is made of.
     fn sums(&self, seen: &[Seen<T>], offsets: &[T], slopes: &[T]) -> Sums {
         Sums::new(parallel::sum_array(seen.len(), |i| {
-            let [a, s, u] = [self.area(i), offsets[i], slopes[i]].map(Real::f64);
-            let [w, p] = [seen[i].slope, seen[i].without_it].map(Real::f64);
+            let (a, s, u) = (self.area(i).f64(), offsets[i].f64(), slopes[i].f64());
+            let (w, p) = (seen[i].slope.f64(), seen[i].without_it.f64());
             [a * w * u, a * u * u, a * s * p, a * s * s, a * p * p]
         }))
     }
+}
+
+/// `e` along a row.
+#[inline(always)]
+pub(super) fn means<T: Real>([a, b, c]: &[Node<T>; 3]) -> [T; 3] {
+    [a.mean, b.mean, c.mean]
 }
 
 impl<T: Real> Node<T> {

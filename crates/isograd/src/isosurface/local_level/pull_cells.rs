@@ -4,9 +4,9 @@ use rayon::prelude::*;
 
 use super::Pass;
 use super::blocks::{Blocks, NODES, Overlap};
-use super::forward::{Near, Node, Seen};
+use super::forward::{Near, Node, Seen, means};
 use super::pullback::{Bars, PullbackScratch};
-use super::stencil::Stencil;
+use super::stencil::{CUBE, Stencil};
 use crate::{Real, simd, vector};
 
 /// Cotangents at a cell.
@@ -123,9 +123,17 @@ impl<T: Real> Near<'_, T> {
         let near: [[[Node<T>; 3]; 3]; 3] = blocks.read(nodes, stencil.corner);
         let bars: [[[NodeBars<T>; 3]; 3]; 3] = blocks.read(node_bars, stencil.corner);
         // s M̄ + D̄, and the cotangents of the weights that the sample is left out with.
-        let mut weights_bar = bars.map(|plane| plane.map(|row| row.map(|b| s * b.sum + b.area)));
+        let mut weights_bar = [[[T::zero(); 3]; 3]; 3];
+        for i in 0..3 {
+            for j in 0..3 {
+                for k in 0..3 {
+                    weights_bar[i][j][k] = s * bars[i][j][k].sum + bars[i][j][k].area;
+                }
+            }
+        }
         let (mut s_bar, mut place) = (T::zero(), [T::zero(); 3]);
-        for ([i, j, k], at) in corners.cells() {
+        for at in CUBE {
+            let [i, j, k] = corners.cell(at);
             let (weight, slope) = corners.weight_and_slope(at);
             let mine = area * x[i] * y[j] * z[k];
             let [without, others] = near[i][j][k].without(mine, s);
@@ -150,7 +158,10 @@ impl<T: Real> Near<'_, T> {
                 }
             }
         }
-        let of_mean = stencil.derivatives(|i, j| near[i][j].map(|node| node.mean));
+        let of_mean = stencil.derivatives(
+            #[inline(always)]
+            |i, j| means(&near[i][j]),
+        );
         place = vector::add(place, vector::scale(gradient, area));
         let bend = of_mean.bend(self.samples.normals[i]);
         place = vector::add(place, vector::scale(bend, bar.slope));

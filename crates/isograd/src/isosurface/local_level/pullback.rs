@@ -10,7 +10,7 @@ use super::pull_cells::NodeBars;
 use super::{Pass, Residual};
 use crate::data::GridCotangent;
 use crate::splat::{self, SampleCotangent, Samples};
-use crate::{Field, Grid, Real, parallel, simd, vector};
+use crate::{Field, Grid, Real, parallel, vector};
 
 /// Memory of the pullback, kept between calls.
 #[derive(Clone, Debug, Default)]
@@ -134,9 +134,7 @@ impl<T: Real> PullbackScratch<T> {
     ) -> f64 {
         near.average(&self.blocks, &pass.offsets, &mut self.nodes);
         near.see(&self.blocks, &self.nodes, &pass.offsets, &mut self.seen);
-        let gain = T::of(pass.gain);
-        let taken = self.taken.par_iter_mut().zip(&self.nodes);
-        taken.for_each(|(taken, node)| *taken += gain * node.mean);
+        near.accumulate(&self.nodes, T::of(pass.gain), &mut self.taken);
         let gain_bar = self.gain_bar();
         let (sums_bar, before_bar) = pass.sums.pullback(pass.flattened, gain_bar, flattened_bar);
         self.pull_seen(near, pass, sums_bar);
@@ -150,34 +148,20 @@ impl<T: Real> PullbackScratch<T> {
             samples,
             ..
         } = self;
-        let chunks = samples.par_chunks_mut(parallel::CHUNK).enumerate();
-        chunks.for_each(|(chunk, samples)| {
-            simd::dispatch(
-                near.arch,
-                #[inline(always)]
-                || {
-                    for (n, found) in samples.iter_mut().enumerate() {
-                        let i = chunk * parallel::CHUNK + n;
-                        let s = pass.offsets[i];
-                        let direct = offset_bar(near, pass, &seen[i], sums_bar, i);
-                        let s_bar = direct
-                            + near.pull_sample(
-                                blocks,
-                                (nodes, node_bars),
-                                i,
-                                s,
-                                &seen_bars[i],
-                                found,
-                            );
-                        found.value += trust[i] * s_bar;
-                        // Where nothing is followed, the slope of ω is 0.
-                        if trust[i] > T::zero() {
-                            found.trust += s_bar * s / trust[i];
-                        }
-                    }
-                },
-            );
-        });
+        near.for_each(
+            samples,
+            #[inline(always)]
+            |i, found| {
+                let (s, cells) = (pass.offsets[i], (&nodes[..], &node_bars[..]));
+                let s_bar = offset_bar(near, pass, &seen[i], sums_bar, i)
+                    + near.pull_sample(blocks, cells, i, s, &seen_bars[i], found);
+                found.value += trust[i] * s_bar;
+                // Where nothing is followed, the slope of ω is 0.
+                if trust[i] > T::zero() {
+                    found.trust += s_bar * s / trust[i];
+                }
+            },
+        );
         before_bar
     }
 
@@ -190,8 +174,12 @@ impl<T: Real> PullbackScratch<T> {
             samples,
             ..
         } = self;
-        let [of_cells] =
-            parallel::sum_array(nodes.len(), |o| [total[o].f64() * nodes[o].mean.f64()]);
+        let blocks = nodes.par_chunks(NODES).zip(total.par_chunks(NODES));
+        let of_blocks = blocks.map(|(nodes, total)| {
+            let products = nodes.iter().zip(total);
+            products.map(|(n, t)| n.mean.f64() * t.f64()).sum::<f64>()
+        });
+        let of_cells: f64 = of_blocks.collect::<Vec<f64>>().iter().sum();
         let [of_samples] = parallel::sum_array(seen.len(), |i| {
             let (found, seen) = (samples[i], seen[i]);
             [(found.value * seen.mean + found.slope * seen.slope).f64()]
@@ -246,17 +234,19 @@ impl<T: Real> PullbackScratch<T> {
     /// From the slopes before the first pass to places and normals.
     fn pull_slopes(&mut self, near: &Near<'_, T>, chi: &Field<T>) {
         let (blocks, taken) = (&self.blocks, &self.taken);
-        let samples = self.samples.par_iter_mut().enumerate();
-        samples.for_each(|(i, found)| {
-            let Some(edge) = near.edge(chi, i, |corner| blocks.read(taken, corner)) else {
-                return;
-            };
-            let bend = edge.bend(near.samples.normals[i]);
-            let [of_normal, of_place] =
-                [edge.gradient, bend].map(|v| vector::scale(v, found.slope));
-            found.normal = vector::add(found.normal, of_normal);
-            found.place = vector::add(found.place, of_place);
-        });
+        near.for_each(
+            &mut self.samples,
+            #[inline(always)]
+            |i, found| {
+                let Some(edge) = near.edge(chi, i, |corner| blocks.read(taken, corner)) else {
+                    return;
+                };
+                let bend = vector::scale(edge.bend(near.samples.normals[i]), found.slope);
+                let of_normal = vector::scale(edge.gradient, found.slope);
+                found.normal = vector::add(found.normal, of_normal);
+                found.place = vector::add(found.place, bend);
+            },
+        );
     }
 
     /// `Σ f(row)` over the rows of cells along z near the samples: `f` is given the place of the first in memory and,

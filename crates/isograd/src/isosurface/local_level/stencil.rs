@@ -21,6 +21,18 @@ pub(super) struct Corners<T> {
     fraction: [T; 3],
 }
 
+/// Places of the cells in a cube of 2³, the last axis fastest.
+pub(super) const CUBE: [[usize; 3]; 8] = [
+    [0, 0, 0],
+    [0, 0, 1],
+    [0, 1, 0],
+    [0, 1, 1],
+    [1, 0, 0],
+    [1, 0, 1],
+    [1, 1, 0],
+    [1, 1, 1],
+];
+
 impl<T: Real> Stencil<T> {
     /// That of a point; `None` too near to a wall, where the splat refuses it.
     #[inline(always)]
@@ -40,13 +52,13 @@ impl<T: Real> Stencil<T> {
     /// `B` on the 3 cells along each axis.
     #[inline(always)]
     pub(super) fn weights(&self) -> [[T; 3]; 3] {
-        self.offset.map(splat::quadratic_bspline)
+        splat::bspline_weights(self.offset)
     }
 
     /// Derivatives of [`Self::weights`].
     #[inline(always)]
     pub(super) fn slopes(&self) -> [[T; 3]; 3] {
-        self.offset.map(splat::quadratic_bspline_slope)
+        splat::bspline_slopes(self.offset)
     }
 
     /// First and second derivatives of `Σ_o B_o v_o`; `row(i, j)` has the 3 values along z of row `(i, j)` of the 3³.
@@ -121,7 +133,8 @@ impl<T: Real> Corners<T> {
     /// Weights of the 2 cells along each axis.
     #[inline(always)]
     pub(super) fn weights(&self) -> [[T; 2]; 3] {
-        self.fraction.map(|f| [T::one() - f, f])
+        let [x, y, z] = self.fraction;
+        [[T::one() - x, x], [T::one() - y, y], [T::one() - z, z]]
     }
 
     /// The weight of each cell and its derivatives, by place among the 2³.
@@ -137,12 +150,10 @@ impl<T: Real> Corners<T> {
         (x[i] * y[j] * z[k], slope)
     }
 
-    /// Places in the 3³ of the 2³ cells, and among these.
+    /// Place in the 3³ of one of the 2³ cells.
     #[inline(always)]
-    pub(super) fn cells(&self) -> [([usize; 3], [usize; 3]); 8] {
-        std::array::from_fn(|c| {
-            let at = [c >> 2, c >> 1 & 1, c & 1];
-            (std::array::from_fn(|a| self.place[a] + at[a]), at)
-        })
+    pub(super) fn cell(&self, [i, j, k]: [usize; 3]) -> [usize; 3] {
+        let [x, y, z] = self.place;
+        [x + i, y + j, z + k]
     }
 }

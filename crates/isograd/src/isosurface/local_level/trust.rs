@@ -24,14 +24,18 @@ impl<T: Real> Near<'_, T> {
         slopes: &mut Vec<T>,
         residual: &mut Residual<T>,
     ) {
-        let samples = 0..self.samples.points.len();
-        let slope = |i: usize| {
-            let edge = self.edge(chi, i, |_| [[[T::zero(); 3]; 3]; 3]);
-            edge.map_or(T::zero(), |edge| {
-                vector::dot(edge.gradient, self.samples.normals[i])
-            })
-        };
-        samples.into_par_iter().map(slope).collect_into_vec(slopes);
+        slopes.resize(self.samples.points.len(), T::zero());
+        self.for_each(
+            slopes,
+            #[inline(always)]
+            |i, slope| {
+                let edge = self.edge(chi, i, |_| [[[T::zero(); 3]; 3]; 3]);
+                *slope = match edge {
+                    Some(edge) => vector::dot(edge.gradient, self.samples.normals[i]),
+                    None => T::zero(),
+                };
+            },
+        );
         let [sum, area] = parallel::sum_array(slopes.len(), |i| {
             let (a, slope) = (self.area(i).f64(), rising(slopes[i]));
             [a * slope * slope, a]
@@ -64,10 +68,15 @@ impl<T: Real> Near<'_, T> {
         let [_, ny, nz] = self.grid.shape();
         let [x, y, z] = stencil.corner;
         let added = added(stencil.corner);
-        Some(stencil.derivatives(|i, j| {
-            let start = ((x + i) * ny + y + j) * nz + z;
-            std::array::from_fn(|k| chi.values()[start + k] + added[i][j][k])
-        }))
+        Some(stencil.derivatives(
+            #[inline(always)]
+            |i, j| {
+                let start = ((x + i) * ny + y + j) * nz + z;
+                let added = added[i][j];
+                let row = &chi.values()[start..start + 3];
+                [row[0] + added[0], row[1] + added[1], row[2] + added[2]]
+            },
+        ))
     }
 
     /// Fills `bars` with the cotangents of `u` and `â` of every sample; `found(i)` has those of its `ω` and `δ`. Returns
