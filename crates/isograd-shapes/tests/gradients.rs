@@ -26,6 +26,10 @@ fn whole_pullback_is_the_transpose_of_the_derivative() {
     ] {
         let cloud = cloud(name, points);
         let grid = Grid::fit(&cloud, Resolution::Cells(cells), 0.1).expect("a grid");
+        // The bodies' planes of symmetry are not those of the cells, where a sample has the slope of one side.
+        let shift = [0.137, -0.211, 0.071].map(|s| s * grid.spacing());
+        let lower = std::array::from_fn(|a| grid.lower()[a] + shift[a]);
+        let grid = Grid::new(lower, grid.spacing(), grid.shape()).expect("a grid");
         let options = Options {
             motions: vec![
                 Motion::Noise,

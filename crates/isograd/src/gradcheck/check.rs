@@ -6,6 +6,7 @@ use super::functional::{Functional, parting};
 use super::{CheckError, Difference, Motion, Options, Row};
 use crate::distance::lattice::NO_TRIANGLE;
 use crate::distance::triangle::closest_point;
+use crate::isosurface::Level;
 use crate::splat::Weights;
 use crate::vector::{dot, norm, sub};
 use crate::{CloudCotangent, Cotangent, Error, Mesh, PointCloud, Reconstruction, Reconstructor};
@@ -138,8 +139,9 @@ impl<'a> Check<'a> {
             false => self.plan.reconstruct(moved)?,
         };
         let (grid, values) = (result.sdf().grid(), result.sdf().values());
-        let paper = result.options().weights == Weights::Paper;
-        let between = |x: f64| match paper {
+        let options = result.options();
+        let faces = options.weights == Weights::Paper || options.level != Level::Mean;
+        let between = |x: f64| match faces {
             true => (2.0 * x).floor() as i64,
             false => (x + 0.5).floor() as i64,
         };

@@ -86,8 +86,8 @@ pub struct Difference {
     pub normals: usize,
     /// Cells that changed from inside to outside, or back.
     pub cells: usize,
-    /// Points that passed a plane through cell centres, where the slope of the iso-value jumps, or with the
-    /// paper's weights a face of a cell, where the indicator does.
+    /// Points that passed a plane through cell centres, where the slope of the iso-value jumps, or a face of a cell,
+    /// where those of the gains and the trust of the local iso-value do, and with the paper's weights the indicator.
     pub crossings: usize,
 }
 

@@ -26,7 +26,7 @@
 //! **Thin parts** hardly show in `χ`: the steps of their two faces cancel. A plate of thickness `t` has on its faces
 //! the share `q = 1 − exp(−t²/2w²)` of the slope `U` of a thick body, with `w` the width of the step; `U` is the root
 //! mean square of `u` over the samples, and so `t` is known. Lattice points miss what is thinner than a cell: a surface
-//! that follows it is full of holes, and jumps when anything moves. `ω_i` rises from 0 to 1 for `t` from 1 to 1.6 cells,
+//! that follows it is full of holes, and jumps when anything moves. `ω_i` rises from 0 to 1 for `t` from 1 to 2.2 cells,
 //! and `δ = 0`. [`Level::Thin`](super::Level::Thin) has the rise from 0.1 to 0.3 cells, and makes thicker what is left:
 //! `δ_i = U t (exp(−t²/8w²) − exp(−1/8w²))`, if that is more than 0, is how much `χ` rises from the face to where that
 //! of a plate of one cell would be.
@@ -53,7 +53,8 @@
 //! [`iso_value::pullback`](super::iso_value::pullback) adds for `r̄`. `σ̄` is that of the width of the step.
 //!
 //! # Not differentiable
-//! `∇(Te)` jumps where a sample crosses a plane through cell centres. `λ` has kinks where the fit is 1, where `ρ` or `λ`
+//! `∇(Te)` jumps where a sample crosses a plane through cell centres, `∇(n·∇χ)` and `∇(n·∇e)` where it crosses a face
+//! of a cell. `λ` has kinks where the fit is 1, where `ρ` or `λ`
 //! is 0.
 
 mod blocks;
@@ -77,8 +78,9 @@ const PASSES: usize = 3;
 const LEAST_AREA: f64 = 0.05;
 
 /// Thicknesses, in cells, between which `ω` goes from 0 to 1. Less than a cell here follows more of a thin wing, but
-/// the derivative of a fish whose tail ends in an edge then goes up and down within a cell, by 6 to 27 %.
-const FOLLOWED: [f64; 2] = [1.0, 1.6];
+/// the derivative of a fish whose tail ends in an edge then goes up and down within a cell, by 6 to 27 %. So it does, by 8 %,
+/// if `ω` is 1 at 1.6 cells already: it then changes so fast that its own derivative does it.
+const FOLLOWED: [f64; 2] = [1.0, 2.2];
 
 /// The same for thin parts: below, the dip of `χ` is no larger than its noise.
 const FOLLOWED_THIN: [f64; 2] = [0.1, 0.3];
