@@ -18,7 +18,6 @@
 
 use rayon::prelude::*;
 
-use crate::data::GridCotangent;
 use crate::splat::{self, SampleCotangent, Samples};
 use crate::trilinear::{self, Cube};
 use crate::{Field, Grid, Real, parallel, vector};
@@ -138,19 +137,11 @@ pub fn pullback<T: Real>(
         let slope = value_bar(i) / grid.spacing();
         vector::scale(residual.at_samples[i].gradient, slope)
     };
-    let bars = out.points.par_iter_mut().zip(&mut out.areas);
-    bars.enumerate().for_each(|(i, (point, area))| {
-        *point = vector::add(*point, point_bar(i));
+    // The mean is the same whatever the unit of the areas.
+    out.areas.par_iter_mut().enumerate().for_each(|(i, area)| {
         *area += T::of(share * (residual.at_samples[i].value.f64() - residual.value));
     });
-    let [x, y, z, spacing] = parallel::sum_array(points.len(), |i| {
-        let mut part = GridCotangent::default();
-        part.subtract_point(grid, points[i], point_bar(i));
-        let [x, y, z] = part.lower;
-        [x, y, z, part.spacing]
-    });
-    out.grid.lower = vector::add(out.grid.lower, [x, y, z]);
-    out.grid.spacing += spacing;
+    out.add(grid, samples, false, |i| (point_bar(i), T::zero()));
     trilinear::spread(grid, points, order, value_bar, chi_bar);
 }
 

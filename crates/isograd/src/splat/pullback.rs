@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::stencil::{self, Gathered, REACH, WIDTH};
 use super::{Residual, Samples, central_cell};
 use crate::data::GridCotangent;
-use crate::{Field, Real, simd, vector};
+use crate::{Field, Grid, Real, parallel, simd, vector};
 
 /// Samples in one task.
 const TASK: usize = 512;
@@ -22,6 +22,40 @@ pub struct SampleCotangent<T> {
     pub areas: Vec<T>,
     /// Of the grid.
     pub grid: GridCotangent<f64>,
+}
+
+impl<T: Real> SampleCotangent<T> {
+    /// Adds what each sample has in `bar(i)`: the cotangents of its point, and of its [area in
+    /// cells](Samples::area_in_cells). The grid takes its share; sums are in one fixed order.
+    pub(crate) fn add(
+        &mut self,
+        grid: &Grid<T>,
+        samples: Samples<'_, T>,
+        area_weights: bool,
+        bar: impl Fn(usize) -> ([T; 3], T) + Sync,
+    ) {
+        let (h, points) = (grid.spacing(), samples.points);
+        let unit = if area_weights { h } else { T::one() };
+        let bars = self.points.par_iter_mut().zip(&mut self.areas).enumerate();
+        bars.for_each(|(i, (point_bar, area_bar))| {
+            let (point, area) = bar(i);
+            *point_bar = vector::add(*point_bar, point);
+            *area_bar += area / unit / unit;
+        });
+        let [x, y, z, spacing] = parallel::sum_array(points.len(), |i| {
+            let (point, area) = bar(i);
+            let mut part = GridCotangent::default();
+            part.subtract_point(grid, points[i], point);
+            if area_weights {
+                let share = samples.area_in_cells(grid, area_weights, i) * area / h;
+                part.spacing -= 2.0 * share.f64();
+            }
+            let [x, y, z] = part.lower;
+            [x, y, z, part.spacing]
+        });
+        self.grid.lower = vector::add(self.grid.lower, [x, y, z]);
+        self.grid.spacing += spacing;
+    }
 }
 
 /// Buffers of the pullback.
@@ -78,6 +112,16 @@ pub fn pullback<T: Real>(
 }
 
 impl<T: Real> Samples<'_, T> {
+    /// `â_i`: the area of a sample in cells², or the weight itself where it is a count.
+    #[inline(always)]
+    pub(crate) fn area_in_cells(&self, grid: &Grid<T>, area_weights: bool, i: usize) -> T {
+        let h = grid.spacing();
+        match area_weights {
+            true => self.areas[i] / h / h,
+            false => self.areas[i],
+        }
+    }
+
     /// What `b_bar` holds for sample `i`.
     #[inline(always)]
     fn gather(&self, i: usize, residual: &Residual, b_bar: &Field<T>) -> Gathered<T> {

@@ -175,7 +175,7 @@ fn along<T: Real>(row: &[T; WIDTH], weight: &[T; WIDTH]) -> T {
 
 /// Weights of the quadratic B-spline on the cell below, the central cell and the cell above.
 #[inline(always)]
-pub(crate) fn quadratic_bspline<T: Real>(f: T) -> [T; 3] {
+fn quadratic_bspline<T: Real>(f: T) -> [T; 3] {
     let half = T::of(0.5);
     let (below, above) = (half - f, half + f);
     [
@@ -207,7 +207,7 @@ pub(crate) fn bspline_slopes<T: Real>([x, y, z]: [T; 3]) -> [[T; 3]; 3] {
 
 /// Derivatives of [`quadratic_bspline`].
 #[inline(always)]
-pub(crate) fn quadratic_bspline_slope<T: Real>(f: T) -> [T; 3] {
+fn quadratic_bspline_slope<T: Real>(f: T) -> [T; 3] {
     let half = T::of(0.5);
     [f - half, -(f + f), half + f]
 }

@@ -213,19 +213,17 @@ impl<T: Real> Task<'_, T> {
         for index in (0..PACKETS).filter(|&index| cells.contain(Cells::packet(index))) {
             let seeds = [seeds[2 * index], seeds[2 * index + 1]];
             let mut found = [Found::NOTHING; 2];
-            let mut packet = None;
-            dispatch(
+            let packet = dispatch(
                 self.arch,
                 #[inline(always)]
                 || {
-                    let points = packet.insert(Packet::new(&cells, index, local.centre, per_cell));
-                    search.closest(points, seeds, measured, &mut found);
+                    let packet = Packet::new(&cells, index, local.centre, per_cell);
+                    search.closest(&packet, seeds, measured, &mut found);
+                    packet
                 },
             );
-            if let Some(packet) = &packet {
-                let first = Cells::packet(index);
-                self.write(local, block, &cells, (first, packet), &found, output);
-            }
+            let first = Cells::packet(index);
+            self.write(local, block, &cells, (first, &packet), &found, output);
         }
     }
 

@@ -169,11 +169,7 @@ impl<'a, T: Real> Near<'a, T> {
     /// `â_i`.
     #[inline(always)]
     pub(super) fn area(&self, i: usize) -> T {
-        let h = self.grid.spacing();
-        match self.area_weights {
-            true => self.samples.areas[i] / h / h,
-            false => self.samples.areas[i],
-        }
+        self.samples.area_in_cells(self.grid, self.area_weights, i)
     }
 
     #[inline(always)]

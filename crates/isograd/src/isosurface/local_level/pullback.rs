@@ -8,7 +8,6 @@ use super::forward::{Near, Node, Seen};
 use super::gain::Sums;
 use super::pull_cells::NodeBars;
 use super::{Pass, Residual};
-use crate::data::GridCotangent;
 use crate::splat::{self, SampleCotangent, Samples};
 use crate::{Field, Grid, Real, parallel, vector};
 
@@ -284,31 +283,11 @@ fn offset_bar<T: Real>(
 impl<T: Real> Near<'_, T> {
     /// From index coordinates and areas in cells to those of the user.
     fn add(&self, found: &[Bars<T>], out: &mut SampleCotangent<T>) {
-        let h = self.grid.spacing();
-        let points = self.samples.points;
-        let area = |i: usize| match self.area_weights {
-            true => found[i].area / h / h,
-            false => found[i].area,
-        };
-        let point = |i: usize| vector::scale(found[i].place, T::one() / h);
-        let bars = out.points.par_iter_mut().zip(&mut out.areas);
-        let bars = bars.zip(&mut out.normals).enumerate();
-        bars.for_each(|(i, ((point_bar, area_bar), normal_bar))| {
-            *point_bar = vector::add(*point_bar, point(i));
-            *area_bar += area(i);
-            *normal_bar = vector::add(*normal_bar, found[i].normal);
+        let normals = out.normals.par_iter_mut().zip(found);
+        normals.for_each(|(bar, found)| *bar = vector::add(*bar, found.normal));
+        let per_cell = T::one() / self.grid.spacing();
+        out.add(self.grid, self.samples, self.area_weights, |i| {
+            (vector::scale(found[i].place, per_cell), found[i].area)
         });
-        let [x, y, z, spacing] = parallel::sum_array(points.len(), |i| {
-            let mut part = GridCotangent::default();
-            part.subtract_point(self.grid, points[i], point(i));
-            if self.area_weights {
-                let share = self.area(i) * found[i].area / h;
-                part.spacing -= 2.0 * share.f64();
-            }
-            let [x, y, z] = part.lower;
-            [x, y, z, part.spacing]
-        });
-        out.grid.lower = vector::add(out.grid.lower, [x, y, z]);
-        out.grid.spacing += spacing;
     }
 }

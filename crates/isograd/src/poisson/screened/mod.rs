@@ -82,10 +82,6 @@ impl<T: Real> Equation<'_, T> {
     /// `â_i`.
     #[inline(always)]
     fn area(&self, i: usize) -> T {
-        let h = self.grid.spacing();
-        match self.area_weights {
-            true => self.samples.areas[i] / h / h,
-            false => self.samples.areas[i],
-        }
+        self.samples.area_in_cells(self.grid, self.area_weights, i)
     }
 }

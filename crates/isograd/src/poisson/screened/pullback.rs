@@ -1,9 +1,6 @@
 //! The adjoint solve, and the derivative of the matrix.
 
-use rayon::prelude::*;
-
 use super::{Equation, Error, Scratch};
-use crate::data::GridCotangent;
 use crate::isosurface::iso_value;
 use crate::splat::SampleCotangent;
 use crate::trilinear::{self, Cube};
@@ -78,24 +75,6 @@ impl<T: Real> Equation<'_, T> {
             let point = vector::scale(both, -alpha * self.area(i) / h);
             (point, -alpha * value * offset)
         };
-        let unit = if self.area_weights { h } else { T::one() };
-        let bars = out.points.par_iter_mut().zip(&mut out.areas).enumerate();
-        bars.for_each(|(i, (point_bar, area_bar))| {
-            let (point, area) = of_sample(i);
-            *point_bar = vector::add(*point_bar, point);
-            *area_bar += area / unit / unit;
-        });
-        let [x, y, z, spacing] = parallel::sum_array(points.len(), |i| {
-            let (point, area) = of_sample(i);
-            let mut part = GridCotangent::default();
-            part.subtract_point(grid, points[i], point);
-            if self.area_weights {
-                part.spacing -= 2.0 * (area * self.area(i) / h).f64();
-            }
-            let [x, y, z] = part.lower;
-            [x, y, z, part.spacing]
-        });
-        out.grid.lower = vector::add(out.grid.lower, [x, y, z]);
-        out.grid.spacing += spacing;
+        out.add(grid, self.samples, self.area_weights, of_sample);
     }
 }
