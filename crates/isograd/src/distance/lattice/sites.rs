@@ -62,22 +62,34 @@ impl Sites {
         } else {
             f64::NEG_INFINITY
         };
-        let triangles = 0..bvh.len() as u32;
-        let edges = triangles
-            .clone()
-            .map(|place| bvh.frame(place).longest_edge());
-        self.longest_edge = edges.fold(0.0, f64::max);
-        self.large.clear();
-        self.large
-            .extend(triangles.map(|place| !(bvh.frame(place).slack() <= limit)));
-        (0..bvh.len() as u32)
-            .into_par_iter()
-            .map(|place| Facet::new(bvh.frame(place), bvh.face(place), 1.0 / spacing))
-            .collect_into_vec(&mut self.facets);
-        self.number(mesh, bvh);
-        self.collect_stars(mesh, bvh);
+        let mut facets = std::mem::take(&mut self.facets);
+        let places = 0..bvh.len() as u32;
+        rayon::join(
+            || {
+                let facet = |place| Facet::new(bvh.frame(place), bvh.face(place), 1.0 / spacing);
+                let facets_of_all = places.clone().into_par_iter().map(facet);
+                facets_of_all.collect_into_vec(&mut facets);
+            },
+            || {
+                self.measure(bvh, limit);
+                self.number(mesh, bvh);
+                self.collect_stars(mesh, bvh);
+            },
+        );
+        self.facets = facets;
         if !self.large.contains(&true) {
             self.large.clear();
+        }
+    }
+
+    /// Finds the longest edge, and the triangles whose slack is not within `limit`.
+    fn measure(&mut self, bvh: &Bvh, limit: f64) {
+        self.longest_edge = 0.0;
+        self.large.clear();
+        for place in 0..bvh.len() as u32 {
+            let frame = bvh.frame(place);
+            self.longest_edge = self.longest_edge.max(frame.longest_edge());
+            self.large.push(!(frame.slack() <= limit));
         }
     }
 

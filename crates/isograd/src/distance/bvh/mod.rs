@@ -1,0 +1,224 @@
+//! A tree of boxes over the triangles of a mesh.
+//!
+//! The triangles are sorted along a Morton curve and cut into leaves of [`LEAF`]; every [`WIDTH`] leaves, or
+//! nodes, have one node above them. So the tree is a few flat arrays: no pointers, built in parallel, the
+//! same for any number of threads, and rebuilt in the same memory.
+
+mod build;
+mod node;
+
+use super::lanes;
+use super::triangle::Frame;
+pub(super) use build::{corners, morton_code};
+use node::Node;
+pub(super) use node::Region;
+
+/// Triangles in a leaf.
+pub(super) const LEAF: usize = 4;
+/// Children of a node.
+const WIDTH: usize = 8;
+/// Points walked down the tree together.
+pub(super) const LANES: usize = 8;
+
+/// Coordinates of [`LANES`] points, `[axis][point]`.
+pub(super) type Points = [[f64; LANES]; 3];
+
+/// The closest triangles found so far for [`LANES`] points.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Found {
+    /// Squared distances.
+    pub squared: [f64; LANES],
+    /// Places of the triangles in the sorted order.
+    pub triangle: [u32; LANES],
+}
+
+impl Found {
+    pub(super) const NOTHING: Self = Self {
+        squared: [f64::INFINITY; LANES],
+        triangle: [NOWHERE; LANES],
+    };
+}
+
+/// The place of a triangle that was not found.
+pub(super) const NOWHERE: u32 = u32::MAX;
+
+/// A node still to be visited: its level, its place in the level, and the least squared distance from it to
+/// any of the points.
+type Waiting = (u32, u32, f64);
+
+/// Memory of a walk down the tree.
+pub(super) type Stack = Vec<Waiting>;
+
+/// See the head of this file.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Bvh {
+    /// Morton code and face, sorted.
+    keys: Vec<(u64, u32)>,
+    frames: Vec<Frame>,
+    /// From the nodes above the leaves up to the root.
+    levels: Vec<Vec<Node>>,
+    /// The largest absolute coordinate.
+    magnitude: f64,
+    low: [f64; 3],
+    /// Cells of the Morton curve per unit of length.
+    per_unit: f64,
+}
+
+impl Bvh {
+    /// The triangle at a place of the sorted order.
+    #[inline(always)]
+    pub(super) fn frame(&self, place: u32) -> &Frame {
+        &self.frames[place as usize]
+    }
+
+    /// Places of the triangles of a leaf.
+    #[inline(always)]
+    pub(super) fn leaf(&self, leaf: u32) -> std::ops::Range<u32> {
+        let first = leaf * LEAF as u32;
+        first..(self.frames.len() as u32).min(first + LEAF as u32)
+    }
+
+    /// The face of the mesh at a place of the sorted order.
+    #[inline(always)]
+    pub(super) fn face(&self, place: u32) -> u32 {
+        self.keys[place as usize].1
+    }
+
+    #[cfg(test)]
+    pub(super) fn capacity(&self) -> usize {
+        let nodes: usize = self.levels.iter().map(Vec::capacity).sum();
+        self.keys.capacity() + self.frames.capacity() + nodes
+    }
+
+    /// Number of triangles.
+    pub(super) fn len(&self) -> usize {
+        self.keys.len()
+    }
+
+    /// The largest absolute coordinate of the mesh.
+    pub(super) fn magnitude(&self) -> f64 {
+        self.magnitude
+    }
+
+    /// Replaces in `found` whatever has a closer triangle. Nodes are visited nearest first.
+    #[inline(always)]
+    pub(super) fn nearest(&self, points: &Points, found: &mut Found, stack: &mut Stack) {
+        stack.clear();
+        stack.push((self.levels.len() as u32, 0, 0.0));
+        while let Some((level, index, least)) = stack.pop() {
+            if !(least < lanes::largest(&found.squared)) {
+                continue;
+            }
+            if level == 0 {
+                self.nearest_in_leaf(points, index, found);
+                continue;
+            }
+            let node = &self.levels[level as usize - 1][index as usize];
+            let top = stack.len();
+            for slot in 0..WIDTH {
+                let distances = node.distances(slot, points);
+                if (0..LANES).any(|l| distances[l] < found.squared[l]) {
+                    let child = index * WIDTH as u32 + slot as u32;
+                    stack.push((level - 1, child, lanes::least(&distances)));
+                }
+            }
+            sort_descending(&mut stack[top..]);
+        }
+    }
+
+    /// The triangle closest to one point, by its place, if one is within a distance (squared).
+    #[inline(always)]
+    pub(super) fn nearest_to(&self, q: [f64; 3], within: f64, stack: &mut Stack) -> Option<u32> {
+        let mut best = (within, None);
+        stack.clear();
+        stack.push((self.levels.len() as u32, 0, 0.0));
+        while let Some((level, index, least)) = stack.pop() {
+            if !(least < best.0) {
+                continue;
+            }
+            if level == 0 {
+                for place in self.leaf(index) {
+                    let [squared] = self.frame(place).distances(&q.map(|x| [x]));
+                    if squared < best.0 {
+                        best = (squared, Some(place));
+                    }
+                }
+                continue;
+            }
+            let squared = self.levels[level as usize - 1][index as usize].distances_from(q);
+            let top = stack.len();
+            for slot in 0..WIDTH {
+                if squared[slot] < best.0 {
+                    let child = index * WIDTH as u32 + slot as u32;
+                    stack.push((level - 1, child, squared[slot]));
+                }
+            }
+            sort_descending(&mut stack[top..]);
+        }
+        best.1
+    }
+
+    #[inline(always)]
+    fn nearest_in_leaf(&self, points: &Points, leaf: u32, found: &mut Found) {
+        for place in self.leaf(leaf) {
+            found.try_triangle(self.frame(place), place, points);
+        }
+    }
+
+    /// Appends the leaves that may hold what is closest to some point of the box `region`.
+    ///
+    /// The rule: let `y` be any point of the mesh. `|q|² − d²(q, S)` is convex in `q` for every set `S`, and
+    /// `|q|² − |q − y|²` is linear; so where a set is farther than `y` from all eight corners of the box, it
+    /// is farther than `y` from every point of the box. For a set that is a box itself the worst corner is
+    /// found one axis at a time.
+    #[inline(always)]
+    pub(super) fn undominated(&self, region: &Region, stack: &mut Stack, leaves: &mut Vec<u32>) {
+        stack.clear();
+        stack.push((self.levels.len() as u32, 0, 0.0));
+        while let Some((level, index, _)) = stack.pop() {
+            if level == 0 {
+                leaves.push(index);
+                continue;
+            }
+            let kept = self.levels[level as usize - 1][index as usize].undominated(region);
+            for slot in 0..WIDTH {
+                if kept[slot] {
+                    stack.push((level - 1, index * WIDTH as u32 + slot as u32, 0.0));
+                }
+            }
+        }
+    }
+}
+
+impl Found {
+    /// Takes the triangle for every point to which it is closer than what was found.
+    #[inline(always)]
+    pub(super) fn try_triangle(&mut self, frame: &Frame, place: u32, points: &Points) {
+        let squared = frame.distances(points);
+        // Both arrays are written whole: a store of some lanes would hold up the next load.
+        for l in 0..LANES {
+            let old = self.triangle[l];
+            self.triangle[l] = if squared[l] < self.squared[l] {
+                place
+            } else {
+                old
+            };
+        }
+        for l in 0..LANES {
+            let old = self.squared[l];
+            self.squared[l] = if squared[l] < old { squared[l] } else { old };
+        }
+    }
+}
+
+/// Insertion sort: there are at most [`WIDTH`].
+#[inline(always)]
+fn sort_descending(waiting: &mut [Waiting]) {
+    for i in 1..waiting.len() {
+        let mut j = i;
+        while j > 0 && waiting[j - 1].2 < waiting[j].2 {
+            waiting.swap(j - 1, j);
+            j -= 1;
+        }
+    }
+}
