@@ -43,7 +43,7 @@ impl Facet {
             outline,
             ..
         } = *self;
-        let [x0, y0] = self.corners[corner as usize % 3];
+        let [x0, y0] = self.corners[corner.min(2) as usize];
         let mut squared = [0.0; N];
         for l in 0..N {
             let (a, b, c) = (from[0][l], from[1][l], from[2][l]);

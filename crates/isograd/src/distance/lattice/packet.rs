@@ -3,7 +3,6 @@
 //! Single precision finds out which triangles come into question; they are measured in double precision.
 
 use super::block::Cells;
-use super::facet::Facet;
 use super::site_list::Site;
 use super::sites::Sites;
 use super::workspace::Measured;
@@ -88,9 +87,7 @@ impl Search<'_> {
         found: &mut [Found; 2],
     ) {
         for half in 0..2 {
-            for &place in self.large {
-                found[half].try_triangle(self.bvh.frame(place), place, &packet.points[half]);
-            }
+            self.try_all(self.large, &packet.points[half], &mut found[half]);
         }
         let mut best = self.bounds(found);
         measured.clear(self.bvh.len());
@@ -100,10 +97,19 @@ impl Search<'_> {
         let limit = self.limits(&best);
         for half in 0..2 {
             measured.choose(half, &limit);
-            for &place in measured.chosen() {
-                found[half].try_triangle(self.bvh.frame(place), place, &packet.points[half]);
-            }
+            self.try_all(measured.chosen(), &packet.points[half], &mut found[half]);
         }
+    }
+
+    /// Measures triangles in double precision.
+    #[inline(always)]
+    fn try_all(&self, places: &[u32], points: &Points, found: &mut Found) {
+        // In registers: in memory, what one triangle stores for some points would hold up the load of the next.
+        let mut nearest = *found;
+        for &place in places {
+            nearest.try_triangle(self.bvh.frame(place), place, points);
+        }
+        *found = nearest;
     }
 
     /// In squared cells and single precision.
@@ -173,18 +179,18 @@ impl Search<'_> {
         if measured.near.len() < self.listed.len() {
             measured.near.resize(self.listed.len(), 0);
         }
+        let (all, kept) = (self.all, &mut measured.near[..self.listed.len()]);
         let mut length = 0;
         for &place in self.listed {
-            let site = &self.all[place as usize];
+            let site = &all[place as usize];
             let v = site.position;
-            let gap = v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - site.slack;
             let mut near = false;
             for l in 0..CELLS {
                 let along = twice[0][l] * v[0] + twice[1][l] * v[1] + twice[2][l] * v[2];
-                near |= gap + power[l] <= along;
+                near |= site.power + power[l] <= along;
             }
             // Written in any case, and kept if near: no branch can foretell which are.
-            measured.near[length] = place;
+            kept[length] = place;
             length += usize::from(near);
         }
         for index in 0..length {
@@ -201,16 +207,17 @@ impl Search<'_> {
         best: &mut [f32; CELLS],
         measured: &mut Measured,
     ) {
-        for index in first..measured.length {
-            let candidate = measured.candidates[index];
+        let range = first..measured.length;
+        let candidates = &measured.candidates[range.clone()];
+        let facets = self.sites.facets();
+        for (candidate, squared) in candidates.iter().zip(&mut measured.squared[range]) {
             let mut from = packet.local;
             for a in 0..3 {
                 for l in 0..CELLS {
                     from[a][l] -= candidate.from[a];
                 }
             }
-            let facet: &Facet = self.sites.facet(candidate.place);
-            let squared = facet.distances(candidate.corner, &from);
+            *squared = facets[candidate.place as usize].distances(candidate.corner, &from);
             for l in 0..CELLS {
                 best[l] = if squared[l] < best[l] {
                     squared[l]
@@ -218,7 +225,6 @@ impl Search<'_> {
                     best[l]
                 };
             }
-            measured.squared[index] = squared;
         }
     }
 }

@@ -9,6 +9,8 @@ pub(super) struct Site {
     pub position: [f32; 3],
     /// The largest slack of its triangles (see `Frame`).
     pub slack: f32,
+    /// The square of its distance from the centre of the block, less the slack.
+    pub power: f32,
     /// Its number.
     pub number: u32,
 }

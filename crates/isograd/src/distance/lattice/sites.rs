@@ -198,10 +198,10 @@ impl Sites {
         self.slack[site as usize]
     }
 
-    /// The triangle at a place of the tree.
+    /// The triangles, in the order of the tree.
     #[inline(always)]
-    pub(super) fn facet(&self, place: u32) -> &Facet {
-        &self.facets[place as usize]
+    pub(super) fn facets(&self) -> &[Facet] {
+        &self.facets
     }
 
     /// The small triangles round a site.

@@ -156,9 +156,12 @@ impl<T: Real> Task<'_, T> {
     fn site(&self, number: u32, centre: [f64; 3]) -> Site {
         let per_cell = 1.0 / self.grid.spacing().f64();
         let slack = self.sites.slack(number) * per_cell * per_cell;
+        let v = scale(sub(self.sites.position(number), centre), per_cell).map(|x| x as f32);
+        let slack = (slack * (1.0 + 2.0 * kernels::MARGIN)) as f32;
         Site {
-            position: scale(sub(self.sites.position(number), centre), per_cell).map(|x| x as f32),
-            slack: (slack * (1.0 + 2.0 * kernels::MARGIN)) as f32,
+            position: v,
+            slack,
+            power: v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - slack,
             number,
         }
     }
@@ -253,7 +256,8 @@ impl<T: Real> Task<'_, T> {
             if distance <= self.width {
                 let index = ((at[0] + x) * BLOCK + at[1] + y) * BLOCK + at[2] + z;
                 output.distance[index] = T::of(distance);
-                output.closest[index] = self.bvh.face(place);
+                // The facet was just in use: what the tree has of the face would come from afar.
+                output.closest[index] = self.sites.facets()[place as usize].face;
             }
         }
     }
@@ -263,7 +267,7 @@ impl<T: Real> Task<'_, T> {
         if squared >= edge * edge {
             return squared.sqrt();
         }
-        let face = self.sites.facet(place).face;
+        let face = self.sites.facets()[place as usize].face;
         triangle::closest_point(q, self.mesh.corners(face as usize).map(to_f64)).distance
     }
 }

@@ -119,9 +119,25 @@ impl Seen {
         self.round += 1;
     }
 
+    #[inline(always)]
+    fn open(&mut self) -> Open<'_> {
+        Open {
+            rounds: &mut self.rounds,
+            round: self.round,
+        }
+    }
+}
+
+/// [`Seen`] in a loop: what writes to other memory leaves this in registers.
+struct Open<'a> {
+    rounds: &'a mut [u32],
+    round: u32,
+}
+
+impl Open<'_> {
     /// Whether it is new.
     #[inline(always)]
-    pub(super) fn insert(&mut self, index: u32) -> bool {
+    fn insert(&mut self, index: u32) -> bool {
         let round = &mut self.rounds[index as usize];
         let new = *round != self.round;
         *round = self.round;
@@ -145,15 +161,16 @@ impl Measured {
             self.squared.resize(2 * most, [0.0; CELLS]);
         }
         let candidates = &mut self.candidates[self.length..most];
+        let mut seen = self.seen.open();
         let mut length = 0;
-        for spoke in star {
+        for &Spoke { place, corner } in star {
             // Written in any case, and kept if new: half of them are, and no branch can foretell which.
             candidates[length] = Candidate {
-                place: spoke.place,
-                corner: spoke.corner,
+                place,
+                corner,
                 from,
             };
-            length += usize::from(self.seen.insert(spoke.place));
+            length += usize::from(seen.insert(place));
         }
         self.length += length;
     }
@@ -164,15 +181,19 @@ impl Measured {
         if self.chosen.len() < self.length {
             self.chosen.resize(self.length, 0);
         }
-        let measured = self.candidates.iter().zip(&self.squared);
+        let first = half * LANES;
+        let mut own = [0.0; LANES];
+        own.copy_from_slice(&limit[first..first + LANES]);
+        let candidates = &self.candidates[..self.length];
+        let chosen = &mut self.chosen[..self.length];
         let mut length = 0;
-        for (candidate, squared) in measured.take(self.length) {
+        for (candidate, squared) in candidates.iter().zip(&self.squared) {
             let mut near = false;
-            for l in half * LANES..(half + 1) * LANES {
-                near |= !(squared[l] > limit[l]);
+            for l in 0..LANES {
+                near |= !(squared[first + l] > own[l]);
             }
             // Written in any case, and kept if near: no branch can foretell which are.
-            self.chosen[length] = candidate.place;
+            chosen[length] = candidate.place;
             length += usize::from(near);
         }
         self.choices = length;
