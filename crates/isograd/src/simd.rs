@@ -22,3 +22,14 @@ impl<R, F: FnMut() -> R> WithSimd for Inline<F> {
         (self.0)()
     }
 }
+
+/// `a b + c`, rounded once where the instruction set `S` does that in one step, else twice.
+#[inline(always)]
+pub(crate) fn multiply_add<S: Simd>(a: f32, b: f32, c: f32) -> f32 {
+    // The sets with vectors of more than sixteen bytes have the instruction. In others it may be a call.
+    if size_of::<S::f32s>() > 16 {
+        a.mul_add(b, c)
+    } else {
+        a * b + c
+    }
+}

@@ -168,7 +168,7 @@ impl Frame {
         for l in 0..N {
             let p = sub([points[0][l], points[1][l], points[2][l]], origin);
             let (x, y, z) = (dot(u, p), dot(v, p), dot(w, p));
-            squared[l] = z * z + outline.distance_squared(x, y);
+            squared[l] = z * z + outline.distance_squared(x, y, rounded_twice);
         }
         squared
     }
@@ -205,7 +205,7 @@ impl Frame {
             return on_edge(0, x, base);
         }
         let (side, way) = self.outline.side(x);
-        let (along, across) = side.coordinates(way, y);
+        let (along, across) = side.coordinates(way, y, rounded_twice);
         if across < 0.0 {
             let c = min(y / self.height, 1.0);
             let b = clamp((x - c * foot) / base, 1.0 - c);
@@ -269,30 +269,34 @@ impl Side<f64> {
 }
 
 impl<T: Float> Side<T> {
-    /// Coordinates along the side and across it, positive outside.
+    /// Coordinates along the side and across it, positive outside. `multiply_add(a, b, c)` is `a b + c`.
     #[inline(always)]
-    fn coordinates(&self, x: T, y: T) -> (T, T) {
+    fn coordinates(&self, x: T, y: T, multiply_add: impl Fn(T, T, T) -> T) -> (T, T) {
         let [c, s] = self.unit;
-        (c * x + s * y, c * y - s * x)
+        (multiply_add(c, x, s * y), multiply_add(c, y, -(s * x)))
     }
 }
 
 impl<T: Float> Outline<T> {
-    /// Squared distance from a point of the plane.
+    /// Squared distance from a point of the plane. `multiply_add(a, b, c)` is `a b + c`.
     ///
     /// Angles at the base are not above 90°. So what is closest to a point above the base is on the side on
     /// its side of the apex, or inside; and a point below is as far from the triangle as from the point over
     /// it on the line of the base, and that way besides.
     #[inline(always)]
-    pub fn distance_squared(&self, x: T, y: T) -> T {
+    pub fn distance_squared(&self, x: T, y: T, multiply_add: impl Fn(T, T, T) -> T + Copy) -> T {
         let zero = T::zero();
         let above = if y > zero { y } else { zero };
         let below = y - above;
         let (side, way) = self.side(x);
-        let (along, across) = side.coordinates(way, above);
+        let (along, across) = side.coordinates(way, above, multiply_add);
         let beyond = along - clamp(along, side.length);
         let outside = if across > zero { across } else { zero };
-        below * below + (beyond * beyond + outside * outside)
+        multiply_add(
+            below,
+            below,
+            multiply_add(beyond, beyond, outside * outside),
+        )
     }
 
     /// The side on this side of the apex, and how far `x` is from its end of the base.
@@ -311,6 +315,12 @@ impl<T: Float> Outline<T> {
         let back = self.base - x;
         (side, if left { x } else { back })
     }
+}
+
+/// `a b + c` with the same bits on every machine.
+#[inline(always)]
+fn rounded_twice(a: f64, b: f64, c: f64) -> f64 {
+    a * b + c
 }
 
 /// Weights at the place `along` of edge `k`, whose length is given.

@@ -191,14 +191,17 @@ impl Bvh {
 }
 
 impl Found {
-    /// Takes the triangle for every point to which it is closer than what was found.
+    /// Takes the triangle for every point to which it is closer than what was found. Of equally close ones it
+    /// is the last in the sorted order, whichever comes first.
     #[inline(always)]
     pub(super) fn try_triangle(&mut self, frame: &Frame, place: u32, points: &Points) {
         let squared = frame.distances(points);
         // Both arrays are written whole: a store of some lanes would hold up the next load.
         for l in 0..LANES {
             let old = self.triangle[l];
-            self.triangle[l] = if squared[l] < self.squared[l] {
+            // Nothing is after `NOWHERE`.
+            let tied = (squared[l] == self.squared[l]) & (place > old);
+            self.triangle[l] = if (squared[l] < self.squared[l]) | tied {
                 place
             } else {
                 old

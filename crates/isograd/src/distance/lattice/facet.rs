@@ -1,6 +1,9 @@
 //! A triangle as the search for the closest one sees it: in single precision, and in cells.
 
+use pulp::Simd;
+
 use crate::distance::triangle::{Frame, Outline, Side};
+use crate::simd::multiply_add;
 
 /// The frame of a triangle (see [`triangle`](crate::distance::triangle)) without a place in space: points are
 /// given from one of its corners.
@@ -37,7 +40,11 @@ impl Facet {
 
     /// Squared distances from points, `[axis][point]`, given from corner `corner`.
     #[inline(always)]
-    pub(super) fn distances<const N: usize>(&self, corner: u32, from: &[[f32; N]; 3]) -> [f32; N] {
+    pub(super) fn distances<S: Simd, const N: usize>(
+        &self,
+        corner: u32,
+        from: &[[f32; N]; 3],
+    ) -> [f32; N] {
         let Self {
             axes: [u, v, w],
             outline,
@@ -47,10 +54,13 @@ impl Facet {
         let mut squared = [0.0; N];
         for l in 0..N {
             let (a, b, c) = (from[0][l], from[1][l], from[2][l]);
-            let x = x0 + (u[0] * a + u[1] * b + u[2] * c);
-            let y = y0 + (v[0] * a + v[1] * b + v[2] * c);
-            let z = w[0] * a + w[1] * b + w[2] * c;
-            squared[l] = z * z + outline.distance_squared(x, y);
+            let along = |axis: [f32; 3], start: f32| {
+                let last = multiply_add::<S>(axis[2], c, start);
+                multiply_add::<S>(axis[0], a, multiply_add::<S>(axis[1], b, last))
+            };
+            let (x, y, z) = (along(u, x0), along(v, y0), along(w, 0.0));
+            let in_plane = outline.distance_squared(x, y, multiply_add::<S>);
+            squared[l] = multiply_add::<S>(z, z, in_plane);
         }
         squared
     }

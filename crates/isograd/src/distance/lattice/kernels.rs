@@ -3,6 +3,9 @@
 
 use pulp::{Simd, WithSimd};
 
+use super::block::Cells;
+use super::packet::{Packet, Search};
+use super::workspace::Measured;
 use crate::distance::bvh::{Bvh, Found, LANES, Points, Region, Stack};
 
 /// Relative error of squares that culling allows its single precision for (a dozen times over).
@@ -68,5 +71,31 @@ impl WithSimd for Gather<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         self.bvh.undominated(self.region, self.stack, self.leaves);
+    }
+}
+
+/// What is closest to the cells of a packet, whose number in its block is `index`.
+pub(super) struct Closest<'a> {
+    pub search: &'a Search<'a>,
+    pub cells: &'a Cells,
+    pub index: usize,
+    /// Origin of the packet's frame.
+    pub origin: [f64; 3],
+    /// Places of sites near its halves.
+    pub seeds: [u32; 2],
+    pub measured: &'a mut Measured,
+    pub found: &'a mut [Found; 2],
+}
+
+impl WithSimd for Closest<'_> {
+    type Output = Packet;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Packet {
+        let packet = Packet::new(self.cells, self.index, self.origin, self.search.per_cell);
+        let (measured, found) = (self.measured, self.found);
+        self.search
+            .closest::<S>(&packet, self.seeds, measured, found);
+        packet
     }
 }

@@ -2,11 +2,14 @@
 //!
 //! Single precision finds out which triangles come into question; they are measured in double precision.
 
+use pulp::Simd;
+
 use super::block::Cells;
 use super::site_list::Site;
 use super::sites::Sites;
 use super::workspace::Measured;
 use crate::distance::bvh::{Bvh, Found, LANES, Points};
+use crate::simd::multiply_add;
 
 /// Cells of a packet, in halves of [`LANES`].
 pub(super) const CELLS: usize = 2 * LANES;
@@ -16,7 +19,7 @@ pub(super) const CELLS: usize = 2 * LANES;
 ///
 /// In units of 2⁻²⁴: what is between a cell and a corner is off by 2 of them, its coordinates in the frame of
 /// the triangle by 13, and the parts of the distance by 21; so the square of a distance `d` by `46 d`, and a
-/// difference of two by `92 d`.
+/// difference of two by `92 d`. Where a product and a sum are rounded at once, it is less.
 const ERROR: f32 = 128.0 / (1u32 << 24) as f32;
 
 /// The centres of the cells of a packet.
@@ -79,7 +82,7 @@ pub(super) struct Search<'a> {
 impl Search<'_> {
     /// The closest triangle to each cell.
     #[inline(always)]
-    pub(super) fn closest(
+    pub(super) fn closest<S: Simd>(
         &self,
         packet: &Packet,
         seeds: [u32; 2],
@@ -92,7 +95,7 @@ impl Search<'_> {
         let mut best = self.bounds(found);
         measured.clear(self.bvh.len());
         if !self.listed.is_empty() {
-            self.filter(packet, seeds, &mut best, measured);
+            self.filter::<S>(packet, seeds, &mut best, measured);
         }
         let limit = self.limits(&best);
         for half in 0..2 {
@@ -138,7 +141,7 @@ impl Search<'_> {
 
     /// Measures all small triangles that may be closest to a cell. `seeds` are places of sites near its halves.
     #[inline(always)]
-    fn filter(
+    fn filter<S: Simd>(
         &self,
         packet: &Packet,
         seeds: [u32; 2],
@@ -148,10 +151,10 @@ impl Search<'_> {
         for seed in seeds {
             self.collect_star(seed, measured);
         }
-        self.measure(packet, 0, best, measured);
+        self.measure::<S>(packet, 0, best, measured);
         let first = measured.length;
-        self.collect_near(packet, best, measured);
-        self.measure(packet, first, best, measured);
+        self.collect_near::<S>(packet, best, measured);
+        self.measure::<S>(packet, first, best, measured);
     }
 
     /// Lists the small triangles round a site.
@@ -163,17 +166,17 @@ impl Search<'_> {
 
     /// Lists the small triangles round the sites that matter.
     #[inline(always)]
-    fn collect_near(&self, packet: &Packet, best: &[f32; CELLS], measured: &mut Measured) {
+    fn collect_near<S: Simd>(&self, packet: &Packet, best: &[f32; CELLS], measured: &mut Measured) {
         let limit = self.limits(best);
         let [x, y, z] = &packet.local;
-        // |q − v|² − slack = (|q|² − limit) − 2 q·v + (|v|² − slack)
-        let (mut twice, mut power) = (packet.local, limit);
+        // |q − v|² − slack ≤ limit where (|v|² − slack) − 2 q·v ≤ limit − |q|²
+        let (mut minus_twice, mut most) = (packet.local, limit);
         for l in 0..CELLS {
             let way = self.way + limit[l].sqrt();
             let radius = limit[l] + ERROR * way * way;
-            power[l] = x[l] * x[l] + y[l] * y[l] + z[l] * z[l] - radius;
+            most[l] = radius - (x[l] * x[l] + y[l] * y[l] + z[l] * z[l]);
             for a in 0..3 {
-                twice[a][l] = 2.0 * packet.local[a][l];
+                minus_twice[a][l] = -2.0 * packet.local[a][l];
             }
         }
         if measured.near.len() < self.listed.len() {
@@ -186,8 +189,9 @@ impl Search<'_> {
             let v = site.position;
             let mut near = false;
             for l in 0..CELLS {
-                let along = twice[0][l] * v[0] + twice[1][l] * v[1] + twice[2][l] * v[2];
-                near |= site.power + power[l] <= along;
+                let last = multiply_add::<S>(minus_twice[2][l], v[2], site.power);
+                let two = multiply_add::<S>(minus_twice[1][l], v[1], last);
+                near |= multiply_add::<S>(minus_twice[0][l], v[0], two) <= most[l];
             }
             // Written in any case, and kept if near: no branch can foretell which are.
             kept[length] = place;
@@ -200,7 +204,7 @@ impl Search<'_> {
 
     /// Measures the triangles listed from `first` on.
     #[inline(always)]
-    fn measure(
+    fn measure<S: Simd>(
         &self,
         packet: &Packet,
         first: usize,
@@ -217,7 +221,8 @@ impl Search<'_> {
                     from[a][l] -= candidate.from[a];
                 }
             }
-            *squared = facets[candidate.place as usize].distances(candidate.corner, &from);
+            *squared =
+                facets[candidate.place as usize].distances::<S, CELLS>(candidate.corner, &from);
             for l in 0..CELLS {
                 best[l] = if squared[l] < best[l] {
                     squared[l]

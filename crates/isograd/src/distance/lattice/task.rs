@@ -216,15 +216,15 @@ impl<T: Real> Task<'_, T> {
         for index in (0..PACKETS).filter(|&index| cells.contain(Cells::packet(index))) {
             let seeds = [seeds[2 * index], seeds[2 * index + 1]];
             let mut found = [Found::NOTHING; 2];
-            let packet = dispatch(
-                self.arch,
-                #[inline(always)]
-                || {
-                    let packet = Packet::new(&cells, index, local.centre, per_cell);
-                    search.closest(&packet, seeds, measured, &mut found);
-                    packet
-                },
-            );
+            let packet = self.arch.dispatch(kernels::Closest {
+                search: &search,
+                cells: &cells,
+                index,
+                origin: local.centre,
+                seeds,
+                measured,
+                found: &mut found,
+            });
             let first = Cells::packet(index);
             self.write(local, block, &cells, (first, &packet), &found, output);
         }

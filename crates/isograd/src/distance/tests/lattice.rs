@@ -1,5 +1,6 @@
 use super::{Random, brute_force, soup, sphere, torus};
 use crate::distance::Error;
+use crate::distance::bvh::{Bvh, Found, LANES};
 use crate::distance::lattice::{Band, NO_TRIANGLE, Scratch, forward};
 use crate::distance::triangle::closest_point;
 use crate::vector::to_f64;
@@ -183,6 +184,26 @@ fn bits_do_not_depend_on_the_number_of_threads() {
     let one = with(1);
     assert!(one == with(2));
     assert!(one == with(5));
+}
+
+#[test]
+fn face_does_not_depend_on_what_single_precision_leaves_over() {
+    let mesh = sphere::<f32>(6, 0.7);
+    let grid = Grid::new([-1.0; 3], 0.125, [16; 3]).expect("a grid");
+    let (_, closest) = solve(&mesh, &signs(grid, 5), Band::Full);
+    let mut bvh = Bvh::default();
+    bvh.rebuild(&mesh).expect("a mesh");
+    for index in (0..grid.cells()).step_by(7) {
+        let points = grid.center_f64(grid.cell(index)).map(|x| [x; LANES]);
+        let (mut found, mut backwards) = (Found::NOTHING, Found::NOTHING);
+        for place in 0..bvh.len() as u32 {
+            found.try_triangle(bvh.frame(place), place, &points);
+            let place = bvh.len() as u32 - 1 - place;
+            backwards.try_triangle(bvh.frame(place), place, &points);
+        }
+        assert_eq!(found.triangle, backwards.triangle);
+        assert_eq!(bvh.face(found.triangle[0]), closest[index], "cell {index}");
+    }
 }
 
 #[test]
