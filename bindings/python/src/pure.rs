@@ -9,14 +9,9 @@ use crate::errors::value;
 use crate::saved::{self, Inputs, Outputs};
 use crate::settings::Settings;
 
-type Arrays<'py> = (
-    Bound<'py, PyAny>,
-    Bound<'py, PyAny>,
-    Bound<'py, PyAny>,
-    Bound<'py, PyAny>,
-);
+type Arrays<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
 
-/// φ, indicator, closest faces and normals of a cloud.
+/// φ, closest faces and normals of a cloud.
 #[pyfunction]
 #[pyo3(signature = (settings, points, normals=None))]
 pub fn forward_saved<'py>(
@@ -42,23 +37,21 @@ fn forward<'py, T: Number>(
     let grid = Settings::parse(&settings).map_err(value)?;
     let grid = grid.grid::<T>().map_err(value)?;
     let result = background::run(py, move |_| {
-        let (cells, zero) = (grid.cells(), T::zero());
-        let (mut sdf, mut indicator) = (vec![zero; cells], vec![zero; cells]);
-        let (mut closest, mut normals) = (vec![0; cells], vec![[zero; 3]; points.len()]);
+        let cells = grid.cells();
+        let (mut sdf, mut closest) = (vec![T::zero(); cells], vec![0; cells]);
+        let mut normals = vec![[T::zero(); 3]; points.len()];
         let out = Outputs {
             sdf: &mut sdf,
-            indicator: &mut indicator,
             closest: &mut closest,
             normals: &mut normals,
         };
         saved::forward(&settings, &points, given.as_deref(), out)?;
-        Ok::<_, String>((sdf, indicator, closest, normals))
+        Ok::<_, String>((sdf, closest, normals))
     })?;
-    let (sdf, indicator, closest, normals) = result.map_err(value)?;
+    let (sdf, closest, normals) = result.map_err(value)?;
     let shape = grid.shape();
     Ok((
         arrays::shaped(py, sdf, shape)?,
-        arrays::shaped(py, indicator, shape)?,
         arrays::shaped(py, closest, shape)?,
         arrays::of_vectors(py, &normals),
     ))
@@ -66,7 +59,7 @@ fn forward<'py, T: Number>(
 
 /// Cotangents of the points, and of the given normals where there are any, from that of φ.
 #[pyfunction]
-#[pyo3(signature = (settings, points, given, sdf, indicator, closest, normals, sdf_bar))]
+#[pyo3(signature = (settings, points, given, sdf, closest, normals, sdf_bar))]
 #[expect(
     clippy::too_many_arguments,
     reason = "a pure function: all it knows is what it is given"
@@ -76,12 +69,11 @@ pub fn pullback_saved<'py>(
     points: &Bound<'py, PyAny>,
     given: Option<&Bound<'py, PyAny>>,
     sdf: &Bound<'py, PyAny>,
-    indicator: &Bound<'py, PyAny>,
     closest: &Bound<'py, PyAny>,
     normals: &Bound<'py, PyAny>,
     sdf_bar: &Bound<'py, PyAny>,
 ) -> PyResult<(Bound<'py, PyAny>, Option<Bound<'py, PyAny>>)> {
-    let fields = [sdf, indicator, sdf_bar];
+    let fields = [sdf, sdf_bar];
     match arrays::dtype(points, "points")? {
         Dtype::F32 => pullback::<f32>(settings, points, given, fields, closest, normals),
         Dtype::F64 => pullback::<f64>(settings, points, given, fields, closest, normals),
@@ -92,7 +84,7 @@ fn pullback<'py, T: Number>(
     settings: String,
     points: &Bound<'py, PyAny>,
     given: Option<&Bound<'py, PyAny>>,
-    [sdf, indicator, sdf_bar]: [&Bound<'py, PyAny>; 3],
+    [sdf, sdf_bar]: [&Bound<'py, PyAny>; 2],
     closest: &Bound<'py, PyAny>,
     normals: &Bound<'py, PyAny>,
 ) -> PyResult<(Bound<'py, PyAny>, Option<Bound<'py, PyAny>>)> {
@@ -101,7 +93,6 @@ fn pullback<'py, T: Number>(
     let given = given.map(|n| arrays::vectors::<T>(n, "normals"));
     let given = given.transpose()?;
     let sdf = arrays::values::<T>(sdf, "sdf")?;
-    let indicator = arrays::values::<T>(indicator, "indicator")?;
     let sdf_bar = arrays::values::<T>(sdf_bar, "the cotangent of sdf")?;
     let closest = arrays::indices(closest, "closest")?;
     let normals = arrays::vectors::<T>(normals, "normals")?;
@@ -115,7 +106,6 @@ fn pullback<'py, T: Number>(
             given: given.as_deref(),
             saved: Saved {
                 sdf: &sdf,
-                indicator: &indicator,
                 closest: &closest,
                 normals: &normals,
             },

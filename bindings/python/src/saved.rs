@@ -9,8 +9,6 @@ use crate::pool;
 pub struct Outputs<'a, T> {
     /// `(nx, ny, nz)` φ.
     pub sdf: &'a mut [T],
-    /// `(nx, ny, nz)` χ.
-    pub indicator: &'a mut [T],
     /// `(nx, ny, nz)` closest faces.
     pub closest: &'a mut [u32],
     /// `(N, 3)` outward normals.
@@ -44,7 +42,6 @@ pub fn forward<T: Real>(
         let result = plan.reconstructor.reconstruct(&cloud);
         let result = result.map_err(|e| e.to_string())?;
         copy("φ", result.sdf().values(), out.sdf)?;
-        copy("the indicator", result.indicator().values(), out.indicator)?;
         copy("the closest faces", result.closest(), out.closest)?;
         copy("the normals", result.normals(), out.normals)
     })?

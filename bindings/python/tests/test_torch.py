@@ -82,7 +82,7 @@ def test_opcheck_passes_for_both_operators():
         torch.library.opcheck(_signed_distance, (points.clone().requires_grad_(), given, settings))
         given = None if given is None else given.detach()
         saved = _signed_distance(points, given, settings)
-        # The operators' order: φ, indicator, closest faces, normals.
+        # The operators' order: φ, closest faces, normals.
         torch.library.opcheck(_pullback, (points, given, *saved, weights(), settings))
 
 

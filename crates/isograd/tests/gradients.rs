@@ -402,7 +402,7 @@ fn what_does_not_fit_is_refused_with_a_reason() {
     assert!(pulled.points.iter().flatten().all(|&x| x == 0.0));
 }
 
-/// What is brought back from φ, χ, closest faces and normals pulls back to the same bits.
+/// What is brought back from φ, closest faces and normals pulls back to the same bits.
 fn assert_restored<T: Real>(options: &Options) {
     let cloud = cloud::<T>();
     let mut plan = Reconstructor::new(grid(), options.clone()).expect("options");
@@ -411,7 +411,6 @@ fn assert_restored<T: Real>(options: &Options) {
     let expected = Weighted::new(&result, &extended).pull(&result, &cloud, &extended);
     let saved = Saved {
         sdf: result.sdf().values(),
-        indicator: result.indicator().values(),
         closest: result.closest(),
         normals: result.normals(),
     };

@@ -118,15 +118,14 @@ def orient(
 
 def forward_saved(
     settings: str, points: _Floats, normals: _Floats | None = None
-) -> tuple[_Floats, _Floats, _Indices, _Floats]:
-    """φ, indicator, closest faces and normals of a cloud."""
+) -> tuple[_Floats, _Indices, _Floats]:
+    """φ, closest faces and normals of a cloud."""
 
 def pullback_saved(
     settings: str,
     points: _Floats,
     given: _Floats | None,
     sdf: _Floats,
-    indicator: _Floats,
     closest: _Indices,
     normals: _Floats,
     sdf_bar: _Floats,

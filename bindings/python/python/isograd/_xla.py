@@ -31,10 +31,10 @@ class Plan:
     """How far an attribute is extended, in cells."""
 
     def kept(self, points: jax.Array) -> tuple[jax.ShapeDtypeStruct, ...]:
-        """φ, indicator, closest faces and normals: what a pullback needs besides its inputs."""
-        field = jax.ShapeDtypeStruct(self.shape, points.dtype)
+        """φ, closest faces and normals: what a pullback needs besides its inputs."""
+        sdf = jax.ShapeDtypeStruct(self.shape, points.dtype)
         closest = jax.ShapeDtypeStruct(self.shape, np.uint32)
-        return (field, field, closest, *like(points))
+        return (sdf, closest, *like(points))
 
 
 def like(*arrays: jax.Array | None) -> tuple[jax.ShapeDtypeStruct, ...]:

@@ -83,20 +83,19 @@ def _checked(values: Tensor, name: str) -> Tensor:
 @torch.library.custom_op("isograd::signed_distance", mutates_args=(), device_types="cpu")
 def _signed_distance(
     points: Tensor, given: Optional[Tensor], settings: str
-) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """φ, and what its pullback needs: indicator, closest faces and normals."""
-    sdf, indicator, closest, normals = _core.forward_saved(settings, _array(points), _array(given))
+) -> tuple[Tensor, Tensor, Tensor]:
+    """φ, and what its pullback needs: closest faces and normals."""
+    sdf, closest, normals = _core.forward_saved(settings, _array(points), _array(given))
     # PyTorch can do little with uint32: the same bits as int32.
-    arrays = (sdf, indicator, closest.view(np.int32), normals)
+    arrays = (sdf, closest.view(np.int32), normals)
     return tuple(torch.from_numpy(array) for array in arrays)  # type: ignore[return-value]
 
 
 @_signed_distance.register_fake
-def _(points: Tensor, given: Optional[Tensor], settings: str) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+def _(points: Tensor, given: Optional[Tensor], settings: str) -> tuple[Tensor, Tensor, Tensor]:
     shape = json.loads(settings)["shape"]
-    field = points.new_empty(shape)
     closest = points.new_empty(shape, dtype=torch.int32)
-    return field, torch.empty_like(field), closest, points.new_empty(points.shape)
+    return points.new_empty(shape), closest, points.new_empty(points.shape)
 
 
 @torch.library.custom_op("isograd::signed_distance_pullback", mutates_args=(), device_types="cpu")
@@ -104,7 +103,6 @@ def _pullback(
     points: Tensor,
     given: Optional[Tensor],
     sdf: Tensor,
-    indicator: Tensor,
     closest: Tensor,
     normals: Tensor,
     sdf_bar: Tensor,
@@ -116,7 +114,6 @@ def _pullback(
         _array(points),
         _array(given),
         _array(sdf),
-        _array(indicator),
         _array(closest).view(np.uint32),
         _array(normals),
         _array(sdf_bar),
@@ -131,7 +128,6 @@ def _(
     points: Tensor,
     given: Optional[Tensor],
     sdf: Tensor,
-    indicator: Tensor,
     closest: Tensor,
     normals: Tensor,
     sdf_bar: Tensor,
@@ -143,10 +139,10 @@ def _(
 
 def _save(ctx: Any, inputs: tuple[Any, ...], output: tuple[Tensor, ...]) -> None:
     points, given, ctx.settings = inputs
-    sdf, indicator, closest, normals = output
-    ctx.save_for_backward(points, given, sdf, indicator, closest, normals)
+    sdf, closest, normals = output
+    ctx.save_for_backward(points, given, sdf, closest, normals)
     # Only φ is pulled back; the others are there to be saved.
-    ctx.mark_non_differentiable(indicator, closest, normals)
+    ctx.mark_non_differentiable(closest, normals)
 
 
 def _backward(ctx: Any, sdf_bar: Tensor, *_unused: Tensor) -> tuple[Tensor | None, Tensor | None, None]:

@@ -50,20 +50,18 @@ pub fn with_result<T: Real, R>(
 /// Where a forward map keeps what its pullback needs, in the order of [`Saved`].
 pub struct Keep<'a, T> {
     sdf: BatchMut<'a, T>,
-    indicator: BatchMut<'a, T>,
     closest: BatchMut<'a, u32>,
     normals: BatchMut<'a, [T; 3]>,
 }
 
 impl<'a, T: Float> Keep<'a, T> {
-    /// The next four outputs.
+    /// The next three outputs.
     ///
     /// # Errors
     /// Outputs of another type or shape.
     pub fn take(call: &mut Call<'a>) -> Result<Self, String> {
         Ok(Self {
             sdf: call.output("φ", 3)?,
-            indicator: call.output("the indicator", 3)?,
             closest: call.output("the closest faces", 3)?,
             normals: call.vectors_out("the normals")?,
         })
@@ -75,8 +73,6 @@ impl<'a, T: Float> Keep<'a, T> {
     /// Another length.
     pub fn fill(&mut self, k: usize, result: &Reconstruction<T>) -> Result<(), String> {
         saved::copy("φ", result.sdf().values(), self.sdf.of(k))?;
-        let indicator = result.indicator().values();
-        saved::copy("the indicator", indicator, self.indicator.of(k))?;
         saved::copy("the closest faces", result.closest(), self.closest.of(k))?;
         saved::copy("the normals", result.normals(), self.normals.of(k))
     }
@@ -85,20 +81,18 @@ impl<'a, T: Float> Keep<'a, T> {
 /// What a forward map kept.
 pub struct Kept<'a, T> {
     sdf: Batch<'a, T>,
-    indicator: Batch<'a, T>,
     closest: Batch<'a, u32>,
     normals: Batch<'a, [T; 3]>,
 }
 
 impl<'a, T: Float> Kept<'a, T> {
-    /// The next four inputs.
+    /// The next three inputs.
     ///
     /// # Errors
     /// Inputs of another type or shape.
     pub fn take(call: &mut Call<'a>) -> Result<Self, String> {
         Ok(Self {
             sdf: call.input("φ", 3)?,
-            indicator: call.input("the indicator", 3)?,
             closest: call.input("the closest faces", 3)?,
             normals: call.vectors("the normals")?,
         })
@@ -117,7 +111,6 @@ impl<'a, T: Float> Kept<'a, T> {
     ) -> Result<(), String> {
         let saved = Saved {
             sdf: self.sdf.of(k),
-            indicator: self.indicator.of(k),
             closest: self.closest.of(k),
             normals: self.normals.of(k),
         };

@@ -7,14 +7,12 @@ use crate::distance::NO_TRIANGLE;
 use crate::report::Report;
 use crate::{Real, isosurface};
 
-/// The results from which the others are found again in little time: arrays whose length is that of the cloud
+/// The results that take longest to find, from which the others are found again: arrays whose length is that of the cloud
 /// or of the grid, which is known before anything is computed.
 #[derive(Clone, Copy, Debug)]
 pub struct Saved<'a, T> {
     /// `(nx, ny, nz)` φ.
     pub sdf: &'a [T],
-    /// `(nx, ny, nz)` χ.
-    pub indicator: &'a [T],
     /// `(nx, ny, nz)` closest faces.
     pub closest: &'a [u32],
     /// `(N, 3)` outward normals.
@@ -50,8 +48,8 @@ pub enum RestoreError {
 }
 
 impl<T: Real> Reconstructor<T> {
-    /// The reconstruction of `cloud` that `saved` is from, to the bit: what is not saved is computed again
-    /// (neighbours, planes, areas, mesh), a small share of the whole. The report is empty, and so is the confidence.
+    /// The reconstruction of `cloud` that `saved` is from, to the bit. What is not saved is computed again: all but
+    /// orientation and distance. The report is empty, and so is the confidence.
     ///
     /// # Errors
     /// As [`RestoreError`] lists.
@@ -72,7 +70,6 @@ impl<T: Real> Reconstructor<T> {
     ) -> Result<(), RestoreError> {
         let cells = self.grid().cells();
         check("φ", saved.sdf.len(), cells)?;
-        check("indicator", saved.indicator.len(), cells)?;
         check("list of closest faces", saved.closest.len(), cells)?;
         check("list of normals", saved.normals.len(), cloud.len())?;
         self.result.report = Report {
