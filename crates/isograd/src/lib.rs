@@ -10,6 +10,7 @@ mod concrete;
 pub mod data;
 pub mod differential;
 pub mod distance;
+pub mod element;
 pub(crate) mod gather;
 pub mod gradcheck;
 pub mod isosurface;

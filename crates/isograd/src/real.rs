@@ -7,12 +7,14 @@ use num_traits::{Float, FloatConst, NumAssign};
 use rustfft::FftNum;
 
 use crate::concrete::Concrete;
+use crate::element::Element;
 
 /// `f32` or `f64`: the type of every coordinate and every field value. What comes in goes out.
 ///
 /// Sealed: the error bounds of the stages are stated for these two alone.
 pub trait Real:
     Concrete
+    + Element
     + Float
     + FloatConst
     + NumAssign

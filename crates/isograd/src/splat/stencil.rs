@@ -5,6 +5,7 @@
 
 use super::Weights;
 use crate::Real;
+use crate::element::spline;
 use crate::vector::dot;
 
 /// Cells along each axis to which one sample contributes.
@@ -176,13 +177,7 @@ fn along<T: Real>(row: &[T; WIDTH], weight: &[T; WIDTH]) -> T {
 /// Weights of the quadratic B-spline on the cell below, the central cell and the cell above.
 #[inline(always)]
 fn quadratic_bspline<T: Real>(f: T) -> [T; 3] {
-    let half = T::of(0.5);
-    let (below, above) = (half - f, half + f);
-    [
-        half * below * below,
-        T::of(0.75) - f * f,
-        half * above * above,
-    ]
+    [spline::below(f), spline::centre(f), spline::above(f)]
 }
 
 /// [`quadratic_bspline`] along each axis. By name: mapped over an array, it is not inlined.
@@ -208,8 +203,11 @@ pub(crate) fn bspline_slopes<T: Real>([x, y, z]: [T; 3]) -> [[T; 3]; 3] {
 /// Derivatives of [`quadratic_bspline`].
 #[inline(always)]
 fn quadratic_bspline_slope<T: Real>(f: T) -> [T; 3] {
-    let half = T::of(0.5);
-    [f - half, -(f + f), half + f]
+    [
+        spline::below_slope(f),
+        spline::centre_slope(f),
+        spline::above_slope(f),
+    ]
 }
 
 /// `½ max(0, 1 − |Δ|/2)` on the cell below, the central cell and the cell above (paper, eq.

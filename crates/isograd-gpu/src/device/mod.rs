@@ -1,0 +1,201 @@
+//! A device, and memory on it.
+
+mod buffer;
+mod open;
+
+use cubecl::prelude::*;
+
+pub use buffer::Buffer;
+#[cfg(feature = "cuda")]
+pub use open::Cuda;
+#[cfg(feature = "wgpu")]
+pub use open::Vulkan;
+
+/// `f32` or `f64`, on the host and on a device.
+pub trait Scalar: isograd::Real + Float + CubeElement {}
+
+impl Scalar for f32 {}
+impl Scalar for f64 {}
+
+/// Why a device can't do what it was asked to.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// There is no such device here.
+    #[error("no {backend} device: {reason}; {remedy}")]
+    NoDevice {
+        /// `Vulkan` or `CUDA`.
+        backend: &'static str,
+        /// What was found instead.
+        reason: String,
+        /// What to do about it.
+        remedy: &'static str,
+    },
+    /// The device has no double precision.
+    #[error("{device} has no {number}; use f32, or the CPU")]
+    NoNumber {
+        /// Name of the device.
+        device: String,
+        /// Name of the number type.
+        number: &'static str,
+    },
+    /// An array is longer than the device can bind to a kernel.
+    #[error(
+        "an array of {bytes} bytes is more than the {limit} that {device} binds to a kernel; use a coarser grid, or the CPU"
+    )]
+    TooLarge {
+        /// Name of the device.
+        device: String,
+        /// Bytes asked for.
+        bytes: u64,
+        /// Most that one array may have.
+        limit: u64,
+    },
+    /// What is given does not fit together.
+    #[error("{what} has {found} elements, but {expected} are needed")]
+    Length {
+        /// Which array.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length that fits.
+        expected: usize,
+    },
+    /// The device failed while it worked.
+    #[error("{device} failed: {reason}")]
+    Failed {
+        /// Name of the device.
+        device: String,
+        /// What the driver says.
+        reason: String,
+    },
+}
+
+/// An open device: what kernels are launched on.
+///
+/// Work is queued in the order of the calls, and a call returns before the device has done it;
+/// [`Self::download`] and [`Self::wait`] wait.
+#[derive(Clone)]
+pub struct Device<R: Runtime> {
+    client: ComputeClient<R>,
+    name: String,
+}
+
+impl<R: Runtime> Device<R> {
+    /// The name that its driver gives the device.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Where kernels are launched.
+    pub(crate) fn client(&self) -> &ComputeClient<R> {
+        &self.client
+    }
+
+    /// Whether kernels of this number type run here.
+    ///
+    /// # Errors
+    /// [`Error::NoNumber`] if they don't.
+    pub fn check_number<T: Scalar>(&self) -> Result<(), Error> {
+        let number = T::as_type_native_unchecked().elem_type();
+        if self.client.properties().supports_type(number) {
+            Ok(())
+        } else {
+            Err(Error::NoNumber {
+                device: self.name.clone(),
+                number: T::NAME,
+            })
+        }
+    }
+
+    /// An array of `len` elements that hold anything.
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`].
+    pub fn empty<E: CubeElement>(&self, len: usize) -> Result<Buffer<E>, Error> {
+        let bytes = self.check_size::<E>(len)?;
+        Ok(Buffer::from_handle(self.client.empty(bytes), len))
+    }
+
+    /// A copy of `values` on the device.
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`].
+    pub fn upload<E: CubeElement>(&self, values: &[E]) -> Result<Buffer<E>, Error> {
+        if values.is_empty() {
+            return self.empty(0);
+        }
+        self.check_size::<E>(values.len())?;
+        let handle = self.client.create_from_slice(E::as_bytes(values));
+        Ok(Buffer::from_handle(handle, values.len()))
+    }
+
+    /// A copy of an array in the host's memory. Waits for the work that makes it.
+    ///
+    /// # Errors
+    /// [`Error::Failed`].
+    pub fn download<E: CubeElement>(&self, buffer: &Buffer<E>) -> Result<Vec<E>, Error> {
+        if buffer.is_empty() {
+            return Ok(Vec::new());
+        }
+        let bytes = self.client.read_one(buffer.handle());
+        let bytes = bytes.map_err(|e| self.failed(&e))?;
+        let mut values = E::from_bytes(&bytes).to_vec();
+        values.truncate(buffer.len());
+        Ok(values)
+    }
+
+    /// Waits until all that was queued is done.
+    ///
+    /// # Errors
+    /// [`Error::Failed`].
+    pub fn wait(&self) -> Result<(), Error> {
+        cubecl::future::block_on(self.client.sync()).map_err(|e| self.failed(&e))
+    }
+
+    /// Groups of `block` units for at least `count` units, as many along y as it takes to stay within the
+    /// limit along x. Kernels compare `ABSOLUTE_POS` with their number of elements.
+    pub(crate) fn groups(&self, count: usize, block: u32) -> CubeCount {
+        let groups = count.div_ceil(block as usize) as u64;
+        let limit = u64::from(self.client.properties().hardware.max_cube_count.0);
+        let rows = groups.div_ceil(limit).max(1);
+        CubeCount::Static(groups.div_ceil(rows).max(1) as u32, rows as u32, 1)
+    }
+
+    /// Bytes of an array of at least one element (devices have no empty ones).
+    fn check_size<E: CubeElement>(&self, len: usize) -> Result<usize, Error> {
+        let bytes = len.max(1).saturating_mul(size_of::<E>());
+        let limit = self.client.properties().memory.max_page_size;
+        if bytes as u64 > limit {
+            return Err(Error::TooLarge {
+                device: self.name.clone(),
+                bytes: bytes as u64,
+                limit,
+            });
+        }
+        Ok(bytes)
+    }
+
+    fn failed(&self, error: &dyn std::fmt::Debug) -> Error {
+        Error::Failed {
+            device: self.name.clone(),
+            reason: format!("{error:?}"),
+        }
+    }
+}
+
+/// An array must have the length that the others call for.
+pub(crate) fn check_length<E>(
+    what: &'static str,
+    buffer: &Buffer<E>,
+    expected: usize,
+) -> Result<(), Error> {
+    if buffer.len() == expected {
+        Ok(())
+    } else {
+        Err(Error::Length {
+            what,
+            found: buffer.len(),
+            expected,
+        })
+    }
+}

@@ -1,0 +1,7 @@
+//! The formulas of [`isograd::element`], compiled as parts of kernels: the same files.
+
+/// A number in a formula.
+pub(crate) use cubecl::prelude::Float as Element;
+
+#[path = "../../isograd/src/element/spline.rs"]
+pub(crate) mod spline;

@@ -1,0 +1,23 @@
+//! The stages of isograd as GPU kernels: one source in Rust, run on NVIDIA devices through CUDA and on
+//! others through Vulkan.
+//!
+//! A stage is one file, forward and pullback side by side, as in [`isograd`]; data stay in [`Buffer`]s on a
+//! [`Device`] from the points to φ and back, and only what [`Device::download`] asks for is copied. Formulas
+//! of single elements are those of [`isograd::element`], the same lines.
+//!
+//! # Determinism
+//! The same input gives the same bits on the same device, every time: sums have a fixed order, and nothing
+//! is added by atomic operations on floating-point numbers.
+
+// The macro makes a public module of every kernel, documented or not.
+#![allow(missing_docs)]
+
+mod device;
+mod element;
+pub mod primitives;
+
+#[cfg(feature = "cuda")]
+pub use device::Cuda;
+#[cfg(feature = "wgpu")]
+pub use device::Vulkan;
+pub use device::{Buffer, Device, Error, Scalar};

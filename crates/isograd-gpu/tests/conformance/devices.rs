@@ -1,0 +1,43 @@
+//! The devices that are here. One that is not prints why.
+
+/// Runs a function that is generic over the runtime on every device that is here:
+/// `on_each_device!(function)` calls `function(&device)`.
+macro_rules! on_each_device {
+    ($function:path) => {{
+        match isograd_gpu::Device::vulkan() {
+            Ok(device) => $function(&device),
+            Err(reason) => println!("SKIPPED on Vulkan: {reason}"),
+        }
+        #[cfg(feature = "cuda")]
+        match isograd_gpu::Device::cuda(0) {
+            Ok(device) => $function(&device),
+            Err(reason) => println!("SKIPPED on CUDA: {reason}"),
+        }
+    }};
+}
+
+pub(crate) use on_each_device;
+
+/// Numbers that look random, the same every time: splitmix64.
+pub struct Numbers(pub u64);
+
+impl Numbers {
+    /// The next 32 bits.
+    pub fn bits(&mut self) -> u32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 32) as u32
+    }
+
+    /// Between 0 and 1.
+    pub fn unit(&mut self) -> f64 {
+        f64::from(self.bits()) / 4_294_967_296.0
+    }
+
+    /// Between −1 and 1.
+    pub fn signed(&mut self) -> f64 {
+        2.0 * self.unit() - 1.0
+    }
+}
