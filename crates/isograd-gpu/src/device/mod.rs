@@ -1,6 +1,8 @@
 //! A device, and memory on it.
 
 mod buffer;
+#[cfg(feature = "cuda")]
+mod libraries;
 mod open;
 
 use cubecl::prelude::*;
@@ -81,6 +83,11 @@ pub struct Device<R: Runtime> {
 }
 
 impl<R: Runtime> Device<R> {
+    /// A device of any runtime of CubeCL.
+    pub fn new(client: ComputeClient<R>, name: String) -> Self {
+        Self { client, name }
+    }
+
     /// The name that its driver gives the device.
     pub fn name(&self) -> &str {
         &self.name

@@ -34,10 +34,8 @@ mod vulkan {
                 reason: "the loader lists none".into(),
                 remedy: REMEDY,
             })?;
-            Ok(Self {
-                client: WgpuRuntime::client(&WgpuDevice::DefaultDevice),
-                name,
-            })
+            let client = WgpuRuntime::client(&WgpuDevice::DefaultDevice);
+            Ok(Self::new(client, name))
         }
     }
 
@@ -64,11 +62,15 @@ mod vulkan {
 mod cuda {
     use cubecl::cuda::{CudaDevice, CudaRuntime};
     use cubecl::prelude::*;
+    use cudarc::driver::result;
 
+    use super::super::libraries;
     use super::{Device, Error};
 
     /// Kernels as CUDA C++, compiled by NVRTC.
     pub type Cuda = CudaRuntime;
+
+    const REMEDY: &str = "install the NVIDIA driver and NVRTC of CUDA 12 where the loader finds them (LD_LIBRARY_PATH)";
 
     impl Device<Cuda> {
         /// The CUDA device of this number. The CUDA libraries are loaded here, and nowhere before.
@@ -76,17 +78,33 @@ mod cuda {
         /// # Errors
         /// [`Error::NoDevice`].
         pub fn cuda(index: usize) -> Result<Self, Error> {
-            let name = super::super::buffer::cuda_device_name(index).map_err(|reason| {
-                Error::NoDevice {
-                    backend: "CUDA",
-                    reason,
-                    remedy: "install the NVIDIA driver and the CUDA 12 runtime compiler (NVRTC)",
-                }
+            let name = name(index).map_err(|reason| Error::NoDevice {
+                backend: "CUDA",
+                reason,
+                remedy: REMEDY,
             })?;
-            Ok(Self {
-                client: CudaRuntime::client(&CudaDevice::new(index)),
+            Ok(Self::new(
+                CudaRuntime::client(&CudaDevice::new(index)),
                 name,
-            })
+            ))
         }
+    }
+
+    /// The name of the device, or why there is none.
+    fn name(index: usize) -> Result<String, String> {
+        if let Some(library) = libraries::missing() {
+            return Err(format!("the library {library} is not here"));
+        }
+        let say = |e: cudarc::driver::DriverError| format!("the driver says: {e}");
+        result::init().map_err(say)?;
+        let count = result::device::get_count().map_err(say)?;
+        let index = i32::try_from(index).unwrap_or(i32::MAX);
+        if index >= count {
+            return Err(format!(
+                "there are {count}, and number {index} was asked for"
+            ));
+        }
+        let device = result::device::get(index).map_err(say)?;
+        result::device::get_name(device).map_err(say)
     }
 }
