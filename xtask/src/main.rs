@@ -5,6 +5,7 @@ mod deny;
 mod examples;
 mod fit;
 mod links;
+mod nvrtc;
 mod pages;
 mod peers;
 mod process;

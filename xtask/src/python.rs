@@ -81,7 +81,7 @@ impl Environment {
         let environment = Self { folder, python };
         let stamp = environment.stamp(&["requirements.txt"])?;
         if !stamp.fits() {
-            let system = interpreter()?;
+            let system = interpreter().map_err(Obstacle::Absent)?;
             remove_folder(&environment.folder)?;
             let mut venv = Command::new(system);
             venv.args(["-m", "venv"]).arg(&environment.folder);
@@ -167,43 +167,49 @@ impl Environment {
             text += &fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
         }
         let file = self.folder.join(format!("installed-{}", files[0]));
-        Ok(Stamp { file, text })
+        Ok(Stamp::new(file, text))
     }
 }
 
 /// A copy of what was asked for, written once it is there.
-struct Stamp {
+pub struct Stamp {
     file: PathBuf,
     text: String,
 }
 
 impl Stamp {
-    fn fits(&self) -> bool {
+    /// To be written to `file` when what `text` asks for is there.
+    pub fn new(file: PathBuf, text: String) -> Self {
+        Self { file, text }
+    }
+
+    /// Whether the same was asked for before, and is there.
+    pub fn fits(&self) -> bool {
         fs::read_to_string(&self.file).is_ok_and(|text| text == self.text)
     }
 
-    fn write(&self) -> Outcome {
+    /// Says that it is there.
+    pub fn write(&self) -> Outcome {
         fs::write(&self.file, &self.text).map_err(|e| format!("{}: {e}", self.file.display()))
     }
 }
 
 /// A Python of this machine that is new enough.
-fn interpreter() -> Result<&'static str, Obstacle> {
+pub fn interpreter() -> Outcome<&'static str> {
     let (major, minor) = OLDEST;
     let question = format!("import sys; sys.exit(sys.version_info < ({major}, {minor}))");
     let good = |name: &&str| {
         let answer = Command::new(name).args(["-c", &question]).output();
         answer.is_ok_and(|output| output.status.success())
     };
-    ["python3", "python"].into_iter().find(good).ok_or_else(|| {
-        Obstacle::Absent(format!(
-            "there is no python3 of version {major}.{minor} or later"
-        ))
-    })
+    ["python3", "python"]
+        .into_iter()
+        .find(good)
+        .ok_or_else(|| format!("there is no python3 of version {major}.{minor} or later"))
 }
 
 /// Runs a command silently; the error is all that it printed.
-fn capture(command: &mut Command) -> Outcome {
+pub fn capture(command: &mut Command) -> Outcome {
     let output = command.output().map_err(|error| error.to_string())?;
     if output.status.success() {
         return Ok(());
@@ -213,7 +219,7 @@ fn capture(command: &mut Command) -> Outcome {
 }
 
 /// The line of an output that says what is wrong: pip's last error, or else the last line.
-fn reason(output: &str) -> &str {
+pub fn reason(output: &str) -> &str {
     let lines = || output.lines().rev().map(str::trim);
     lines()
         .find(|line| line.starts_with("ERROR"))
@@ -232,7 +238,8 @@ fn cannot_connect(output: &str) -> bool {
     .any(|sign| output.contains(sign))
 }
 
-fn remove_folder(folder: &Path) -> Outcome {
+/// Removes a folder, if it is there, and all that is in it.
+pub fn remove_folder(folder: &Path) -> Outcome {
     if !folder.exists() {
         return Ok(());
     }

@@ -2,6 +2,7 @@
 
 use crate::examples;
 use crate::links;
+use crate::nvrtc::Nvrtc;
 use crate::process::{self, Outcome};
 use crate::python;
 use crate::readme;
@@ -80,6 +81,10 @@ fn tests(tally: &mut Tally, targets: &[&str]) -> Outcome<Vec<String>> {
     let before = tally.skipped_lines().len();
     let mut command = process::cargo(["test", "--workspace", "--no-fail-fast"]);
     command.args(targets).args(["--", "--show-output"]);
+    match Nvrtc::fetch() {
+        Ok(nvrtc) => nvrtc.tell(&mut command),
+        Err(reason) => println!("PTX tests are left out: {reason}"),
+    }
     process::run_by_line(&mut command, |line| {
         if tally.read(line) {
             println!("{line}");

@@ -1,9 +1,10 @@
-//! The devices that are here. One that is not prints why.
+//! The devices that are here.
 
 /// Runs a function that is generic over the runtime on every device that is here:
-/// `on_each_device!(function)` calls `function(&device)`.
+/// `on_each_device!(function)` calls `function(&device)`, and prints which devices are not here.
 macro_rules! on_each_device {
     ($function:path) => {{
+        #[cfg(feature = "wgpu")]
         match isograd_gpu::Device::vulkan() {
             Ok(device) => $function(&device),
             Err(reason) => println!("SKIPPED on Vulkan: {reason}"),

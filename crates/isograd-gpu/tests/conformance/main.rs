@@ -2,3 +2,9 @@
 
 mod devices;
 mod primitives;
+
+#[test]
+#[cfg(not(feature = "cuda"))]
+fn these_tests_run_on_cuda_too() {
+    println!("SKIPPED on CUDA: built without the feature `cuda`");
+}
