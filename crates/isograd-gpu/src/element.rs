@@ -3,5 +3,8 @@
 /// A number in a formula.
 pub(crate) use cubecl::prelude::Float as Element;
 
+#[path = "../../isograd/src/element/plane.rs"]
+pub(crate) mod plane;
+
 #[path = "../../isograd/src/element/spline.rs"]
 pub(crate) mod spline;

@@ -12,8 +12,11 @@
 // The macro makes a public module of every kernel, documented or not.
 #![allow(missing_docs)]
 
+pub mod area;
 mod device;
 mod element;
+pub mod neighbors;
+pub mod normals;
 pub mod primitives;
 
 #[cfg(feature = "cuda")]

@@ -1,6 +1,9 @@
 //! Every kernel beside the CPU's stage or a plain loop, on each device that is here.
 
+mod areas;
+mod clouds;
 mod devices;
+mod normals;
 mod primitives;
 
 #[test]

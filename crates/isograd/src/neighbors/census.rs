@@ -2,6 +2,7 @@
 
 use super::candidates::{Candidates, LANES, Lanes, sum_lanes};
 use crate::Real;
+use crate::element::plane;
 
 /// Sums over the samples within `R` of a place.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -40,7 +41,7 @@ fn sum<T: Real>(center: [T; 3], radius: T, near: &Candidates<T>) -> ([u32; LANES
                 let within = d2[l] <= lanes.limit[l];
                 counts[l] += u32::from(within);
                 crowds[l] += if within {
-                    kernel(d2[l], scale)
+                    plane::crowd(d2[l] * scale)
                 } else {
                     T::zero()
                 };
@@ -48,13 +49,6 @@ fn sum<T: Real>(center: [T; 3], radius: T, near: &Candidates<T>) -> ([u32; LANES
         },
     );
     (counts, crowds)
-}
-
-/// `(1 − r²/R²)²` at the squared distance `d2`.
-#[inline(always)]
-fn kernel<T: Real>(d2: T, scale: T) -> T {
-    let rise = T::one() - d2 * scale;
-    rise * rise
 }
 
 #[inline(always)]

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::eigen::{Eigen, eigen};
 use super::{Plane, Residual, widen};
+use crate::element::plane;
 use crate::neighbors::{self, Candidates, Found, LANES, Lanes, Neighborhoods, Radius, sum_lanes};
 use crate::parallel::CHUNK;
 use crate::{Real, simd, vector};
@@ -111,7 +112,7 @@ fn moment_terms<T: Real>(center: [T; 3], epsilon: T, lanes: &Lanes<T>) -> [[T; L
     for l in 0..LANES {
         let [x, y, z] = [0, 1, 2].map(|a| lanes.point[a][l] - center[a]);
         let d2 = x * x + y * y + z * z;
-        let weight = T::one() / (d2.sqrt() + epsilon);
+        let weight = plane::weight(d2.sqrt(), epsilon);
         let w = if d2 <= lanes.limit[l] {
             weight
         } else {

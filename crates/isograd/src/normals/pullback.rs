@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::forward::{EPSILON, SMALLEST_GAP};
 use super::{Plane, Residual};
+use crate::element::plane;
 use crate::neighbors::{Candidates, LANES, Neighborhoods};
 use crate::vector::{add, dot, norm, scale};
 use crate::{Real, vector};
@@ -124,17 +125,13 @@ fn sort_values<T: Real>(
 /// `ŵ (g (n·e) + n (g·e)) − ŵ² (g·e)(n·e) d̂/r̂` with `e = d̂ − m̂` and `g` standing for `ĝ/Ŵ`.
 #[inline(always)]
 fn offset_bar<T: Real>(g: [T; 3], n: [T; 3], mean: [T; 3], d: [T; 3], r: T) -> [T; 3] {
-    let w = T::one() / (r + T::of(EPSILON));
+    let w = plane::weight(r, T::of(EPSILON));
     let e = [d[0] - mean[0], d[1] - mean[1], d[2] - mean[2]];
     let (ge, ne) = (dot(g, e), dot(n, e));
-    let radial = if r > T::zero() {
-        w * w * ge * ne / r
-    } else {
-        T::zero()
-    };
+    let radial = plane::radial(w, ge, ne, r);
     [0, 1, 2].map(
         #[inline(always)]
-        |a| w * (g[a] * ne + n[a] * ge) - radial * d[a],
+        |a| plane::offset_bar(w, g[a], ne, n[a], ge, radial, d[a]),
     )
 }
 

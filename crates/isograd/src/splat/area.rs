@@ -27,6 +27,7 @@
 
 use rayon::prelude::*;
 
+use crate::element::plane;
 use crate::neighbors::{Candidates, LANES, Neighborhoods};
 use crate::{Real, parallel, vector};
 
@@ -47,7 +48,7 @@ pub fn forward<T: Real>(neighborhoods: &Neighborhoods<T>, areas: &mut Vec<T>) {
         if isolated {
             T::zero()
         } else {
-            area(radius, crowd)
+            plane::area(T::PI(), radius, crowd)
         }
     };
     samples.map(area).collect_into_vec(areas);
@@ -60,12 +61,6 @@ pub fn mean<T: Real>(areas: &[T]) -> (f64, usize) {
         [area, f64::from(u8::from(area > 0.0))]
     });
     (sum / count, count as usize)
-}
-
-/// `a_i` from `Σ_j (1 − r_j²/R_i²)²`, which is at least 1, the sample's own part.
-#[inline(always)]
-fn area<T: Real>(radius: T, crowd: T) -> T {
-    T::PI() * radius * radius / (T::of(3.0) * crowd)
 }
 
 /// Buffers of the pullback.

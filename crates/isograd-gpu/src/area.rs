@@ -1,0 +1,215 @@
+//! The area of surface that each sample stands for.
+//!
+//! # Map
+//! [`Neighborhoods`] → `a_i = 1 / Σ_{j∈N_i} K(r_j)`, as on the page of [`isograd::splat::area`], and 0 for
+//! isolated samples: those with a grown radius of whose neighbours fewer than 1 in 8 have them as theirs.
+//!
+//! # Residual
+//! [`Residual`]: the areas and the neighbourhoods.
+//!
+//! # Pullback
+//! As printed there; [`pullback`] gathers, with the radius of each centre.
+//!
+//! # Not differentiable
+//! The radii and what is isolated, which are held constant.
+
+use cubecl::prelude::*;
+
+use crate::device::check_length;
+use crate::element::plane;
+use crate::neighbors::{BLOCK, Neighborhoods, Vector3, end_of_leaf, first_of_leaf, next_leaf};
+use crate::{Buffer, Device, Error, Scalar};
+
+/// What the pullback needs of [`forward`].
+#[derive(Clone, Debug)]
+pub struct Residual<T> {
+    neighborhoods: Neighborhoods<T>,
+    /// In input order.
+    areas: Buffer<T>,
+}
+
+/// The `(N,)` areas `a_i`, in input order and the unit of the points squared; positive, and 0 for isolated
+/// samples. A radius above `common_radius` has grown ([`isograd::neighbors::Neighborhoods::common_radius`]).
+///
+/// # Errors
+/// [`Error::TooLarge`].
+pub fn forward<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    neighborhoods: &Neighborhoods<T>,
+    common_radius: T,
+) -> Result<(Buffer<T>, Residual<T>), Error> {
+    let n = neighborhoods.len();
+    let areas = device.empty(n)?;
+    if n > 0 {
+        find_areas::launch::<T, R>(
+            device.client(),
+            device.groups(n, BLOCK),
+            CubeDim::new_1d(BLOCK),
+            neighborhoods.points.arg(),
+            neighborhoods.radii.arg(),
+            neighborhoods.places.arg(),
+            neighborhoods.nodes.arg(),
+            neighborhoods.links.arg(),
+            areas.arg(),
+            common_radius,
+            T::PI(),
+        );
+    }
+    let residual = Residual {
+        neighborhoods: neighborhoods.clone(),
+        areas: areas.clone(),
+    };
+    Ok((areas, residual))
+}
+
+/// What the cotangents `areas_bar` `(N,)` of the areas mean for the points: `(N, 3)`. Both in input order.
+///
+/// # Errors
+/// [`Error::Length`], [`Error::TooLarge`].
+pub fn pullback<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    residual: &Residual<T>,
+    areas_bar: &Buffer<T>,
+) -> Result<Buffer<T>, Error> {
+    let near = &residual.neighborhoods;
+    let n = near.len();
+    check_length("areas_bar", areas_bar, n)?;
+    let points_bar = device.empty(3 * n)?;
+    if n == 0 {
+        return Ok(points_bar);
+    }
+    let factors: Buffer<T> = device.empty(n)?;
+    let (groups, dim) = (device.groups(n, BLOCK), CubeDim::new_1d(BLOCK));
+    fill_factors::launch::<T, R>(
+        device.client(),
+        groups.clone(),
+        dim,
+        residual.areas.arg(),
+        near.radii.arg(),
+        near.places.arg(),
+        areas_bar.arg(),
+        factors.arg(),
+        T::FRAC_1_PI(),
+    );
+    gather::launch::<T, R>(
+        device.client(),
+        groups,
+        dim,
+        near.points.arg(),
+        near.radii.arg(),
+        near.places.arg(),
+        near.nodes.arg(),
+        near.links.arg(),
+        factors.arg(),
+        points_bar.arg(),
+    );
+    Ok(points_bar)
+}
+
+#[cube(launch)]
+fn find_areas<F: Float + CubeElement>(
+    points: &Array<F>,
+    radii: &Array<F>,
+    places: &Array<u32>,
+    nodes: &Array<F>,
+    links: &Array<u32>,
+    areas: &mut Array<F>,
+    common_radius: F,
+    pi: F,
+) {
+    let n = radii.len();
+    if ABSOLUTE_POS < n {
+        let centre = Vector3::<F>::at(points, ABSOLUTE_POS);
+        let radius = radii[ABSOLUTE_POS];
+        let scale = F::new(1.0) / (radius * radius);
+        let mut crowd = F::new(0.0);
+        // Both without the point itself.
+        let mut count = 0u32;
+        let mut mutual = 0u32;
+        let mut node = next_leaf::<F>(nodes, links, centre, radius, 0usize, false);
+        while node < links.len() {
+            let first = first_of_leaf(links, node);
+            let mut of_leaf = F::new(0.0);
+            for j in first..end_of_leaf(first, n) {
+                let offset = Vector3::<F>::at(points, j).sub(centre);
+                let square = offset.dot(offset);
+                if square <= radius * radius {
+                    of_leaf += plane::crowd::<F>(square * scale);
+                    if j != ABSOLUTE_POS {
+                        count += 1u32;
+                        mutual += select(square <= radii[j] * radii[j], 1u32, 0u32);
+                    }
+                }
+            }
+            crowd += of_leaf;
+            node = next_leaf::<F>(nodes, links, centre, radius, node + 1, false);
+        }
+        let isolated = radius > common_radius && 8u32 * mutual < max(count, 1u32);
+        let area = plane::area::<F>(pi, radius, crowd);
+        let place = places[ABSOLUTE_POS] as usize;
+        areas[place] = select(isolated, F::new(0.0), area);
+    }
+}
+
+/// `ā_i a_i² · 12/(π R_i⁴)`, in sorted order.
+#[cube(launch)]
+fn fill_factors<F: Float + CubeElement>(
+    areas: &Array<F>,
+    radii: &Array<F>,
+    places: &Array<u32>,
+    areas_bar: &Array<F>,
+    factors: &mut Array<F>,
+    one_over_pi: F,
+) {
+    if ABSOLUTE_POS < factors.len() {
+        let place = places[ABSOLUTE_POS] as usize;
+        let share = areas[place] / (radii[ABSOLUTE_POS] * radii[ABSOLUTE_POS]);
+        factors[ABSOLUTE_POS] = F::new(12.0) * one_over_pi * areas_bar[place] * share * share;
+    }
+}
+
+/// `−Σ_c [f_k (1 − r²/R_k²) + f_c (1 − r²/R_c²)] d_c`, each where the radius reaches: what point `k` gets as a
+/// centre, and as a neighbour of the others.
+#[cube(launch)]
+fn gather<F: Float>(
+    points: &Array<F>,
+    radii: &Array<F>,
+    places: &Array<u32>,
+    nodes: &Array<F>,
+    links: &Array<u32>,
+    factors: &Array<F>,
+    points_bar: &mut Array<F>,
+) {
+    let n = radii.len();
+    if ABSOLUTE_POS < n {
+        let point = Vector3::<F>::at(points, ABSOLUTE_POS);
+        let radius = radii[ABSOLUTE_POS];
+        let own = factors[ABSOLUTE_POS];
+        let mut x = F::new(0.0);
+        let mut y = F::new(0.0);
+        let mut z = F::new(0.0);
+        let mut node = next_leaf::<F>(nodes, links, point, radius, 0usize, true);
+        while node < links.len() {
+            let first = first_of_leaf(links, node);
+            for j in first..end_of_leaf(first, n) {
+                let offset = Vector3::<F>::at(points, j).sub(point);
+                let square = offset.dot(offset);
+                let factor =
+                    own * rise::<F>(square, radius) + factors[j] * rise::<F>(square, radii[j]);
+                x -= factor * offset.x;
+                y -= factor * offset.y;
+                z -= factor * offset.z;
+            }
+            node = next_leaf::<F>(nodes, links, point, radius, node + 1, true);
+        }
+        let sum = Vector3::<F> { x, y, z };
+        sum.write(points_bar, places[ABSOLUTE_POS] as usize);
+    }
+}
+
+/// `1 − r²/R²` within the radius, else 0.
+#[cube]
+fn rise<F: Float>(square: F, radius: F) -> F {
+    let rise = F::new(1.0) - square / (radius * radius);
+    select(rise > F::new(0.0), rise, F::new(0.0))
+}

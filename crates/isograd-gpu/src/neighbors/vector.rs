@@ -1,0 +1,73 @@
+//! Vectors of three numbers in kernels.
+
+use cubecl::prelude::*;
+
+#[derive(CubeType, Clone, Copy)]
+pub(crate) struct Vector3<F: Float> {
+    pub x: F,
+    pub y: F,
+    pub z: F,
+}
+
+#[cube]
+impl<F: Float> Vector3<F> {
+    /// Row `i` of an `(N, 3)` array.
+    pub fn at(array: &Array<F>, i: usize) -> Self {
+        Vector3::<F> {
+            x: array[3 * i],
+            y: array[3 * i + 1],
+            z: array[3 * i + 2],
+        }
+    }
+
+    pub fn write(self, array: &mut Array<F>, i: usize) {
+        array[3 * i] = self.x;
+        array[3 * i + 1] = self.y;
+        array[3 * i + 2] = self.z;
+    }
+
+    pub fn add(self, other: Self) -> Self {
+        Vector3::<F> {
+            x: self.x + other.x,
+            y: self.y + other.y,
+            z: self.z + other.z,
+        }
+    }
+
+    pub fn sub(self, other: Self) -> Self {
+        Vector3::<F> {
+            x: self.x - other.x,
+            y: self.y - other.y,
+            z: self.z - other.z,
+        }
+    }
+
+    pub fn scale(self, factor: F) -> Self {
+        Vector3::<F> {
+            x: self.x * factor,
+            y: self.y * factor,
+            z: self.z * factor,
+        }
+    }
+
+    pub fn dot(self, other: Self) -> F {
+        self.x * other.x + self.y * other.y + self.z * other.z
+    }
+
+    pub fn cross(self, other: Self) -> Self {
+        Vector3::<F> {
+            x: self.y * other.z - self.z * other.y,
+            y: self.z * other.x - self.x * other.z,
+            z: self.x * other.y - self.y * other.x,
+        }
+    }
+
+    /// `self` where the condition holds, else `other`.
+    pub fn choose(self, condition: bool, other: Self) -> Self {
+        Vector3::<F> {
+            x: select(condition, self.x, other.x),
+            y: select(condition, self.y, other.y),
+            z: select(condition, self.z, other.z),
+        }
+    }
+}

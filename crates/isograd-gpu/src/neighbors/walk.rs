@@ -1,0 +1,74 @@
+//! Walks down the tree.
+
+use cubecl::prelude::*;
+
+use super::LEAF;
+use super::tree::{IS_LEAF, NODE};
+use super::vector::Vector3;
+
+/// The first leaf at or after node `from` that may hold points within `radius` of `x`, or, if `mutual`, points
+/// whose own radius reaches `x`; the number of nodes where there is none.
+#[cube]
+pub(crate) fn next_leaf<F: Float>(
+    nodes: &Array<F>,
+    links: &Array<u32>,
+    x: Vector3<F>,
+    radius: F,
+    from: usize,
+    #[comptime] mutual: bool,
+) -> usize {
+    let mut node = from;
+    let mut end = links.len();
+    while node < end {
+        let link = links[node];
+        let mut reach = radius;
+        if mutual {
+            let other = nodes[NODE * node + 6];
+            reach = select(other > radius, other, radius);
+        }
+        // So much more that no rounding can shut out a neighbour.
+        let limit = reach * reach * F::new(1.0001);
+        if box_distance_squared(nodes, node, x) <= limit {
+            if link >= IS_LEAF {
+                end = node;
+            } else {
+                node += 1;
+            }
+        } else if link >= IS_LEAF {
+            node += 1;
+        } else {
+            node = link as usize;
+        }
+    }
+    // `end` is the leaf, where one was found.
+    select(node < links.len(), node, links.len())
+}
+
+#[cube]
+fn box_distance_squared<F: Float>(nodes: &Array<F>, node: usize, x: Vector3<F>) -> F {
+    let dx = outside(nodes, node, 0usize, x.x);
+    let dy = outside(nodes, node, 1usize, x.y);
+    let dz = outside(nodes, node, 2usize, x.z);
+    dx * dx + dy * dy + dz * dz
+}
+
+/// How far a coordinate is outside a box, along one axis.
+#[cube]
+fn outside<F: Float>(nodes: &Array<F>, node: usize, #[comptime] axis: usize, x: F) -> F {
+    let below = nodes[NODE * node + axis] - x;
+    let above = x - nodes[NODE * node + 3 + axis];
+    let larger = select(below > above, below, above);
+    select(larger > F::new(0.0), larger, F::new(0.0))
+}
+
+/// The first point of a leaf.
+#[cube]
+pub(crate) fn first_of_leaf(links: &Array<u32>, node: usize) -> usize {
+    (links[node] - IS_LEAF) as usize * LEAF
+}
+
+/// The point after the last of a leaf that begins at `first`.
+#[cube]
+pub(crate) fn end_of_leaf(first: usize, count: usize) -> usize {
+    min(first + LEAF, count)
+}

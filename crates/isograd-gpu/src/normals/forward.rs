@@ -1,0 +1,202 @@
+//! Neighbourhoods to axes.
+
+use cubecl::prelude::*;
+
+use super::eigen::{Symmetric, eigen};
+use super::{CENTROID, PLANE, Residual, TANGENT, VALUES, WEIGHT};
+use crate::element::plane::weight;
+use crate::neighbors::{BLOCK, Neighborhoods, Vector3, end_of_leaf, first_of_leaf, next_leaf};
+use crate::{Buffer, Device, Error, Scalar};
+
+/// Sums over a neighbourhood: `Σ w`, `Σ w d` and `Σ w d dᵀ` (`xx, xy, xz, yy, yz, zz`), in units of the radius.
+const MOMENTS: usize = 10;
+
+/// The axis `(N, 3)` of the surface at every point, in input order, and what the pullback needs; see the
+/// [module](super).
+///
+/// Where the points of a neighbourhood lie on a line or in one place, the axis is some unit vector at a right
+/// angle to the line, or any, and counts as guarded.
+///
+/// # Errors
+/// [`Error::TooLarge`].
+pub fn forward<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    neighborhoods: &Neighborhoods<T>,
+) -> Result<(Buffer<T>, Residual<T>), Error> {
+    let n = neighborhoods.len();
+    let normals = device.empty(3 * n)?;
+    let residual = Residual {
+        neighborhoods: neighborhoods.clone(),
+        planes: device.empty(PLANE * n)?,
+        count: device.empty(n)?,
+    };
+    if n == 0 {
+        return Ok((normals, residual));
+    }
+    let moments: Buffer<T> = device.empty(MOMENTS * n)?;
+    let (groups, dim) = (device.groups(n, BLOCK), CubeDim::new_1d(BLOCK));
+    sum_moments::launch::<T, R>(
+        device.client(),
+        groups.clone(),
+        dim,
+        neighborhoods.points.arg(),
+        neighborhoods.radii.arg(),
+        neighborhoods.places.arg(),
+        neighborhoods.nodes.arg(),
+        neighborhoods.links.arg(),
+        moments.arg(),
+        residual.count.arg(),
+    );
+    find_planes::launch::<T, R>(
+        device.client(),
+        groups,
+        dim,
+        moments.arg(),
+        neighborhoods.places.arg(),
+        residual.planes.arg(),
+        normals.arg(),
+    );
+    Ok((normals, residual))
+}
+
+/// `ε/R = 1/5`, as on the CPU.
+#[cube]
+pub(super) fn epsilon<F: Float>() -> F {
+    F::new(1.0) / F::new(5.0)
+}
+
+/// Sums and numbers of all neighbourhoods. Each leaf is summed by itself, and sums of leaves are added up, so
+/// that rounding stays small where many points are close.
+#[cube(launch)]
+fn sum_moments<F: Float>(
+    points: &Array<F>,
+    radii: &Array<F>,
+    places: &Array<u32>,
+    nodes: &Array<F>,
+    links: &Array<u32>,
+    moments: &mut Array<F>,
+    counts: &mut Array<u32>,
+) {
+    let n = radii.len();
+    if ABSOLUTE_POS < n {
+        let centre = Vector3::<F>::at(points, ABSOLUTE_POS);
+        let radius = radii[ABSOLUTE_POS];
+        let mut count = 0u32;
+        let mut sums = Array::<F>::new(MOMENTS);
+        let mut of_leaf = Array::<F>::new(MOMENTS);
+        #[unroll]
+        for k in 0..MOMENTS {
+            sums[k] = F::new(0.0);
+        }
+        let mut node = next_leaf::<F>(nodes, links, centre, radius, 0usize, false);
+        while node < links.len() {
+            #[unroll]
+            for k in 0..MOMENTS {
+                of_leaf[k] = F::new(0.0);
+            }
+            let first = first_of_leaf(links, node);
+            for j in first..end_of_leaf(first, n) {
+                let offset = Vector3::<F>::at(points, j).sub(centre);
+                if offset.dot(offset) <= radius * radius {
+                    add_moments::<F>(offset.scale(F::new(1.0) / radius), &mut of_leaf);
+                    count += 1u32;
+                }
+            }
+            #[unroll]
+            for k in 0..MOMENTS {
+                sums[k] += of_leaf[k];
+            }
+            node = next_leaf::<F>(nodes, links, centre, radius, node + 1, false);
+        }
+        #[unroll]
+        for k in 0..MOMENTS {
+            moments[k * n + ABSOLUTE_POS] = sums[k];
+        }
+        let place = places[ABSOLUTE_POS] as usize;
+        counts[place] = count;
+    }
+}
+
+/// Adds `w`, `w d` and `w d dᵀ` of an offset in units of the radius.
+#[cube]
+fn add_moments<F: Float>(d: Vector3<F>, sums: &mut Array<F>) {
+    let w = weight::<F>(F::sqrt(d.dot(d)), epsilon::<F>());
+    let wd = d.scale(w);
+    sums[0] += w;
+    sums[1] += wd.x;
+    sums[2] += wd.y;
+    sums[3] += wd.z;
+    sums[4] += wd.x * d.x;
+    sums[5] += wd.x * d.y;
+    sums[6] += wd.x * d.z;
+    sums[7] += wd.y * d.y;
+    sums[8] += wd.y * d.z;
+    sums[9] += wd.z * d.z;
+}
+
+/// Planes in sorted order and normals in input order.
+#[cube(launch)]
+fn find_planes<F: Float>(
+    moments: &Array<F>,
+    places: &Array<u32>,
+    planes: &mut Array<F>,
+    normals: &mut Array<F>,
+) {
+    let n = places.len();
+    let at = ABSOLUTE_POS;
+    if at < n {
+        let weight = moments[at];
+        let mx = moments[n + at] / weight;
+        let my = moments[2 * n + at] / weight;
+        let mz = moments[3 * n + at] / weight;
+        let found = eigen::<F>(Symmetric::<F> {
+            xx: moments[4 * n + at] / weight - mx * mx,
+            xy: moments[5 * n + at] / weight - mx * my,
+            xz: moments[6 * n + at] / weight - mx * mz,
+            yy: moments[7 * n + at] / weight - my * my,
+            yz: moments[8 * n + at] / weight - my * mz,
+            zz: moments[9 * n + at] / weight - mz * mz,
+        });
+        let sign = sign::<F>(found.first);
+        let normal = found.first.scale(sign);
+        normal.write(normals, places[at] as usize);
+        // Turning two vectors of the three keeps the basis right-handed.
+        let tangent = found.second.scale(sign);
+        write_rows::<F>(normal, planes, 0usize, n);
+        write_rows::<F>(tangent, planes, TANGENT, n);
+        let centroid = Vector3::<F> {
+            x: mx,
+            y: my,
+            z: mz,
+        };
+        write_rows::<F>(centroid, planes, CENTROID, n);
+        let values = Vector3::<F> {
+            x: not_negative::<F>(found.values.x),
+            y: not_negative::<F>(found.values.y),
+            z: not_negative::<F>(found.values.z),
+        };
+        write_rows::<F>(values, planes, VALUES, n);
+        planes[WEIGHT * n + at] = weight;
+    }
+}
+
+/// Writes three of the numbers of this unit's point, from number `k`.
+#[cube]
+fn write_rows<F: Float>(v: Vector3<F>, planes: &mut Array<F>, #[comptime] k: usize, n: usize) {
+    planes[k * n + ABSOLUTE_POS] = v.x;
+    planes[(k + 1) * n + ABSOLUTE_POS] = v.y;
+    planes[(k + 2) * n + ABSOLUTE_POS] = v.z;
+}
+
+#[cube]
+fn not_negative<F: Float>(x: F) -> F {
+    select(x > F::new(0.0), x, F::new(0.0))
+}
+
+/// `+1` or `−1`: what makes the component of largest magnitude (the first among equals) positive.
+#[cube]
+fn sign<F: Float>(v: Vector3<F>) -> F {
+    let of_two = select(v.y.abs() > v.x.abs(), v.y, v.x);
+    let largest = select(v.z.abs() > of_two.abs(), v.z, of_two);
+    select(largest < F::new(0.0), F::new(-1.0), F::new(1.0))
+}

@@ -1,0 +1,132 @@
+//! The axis of the surface at every sample: distance-weighted principal components (D-PCA). What it computes,
+//! and why, is on the page of [`isograd::normals`]; radii, which the CPU widens where samples scatter, are given.
+//!
+//! # Map
+//! [`Neighborhoods`] → unit vectors `(N, 3)` along the surface normal, in input order, each with its component
+//! of largest magnitude positive.
+//!
+//! # Residual
+//! [`Residual`]: per point `n`, `v₂`, `m`, `W` and the eigenvalues `λ₁ ≤ λ₂ ≤ λ₃`, in units of the radius:
+//! `m/R`, `W R`, `λ/R²`, so that nothing overflows or vanishes in single precision whatever the unit of the
+//! cloud. `v₃ = n × v₂`. Of the pullback, `⟨B, C⟩ = 0`, and `B` is `n` and a vector `g` made of these.
+//!
+//! # Pullback
+//! As printed there. One walk over the tree gathers both what a point gets as a neighbour of others and what it
+//! hands out as a centre, with the radius of each centre. No atomics.
+//!
+//! # Not differentiable
+//! The neighbourhoods, the radii, the sign. Where `λ₂ − λ₁` is at most `10⁻³ λ₃`, the pullback bounds
+//! `1/(λ₁ − λ_k)`: [`Residual::guarded`].
+
+mod eigen;
+mod forward;
+mod pullback;
+
+pub use forward::forward;
+pub use pullback::pullback;
+
+use cubecl::prelude::*;
+
+use crate::neighbors::{BLOCK, Neighborhoods};
+use crate::primitives::scan::exclusive_sum;
+use crate::{Buffer, Device, Error, Scalar};
+
+/// Numbers that the residual has of a point, each an array `(N,)` in sorted order, one after the other:
+/// normal, tangent, centroid, eigenvalues, weight.
+const PLANE: usize = 13;
+const TANGENT: usize = 3;
+const CENTROID: usize = 6;
+const VALUES: usize = 9;
+const WEIGHT: usize = 12;
+
+/// Parts of 1000 of `λ₃` up to which the gap `λ₂ − λ₁` is too small for a normal to mean anything: as on the CPU.
+const SMALLEST_GAP: f32 = 1.0;
+
+/// What the pullback needs of [`forward`].
+#[derive(Clone, Debug)]
+pub struct Residual<T> {
+    neighborhoods: Neighborhoods<T>,
+    planes: Buffer<T>,
+    /// `(N,)` number of samples within each radius, the point itself included, in input order.
+    pub count: Buffer<u32>,
+}
+
+/// The local planes on the host, in input order and in the unit of the points; see [`isograd::normals::Plane`].
+pub type Planes<T> = Vec<isograd::normals::Plane<T>>;
+
+impl<T: Scalar> Residual<T> {
+    /// Number of points whose normal is ill defined. Waits for the device.
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`], [`Error::Failed`].
+    pub fn guarded<R: Runtime>(&self, device: &Device<R>) -> Result<usize, Error> {
+        let n = self.neighborhoods.len();
+        if n == 0 {
+            return Ok(0);
+        }
+        let flags: Buffer<u32> = device.empty(n)?;
+        let (groups, dim) = (device.groups(n, BLOCK), CubeDim::new_1d(BLOCK));
+        flag_guarded::launch::<T, R>(device.client(), groups, dim, self.planes.arg(), flags.arg());
+        let sums = exclusive_sum(device, &flags)?;
+        let total: Buffer<u32> = device.empty(1)?;
+        let one = CubeDim::new_1d(1);
+        take_last::launch::<R>(
+            device.client(),
+            device.groups(1, 1),
+            one,
+            sums.arg(),
+            total.arg(),
+        );
+        Ok(device.download(&total)?[0] as usize)
+    }
+
+    /// A copy of the planes on the host.
+    ///
+    /// # Errors
+    /// [`Error::Failed`].
+    pub fn planes<R: Runtime>(&self, device: &Device<R>) -> Result<Planes<T>, Error> {
+        let n = self.neighborhoods.len();
+        let places = device.download(&self.neighborhoods.places)?;
+        let radii = device.download(&self.neighborhoods.radii)?;
+        let numbers = device.download(&self.planes)?;
+        let mut planes = vec![isograd::normals::Plane::default(); n];
+        for (sorted, &place) in places.iter().enumerate() {
+            let at = |k: usize| isograd::Real::f64(numbers[k * n + sorted]);
+            let triple = |k: usize| [at(k), at(k + 1), at(k + 2)];
+            let radius = isograd::Real::f64(radii[sorted]);
+            let of = |v: [f64; 3], unit: f64| v.map(|x| <T as isograd::Real>::of(x * unit));
+            let (normal, tangent) = (triple(0), triple(TANGENT));
+            let [l1, l2, l3] = triple(VALUES);
+            planes[place as usize] = isograd::normals::Plane {
+                centroid: of(triple(CENTROID), radius),
+                weight: <T as isograd::Real>::of(at(WEIGHT) / radius),
+                eigenvalues: of([l1, l2, l3], radius * radius),
+                tangents: [
+                    of(tangent, 1.0),
+                    of(isograd::vector::cross(normal, tangent), 1.0),
+                ],
+                guarded: !(1000.0 * (l2 - l1) > f64::from(SMALLEST_GAP) * l3),
+            };
+        }
+        Ok(planes)
+    }
+}
+
+#[cube(launch)]
+fn flag_guarded<F: Float>(planes: &Array<F>, flags: &mut Array<u32>) {
+    let n = flags.len();
+    if ABSOLUTE_POS < n {
+        let first = planes[VALUES * n + ABSOLUTE_POS];
+        let second = planes[(VALUES + 1) * n + ABSOLUTE_POS];
+        let third = planes[(VALUES + 2) * n + ABSOLUTE_POS];
+        let clear = F::new(1000.0) * (second - first) > F::new(SMALLEST_GAP) * third;
+        flags[ABSOLUTE_POS] = select(clear, 0u32, 1u32);
+    }
+}
+
+#[cube(launch)]
+fn take_last(values: &Array<u32>, last: &mut Array<u32>) {
+    if ABSOLUTE_POS == 0 {
+        last[0] = values[values.len() - 1];
+    }
+}

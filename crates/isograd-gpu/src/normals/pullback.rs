@@ -1,0 +1,186 @@
+//! Cotangents of the axes to cotangents of the points.
+//!
+//! All lengths are in units of the radius of a centre: `d̂ = d/R`, `ŵ = wR`, `ĝ = R² g/(RW)`. What a centre hands
+//! out is divided by its `R` at the end.
+
+use cubecl::prelude::*;
+
+use super::forward::epsilon;
+use super::{CENTROID, Residual, SMALLEST_GAP, TANGENT, VALUES, WEIGHT};
+use crate::device::check_length;
+use crate::element::plane;
+use crate::neighbors::{BLOCK, Vector3, end_of_leaf, first_of_leaf, next_leaf};
+use crate::{Buffer, Device, Error, Scalar};
+
+/// What the cotangents `normals_bar` `(N, 3)` of the axes (with the sign that [`forward`](super::forward) gave
+/// them; their part along the axis drops out) mean for the points: `(N, 3)`. Both in input order.
+///
+/// # Errors
+/// [`Error::Length`], [`Error::TooLarge`].
+pub fn pullback<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    residual: &Residual<T>,
+    normals_bar: &Buffer<T>,
+) -> Result<Buffer<T>, Error> {
+    let near = &residual.neighborhoods;
+    let n = near.len();
+    check_length("normals_bar", normals_bar, 3 * n)?;
+    let points_bar = device.empty(3 * n)?;
+    if n == 0 {
+        return Ok(points_bar);
+    }
+    let centres: Buffer<T> = device.empty(CENTRE * n)?;
+    let (groups, dim) = (device.groups(n, BLOCK), CubeDim::new_1d(BLOCK));
+    fill_centres::launch::<T, R>(
+        device.client(),
+        groups.clone(),
+        dim,
+        residual.planes.arg(),
+        near.places.arg(),
+        normals_bar.arg(),
+        centres.arg(),
+    );
+    gather::launch::<T, R>(
+        device.client(),
+        groups,
+        dim,
+        near.points.arg(),
+        near.radii.arg(),
+        near.places.arg(),
+        near.nodes.arg(),
+        near.links.arg(),
+        centres.arg(),
+        points_bar.arg(),
+    );
+    Ok(points_bar)
+}
+
+/// Numbers that a centre hands out by: `ĝ/Ŵ`, `n` and `m̂`.
+const CENTRE: usize = 9;
+
+/// The same numbers.
+#[derive(CubeType, Clone, Copy)]
+struct Centre<F: Float> {
+    g: Vector3<F>,
+    n: Vector3<F>,
+    mean: Vector3<F>,
+}
+
+#[cube]
+impl<F: Float> Centre<F> {
+    fn at(centres: &Array<F>, i: usize) -> Self {
+        Centre::<F> {
+            g: Vector3::<F>::at(centres, 3 * i),
+            n: Vector3::<F>::at(centres, 3 * i + 1),
+            mean: Vector3::<F>::at(centres, 3 * i + 2),
+        }
+    }
+
+    /// `d̄` in units of the radius, for an offset `d̂` from the centre.
+    fn offset_bar(self, d: Vector3<F>) -> Vector3<F> {
+        let r = F::sqrt(d.dot(d));
+        let w = plane::weight::<F>(r, epsilon::<F>());
+        let e = d.sub(self.mean);
+        let ge = self.g.dot(e);
+        let ne = self.n.dot(e);
+        let radial = plane::radial::<F>(w, ge, ne, r);
+        Vector3::<F> {
+            x: plane::offset_bar::<F>(w, self.g.x, ne, self.n.x, ge, radial, d.x),
+            y: plane::offset_bar::<F>(w, self.g.y, ne, self.n.y, ge, radial, d.y),
+            z: plane::offset_bar::<F>(w, self.g.z, ne, self.n.z, ge, radial, d.z),
+        }
+    }
+}
+
+/// Three of the numbers of this unit's point, from number `k`.
+#[cube]
+fn rows<F: Float>(planes: &Array<F>, #[comptime] k: usize, n: usize) -> Vector3<F> {
+    Vector3::<F> {
+        x: planes[k * n + ABSOLUTE_POS],
+        y: planes[(k + 1) * n + ABSOLUTE_POS],
+        z: planes[(k + 2) * n + ABSOLUTE_POS],
+    }
+}
+
+#[cube(launch)]
+fn fill_centres<F: Float>(
+    planes: &Array<F>,
+    places: &Array<u32>,
+    normals_bar: &Array<F>,
+    centres: &mut Array<F>,
+) {
+    let n = places.len();
+    if ABSOLUTE_POS < n {
+        let normal = rows::<F>(planes, 0usize, n);
+        let second = rows::<F>(planes, TANGENT, n);
+        let values = rows::<F>(planes, VALUES, n);
+        let weight = planes[WEIGHT * n + ABSOLUTE_POS];
+        let bar = Vector3::<F>::at(normals_bar, places[ABSOLUTE_POS] as usize);
+        let third = normal.cross(second);
+        let g = second
+            .scale(slope::<F>(values.y - values.x, values.z, weight) * second.dot(bar))
+            .add(third.scale(slope::<F>(values.z - values.x, values.z, weight) * third.dot(bar)));
+        g.write(centres, 3 * ABSOLUTE_POS);
+        normal.write(centres, 3 * ABSOLUTE_POS + 1);
+        rows::<F>(planes, CENTROID, n).write(centres, 3 * ABSOLUTE_POS + 2);
+    }
+}
+
+/// `1/((λ₁ − λ_k) W)`; gaps count as at least a thousandth of the largest eigenvalue, and samples in one place,
+/// where that is as good as 0, have no derivative.
+#[cube]
+fn slope<F: Float>(gap: F, largest: F, weight: F) -> F {
+    let least = F::new(SMALLEST_GAP) * largest / F::new(1000.0);
+    let extends = largest > F::new(1e-30);
+    let bounded = select(gap > least, gap, least);
+    let divisor = select(extends, bounded * weight, F::new(1.0));
+    select(extends, F::new(-1.0) / divisor, F::new(0.0))
+}
+
+/// What each point gets as a neighbour of the others, less what it hands out as a centre.
+#[cube(launch)]
+fn gather<F: Float>(
+    points: &Array<F>,
+    radii: &Array<F>,
+    places: &Array<u32>,
+    nodes: &Array<F>,
+    links: &Array<u32>,
+    centres: &Array<F>,
+    points_bar: &mut Array<F>,
+) {
+    let n = radii.len();
+    if ABSOLUTE_POS < n {
+        let point = Vector3::<F>::at(points, ABSOLUTE_POS);
+        let radius = radii[ABSOLUTE_POS];
+        let inverse = F::new(1.0) / radius;
+        let own = Centre::<F>::at(centres, ABSOLUTE_POS);
+        let mut x = F::new(0.0);
+        let mut y = F::new(0.0);
+        let mut z = F::new(0.0);
+        let mut node = next_leaf::<F>(nodes, links, point, radius, 0usize, true);
+        while node < links.len() {
+            let first = first_of_leaf(links, node);
+            for j in first..end_of_leaf(first, n) {
+                let offset = Vector3::<F>::at(points, j).sub(point);
+                let square = offset.dot(offset);
+                if square <= radius * radius {
+                    let out = own.offset_bar(offset.scale(inverse));
+                    x -= out.x * inverse;
+                    y -= out.y * inverse;
+                    z -= out.z * inverse;
+                }
+                let other = radii[j];
+                if square <= other * other {
+                    let unit = F::new(1.0) / other;
+                    let into = Centre::<F>::at(centres, j).offset_bar(offset.scale(-unit));
+                    x += into.x * unit;
+                    y += into.y * unit;
+                    z += into.z * unit;
+                }
+            }
+            node = next_leaf::<F>(nodes, links, point, radius, node + 1, true);
+        }
+        let sum = Vector3::<F> { x, y, z };
+        sum.write(points_bar, places[ABSOLUTE_POS] as usize);
+    }
+}

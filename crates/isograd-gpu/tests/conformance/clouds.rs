@@ -1,0 +1,118 @@
+//! Clouds that stages of points are tried on, and what the CPU finds in them.
+
+use isograd::neighbors::{self, Radius};
+use isograd::{Real, normals};
+use isograd_gpu::{Buffer, Device, Scalar};
+use isograd_shapes::{Layout, Sampling};
+
+use crate::devices::Numbers;
+use cubecl::prelude::Runtime;
+
+/// A cloud, and its neighbourhoods and axes on the CPU.
+pub struct Cloud<T> {
+    pub name: &'static str,
+    pub points: Vec<[T; 3]>,
+    pub near: neighbors::Neighborhoods<T>,
+    pub axes: normals::Residual<T>,
+}
+
+impl<T: Scalar> Cloud<T> {
+    fn new(name: &'static str, points: Vec<[f64; 3]>) -> Self {
+        let points: Vec<[T; 3]> = points.iter().map(|p| p.map(real)).collect();
+        let (mut near, mut axes) = Default::default();
+        normals::forward_with_neighborhoods(&points, Radius::Auto, &mut near, &mut axes)
+            .expect(name);
+        Self {
+            name,
+            points,
+            near,
+            axes,
+        }
+    }
+
+    /// The points on the device.
+    pub fn upload<R: Runtime>(&self, device: &Device<R>) -> Buffer<T> {
+        device.upload(self.points.as_flattened()).unwrap()
+    }
+}
+
+/// The nearest number of type `T`.
+pub fn real<T: Scalar>(x: f64) -> T {
+    <T as Real>::of(x)
+}
+
+/// Samples of surfaces with and without noise, and clouds that break careless indices.
+pub fn clouds<T: Scalar>() -> Vec<Cloud<T>> {
+    let sampling = Sampling {
+        layout: Layout::Random,
+        ..Sampling::default()
+    };
+    let sample = |name: &str, n: usize| {
+        let shape = isograd_shapes::by_name(name).unwrap();
+        let samples = shape.sample::<f64>(n, &sampling, 5).unwrap();
+        samples.cloud.points().to_vec()
+    };
+    let mut numbers = Numbers(7);
+    let mut noisy = sample("torus", 1201);
+    for x in noisy.as_flattened_mut() {
+        *x += 0.02 * numbers.signed();
+    }
+    let mut make = |n: usize, f: &dyn Fn(usize, [f64; 3]) -> [f64; 3]| -> Vec<[f64; 3]> {
+        (0..n)
+            .map(|i| f(i, [0; 3].map(|_| numbers.unit())))
+            .collect()
+    };
+    let mut doubled = make(701, &|_, p| p);
+    for i in (0..700).step_by(7) {
+        doubled[i] = doubled[i + 1];
+    }
+    doubled.push([30.0, -20.0, 10.0]);
+    let dense_spot = |i: usize, p: [f64; 3]| match i % 10 {
+        0 => p,
+        _ => p.map(|x| 1e-6 * x),
+    };
+    vec![
+        Cloud::new("torus", sample("torus", 3001)),
+        Cloud::new("fish", sample("fish", 2503)),
+        Cloud::new("torus with noise", noisy),
+        Cloud::new("duplicates and an isolated point", doubled),
+        Cloud::new("nine tenths in one place", make(600, &dense_spot)),
+        Cloud::new(
+            "two clusters far apart",
+            make(400, &|i, p| p.map(|x| x + 1e3 * (i % 2) as f64)),
+        ),
+        Cloud::new(
+            "one outlier",
+            make(400, &|i, p| if i == 17 { [1e9, -1e9, 1e9] } else { p }),
+        ),
+    ]
+}
+
+/// What a stage may differ by from the CPU.
+pub fn tolerance<T: Scalar>() -> f64 {
+    if size_of::<T>() == 4 { 1e-4 } else { 1e-10 }
+}
+
+/// The largest difference, over the largest number that is expected.
+pub fn relative<T: Scalar>(found: &[T], expected: &[T]) -> f64 {
+    assert_eq!(found.len(), expected.len());
+    let (mut difference, mut size) = (0.0f64, f64::MIN_POSITIVE);
+    for (found, expected) in found.iter().zip(expected) {
+        let (found, expected) = (Real::f64(*found), Real::f64(*expected));
+        assert!(found.is_finite(), "{found}, not {expected}");
+        difference = difference.max((found - expected).abs());
+        size = size.max(expected.abs());
+    }
+    difference / size
+}
+
+/// Whether the device has the number type; prints why not.
+pub fn has_number<R: Runtime, T: Scalar>(device: &Device<R>) -> bool {
+    match device.check_number::<T>() {
+        Ok(()) => true,
+        Err(reason) => {
+            println!("SKIPPED in {}: {reason}", T::NAME);
+            false
+        }
+    }
+}
