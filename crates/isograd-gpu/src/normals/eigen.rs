@@ -121,9 +121,9 @@ fn eigen_normalized<F: Float>(b: Symmetric<F>) -> Eigen<F> {
 #[cube]
 fn eigenvalue_apart<F: Float>(h: F) -> F {
     let height = select(h.abs() < F::new(1.0), h.abs(), F::new(1.0));
-    let root_of_three = F::sqrt(F::new(3.0));
     // The chord from (0, √3) to (1, 2) is within 0.007 of the root; each step squares the error.
-    let mut beta = root_of_three + (F::new(2.0) - root_of_three) * height;
+    // √3 is written out: WGSL takes no root of a constant in double precision.
+    let mut beta = F::new(1.732_050_8) + F::new(0.267_949_2) * height;
     #[unroll]
     for _ in 0..4 {
         beta -= (beta * (beta * beta - F::new(3.0)) - F::new(2.0) * height)

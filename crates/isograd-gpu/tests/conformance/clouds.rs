@@ -103,6 +103,7 @@ pub fn relative<T: Scalar>(found: &[T], expected: &[T]) -> f64 {
         difference = difference.max((found - expected).abs());
         size = size.max(expected.abs());
     }
+    assert!(size > f64::MIN_POSITIVE, "nothing is expected");
     difference / size
 }
 

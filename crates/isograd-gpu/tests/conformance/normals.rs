@@ -231,8 +231,11 @@ fn lines_and_heaps_are_guarded_and_finite() {
     in_each_number!(check_guarded);
 }
 
+/// A name, and its points by number.
+type Heap = (&'static str, fn(usize) -> [f64; 3]);
+
 fn check_guarded<R: Runtime, T: Scalar>(device: &Device<R>) {
-    let clouds: [(&str, fn(usize) -> [f64; 3]); 4] = [
+    let clouds: [Heap; 4] = [
         ("line", |i| [i as f64, 2.0 * i as f64, 0.0]),
         ("all in one place", |_| [3.0, -1.0, 2.0]),
         ("far from each other", |i| [1e3 * i as f64, 0.0, -1e4]),
