@@ -6,5 +6,9 @@ pub(crate) use cubecl::prelude::Float as Element;
 #[path = "../../isograd/src/element/plane.rs"]
 pub(crate) mod plane;
 
+#[path = "../../isograd/src/element/hat.rs"]
+pub(crate) mod hat;
+#[path = "../../isograd/src/element/linear.rs"]
+pub(crate) mod linear;
 #[path = "../../isograd/src/element/spline.rs"]
 pub(crate) mod spline;

@@ -15,9 +15,13 @@
 pub mod area;
 mod device;
 mod element;
+mod grid;
+pub mod iso_value;
 pub mod neighbors;
 pub mod normals;
 pub mod primitives;
+pub mod splat;
+mod spread;
 
 #[cfg(feature = "cuda")]
 pub use device::Cuda;

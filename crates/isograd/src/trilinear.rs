@@ -6,6 +6,7 @@
 
 use rayon::prelude::*;
 
+use crate::element::linear::lerp;
 use crate::{Field, Grid, Real, splat};
 
 /// Planes across x that one task of [`spread`] owns.
@@ -139,11 +140,6 @@ impl<T: Real> Field<T> {
         let (value, gradient) = cube.value_and_gradient(self.values());
         (value, gradient.map(|g| g / grid.spacing()))
     }
-}
-
-#[inline(always)]
-fn lerp<T: Real>(a: T, b: T, t: T) -> T {
-    a + (b - a) * t
 }
 
 /// `u` limited to `0..=max`, and whether it was there already. NaN stays NaN.

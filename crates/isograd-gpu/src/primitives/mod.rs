@@ -1,4 +1,6 @@
 //! What several stages need: sums from the beginning, orders, totals.
 
+pub mod fill;
+pub mod reduce;
 pub mod scan;
 pub mod sort;

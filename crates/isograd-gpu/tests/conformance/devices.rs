@@ -42,3 +42,17 @@ impl Numbers {
         2.0 * self.unit() - 1.0
     }
 }
+
+/// Runs a function that is generic over the number type in single precision, to 1e-4, and where the device has
+/// it in double, to 1e-10: `in_both_numbers!(device, function)` calls `function::<R, T>(device, tolerance)`.
+macro_rules! in_both_numbers {
+    ($device:expr, $function:ident) => {{
+        $function::<R, f32>($device, 1e-4);
+        match $device.check_number::<f64>() {
+            Ok(()) => $function::<R, f64>($device, 1e-10),
+            Err(reason) => println!("SKIPPED in f64: {reason}"),
+        }
+    }};
+}
+
+pub(crate) use in_both_numbers;

@@ -3,8 +3,12 @@
 mod areas;
 mod clouds;
 mod devices;
+mod iso_value;
 mod normals;
 mod primitives;
+mod samples;
+mod reduce;
+mod splat;
 
 #[test]
 #[cfg(not(feature = "cuda"))]

@@ -5,7 +5,7 @@
 
 use super::Weights;
 use crate::Real;
-use crate::element::spline;
+use crate::element::{hat as hats, spline};
 use crate::vector::dot;
 
 /// Cells along each axis to which one sample contributes.
@@ -210,27 +210,24 @@ fn quadratic_bspline_slope<T: Real>(f: T) -> [T; 3] {
     ]
 }
 
-/// `½ max(0, 1 − |Δ|/2)` on the cell below, the central cell and the cell above (paper, eq.
-/// `alpha_product`, not normalised); `Δ` is the distance to the cell's centre in cells.
+/// The paper's weights on the cell below, the central cell and the cell above, not normalised.
 #[inline(always)]
 pub(super) fn hat<T: Real>(f: T) -> [T; 3] {
-    let half = T::of(0.5);
-    [-T::one(), T::zero(), T::one()]
-        .map(|centre| half * (T::one() - half * (f - centre).abs()).max(T::zero()))
+    [
+        hats::weight(f + T::one()),
+        hats::weight(f),
+        hats::weight(f - T::one()),
+    ]
 }
 
 /// Derivatives of [`hat`]; 0 for the central cell at its centre, where there is none.
 #[inline(always)]
 pub(super) fn hat_slope<T: Real>(f: T) -> [T; 3] {
-    let quarter = T::of(0.25);
-    let central = if f > T::zero() {
-        -quarter
-    } else if f < T::zero() {
-        quarter
-    } else {
-        T::zero()
-    };
-    [-quarter, central, quarter]
+    [
+        hats::slope(f + T::one()),
+        hats::slope(f),
+        hats::slope(f - T::one()),
+    ]
 }
 
 /// `M u`, with `M = (1, 4, 1)/6`.

@@ -1,0 +1,79 @@
+//! A grid, as kernels see it.
+
+use cubecl::prelude::*;
+
+use crate::device::check_length;
+use crate::{Buffer, Error, Scalar};
+
+/// Low corner, cell size and numbers of cells.
+#[derive(CubeLaunch, CubeType, Clone, Copy)]
+pub(crate) struct Lattice<F: Float + CubeElement> {
+    pub x: F,
+    pub y: F,
+    pub z: F,
+    pub spacing: F,
+    pub nx: u32,
+    pub ny: u32,
+    pub nz: u32,
+}
+
+/// A grid as an argument of a kernel.
+pub(crate) fn arg<R: Runtime, T: Scalar>(grid: &isograd::Grid<T>) -> LatticeLaunch<T, R> {
+    let ([x, y, z], [nx, ny, nz]) = (grid.lower(), grid.shape().map(|n| n as u32));
+    LatticeLaunch::new(x, y, z, grid.spacing(), nx, ny, nz)
+}
+
+/// Index coordinates of a point.
+#[derive(CubeType, Clone, Copy)]
+pub(crate) struct Place<F: Float> {
+    pub x: F,
+    pub y: F,
+    pub z: F,
+}
+
+/// `(x − lower)/h` of point `i`.
+#[cube]
+pub(crate) fn place<F: Float + CubeElement>(
+    points: &Array<F>,
+    i: usize,
+    grid: &Lattice<F>,
+) -> Place<F> {
+    Place::<F> {
+        x: (points[3 * i] - grid.x) / grid.spacing,
+        y: (points[3 * i + 1] - grid.y) / grid.spacing,
+        z: (points[3 * i + 2] - grid.z) / grid.spacing,
+    }
+}
+
+/// The cell at a place in memory.
+#[derive(CubeType, Clone, Copy)]
+pub(crate) struct Cell {
+    pub i: u32,
+    pub j: u32,
+    pub k: u32,
+}
+
+#[cube]
+pub(crate) fn cell_at(index: u32, ny: u32, nz: u32) -> Cell {
+    let row = index / nz;
+    Cell {
+        i: row / ny,
+        j: row % ny,
+        k: index % nz,
+    }
+}
+
+/// How far `x` lies from the centre of a cell, in cells.
+#[cube]
+pub(crate) fn from_centre<F: Float>(x: F, cell: u32) -> F {
+    x - F::cast_from(cell) - F::new(0.5)
+}
+
+/// A field must have a value a cell.
+pub(crate) fn check_field<T: Scalar>(
+    what: &'static str,
+    field: &Buffer<T>,
+    grid: &isograd::Grid<T>,
+) -> Result<(), Error> {
+    check_length(what, field, grid.cells())
+}

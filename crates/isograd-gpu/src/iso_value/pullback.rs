@@ -1,0 +1,180 @@
+//! Cotangent of the iso-value to cotangents of the indicator, the samples and the grid.
+
+use cubecl::prelude::*;
+
+use super::Residual;
+use crate::device::check_length;
+use crate::grid::{self, Lattice, cell_at, check_field, from_centre, place};
+use crate::primitives::fill::add;
+use crate::primitives::reduce::{BLOCK, sum_columns};
+use crate::splat::{self, SampleCotangent, Samples, subtract_from_grid};
+use crate::spread::{Before, Spread, spread};
+use crate::{Buffer, Device, Error, Scalar};
+
+/// Cells between that of a sample and the outermost between whose centres `χ` is interpolated.
+const REACH: u32 = 1;
+
+/// Numbers of a sample in the form that is spread: offset from the centre of its cell, and `s_i`.
+const NUMBERS: usize = 4;
+
+/// Adds to `chi_bar`, `(nx, ny, nz)`, and to `out` what the cotangent `bar` of the iso-value, an array of one
+/// number, and the cotangents `values_bar` `(N,)` of `χ(x_i)` mean for the indicator, the samples and the grid.
+/// `splat` is what the forward splat of the same samples on the same grid left; all else is as it was in
+/// [`forward`](super::forward).
+///
+/// # Errors
+/// [`Error::Length`] where the arrays do not match, [`Error::TooLarge`].
+#[allow(clippy::too_many_arguments)]
+pub fn pullback<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    residual: &Residual<T>,
+    splat: &splat::Residual<T>,
+    samples: Samples<'_, T>,
+    bar: &Buffer<T>,
+    values_bar: Option<&Buffer<T>>,
+    chi_bar: &Buffer<T>,
+    out: &SampleCotangent<T>,
+) -> Result<(), Error> {
+    let (grid, order, count) = (&splat.grid, &splat.order, samples.len());
+    samples.check()?;
+    check_length("the array of areas", samples.areas, order.keys.len())?;
+    check_length("the residual", &residual.at_samples, 4 * count)?;
+    check_length("the cotangent of the iso-value", bar, 1)?;
+    check_field("the cotangent of the indicator", chi_bar, grid)?;
+    out.check(count)?;
+    let given = values_bar.unwrap_or(bar);
+    if values_bar.is_some() {
+        check_length("the cotangent of the values", given, count)?;
+    }
+    let groups = device.groups(count, BLOCK as u32);
+    let dim = CubeDim::new_1d(BLOCK as u32);
+    let shares: Buffer<T> = device.empty(count)?;
+    pull_samples::launch::<T, R>(
+        device.client(),
+        groups.clone(),
+        dim,
+        samples.areas.arg(),
+        residual.at_samples.arg(),
+        residual.sums.arg(),
+        bar.arg(),
+        given.arg(),
+        out.points.arg(),
+        out.areas.arg(),
+        shares.arg(),
+        count as u32,
+        grid.spacing(),
+        values_bar.is_some(),
+    );
+    let sorted: Buffer<T> = device.empty(NUMBERS * count)?;
+    let grid_sums: Buffer<T> = device.empty(4 * count.div_ceil(BLOCK))?;
+    sort_shares::launch::<T, R>(
+        device.client(),
+        groups,
+        dim,
+        samples.points.arg(),
+        residual.at_samples.arg(),
+        shares.arg(),
+        order.keys.arg(),
+        order.places.arg(),
+        sorted.arg(),
+        grid_sums.arg(),
+        count as u32,
+        grid::arg(grid),
+    );
+    add(device, &sum_columns(device, &grid_sums, 4)?, &out.grid)?;
+    spread::<R, T, Trilinear>(device, &sorted, order, REACH, Before::Kept, chi_bar)
+}
+
+/// The cotangent of the value at each sample, and what it means for the point; and the cotangent of the area,
+/// which the mean alone depends on.
+#[cube(launch)]
+fn pull_samples<F: Float + CubeElement>(
+    areas: &Array<F>,
+    at_samples: &Array<F>,
+    sums: &Array<F>,
+    bar: &Array<F>,
+    values_bar: &Array<F>,
+    points_bar: &mut Array<F>,
+    areas_bar: &mut Array<F>,
+    shares: &mut Array<F>,
+    count: u32,
+    spacing: F,
+    #[comptime] given: bool,
+) {
+    let i = ABSOLUTE_POS;
+    if i < count as usize {
+        let share = bar[0] / sums[1];
+        let mean = sums[0] / sums[1];
+        let mut value_bar = share * areas[i];
+        if given {
+            value_bar += values_bar[i];
+        }
+        shares[i] = value_bar;
+        let slope = value_bar / spacing;
+        for axis in 0..3usize {
+            points_bar[3 * i + axis] += at_samples[4 * i + 1 + axis] * slope;
+        }
+        areas_bar[i] += share * (at_samples[4 * i] - mean);
+    }
+}
+
+/// Offset and share of each sample in sorted order; and what the cotangents of the points mean for the grid,
+/// summed a group at a time.
+#[cube(launch)]
+fn sort_shares<F: Float + CubeElement>(
+    points: &Array<F>,
+    at_samples: &Array<F>,
+    shares: &Array<F>,
+    keys: &Array<u32>,
+    places: &Array<u32>,
+    sorted: &mut Array<F>,
+    grid_sums: &mut Array<F>,
+    count: u32,
+    grid: Lattice<F>,
+) {
+    let s = ABSOLUTE_POS;
+    let zero = F::new(0.0);
+    let mut bar_x = zero;
+    let mut bar_y = zero;
+    let mut bar_z = zero;
+    let mut bar_h = zero;
+    if s < count as usize {
+        let i = places[s] as usize;
+        let x = place::<F>(points, i, &grid);
+        let cell = cell_at(keys[s], grid.ny, grid.nz);
+        sorted[NUMBERS * s] = from_centre::<F>(x.x, cell.i);
+        sorted[NUMBERS * s + 1] = from_centre::<F>(x.y, cell.j);
+        sorted[NUMBERS * s + 2] = from_centre::<F>(x.z, cell.k);
+        sorted[NUMBERS * s + 3] = shares[i];
+        let slope = shares[i] / grid.spacing;
+        bar_x = at_samples[4 * i + 1] * slope;
+        bar_y = at_samples[4 * i + 2] * slope;
+        bar_z = at_samples[4 * i + 3] * slope;
+        bar_h = x.x * bar_x + x.y * bar_y + x.z * bar_z;
+    }
+    subtract_from_grid::<F>(bar_x, bar_y, bar_z, bar_h, grid_sums);
+}
+
+/// By the weights of trilinear interpolation. Samples keep 2 cells from the walls, where it would end.
+struct Trilinear;
+
+#[cube]
+impl Spread for Trilinear {
+    fn part<F: Float>(samples: &Array<F>, s: usize, x: u32, y: u32, z: u32) -> F {
+        let at = s * NUMBERS;
+        let wx = tent::<F>(samples[at], x);
+        let wy = tent::<F>(samples[at + 1], y);
+        let wz = tent::<F>(samples[at + 2], z);
+        samples[at + 3] * wx * wy * wz
+    }
+}
+
+/// `max(0, 1 − |Δ|)` in the cell below (0), at (1) or above (2) that of a point `f` from its centre.
+#[cube]
+fn tent<F: Float>(f: F, cell: u32) -> F {
+    let zero = F::new(0.0);
+    let below = max(-f, zero);
+    let above = max(f, zero);
+    let at = F::new(1.0) - below - above;
+    select(cell == 1u32, at, select(cell == 0u32, below, above))
+}

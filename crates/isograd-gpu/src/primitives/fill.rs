@@ -1,0 +1,48 @@
+//! Arrays of zeros, and arrays added to arrays.
+
+use cubecl::prelude::*;
+
+use crate::device::check_length;
+use crate::{Buffer, Device, Error, Scalar};
+
+const BLOCK: u32 = 256;
+
+/// `len` zeros.
+///
+/// # Errors
+/// [`Error::TooLarge`].
+pub fn zeros<R: Runtime, T: Scalar>(device: &Device<R>, len: usize) -> Result<Buffer<T>, Error> {
+    let out = device.empty(len)?;
+    let (groups, dim) = (device.groups(len, BLOCK), CubeDim::new_1d(BLOCK));
+    fill_zeros::launch::<T, R>(device.client(), groups, dim, out.arg());
+    Ok(out)
+}
+
+/// Adds `values` to `out`, one by one.
+///
+/// # Errors
+/// [`Error::Length`] where their lengths differ.
+pub fn add<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    values: &Buffer<T>,
+    out: &Buffer<T>,
+) -> Result<(), Error> {
+    check_length("the array to add", values, out.len())?;
+    let (groups, dim) = (device.groups(out.len(), BLOCK), CubeDim::new_1d(BLOCK));
+    add_values::launch::<T, R>(device.client(), groups, dim, values.arg(), out.arg());
+    Ok(())
+}
+
+#[cube(launch)]
+fn fill_zeros<F: Float>(out: &mut Array<F>) {
+    if ABSOLUTE_POS < out.len() {
+        out[ABSOLUTE_POS] = F::new(0.0);
+    }
+}
+
+#[cube(launch)]
+fn add_values<F: Float>(values: &Array<F>, out: &mut Array<F>) {
+    if ABSOLUTE_POS < out.len() {
+        out[ABSOLUTE_POS] += values[ABSOLUTE_POS];
+    }
+}

@@ -1,0 +1,98 @@
+//! Sums of whole arrays, by a tree that depends on their length alone: the same bits every time.
+
+use cubecl::prelude::*;
+
+use crate::device::check_length;
+use crate::{Buffer, Device, Error, Scalar};
+
+/// Units of a group of a kernel that sums.
+pub(crate) const BLOCK: usize = 256;
+
+/// Rows that one unit adds up before its group does.
+const STEPS: usize = 8;
+
+/// The sum of `values`, an array of one number. Of no values, it is 0.
+///
+/// # Errors
+/// [`Error::TooLarge`].
+pub fn sum<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    values: &Buffer<T>,
+) -> Result<Buffer<T>, Error> {
+    sum_columns(device, values, 1)
+}
+
+/// The sum of each column of `values`, `(N, columns)`: `columns` numbers.
+///
+/// # Errors
+/// [`Error::Length`] where `values` are not whole rows.
+pub fn sum_columns<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    values: &Buffer<T>,
+    columns: usize,
+) -> Result<Buffer<T>, Error> {
+    let rows = values.len() / columns;
+    check_length("the array to sum", values, rows * columns)?;
+    let groups = rows.div_ceil(BLOCK * STEPS).max(1);
+    let sums: Buffer<T> = device.empty(groups * columns)?;
+    sum_spans::launch::<T, R>(
+        device.client(),
+        device.groups(groups * BLOCK, BLOCK as u32),
+        CubeDim::new_1d(BLOCK as u32),
+        values.arg(),
+        sums.arg(),
+        rows as u32,
+        groups as u32,
+        columns,
+    );
+    match groups {
+        1 => Ok(sums),
+        _ => sum_columns(device, &sums, columns),
+    }
+}
+
+/// Column sums of `BLOCK · STEPS` rows a group.
+#[cube(launch)]
+fn sum_spans<F: Float>(
+    values: &Array<F>,
+    sums: &mut Array<F>,
+    rows: u32,
+    groups: u32,
+    #[comptime] columns: usize,
+) {
+    let mut shared = SharedMemory::<F>::new(BLOCK);
+    let first = CUBE_POS * (BLOCK * STEPS) + UNIT_POS as usize;
+    for column in 0..columns {
+        let mut own = F::new(0.0);
+        for step in 0..STEPS {
+            let row = first + step * BLOCK;
+            if row < rows as usize {
+                own += values[row * columns + column];
+            }
+        }
+        let total = sum_of_group::<F>(own, &mut shared);
+        if UNIT_POS == 0 && CUBE_POS < groups as usize {
+            sums[CUBE_POS * columns + column] = total;
+        }
+    }
+}
+
+/// The sum of the values that the `BLOCK` units of a group have, by halves. Every unit must call it.
+#[cube]
+pub(crate) fn sum_of_group<F: Float>(value: F, shared: &mut SharedMemory<F>) -> F {
+    let unit = UNIT_POS as usize;
+    // What was there may still be read.
+    sync_cube();
+    shared[unit] = value;
+    sync_cube();
+    let mut reach = (BLOCK / 2).runtime();
+    while reach > 0 {
+        if unit < reach {
+            let other = shared[unit + reach];
+            shared[unit] += other;
+        }
+        sync_cube();
+        reach /= 2;
+    }
+    shared[0]
+}

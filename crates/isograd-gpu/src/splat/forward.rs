@@ -1,0 +1,105 @@
+//! From samples to the right-hand side.
+
+use cubecl::prelude::*;
+
+use super::stencil::{BSpline, NUMBERS, Paper, REACH, hats, total};
+use super::{Residual, SampleOrder, Samples, Weights};
+use crate::grid::{self, Lattice, cell_at, from_centre, place};
+use crate::spread::{Before, spread};
+use crate::{Buffer, Device, Error, Scalar};
+
+const BLOCK: u32 = 256;
+
+/// `b`, `(nx, ny, nz)` on `grid`. Areas are all 1 for no area weights: `χ` is then scaled, not changed in shape,
+/// where the samples are even. Samples that are less than 2 cells inside the grid or not finite are left
+/// out: see [`Residual::refused`].
+///
+/// # Errors
+/// [`Error::Length`] where the arrays do not match, [`Error::NoNumber`], [`Error::TooLarge`].
+pub fn forward<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    samples: Samples<'_, T>,
+    grid: &isograd::Grid<T>,
+    weights: Weights,
+) -> Result<(Buffer<T>, Residual<T>), Error> {
+    device.check_number::<T>()?;
+    samples.check()?;
+    let residual = Residual {
+        grid: *grid,
+        weights,
+        order: SampleOrder::new(device, samples, grid)?,
+    };
+    let sorted = sorted(device, samples, &residual, weights == Weights::Paper)?;
+    let b: Buffer<T> = device.empty(grid.cells())?;
+    let order = &residual.order;
+    match weights {
+        Weights::BSpline => {
+            spread::<R, T, BSpline>(device, &sorted, order, REACH, Before::Replaced, &b)?;
+        }
+        Weights::Paper => {
+            spread::<R, T, Paper>(device, &sorted, order, REACH, Before::Replaced, &b)?;
+        }
+    }
+    Ok((b, residual))
+}
+
+/// `(N, 6)` offset and vector of each sample, in sorted order. The vector is over the sum of the paper's weights
+/// if `normalise` says so.
+pub(super) fn sorted<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    samples: Samples<'_, T>,
+    residual: &Residual<T>,
+    normalise: bool,
+) -> Result<Buffer<T>, Error> {
+    let sorted: Buffer<T> = device.empty(NUMBERS * samples.len())?;
+    sort_samples::launch::<T, R>(
+        device.client(),
+        device.groups(samples.len(), BLOCK),
+        CubeDim::new_1d(BLOCK),
+        samples.points.arg(),
+        samples.normals.arg(),
+        samples.areas.arg(),
+        residual.order.keys.arg(),
+        residual.order.places.arg(),
+        sorted.arg(),
+        samples.len() as u32,
+        grid::arg(&residual.grid),
+        normalise,
+    );
+    Ok(sorted)
+}
+
+#[cube(launch)]
+fn sort_samples<F: Float + CubeElement>(
+    points: &Array<F>,
+    normals: &Array<F>,
+    areas: &Array<F>,
+    keys: &Array<u32>,
+    places: &Array<u32>,
+    sorted: &mut Array<F>,
+    count: u32,
+    grid: Lattice<F>,
+    #[comptime] normalise: bool,
+) {
+    let s = ABSOLUTE_POS;
+    if s < count as usize {
+        let i = places[s] as usize;
+        let x = place::<F>(points, i, &grid);
+        let cell = cell_at(keys[s], grid.ny, grid.nz);
+        let fx = from_centre::<F>(x.x, cell.i);
+        let fy = from_centre::<F>(x.y, cell.j);
+        let fz = from_centre::<F>(x.z, cell.k);
+        // One division after the other: h² may underflow where a/h² is fine.
+        let mut scale = areas[i] / grid.spacing / grid.spacing;
+        if normalise {
+            scale /= total::<F>(hats::<F>(fx), hats::<F>(fy), hats::<F>(fz));
+        }
+        let at = s * NUMBERS;
+        sorted[at] = fx;
+        sorted[at + 1] = fy;
+        sorted[at + 2] = fz;
+        sorted[at + 3] = normals[3 * i] * scale;
+        sorted[at + 4] = normals[3 * i + 1] * scale;
+        sorted[at + 5] = normals[3 * i + 2] * scale;
+    }
+}

@@ -1,0 +1,330 @@
+//! Cotangents of the right-hand side to cotangents of points, normals, areas and grid: one gather a sample.
+
+use cubecl::prelude::*;
+
+use super::cotangent::subtract_from_grid;
+use super::forward::sorted;
+use super::stencil::{
+    NUMBERS, REACH, Triple, WIDTH, along, bspline, bspline_slope, central, extra, hat_slopes, hats,
+    sum, total,
+};
+use super::{Residual, SampleCotangent, Samples, Weights};
+use crate::device::check_length;
+use crate::grid::{self, Lattice, cell_at, check_field};
+use crate::primitives::fill::add;
+use crate::primitives::reduce::{BLOCK, sum_columns};
+use crate::{Buffer, Device, Error, Scalar};
+
+/// Adds to `out` what the cotangents `b_bar` of the right-hand side, `(nx, ny, nz)`, mean for the samples and
+/// the grid. The samples, and `residual`, are those of [`forward`](super::forward).
+///
+/// # Errors
+/// [`Error::Length`] where the arrays do not match, [`Error::TooLarge`].
+pub fn pullback<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    residual: &Residual<T>,
+    samples: Samples<'_, T>,
+    b_bar: &Buffer<T>,
+    out: &SampleCotangent<T>,
+) -> Result<(), Error> {
+    let (grid, order, count) = (&residual.grid, &residual.order, samples.len());
+    samples.check()?;
+    check_length("the array of areas", samples.areas, order.keys.len())?;
+    check_field("the cotangent of the right-hand side", b_bar, grid)?;
+    out.check(count)?;
+    let groups = device.groups(count, BLOCK as u32);
+    let dim = CubeDim::new_1d(BLOCK as u32);
+    let blocks = count.div_ceil(BLOCK);
+    let gathered = sorted(device, samples, residual, false)?;
+    let grid_sums: Buffer<T> = device.empty(4 * blocks)?;
+    gather::launch::<T, R>(
+        device.client(),
+        groups.clone(),
+        dim,
+        order.keys.arg(),
+        b_bar.arg(),
+        gathered.arg(),
+        grid_sums.arg(),
+        count as u32,
+        grid::arg(grid),
+        residual.weights == Weights::Paper,
+    );
+    add(device, &sum_columns(device, &grid_sums, 4)?, &out.grid)?;
+    add_to_samples::launch::<T, R>(
+        device.client(),
+        groups,
+        dim,
+        samples.normals.arg(),
+        samples.areas.arg(),
+        order.keys.arg(),
+        order.places.arg(),
+        gathered.arg(),
+        out.points.arg(),
+        out.normals.arg(),
+        out.areas.arg(),
+        count as u32,
+        grid.cells() as u32,
+    );
+    Ok(())
+}
+
+/// What the cells round a sample hold for it, in index space: the cotangent of the vector that was spread,
+/// and that of the sample's index coordinates.
+#[derive(CubeType, Clone, Copy)]
+struct Gathered<F: Float> {
+    spread_x: F,
+    spread_y: F,
+    spread_z: F,
+    x: F,
+    y: F,
+    z: F,
+}
+
+/// Weights along each axis, or their derivatives.
+#[derive(CubeType, Clone, Copy)]
+struct Weights3<F: Float> {
+    x: Triple<F>,
+    y: Triple<F>,
+    z: Triple<F>,
+}
+
+/// Offset or vector of a sample.
+#[derive(CubeType, Clone, Copy)]
+struct Vector<F: Float> {
+    x: F,
+    y: F,
+    z: F,
+}
+
+/// Replaces the offset and vector of each sample by the cotangents of the vector `a n`, and of the point; and
+/// sums what they mean for the grid, a group at a time.
+#[cube(launch)]
+fn gather<F: Float + CubeElement>(
+    keys: &Array<u32>,
+    b_bar: &Array<F>,
+    samples: &mut Array<F>,
+    grid_sums: &mut Array<F>,
+    count: u32,
+    grid: Lattice<F>,
+    #[comptime] paper: bool,
+) {
+    let s = ABSOLUTE_POS;
+    let zero = F::new(0.0);
+    let mut bar_x = zero;
+    let mut bar_y = zero;
+    let mut bar_z = zero;
+    let mut bar_h = zero;
+    if s < count as usize && keys[s] < grid.nx * grid.ny * grid.nz {
+        let cell = cell_at(keys[s], grid.ny, grid.nz);
+        let corner = keys[s] - REACH * ((grid.ny + 1u32) * grid.nz + 1u32);
+        let f = vector_at::<F>(samples, s * NUMBERS);
+        let v = vector_at::<F>(samples, s * NUMBERS + 3);
+        let found = gather_sample::<F>(b_bar, corner, &grid, f, v, paper);
+        let h = grid.spacing;
+        bar_x = found.x / h;
+        bar_y = found.y / h;
+        bar_z = found.z / h;
+        samples[s * NUMBERS] = found.spread_x / h / h;
+        samples[s * NUMBERS + 1] = found.spread_y / h / h;
+        samples[s * NUMBERS + 2] = found.spread_z / h / h;
+        samples[s * NUMBERS + 3] = bar_x;
+        samples[s * NUMBERS + 4] = bar_y;
+        samples[s * NUMBERS + 5] = bar_z;
+        // ∂x̂/∂h = −x̂/h; and the areas are divided by h².
+        let of_areas = v.x * found.spread_x + v.y * found.spread_y + v.z * found.spread_z;
+        bar_h = to_place::<F>(f.x, cell.i) * bar_x
+            + to_place::<F>(f.y, cell.j) * bar_y
+            + to_place::<F>(f.z, cell.k) * bar_z
+            + F::new(2.0) * of_areas / h;
+    }
+    subtract_from_grid::<F>(bar_x, bar_y, bar_z, bar_h, grid_sums);
+}
+
+#[cube]
+fn vector_at<F: Float>(values: &Array<F>, at: usize) -> Vector<F> {
+    Vector::<F> {
+        x: values[at],
+        y: values[at + 1],
+        z: values[at + 2],
+    }
+}
+
+/// Index coordinate at offset `f` from the centre of a cell.
+#[cube]
+fn to_place<F: Float>(f: F, cell: u32) -> F {
+    F::cast_from(cell) + F::new(0.5) + f
+}
+
+/// A sample at offset `f` from the centre of its cell, with vector `v`.
+#[cube]
+fn gather_sample<F: Float + CubeElement>(
+    b_bar: &Array<F>,
+    corner: u32,
+    grid: &Lattice<F>,
+    f: Vector<F>,
+    v: Vector<F>,
+    #[comptime] paper: bool,
+) -> Gathered<F> {
+    if comptime!(paper) {
+        let w = Weights3::<F> {
+            x: hats::<F>(f.x),
+            y: hats::<F>(f.y),
+            z: hats::<F>(f.z),
+        };
+        let slopes = Weights3::<F> {
+            x: hat_slopes::<F>(f.x),
+            y: hat_slopes::<F>(f.y),
+            z: hat_slopes::<F>(f.z),
+        };
+        gather_paper::<F>(b_bar, corner, grid, w, slopes, v)
+    } else {
+        let w = Weights3::<F> {
+            x: bspline::<F>(f.x),
+            y: bspline::<F>(f.y),
+            z: bspline::<F>(f.z),
+        };
+        let slopes = Weights3::<F> {
+            x: bspline_slope::<F>(f.x),
+            y: bspline_slope::<F>(f.y),
+            z: bspline_slope::<F>(f.z),
+        };
+        gather_product::<F>(b_bar, corner, grid, w, slopes, v)
+    }
+}
+
+/// `(P + extra · C)/total`, by the rule of quotients: `P` spreads by the product of hats, `C` into the
+/// central cell.
+#[cube]
+fn gather_paper<F: Float + CubeElement>(
+    b_bar: &Array<F>,
+    corner: u32,
+    grid: &Lattice<F>,
+    w: Weights3<F>,
+    d: Weights3<F>,
+    v: Vector<F>,
+) -> Gathered<F> {
+    let one = central::<F>();
+    let ones = Weights3::<F> {
+        x: one,
+        y: one,
+        z: one,
+    };
+    let p = gather_product::<F>(b_bar, corner, grid, w, d, v);
+    let c = gather_product::<F>(b_bar, corner, grid, ones, ones, v);
+    let (extra, total) = (extra::<F>(w.x, w.y, w.z), total::<F>(w.x, w.y, w.z));
+    let spread_x = (p.spread_x + extra * c.spread_x) / total;
+    let spread_y = (p.spread_y + extra * c.spread_y) / total;
+    let spread_z = (p.spread_z + extra * c.spread_z) / total;
+    let whole = v.x * spread_x + v.y * spread_y + v.z * spread_z;
+    let of_centre = v.x * c.spread_x + v.y * c.spread_y + v.z * c.spread_z;
+    let extra_x = -d.x.centre * w.y.centre * w.z.centre;
+    let extra_y = -d.y.centre * w.z.centre * w.x.centre;
+    let extra_z = -d.z.centre * w.x.centre * w.y.centre;
+    let total_x = sum::<F>(d.x) * sum::<F>(w.y) * sum::<F>(w.z) + extra_x;
+    let total_y = sum::<F>(d.y) * sum::<F>(w.z) * sum::<F>(w.x) + extra_y;
+    let total_z = sum::<F>(d.z) * sum::<F>(w.x) * sum::<F>(w.y) + extra_z;
+    Gathered::<F> {
+        spread_x,
+        spread_y,
+        spread_z,
+        x: (p.x + extra_x * of_centre - whole * total_x) / total,
+        y: (p.y + extra_y * of_centre - whole * total_y) / total,
+        z: (p.z + extra_z * of_centre - whole * total_z) / total,
+    }
+}
+
+/// Weights `w` that are a product, with derivatives `d`. Sums over z, then y, then x; `a_b` is weighted by `a`
+/// along y and by `b` along z, where `m` and `s` are the mass and the derivative of the weights and `dm` and
+/// `ds` those of their derivatives.
+#[cube]
+fn gather_product<F: Float + CubeElement>(
+    b_bar: &Array<F>,
+    corner: u32,
+    grid: &Lattice<F>,
+    w: Weights3<F>,
+    d: Weights3<F>,
+    v: Vector<F>,
+) -> Gathered<F> {
+    let zero = F::new(0.0);
+    let mut out = Gathered::<F> {
+        spread_x: zero,
+        spread_y: zero,
+        spread_z: zero,
+        x: zero,
+        y: zero,
+        z: zero,
+    };
+    for i in 0..WIDTH {
+        let mut m_m = zero;
+        let mut s_m = zero;
+        let mut m_s = zero;
+        let mut dm_m = zero;
+        let mut ds_m = zero;
+        let mut dm_s = zero;
+        let mut m_dm = zero;
+        let mut s_dm = zero;
+        let mut m_ds = zero;
+        for j in 0..WIDTH {
+            let row = (corner + (i * grid.ny + j) * grid.nz) as usize;
+            let mut m = zero;
+            let mut s = zero;
+            let mut dm = zero;
+            let mut ds = zero;
+            #[unroll]
+            for k in 0..WIDTH {
+                let value = b_bar[row + k as usize];
+                let (z, dz) = (along::<F>(w.z, k), along::<F>(d.z, k));
+                m += value * z.mass;
+                s += value * z.slope;
+                dm += value * dz.mass;
+                ds += value * dz.slope;
+            }
+            let (y, dy) = (along::<F>(w.y, j), along::<F>(d.y, j));
+            m_m += y.mass * m;
+            s_m += y.slope * m;
+            m_s += y.mass * s;
+            dm_m += dy.mass * m;
+            ds_m += dy.slope * m;
+            dm_s += dy.mass * s;
+            m_dm += y.mass * dm;
+            s_dm += y.slope * dm;
+            m_ds += y.mass * ds;
+        }
+        let (x, dx) = (along::<F>(w.x, i), along::<F>(d.x, i));
+        out.spread_x += x.slope * m_m;
+        out.spread_y += x.mass * s_m;
+        out.spread_z += x.mass * m_s;
+        out.x += v.x * dx.slope * m_m + dx.mass * (v.y * s_m + v.z * m_s);
+        out.y += v.x * x.slope * dm_m + x.mass * (v.y * ds_m + v.z * dm_s);
+        out.z += v.x * x.slope * m_dm + x.mass * (v.y * s_dm + v.z * m_ds);
+    }
+    out
+}
+
+/// From the sorted order to that of the input.
+#[cube(launch)]
+fn add_to_samples<F: Float>(
+    normals: &Array<F>,
+    areas: &Array<F>,
+    keys: &Array<u32>,
+    places: &Array<u32>,
+    gathered: &Array<F>,
+    points_bar: &mut Array<F>,
+    normals_bar: &mut Array<F>,
+    areas_bar: &mut Array<F>,
+    count: u32,
+    cells: u32,
+) {
+    let s = ABSOLUTE_POS;
+    if s < count as usize && keys[s] < cells {
+        let i = places[s] as usize;
+        let mut area_bar = F::new(0.0);
+        for axis in 0..3usize {
+            let spread = gathered[s * NUMBERS + axis];
+            normals_bar[3 * i + axis] += spread * areas[i];
+            points_bar[3 * i + axis] += gathered[s * NUMBERS + 3 + axis];
+            area_bar += spread * normals[3 * i + axis];
+        }
+        areas_bar[i] += area_bar;
+    }
+}

@@ -1,0 +1,97 @@
+//! Sums of whole arrays, beside plain loops in double precision.
+
+use cubecl::prelude::Runtime;
+use isograd_gpu::primitives::fill;
+use isograd_gpu::primitives::reduce::{sum, sum_columns};
+use isograd_gpu::{Device, Error, Scalar};
+
+use crate::samples::distance;
+use crate::devices::{Numbers, in_both_numbers, on_each_device};
+
+#[test]
+fn sums_are_those_of_a_loop() {
+    on_each_device!(check_sums);
+}
+
+fn check_sums<R: Runtime>(device: &Device<R>) {
+    in_both_numbers!(device, check_sums_in);
+}
+
+fn check_sums_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
+    for (rows, columns) in [
+        (0, 1),
+        (1, 1),
+        (255, 4),
+        (2047, 1),
+        (2048, 3),
+        (2049, 2),
+        (1_000_003, 1),
+    ] {
+        let mut numbers = Numbers(rows as u64 + 1);
+        let values: Vec<T> = (0..rows * columns)
+            .map(|_| T::of(numbers.signed()))
+            .collect();
+        let buffer = device.upload(&values).unwrap();
+        let found = device
+            .download(&sum_columns(device, &buffer, columns).unwrap())
+            .unwrap();
+        assert_eq!(found.len(), columns);
+        for column in 0..columns {
+            let of_column = values.iter().skip(column).step_by(columns).map(|v| v.f64());
+            let (expected, size) = of_column.fold((0.0, 0.0), |(s, a), v| (s + v, a + v.abs()));
+            let error = distance(found[column], expected);
+            // Relative to the sum of the magnitudes.
+            assert!(
+                error <= tolerance * size,
+                "{rows} rows: {error:e} of {size}"
+            );
+        }
+        let again = device
+            .download(&sum_columns(device, &buffer, columns).unwrap())
+            .unwrap();
+        assert_eq!(found, again);
+        if columns == 1 {
+            assert_eq!(
+                found,
+                device.download(&sum(device, &buffer).unwrap()).unwrap()
+            );
+        }
+    }
+}
+
+#[test]
+fn rows_that_are_not_whole_are_refused() {
+    on_each_device!(check_refusals);
+}
+
+fn check_refusals<R: Runtime>(device: &Device<R>) {
+    let values = device.upload(&[1.0f32; 7]).unwrap();
+    let refused = sum_columns(device, &values, 2).map(|_| ());
+    assert!(matches!(refused, Err(Error::Length { found: 7, .. })));
+    let other = fill::zeros::<R, f32>(device, 6).unwrap();
+    let refused = fill::add(device, &values, &other);
+    assert!(matches!(
+        refused,
+        Err(Error::Length {
+            found: 7,
+            expected: 6,
+            ..
+        })
+    ));
+}
+
+#[test]
+fn arrays_are_added_number_by_number() {
+    on_each_device!(check_additions);
+}
+
+fn check_additions<R: Runtime>(device: &Device<R>) {
+    let values: Vec<f32> = (0..1000).map(|i| i as f32).collect();
+    let buffer = device.upload(&values).unwrap();
+    let out = fill::zeros(device, 1000).unwrap();
+    assert_eq!(device.download::<f32>(&out).unwrap(), [0.0; 1000]);
+    fill::add(device, &buffer, &out).unwrap();
+    fill::add(device, &buffer, &out).unwrap();
+    let twice: Vec<f32> = values.iter().map(|v| 2.0 * v).collect();
+    assert_eq!(device.download(&out).unwrap(), twice);
+}
