@@ -19,6 +19,7 @@ mod grid;
 pub mod iso_value;
 pub mod neighbors;
 pub mod normals;
+pub mod poisson;
 pub mod primitives;
 pub mod splat;
 mod spread;

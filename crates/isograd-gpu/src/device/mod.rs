@@ -62,6 +62,12 @@ pub enum Error {
         /// The length that fits.
         expected: usize,
     },
+    /// The smoothing is negative or not finite.
+    #[error("the smoothing is {smoothing} cells; it must be finite and 0 or more")]
+    Smoothing {
+        /// What was given.
+        smoothing: f64,
+    },
     /// The device failed while it worked.
     #[error("{device} failed: {reason}")]
     Failed {

@@ -5,9 +5,10 @@ mod clouds;
 mod devices;
 mod iso_value;
 mod normals;
+mod poisson;
 mod primitives;
-mod samples;
 mod reduce;
+mod samples;
 mod splat;
 
 #[test]

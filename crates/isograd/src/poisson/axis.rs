@@ -11,6 +11,7 @@ use std::sync::Arc;
 use rustfft::{Fft, FftPlanner, num_complex::Complex};
 
 use super::scratch::first;
+use super::spectrum;
 use crate::Real;
 
 /// Tables and Fourier plans of an axis of `n` cells.
@@ -44,7 +45,6 @@ pub(super) struct Gain<T> {
 
 impl<T: Real> Axis<T> {
     pub(super) fn new(n: usize, planner: &mut FftPlanner<T>) -> Self {
-        let angle = |k: usize| PI * k as f64 / n as f64;
         let place = |j: usize| {
             if j.is_multiple_of(2) {
                 j / 2
@@ -53,20 +53,15 @@ impl<T: Real> Axis<T> {
             }
         };
         let twiddle = |k: usize| {
-            let (sin, cos) = (0.5 * angle(k)).sin_cos();
+            let (sin, cos) = (0.5 * PI * k as f64 / n as f64).sin_cos();
             Complex::new(T::of(cos), T::of(-sin))
         };
         Self {
             n,
             natural: (0..n).collect(),
             makhoul: (0..n).map(place).collect(),
-            // 2 − 2 cos θ, without the cancellation at small θ.
-            stiffness: (0..n)
-                .map(|k| T::of(4.0 * (0.5 * angle(k)).sin().powi(2)))
-                .collect(),
-            mass: (0..n)
-                .map(|k| T::of((2.0 + angle(k).cos()) / 3.0))
-                .collect(),
+            stiffness: (0..n).map(|k| T::of(spectrum::stiffness(k, n))).collect(),
+            mass: (0..n).map(|k| T::of(spectrum::mass(k, n))).collect(),
             twiddle: (0..=n / 2).map(twiddle).collect(),
             forward: planner.plan_fft_forward(n),
             inverse: planner.plan_fft_inverse(n),
@@ -76,10 +71,7 @@ impl<T: Real> Axis<T> {
     /// Writes `G_k = exp(−σ²(1 − cos θ_k))` for all `k`.
     pub(super) fn gaussian(&self, sigma: f64, out: &mut Vec<T>) {
         out.clear();
-        out.extend((0..self.n).map(|k| {
-            let half = 0.5 * PI * k as f64 / self.n as f64;
-            T::of((-2.0 * (sigma * half.sin()).powi(2)).exp())
-        }));
+        out.extend((0..self.n).map(|k| T::of(spectrum::gaussian(k, self.n, sigma))));
     }
 
     /// Lines in Makhoul order → their Fourier transforms.

@@ -41,6 +41,7 @@ mod passes;
 mod scratch;
 pub mod screened;
 pub mod smoothing;
+pub mod spectrum;
 #[cfg(test)]
 mod tests;
 

@@ -1,0 +1,246 @@
+//! The Poisson equation, solved directly by cosine transforms: [`isograd::poisson`] on a device.
+//!
+//! # Map
+//! `b → χ = IDCT(G/λ · DCT(b))`, one value per cell of a grid of `(nx, ny, nz)` cells in C order, in index
+//! space (cell size 1, no unit), with even reflection at the walls; `λ` and the smoothing `G` by `σ` cells are
+//! those of [`isograd::poisson::spectrum`], and the constant mode is set to 0. A value that is not finite
+//! spreads to all others.
+//!
+//! Each axis is transformed in shared memory, two lines as one complex line, in `O(n log n)`
+//! (J. Makhoul, *A fast cosine transform in one and two dimensions*, IEEE Trans. ASSP 28, 1980) where its
+//! length has no large prime factor and a line fits; otherwise by products with the matrix of cosines, in
+//! `O(n²)`. The last axis to be transformed is the first to be transformed back, and `G/λ` is applied between:
+//! in the same kernel where it has the fast way. Besides `b`, two fields are in memory.
+//!
+//! # Residual
+//! `σ` and `χ`, which share the memory of the result. `b̄` needs the first, `σ̄` both.
+//!
+//! # Pullback
+//! The operator is symmetric: `b̄ = IDCT(G/λ · DCT(χ̄))`. With `L` the sum of second differences,
+//! `σ̄ = σ χ·Lχ̄`: see [`smoothing`].
+//!
+//! # Not differentiable
+//! Nothing: the map is linear in `b`.
+
+mod axis;
+mod gain;
+mod lines;
+mod products;
+pub mod smoothing;
+
+use cubecl::prelude::Runtime;
+use isograd::poisson::spectrum;
+
+use crate::device::check_length;
+use crate::{Buffer, Device, Error, Scalar};
+use axis::{Axis, Lines, Way};
+use gain::Gains;
+
+/// What a grid's Poisson equation has that does not depend on its right-hand side: tables on the device. Made
+/// once, used for every solve.
+pub struct Solver<T> {
+    shape: [usize; 3],
+    /// The axes of more than one cell, in the order of the transforms back; the last axis if there are none.
+    axes: Vec<(usize, Axis<T>)>,
+    /// Eigenvalues of the stiffness along x, y and z, then those of the mass.
+    spectrum: Buffer<T>,
+}
+
+/// What the pullback of a solve needs.
+pub struct Residual<T> {
+    /// `σ` in cells.
+    pub smoothing: f64,
+    /// The solution.
+    pub chi: Buffer<T>,
+}
+
+/// Cotangents of what a solve was given.
+pub struct Cotangents<T> {
+    /// `b̄`, one value per cell.
+    pub b: Buffer<T>,
+    /// `σ̄`, one number.
+    pub smoothing: Buffer<T>,
+}
+
+/// `χ` for the right-hand side `b`, smoothed by `smoothing` cells (0 for none).
+///
+/// # Errors
+/// A field of another size than the solver's ([`Error::Length`]), a smoothing that is negative or not finite
+/// ([`Error::Smoothing`]), or a device without the memory ([`Error::TooLarge`]).
+pub fn forward<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    solver: &Solver<T>,
+    b: &Buffer<T>,
+    smoothing: f64,
+) -> Result<(Buffer<T>, Residual<T>), Error> {
+    let chi = solver.solve(device, b, smoothing)?;
+    let residual = Residual {
+        smoothing,
+        chi: chi.clone(),
+    };
+    Ok((chi, residual))
+}
+
+/// From `χ̄` to `b̄` and `σ̄`.
+///
+/// # Errors
+/// As [`forward`].
+pub fn pullback<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    solver: &Solver<T>,
+    residual: &Residual<T>,
+    chi_bar: &Buffer<T>,
+) -> Result<Cotangents<T>, Error> {
+    let sigma = residual.smoothing;
+    Ok(Cotangents {
+        b: solver.solve(device, chi_bar, sigma)?,
+        smoothing: smoothing::pullback(device, sigma, solver.shape, &residual.chi, chi_bar)?,
+    })
+}
+
+impl<T: Scalar> Solver<T> {
+    /// For grids of `(nx, ny, nz)` cells, of any size, primes included.
+    ///
+    /// # Errors
+    /// [`Error::NoNumber`] if the device doesn't calculate in `T`.
+    pub fn new<R: Runtime>(device: &Device<R>, shape: [usize; 3]) -> Result<Self, Error> {
+        Self::of_axes(device, shape, Axis::new)
+    }
+
+    /// As [`Self::new`], by products with matrices along every axis: `O(n⁴)` for `n³` cells, and another
+    /// way to the same numbers.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn by_products<R: Runtime>(device: &Device<R>, shape: [usize; 3]) -> Result<Self, Error> {
+        Self::of_axes(device, shape, Axis::by_products)
+    }
+
+    fn of_axes<R: Runtime>(
+        device: &Device<R>,
+        shape: [usize; 3],
+        axis: impl Fn(&Device<R>, usize) -> Result<Axis<T>, Error>,
+    ) -> Result<Self, Error> {
+        device.check_number::<T>()?;
+        let mut axes = Vec::new();
+        for a in 0..3 {
+            if shape[a] > 1 || (a == 2 && axes.is_empty()) {
+                axes.push((a, axis(device, shape[a])?));
+            }
+        }
+        let along = |of: fn(usize, usize) -> f64| {
+            let cells = shape.into_iter();
+            cells.flat_map(move |n| (0..n).map(move |k| T::of(of(k, n))))
+        };
+        let eigenvalues: Vec<T> = along(spectrum::stiffness)
+            .chain(along(spectrum::mass))
+            .collect();
+        Ok(Self {
+            shape,
+            axes,
+            spectrum: device.upload(&eigenvalues)?,
+        })
+    }
+
+    /// Number of cells along each axis, `(nx, ny, nz)`.
+    pub fn shape(&self) -> [usize; 3] {
+        self.shape
+    }
+
+    /// `χ` for the right-hand side `b`: [`forward`] without its residual. Its own transpose.
+    ///
+    /// # Errors
+    /// As [`forward`].
+    pub fn solve<R: Runtime>(
+        &self,
+        device: &Device<R>,
+        b: &Buffer<T>,
+        smoothing: f64,
+    ) -> Result<Buffer<T>, Error> {
+        check_length("the right-hand side", b, self.shape.iter().product())?;
+        if !(smoothing >= 0.0) || !smoothing.is_finite() {
+            return Err(Error::Smoothing { smoothing });
+        }
+        if b.is_empty() {
+            return Ok(b.clone());
+        }
+        let gains = self.gains(device, smoothing)?;
+        let mut fields = Fields::new(b);
+        let (first, others) = self.axes.split_first().expect("an axis");
+        for (a, axis) in others.iter().rev() {
+            let lines = Lines::new(self.shape, *a);
+            fields.step(device, |from, to| {
+                axis.forward(device, lines, from, to, None)
+            })?;
+        }
+        let (a, axis) = first;
+        let lines = Lines::new(self.shape, *a);
+        if let Way::Fourier(fourier) = &axis.way {
+            fields.step(device, |from, to| {
+                fourier.filter(device, lines, from, to, &gains)
+            })?;
+        } else {
+            fields.step(device, |from, to| {
+                axis.forward(device, lines, from, to, Some(&gains))
+            })?;
+            fields.step(device, |from, to| axis.inverse(device, lines, from, to))?;
+        }
+        for (a, axis) in others {
+            let lines = Lines::new(self.shape, *a);
+            fields.step(device, |from, to| axis.inverse(device, lines, from, to))?;
+        }
+        Ok(fields.last)
+    }
+
+    /// `G/λ`, over the factor that the transforms leave.
+    fn gains<R: Runtime>(&self, device: &Device<R>, smoothing: f64) -> Result<Gains<'_, T>, Error> {
+        let lengths = self.axes.iter().map(|(a, _)| self.shape[*a]);
+        let factor: f64 = lengths.map(|n| 2.0 * n as f64).product();
+        let mut gaussian = Vec::new();
+        for (a, &n) in self.shape.iter().enumerate() {
+            let amplitude = if a == 0 { 1.0 / factor } else { 1.0 };
+            gaussian.extend((0..n).map(|k| T::of(amplitude * spectrum::gaussian(k, n, smoothing))));
+        }
+        Ok(Gains {
+            shape: self.shape,
+            spectrum: &self.spectrum,
+            gaussian: device.upload(&gaussian)?,
+        })
+    }
+}
+
+/// The fields of a solve: what the last kernel wrote, and room for the next.
+struct Fields<T> {
+    last: Buffer<T>,
+    /// Whether `last` is what was given, not to be written.
+    given: bool,
+    spare: Option<Buffer<T>>,
+}
+
+impl<T: Scalar> Fields<T> {
+    fn new(given: &Buffer<T>) -> Self {
+        Self {
+            last: given.clone(),
+            given: true,
+            spare: None,
+        }
+    }
+
+    /// Runs a kernel from the last field to another.
+    fn step<R: Runtime>(
+        &mut self,
+        device: &Device<R>,
+        kernel: impl FnOnce(&Buffer<T>, &Buffer<T>),
+    ) -> Result<(), Error> {
+        let to = match self.spare.take() {
+            Some(spare) => spare,
+            None => device.empty(self.last.len())?,
+        };
+        kernel(&self.last, &to);
+        let from = std::mem::replace(&mut self.last, to);
+        if !std::mem::take(&mut self.given) {
+            self.spare = Some(from);
+        }
+        Ok(())
+    }
+}

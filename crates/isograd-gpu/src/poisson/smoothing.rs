@@ -1,0 +1,124 @@
+//! What more smoothing would do: [`isograd::poisson::smoothing::pullback`] on a device.
+//!
+//! With `L` the sum of second differences along the axes, even at the walls, `χ·Lχ̄ = −Σ ∇χ·∇χ̄` over the
+//! differences of neighbouring cells: fewer terms, and smaller ones.
+
+use cubecl::prelude::*;
+
+use crate::device::check_length;
+use crate::{Buffer, Device, Error, Scalar};
+
+/// Units of a group.
+const BLOCK: usize = 256;
+
+/// Cells or sums of a unit.
+const OWN: usize = 8;
+
+/// `σ χ·Lχ̄`, one number, which is `σ̄` for cotangents `chi_bar` of `chi`, both `(nx, ny, nz)` in C order.
+/// Added in a fixed order.
+///
+/// # Errors
+/// [`Error::Length`] for fields of other sizes, or [`Error::TooLarge`].
+pub fn pullback<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    smoothing: f64,
+    shape: [usize; 3],
+    chi: &Buffer<T>,
+    chi_bar: &Buffer<T>,
+) -> Result<Buffer<T>, Error> {
+    let cells = shape.iter().product();
+    check_length("the solution", chi, cells)?;
+    check_length("its cotangent", chi_bar, cells)?;
+    if cells == 0 {
+        return device.upload(&[T::of(0.0)]);
+    }
+    let [nx, ny, nz] = shape;
+    let mut sums: Buffer<T> = device.empty(cells.div_ceil(BLOCK * OWN))?;
+    let dim = CubeDim::new_1d(BLOCK as u32);
+    sum_products::launch::<T, R>(
+        device.client(),
+        device.groups(sums.len() * BLOCK, BLOCK as u32),
+        dim,
+        chi.arg(),
+        chi_bar.arg(),
+        sums.arg(),
+        T::of(-smoothing),
+        nx,
+        ny,
+        nz,
+    );
+    while sums.len() > 1 {
+        let fewer = device.empty(sums.len().div_ceil(BLOCK * OWN))?;
+        let groups = device.groups(fewer.len() * BLOCK, BLOCK as u32);
+        sum::launch::<T, R>(device.client(), groups, dim, sums.arg(), fewer.arg());
+        sums = fewer;
+    }
+    Ok(sums)
+}
+
+/// Of the cells of a group, `factor` times the sum of products of differences.
+#[cube(launch)]
+fn sum_products<F: Float + CubeElement>(
+    chi: &Array<F>,
+    chi_bar: &Array<F>,
+    sums: &mut Array<F>,
+    factor: F,
+    nx: usize,
+    ny: usize,
+    nz: usize,
+) {
+    let first = CUBE_POS * (BLOCK * OWN) + UNIT_POS as usize;
+    let mut own = F::new(0.0);
+    for i in 0..OWN {
+        let at = first + i * BLOCK;
+        if at < nx * ny * nz {
+            if at % nz + 1 < nz {
+                own += (chi[at + 1] - chi[at]) * (chi_bar[at + 1] - chi_bar[at]);
+            }
+            if at / nz % ny + 1 < ny {
+                let next = at + nz;
+                own += (chi[next] - chi[at]) * (chi_bar[next] - chi_bar[at]);
+            }
+            if at / (ny * nz) + 1 < nx {
+                let next = at + ny * nz;
+                own += (chi[next] - chi[at]) * (chi_bar[next] - chi_bar[at]);
+            }
+        }
+    }
+    write_sum(factor * own, sums);
+}
+
+/// Of the values of a group, the sum.
+#[cube(launch)]
+fn sum<F: Float>(values: &Array<F>, sums: &mut Array<F>) {
+    let first = CUBE_POS * (BLOCK * OWN) + UNIT_POS as usize;
+    let mut own = F::new(0.0);
+    for i in 0..OWN {
+        let at = first + i * BLOCK;
+        if at < values.len() {
+            own += values[at];
+        }
+    }
+    write_sum(own, sums);
+}
+
+/// Adds what the units of a group have, as a tree, and writes that to the group's place.
+#[cube]
+fn write_sum<F: Float>(own: F, sums: &mut Array<F>) {
+    let unit = UNIT_POS as usize;
+    let mut shared = SharedMemory::<F>::new(BLOCK);
+    shared[unit] = own;
+    sync_cube();
+    let mut half = (BLOCK / 2).runtime();
+    while half > 0 {
+        if unit < half {
+            let more = shared[unit + half];
+            shared[unit] += more;
+        }
+        sync_cube();
+        half /= 2;
+    }
+    if unit == 0 && CUBE_POS < sums.len() {
+        sums[CUBE_POS] = shared[0];
+    }
+}
