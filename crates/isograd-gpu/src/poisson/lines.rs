@@ -42,7 +42,8 @@ struct Launch {
 impl Launch {
     fn new<R: Runtime, T: Scalar>(device: &Device<R>, lines: Lines) -> Self {
         let capacity = capacity::<R, T>(device);
-        let mut pairs = 1 << (capacity / lines.n).ilog2();
+        // A unit stays with one pair.
+        let mut pairs = (1 << (capacity / lines.n).ilog2()).min(BLOCK as usize);
         while pairs > PAIRS && lines.count < 2 * pairs * GROUPS {
             pairs /= 2;
         }
@@ -121,7 +122,7 @@ impl<T: Scalar> Fourier<T> {
         gains: &Gains<T>,
     ) {
         let launch = Launch::new::<R, T>(device, lines);
-        let [nx, ny, nz] = gains.shape;
+        let [_, ny, nz] = gains.shape;
         filter::launch::<T, R>(
             device.client(),
             launch.groups,
@@ -137,7 +138,6 @@ impl<T: Scalar> Fourier<T> {
             lines.step,
             lines.count,
             launch.pairs,
-            nx,
             ny,
             nz,
             launch.capacity,
@@ -176,13 +176,15 @@ fn transform<F: Float>(
     );
     let items = tile.pairs * tile.n;
     let mut item = UNIT_POS as usize;
+    let mut pair = first_pair(&tile);
+    let mut k = first_place(&tile);
     while item < items {
-        let pair = pair_of(&tile, item, tile.n);
-        let k = place_of(&tile, item, tile.n);
         let y = cosine(&re, &im, roots, &tile, at, pair, k);
         write(output, &tile, pair, k, y.re);
         write(output, &tile, pair + tile.pairs, k, y.im);
-        item += CUBE_DIM as usize;
+        item += BLOCK as usize;
+        pair = next_pair(&tile, pair, k);
+        k = next_place(&tile, k);
     }
 }
 
@@ -232,7 +234,6 @@ fn filter<F: Float>(
     step: usize,
     count: usize,
     pairs: usize,
-    nx: usize,
     ny: usize,
     nz: usize,
     #[comptime] capacity: usize,
@@ -252,26 +253,22 @@ fn filter<F: Float>(
         0usize.runtime(),
         capacity,
     );
-    let items = tile.pairs * tile.n;
-    let mut item = UNIT_POS as usize;
-    while item < items {
-        let pair = pair_of(&tile, item, tile.n);
-        let k = place_of(&tile, item, tile.n);
-        let y = cosine(&re, &im, roots, &tile, at, pair, k);
-        let to = capacity - at + place(&tile, pair, k);
+    let line = tile.first + tile.pair;
+    let mut k = tile.begin;
+    while k < tile.n {
+        let y = cosine(&re, &im, roots, &tile, at, tile.pair, k);
+        let to = capacity - at + place(&tile, tile.pair, k);
         let mut one = F::new(0.0);
         let mut other = F::new(0.0);
-        let line = tile.first + pair;
         if line < tile.count {
-            one = gain(spectrum, gaussian, cell(&tile, line, k), nx, ny, nz);
+            one = gain(spectrum, gaussian, k, line, n, ny, nz);
         }
         if line + tile.pairs < tile.count {
-            let frequency = cell(&tile, line + tile.pairs, k);
-            other = gain(spectrum, gaussian, frequency, nx, ny, nz);
+            other = gain(spectrum, gaussian, k, line + tile.pairs, n, ny, nz);
         }
         re[to] = y.re * one;
         im[to] = y.im * other;
-        item += CUBE_DIM as usize;
+        k += tile.stride;
     }
     sync_cube();
     to_fourier(&mut re, &mut im, roots, &tile, capacity - at, capacity);
@@ -281,7 +278,8 @@ fn filter<F: Float>(
     store(output, &re, &im, &tile, end);
 }
 
-/// The lines of a group: `pairs` of them from the first on, paired with as many behind those.
+/// The lines of a group: `pairs` of them from the first on, paired with as many behind those. In shared
+/// memory, places of a line are `pairs` apart.
 #[derive(CubeType, Clone, Copy)]
 struct Tile {
     /// Cells of a line.
@@ -292,20 +290,28 @@ struct Tile {
     count: usize,
     pairs: usize,
     first: usize,
-    /// Whether neighbours on a line are neighbours in memory, or else cells of neighbouring lines. They lie
-    /// beside each other in shared memory, too, and neighbouring units have them.
+    /// Pair of a unit, where it stays with one: units go through its places from `begin` on by `stride`.
+    pair: usize,
+    begin: usize,
+    stride: usize,
+    /// Whether neighbours on a line are neighbours in memory, or else cells of neighbouring lines: the field
+    /// is read and written in that order.
     #[cube(comptime)]
     contiguous: bool,
 }
 
 #[cube]
 fn tile(n: usize, step: usize, count: usize, pairs: usize, #[comptime] contiguous: bool) -> Tile {
+    let unit = UNIT_POS as usize;
     Tile {
         n,
         step,
         count,
         pairs,
         first: CUBE_POS * 2 * pairs,
+        pair: unit % pairs,
+        begin: unit / pairs,
+        stride: BLOCK as usize / pairs,
         contiguous,
     }
 }
@@ -313,36 +319,59 @@ fn tile(n: usize, step: usize, count: usize, pairs: usize, #[comptime] contiguou
 /// Where a cell of a line is in the field.
 #[cube]
 fn cell(tile: &Tile, line: usize, j: usize) -> usize {
-    (line / tile.step) * (tile.n * tile.step) + line % tile.step + j * tile.step
+    if comptime!(tile.contiguous) {
+        line * tile.n + j
+    } else {
+        (line / tile.step) * (tile.n * tile.step) + line % tile.step + j * tile.step
+    }
 }
 
 /// Where a place of a pair is in shared memory.
 #[cube]
 fn place(tile: &Tile, pair: usize, j: usize) -> usize {
+    j * tile.pairs + pair
+}
+
+/// The pair that a unit reads or writes first.
+#[cube]
+fn first_pair(tile: &Tile) -> usize {
     if comptime!(tile.contiguous) {
-        pair * tile.n + j
+        UNIT_POS as usize / tile.n
     } else {
-        j * tile.pairs + pair
+        tile.pair
     }
 }
 
-/// The pair of an item of a tile with `length` items a pair.
+/// The place of that.
 #[cube]
-fn pair_of(tile: &Tile, item: usize, length: usize) -> usize {
+fn first_place(tile: &Tile) -> usize {
     if comptime!(tile.contiguous) {
-        item / length
+        UNIT_POS as usize % tile.n
     } else {
-        item % tile.pairs
+        tile.begin
     }
 }
 
-/// The place in its pair of an item of a tile with `length` items a pair.
+/// The pair that a unit reads or writes after place `j` of this one.
 #[cube]
-fn place_of(tile: &Tile, item: usize, length: usize) -> usize {
+fn next_pair(tile: &Tile, pair: usize, j: usize) -> usize {
     if comptime!(tile.contiguous) {
-        item % length
+        let block = BLOCK as usize;
+        let carry = j + block % tile.n >= tile.n;
+        pair + block / tile.n + select(carry, 1, 0)
     } else {
-        item / tile.pairs
+        pair
+    }
+}
+
+/// The place of that.
+#[cube]
+fn next_place(tile: &Tile, j: usize) -> usize {
+    if comptime!(tile.contiguous) {
+        let next = j + BLOCK as usize % tile.n;
+        select(next >= tile.n, next - tile.n, next)
+    } else {
+        j + tile.stride
     }
 }
 
@@ -363,9 +392,9 @@ fn load<F: Float>(
 ) {
     let items = tile.pairs * tile.n;
     let mut item = UNIT_POS as usize;
+    let mut pair = first_pair(tile);
+    let mut j = first_place(tile);
     while item < items {
-        let pair = pair_of(tile, item, tile.n);
-        let j = place_of(tile, item, tile.n);
         let mut to = j;
         if comptime!(reorder) {
             to = makhoul(j, tile.n);
@@ -373,7 +402,9 @@ fn load<F: Float>(
         let to = place(tile, pair, to);
         re[to] = read(input, tile, pair, j);
         im[to] = read(input, tile, pair + tile.pairs, j);
-        item += CUBE_DIM as usize;
+        item += BLOCK as usize;
+        pair = next_pair(tile, pair, j);
+        j = next_place(tile, j);
     }
     sync_cube();
 }
@@ -389,13 +420,15 @@ fn store<F: Float>(
 ) {
     let items = tile.pairs * tile.n;
     let mut item = UNIT_POS as usize;
+    let mut pair = first_pair(tile);
+    let mut j = first_place(tile);
     while item < items {
-        let pair = pair_of(tile, item, tile.n);
-        let j = place_of(tile, item, tile.n);
         let from = at + place(tile, pair, makhoul(j, tile.n));
         write(output, tile, pair, j, im[from]);
         write(output, tile, pair + tile.pairs, j, re[from]);
-        item += CUBE_DIM as usize;
+        item += BLOCK as usize;
+        pair = next_pair(tile, pair, j);
+        j = next_place(tile, j);
     }
 }
 
@@ -447,17 +480,14 @@ fn to_fourier<F: Float>(
     from: usize,
     #[comptime] capacity: usize,
 ) {
-    let items = tile.pairs * tile.n;
-    let mut item = UNIT_POS as usize;
-    while item < items {
-        let pair = pair_of(tile, item, tile.n);
-        let k = place_of(tile, item, tile.n);
-        let here = place(tile, pair, k);
+    let mut k = tile.begin;
+    while k < tile.n {
+        let here = place(tile, tile.pair, k);
         let a = from + here;
         let mut x = re[a];
         let mut y = im[a];
         if k > 0 {
-            let b = from + place(tile, pair, tile.n - k);
+            let b = from + place(tile, tile.pair, tile.n - k);
             x += im[b];
             y -= re[b];
         }
@@ -466,7 +496,7 @@ fn to_fourier<F: Float>(
         let to = capacity - from + here;
         im[to] = c * x + s * y;
         re[to] = c * y - s * x;
-        item += CUBE_DIM as usize;
+        k += tile.stride;
     }
     sync_cube();
 }
@@ -490,6 +520,12 @@ fn fourier<F: Float>(
         let to = capacity - at;
         if radix == 4 {
             pass_of_four(re, im, roots, tile, at, to, done);
+        } else if radix == 2 {
+            pass_of_two(re, im, roots, tile, at, to, done);
+        } else if radix == 3 {
+            pass_of_few(re, im, roots, tile, at, to, done, 3usize);
+        } else if radix == 5 {
+            pass_of_few(re, im, roots, tile, at, to, done, 5usize);
         } else {
             pass_of_any(re, im, roots, tile, at, to, done, radix);
         }
@@ -506,16 +542,18 @@ struct Complex<F: Float> {
     im: F,
 }
 
-/// The number at `at`, turned by `exp(−2πit/n)`.
+/// Place `j` of a unit's pair, turned by `exp(−2πit/n)`.
 #[cube]
 fn turned<F: Float>(
     re: &SharedMemory<F>,
     im: &SharedMemory<F>,
     roots: &Array<F>,
     tile: &Tile,
-    at: usize,
+    from: usize,
+    j: usize,
     t: usize,
 ) -> Complex<F> {
+    let at = from + place(tile, tile.pair, j);
     let c = roots[t];
     let s = roots[tile.n + t];
     Complex::<F> {
@@ -524,7 +562,36 @@ fn turned<F: Float>(
     }
 }
 
-/// One pass with radix 4, after passes whose product is `done`.
+/// One pass with radix 2, after passes whose product is `done`.
+#[cube]
+fn pass_of_two<F: Float>(
+    re: &mut SharedMemory<F>,
+    im: &mut SharedMemory<F>,
+    roots: &Array<F>,
+    tile: &Tile,
+    from: usize,
+    to: usize,
+    done: usize,
+) {
+    let part = tile.n / 2;
+    let turn = part / done;
+    let mut b = tile.begin;
+    while b < part {
+        let k = b % done;
+        let v0 = from + place(tile, tile.pair, b);
+        let v1 = turned(re, im, roots, tile, from, b + part, k * turn);
+        let first = (b - k) * 2 + k;
+        let u0 = to + place(tile, tile.pair, first);
+        re[u0] = re[v0] + v1.re;
+        im[u0] = im[v0] + v1.im;
+        let u1 = to + place(tile, tile.pair, first + done);
+        re[u1] = re[v0] - v1.re;
+        im[u1] = im[v0] - v1.im;
+        b += tile.stride;
+    }
+}
+
+/// One pass with radix 4.
 #[cube]
 fn pass_of_four<F: Float>(
     re: &mut SharedMemory<F>,
@@ -537,49 +604,83 @@ fn pass_of_four<F: Float>(
 ) {
     let part = tile.n / 4;
     let turn = part / done;
-    let items = tile.pairs * part;
-    let mut item = UNIT_POS as usize;
-    while item < items {
-        let pair = pair_of(tile, item, part);
-        let b = place_of(tile, item, part);
+    let mut b = tile.begin;
+    while b < part {
         let k = b % done;
         let t = k * turn;
-        let v0 = from + place(tile, pair, b);
-        let v1 = turned(re, im, roots, tile, from + place(tile, pair, b + part), t);
-        let v2 = turned(
-            re,
-            im,
-            roots,
-            tile,
-            from + place(tile, pair, b + 2 * part),
-            2 * t,
-        );
-        let v3 = turned(
-            re,
-            im,
-            roots,
-            tile,
-            from + place(tile, pair, b + 3 * part),
-            3 * t,
-        );
+        let v0 = from + place(tile, tile.pair, b);
+        let v1 = turned(re, im, roots, tile, from, b + part, t);
+        let v2 = turned(re, im, roots, tile, from, b + 2 * part, 2 * t);
+        let v3 = turned(re, im, roots, tile, from, b + 3 * part, 3 * t);
         let (sum_re, sum_im) = (re[v0] + v2.re, im[v0] + v2.im);
         let (gap_re, gap_im) = (re[v0] - v2.re, im[v0] - v2.im);
         let (odd_re, odd_im) = (v1.re + v3.re, v1.im + v3.im);
         let (odd_gap_re, odd_gap_im) = (v1.re - v3.re, v1.im - v3.im);
         let first = (b - k) * 4 + k;
-        let u0 = to + place(tile, pair, first);
+        let u0 = to + place(tile, tile.pair, first);
         re[u0] = sum_re + odd_re;
         im[u0] = sum_im + odd_im;
-        let u1 = to + place(tile, pair, first + done);
+        let u1 = to + place(tile, tile.pair, first + done);
         re[u1] = gap_re + odd_gap_im;
         im[u1] = gap_im - odd_gap_re;
-        let u2 = to + place(tile, pair, first + 2 * done);
+        let u2 = to + place(tile, tile.pair, first + 2 * done);
         re[u2] = sum_re - odd_re;
         im[u2] = sum_im - odd_im;
-        let u3 = to + place(tile, pair, first + 3 * done);
+        let u3 = to + place(tile, tile.pair, first + 3 * done);
         re[u3] = gap_re - odd_gap_im;
         im[u3] = gap_im + odd_gap_re;
-        item += CUBE_DIM as usize;
+        b += tile.stride;
+    }
+}
+
+/// One pass with a small radix, as plain sums of numbers that are read once.
+#[cube]
+fn pass_of_few<F: Float>(
+    re: &mut SharedMemory<F>,
+    im: &mut SharedMemory<F>,
+    roots: &Array<F>,
+    tile: &Tile,
+    from: usize,
+    to: usize,
+    done: usize,
+    #[comptime] radix: usize,
+) {
+    let part = tile.n / radix;
+    let turn = part / done;
+    let mut unit_re = Array::<F>::new(radix);
+    let mut unit_im = Array::<F>::new(radix);
+    #[unroll]
+    for q in 0..radix {
+        unit_re[q] = roots[q * part];
+        unit_im[q] = roots[tile.n + q * part];
+    }
+    let mut v_re = Array::<F>::new(radix);
+    let mut v_im = Array::<F>::new(radix);
+    let mut b = tile.begin;
+    while b < part {
+        let k = b % done;
+        #[unroll]
+        for q in 0..radix {
+            let v = turned(re, im, roots, tile, from, b + q * part, q * k * turn);
+            v_re[q] = v.re;
+            v_im[q] = v.im;
+        }
+        let first = (b - k) * radix + k;
+        #[unroll]
+        for s in 0..radix {
+            let mut sum_re = v_re[0];
+            let mut sum_im = v_im[0];
+            #[unroll]
+            for q in 1..radix {
+                let w = comptime!((q * s) % radix);
+                sum_re += v_re[q] * unit_re[w] - v_im[q] * unit_im[w];
+                sum_im += v_re[q] * unit_im[w] + v_im[q] * unit_re[w];
+            }
+            let at = to + place(tile, tile.pair, first + s * done);
+            re[at] = sum_re;
+            im[at] = sum_im;
+        }
+        b += tile.stride;
     }
 }
 
@@ -596,28 +697,18 @@ fn pass_of_any<F: Float>(
     radix: usize,
 ) {
     let part = tile.n / radix;
-    let items = tile.pairs * tile.n;
-    let mut item = UNIT_POS as usize;
-    while item < items {
-        let pair = pair_of(tile, item, tile.n);
-        let result = place_of(tile, item, tile.n);
+    let mut result = tile.begin;
+    while result < tile.n {
         let k = result % done;
         let blocks = result / done;
         let b = (blocks / radix) * done + k;
-        // Of each term, its angle is so much beyond that of the term before; the sum stays below n.
+        // Of each term, its angle is so much beyond that of the term before; it stays below a whole turn.
         let turn = k * (part / done) + (blocks % radix) * part;
         let mut angle = 0usize.runtime();
         let mut sum_re = F::new(0.0);
         let mut sum_im = F::new(0.0);
         for q in 0..radix {
-            let v = turned(
-                re,
-                im,
-                roots,
-                tile,
-                from + place(tile, pair, b + q * part),
-                angle,
-            );
+            let v = turned(re, im, roots, tile, from, b + q * part, angle);
             sum_re += v.re;
             sum_im += v.im;
             angle += turn;
@@ -625,9 +716,9 @@ fn pass_of_any<F: Float>(
                 angle -= tile.n;
             }
         }
-        let at = to + place(tile, pair, result);
+        let at = to + place(tile, tile.pair, result);
         re[at] = sum_re;
         im[at] = sum_im;
-        item += CUBE_DIM as usize;
+        result += tile.stride;
     }
 }

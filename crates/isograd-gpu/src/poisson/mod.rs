@@ -40,9 +40,12 @@ use gain::Gains;
 /// once, used for every solve.
 pub struct Solver<T> {
     shape: [usize; 3],
-    /// The axes of more than one cell, in the order of the transforms back; the last axis if there are none.
+    /// The same field with axes of one cell moved from the front to the end: the first one, where the gains
+    /// are applied, has more if any has.
+    turned: [usize; 3],
+    /// The first axis and others of more than one cell, of `turned`, in the order of the transforms back.
     axes: Vec<(usize, Axis<T>)>,
-    /// Eigenvalues of the stiffness along x, y and z, then those of the mass.
+    /// Eigenvalues of the stiffness along the axes of `turned`, then those of the mass.
     spectrum: Buffer<T>,
 }
 
@@ -122,21 +125,28 @@ impl<T: Scalar> Solver<T> {
         axis: impl Fn(&Device<R>, usize) -> Result<Axis<T>, Error>,
     ) -> Result<Self, Error> {
         device.check_number::<T>()?;
-        let mut axes = Vec::new();
-        for a in 0..3 {
-            if shape[a] > 1 || (a == 2 && axes.is_empty()) {
-                axes.push((a, axis(device, shape[a])?));
+        let mut turned = shape;
+        for _ in 0..2 {
+            if turned[0] == 1 {
+                turned.rotate_left(1);
+            }
+        }
+        let mut axes = vec![(0, axis(device, turned[0])?)];
+        for a in 1..3 {
+            if turned[a] > 1 {
+                axes.push((a, axis(device, turned[a])?));
             }
         }
         let along = |of: fn(usize, usize) -> f64| {
-            let cells = shape.into_iter();
-            cells.flat_map(move |n| (0..n).map(move |k| T::of(of(k, n))))
+            let lengths = turned.into_iter();
+            lengths.flat_map(move |n| (0..n).map(move |k| T::of(of(k, n))))
         };
         let eigenvalues: Vec<T> = along(spectrum::stiffness)
             .chain(along(spectrum::mass))
             .collect();
         Ok(Self {
             shape,
+            turned,
             axes,
             spectrum: device.upload(&eigenvalues)?,
         })
@@ -168,13 +178,13 @@ impl<T: Scalar> Solver<T> {
         let mut fields = Fields::new(b);
         let (first, others) = self.axes.split_first().expect("an axis");
         for (a, axis) in others.iter().rev() {
-            let lines = Lines::new(self.shape, *a);
+            let lines = Lines::new(self.turned, *a);
             fields.step(device, |from, to| {
                 axis.forward(device, lines, from, to, None)
             })?;
         }
         let (a, axis) = first;
-        let lines = Lines::new(self.shape, *a);
+        let lines = Lines::new(self.turned, *a);
         if let Way::Fourier(fourier) = &axis.way {
             fields.step(device, |from, to| {
                 fourier.filter(device, lines, from, to, &gains)
@@ -186,7 +196,7 @@ impl<T: Scalar> Solver<T> {
             fields.step(device, |from, to| axis.inverse(device, lines, from, to))?;
         }
         for (a, axis) in others {
-            let lines = Lines::new(self.shape, *a);
+            let lines = Lines::new(self.turned, *a);
             fields.step(device, |from, to| axis.inverse(device, lines, from, to))?;
         }
         Ok(fields.last)
@@ -194,15 +204,15 @@ impl<T: Scalar> Solver<T> {
 
     /// `G/λ`, over the factor that the transforms leave.
     fn gains<R: Runtime>(&self, device: &Device<R>, smoothing: f64) -> Result<Gains<'_, T>, Error> {
-        let lengths = self.axes.iter().map(|(a, _)| self.shape[*a]);
+        let lengths = self.axes.iter().map(|(a, _)| self.turned[*a]);
         let factor: f64 = lengths.map(|n| 2.0 * n as f64).product();
         let mut gaussian = Vec::new();
-        for (a, &n) in self.shape.iter().enumerate() {
+        for (a, &n) in self.turned.iter().enumerate() {
             let amplitude = if a == 0 { 1.0 / factor } else { 1.0 };
             gaussian.extend((0..n).map(|k| T::of(amplitude * spectrum::gaussian(k, n, smoothing))));
         }
         Ok(Gains {
-            shape: self.shape,
+            shape: self.turned,
             spectrum: &self.spectrum,
             gaussian: device.upload(&gaussian)?,
         })

@@ -44,7 +44,7 @@ impl<T: Scalar> Products<T> {
         let Some(gains) = gains else {
             return self.multiply(device, lines, from, to, false);
         };
-        let [nx, ny, nz] = gains.shape;
+        let [_, ny, nz] = gains.shape;
         multiply_and_filter::launch::<T, R>(
             device.client(),
             groups(device, lines),
@@ -57,7 +57,6 @@ impl<T: Scalar> Products<T> {
             lines.n,
             lines.step,
             lines.count,
-            nx,
             ny,
             nz,
             kind(lines, false),
@@ -166,7 +165,6 @@ fn multiply_and_filter<F: Float>(
     n: usize,
     step: usize,
     count: usize,
-    nx: usize,
     ny: usize,
     nz: usize,
     #[comptime] kind: Kind,
@@ -180,11 +178,11 @@ fn multiply_and_filter<F: Float>(
         let row = tile.row + own_row(own / OWN, kind);
         let line = tile.line + own_line(own % OWN, kind);
         if row < n.div_ceil(2) && line < count {
-            let at = cell(&tile, line, 2 * row);
-            output[at] = even[own] * gain(spectrum, gaussian, at, nx, ny, nz);
-            if 2 * row + 1 < n {
-                let next = at + step;
-                output[next] = odd[own] * gain(spectrum, gaussian, next, nx, ny, nz);
+            let k = 2 * row;
+            let at = cell(&tile, line, k);
+            output[at] = even[own] * gain(spectrum, gaussian, k, line, n, ny, nz);
+            if k + 1 < n {
+                output[at + step] = odd[own] * gain(spectrum, gaussian, k + 1, line, n, ny, nz);
             }
         }
     }

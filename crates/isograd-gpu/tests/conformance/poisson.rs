@@ -8,7 +8,7 @@ use isograd_gpu::{Device, Error, Scalar};
 use crate::devices::{Numbers, on_each_device};
 
 /// Powers of two, factors of every pass, primes with a pass of their own and without, single cells.
-const SHAPES: [[usize; 3]; 14] = [
+const SHAPES: [[usize; 3]; 15] = [
     [16, 16, 16],
     [31, 17, 5],
     [1, 7, 64],
@@ -23,6 +23,7 @@ const SHAPES: [[usize; 3]; 14] = [
     [1, 1, 1024],
     [1, 1500, 3],
     [9, 2, 2048],
+    [2500, 1, 5],
 ];
 
 /// Runs a generic check in f32, and in f64 where the device has it.
