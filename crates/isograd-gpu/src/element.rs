@@ -10,5 +10,7 @@ pub(crate) mod plane;
 pub(crate) mod hat;
 #[path = "../../isograd/src/element/linear.rs"]
 pub(crate) mod linear;
+#[path = "../../isograd/src/element/crossing.rs"]
+pub(crate) mod crossing;
 #[path = "../../isograd/src/element/spline.rs"]
 pub(crate) mod spline;

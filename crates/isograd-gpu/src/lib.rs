@@ -17,6 +17,7 @@ mod device;
 mod element;
 mod grid;
 pub mod iso_value;
+pub mod isosurface;
 pub mod neighbors;
 pub mod normals;
 pub mod poisson;

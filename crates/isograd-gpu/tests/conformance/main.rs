@@ -4,6 +4,7 @@ mod areas;
 mod clouds;
 mod devices;
 mod iso_value;
+mod isosurface;
 mod normals;
 mod poisson;
 mod primitives;

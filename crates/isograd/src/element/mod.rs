@@ -3,6 +3,7 @@
 //! The files beside this one are compiled twice: here as plain Rust, and in `isograd-gpu`, where the cfg
 //! `cube` makes parts of kernels of the same lines.
 
+pub mod crossing;
 pub mod hat;
 pub mod linear;
 pub mod plane;

@@ -7,6 +7,7 @@ use super::signs::{Signs, ones};
 use super::tables::TABLE;
 use super::{Error, Report};
 use crate::data::{Field, Grid, LatticeEdge, Mesh};
+use crate::element::crossing::crossing;
 use crate::{Real, vector};
 
 /// Memory of the stage, kept between calls: about a fifth of a byte per cell.
@@ -198,20 +199,6 @@ fn emit_vertices<T: Real>(
             }
         }
     }
-}
-
-/// Where the level lies between two values, `η = (level − p)/(q − p)` in `[0, 1]`. The values are finite
-/// and on different sides of the level, so they differ; in IEEE arithmetic their difference is then not
-/// zero either.
-#[inline(always)]
-pub fn crossing<T: Real>(p: T, q: T, level: T) -> T {
-    let difference = q - p;
-    if difference.is_finite() {
-        return (level - p) / difference;
-    }
-    // Halves of numbers whose difference overflows are far from underflow.
-    let half = T::of(0.5);
-    (half * level - half * p) / (half * q - half * p)
 }
 
 /// The point at the fraction `eta` of the way from the centre of `cell` to the next along `axis`. Each

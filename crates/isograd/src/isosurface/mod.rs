@@ -50,10 +50,12 @@ mod tables;
 #[cfg(test)]
 mod tests;
 
-pub use march::{Scratch, crossing, forward};
+pub use crate::element::crossing::crossing;
+pub use march::{Scratch, forward};
 pub use measure::Measures;
 pub use measure_pullback::pullback as measure_pullback;
-pub use pullback::{LevelCotangent, pullback};
+pub use pullback::{LevelCotangent, SMALLEST_DIFFERENCE, pullback};
+pub use tables::triangles;
 
 /// Which value of the indicator the surface is at.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

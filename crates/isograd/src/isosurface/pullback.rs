@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::crossing;
 use crate::data::{Field, GridCotangent, LatticeEdge, Mesh};
+use crate::element::crossing::{bounded, crossing};
 use crate::{Real, parallel, vector};
 
 /// Planes across x that one task owns.
@@ -11,7 +11,7 @@ const SLAB: usize = 8;
 
 /// Share of the range of `χ` that the difference along an edge counts as, where it is less: a vertex moves
 /// by no more than a million cells while the whole of `χ` passes.
-const SMALLEST_DIFFERENCE: f64 = 1e-6;
+pub const SMALLEST_DIFFERENCE: f64 = 1e-6;
 
 /// What the vertices mean for the level and the grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -85,16 +85,11 @@ impl<T: Real> Vertices<'_, T> {
         let q = p + grid.strides()[axis];
         let difference = values[q] - values[p];
         let guarded = difference.abs() < self.smallest;
-        let bounded = if guarded {
-            self.smallest.copysign(difference)
-        } else {
-            difference
-        };
         let s = self.bars[vertex][axis] * grid.spacing();
         OnEdge {
             cells: [p, q],
             eta: crossing(values[p], values[q], self.level),
-            pull: s / bounded,
+            pull: s / bounded(difference, self.smallest),
             guarded: guarded && s != T::zero(),
         }
     }

@@ -20,6 +20,14 @@ pub(super) struct Table {
 /// The one table.
 pub(super) static TABLE: LazyLock<Table> = LazyLock::new(Table::build);
 
+/// The triangles of a cube of the lattice, counter-clockwise seen from outside, each three of its edges. Corner
+/// `4·dx + 2·dy + dz` lies at `(dx, dy, dz)` and is inside where its bit of `case` is set. Edge
+/// `4·axis + 2·u + v` runs along `axis` from the corner whose other two coordinates, in the order x, y, z, are
+/// `(u, v)`.
+pub fn triangles(case: u8) -> &'static [[u8; 3]] {
+    TABLE.triangles(case)
+}
+
 impl Table {
     /// Triangles of the cube whose corner `c` is inside where bit `c` of `case` is set.
     #[inline(always)]

@@ -1,0 +1,275 @@
+//! Area and enclosed volume of a triangle mesh.
+//!
+//! # Map
+//! [`forward`]: the two integrals of [`isograd::isosurface::measure`], seen from the centre of the bounding box, so
+//! that the place of the mesh costs no digits. Pieces and topology are left to the CPU.
+//!
+//! # Residual
+//! The mesh and its bounding box.
+//!
+//! # Pullback
+//! [`pullback`]: that of [`isograd::isosurface::measure_pullback`]. Each vertex collects what its faces mean for it,
+//! in the order of the faces.
+//!
+//! # Not differentiable
+//! A face without area: left out of the area, and counted.
+
+use cubecl::prelude::*;
+
+use super::ends::ends;
+use super::signs::{BLOCK, not_finite};
+use super::sums::{fold, groups_for, tree_sum};
+use crate::device::check_length;
+use crate::primitives::sort::{order, starts};
+use crate::{Buffer, Device, Error, Scalar};
+
+/// What there is to measure.
+#[derive(Clone)]
+pub struct Measures<T> {
+    /// `(2,)` the area, in unit length², and the enclosed volume, in unit length³: positive where faces are
+    /// counter-clockwise seen from outside.
+    pub area_and_volume: Buffer<T>,
+    /// `(1,)` faces without area.
+    pub flat_faces: Buffer<u32>,
+}
+
+/// What the pullback needs.
+#[derive(Clone)]
+pub struct Residual<T> {
+    vertices: Buffer<T>,
+    faces: Buffer<u32>,
+    /// Low and high corner of the box round the vertices.
+    bounds: Buffer<T>,
+}
+
+/// Measures a mesh of `(V, 3)` vertices and `(F, 3)` faces, which name vertices from 0.
+///
+/// # Errors
+/// [`Error::Length`] where an array is not of triples or there are no vertices; [`Error::TooLarge`].
+pub fn forward<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    vertices: &Buffer<T>,
+    faces: &Buffer<u32>,
+) -> Result<(Measures<T>, Residual<T>), Error> {
+    check_length("the vertices", vertices, (vertices.len() / 3).max(1) * 3)?;
+    check_length("the faces", faces, faces.len() / 3 * 3)?;
+    let residual = Residual {
+        vertices: vertices.clone(),
+        faces: faces.clone(),
+        bounds: ends(device, vertices, 3)?,
+    };
+    let count = faces.len() / 3;
+    let groups = groups_for(count);
+    let partial: Buffer<T> = device.empty(2 * groups)?;
+    let partly_flat: Buffer<u32> = device.empty(groups)?;
+    let out = Measures {
+        area_and_volume: device.empty(2)?,
+        flat_faces: device.empty(1)?,
+    };
+    add_faces::launch::<T, R>(
+        device.client(),
+        CubeCount::Static(groups as u32, 1, 1),
+        CubeDim::new_1d(BLOCK as u32),
+        residual.arg(),
+        partial.arg(),
+        partly_flat.arg(),
+        count as u32,
+        groups as u32,
+        BLOCK,
+    );
+    fold(device, &partial, groups, 0, &out.area_and_volume);
+    fold(device, &partly_flat, groups, 0, &out.flat_faces);
+    Ok((out, residual))
+}
+
+/// The cotangent `(V, 3)` of the vertices from those `(2,)` of area and volume.
+///
+/// # Errors
+/// [`Error::Length`], [`Error::TooLarge`].
+pub fn pullback<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    residual: &Residual<T>,
+    bars: &Buffer<T>,
+) -> Result<Buffer<T>, Error> {
+    check_length("the cotangent of area and volume", bars, 2)?;
+    let count = residual.vertices.len() / 3;
+    let corners = order(device, &residual.faces, count as u32)?;
+    let first = starts(device, &corners.keys, count as u32)?;
+    let vertices_bar = device.empty(residual.vertices.len())?;
+    gather_faces::launch::<T, R>(
+        device.client(),
+        device.groups(count, BLOCK as u32),
+        CubeDim::new_1d(BLOCK as u32),
+        residual.arg(),
+        corners.places.arg(),
+        first.arg(),
+        bars.arg(),
+        vertices_bar.arg(),
+        count as u32,
+    );
+    Ok(vertices_bar)
+}
+
+impl<T: Scalar> Residual<T> {
+    fn arg<R: Runtime>(&self) -> TrianglesLaunch<T, R> {
+        TrianglesLaunch::new(self.vertices.arg(), self.faces.arg(), self.bounds.arg())
+    }
+}
+
+/// The mesh, in a kernel.
+#[derive(CubeType, CubeLaunch)]
+pub struct Triangles<F: Float + CubeElement> {
+    vertices: Array<F>,
+    faces: Array<u32>,
+    bounds: Array<F>,
+}
+
+#[derive(CubeType, Clone, Copy)]
+struct Vector<F: Float + CubeElement> {
+    x: F,
+    y: F,
+    z: F,
+}
+
+#[cube]
+fn minus<F: Float + CubeElement>(a: Vector<F>, b: Vector<F>) -> Vector<F> {
+    Vector::<F> {
+        x: a.x - b.x,
+        y: a.y - b.y,
+        z: a.z - b.z,
+    }
+}
+
+#[cube]
+fn dot<F: Float + CubeElement>(a: Vector<F>, b: Vector<F>) -> F {
+    a.x * b.x + a.y * b.y + a.z * b.z
+}
+
+#[cube]
+fn cross<F: Float + CubeElement>(a: Vector<F>, b: Vector<F>) -> Vector<F> {
+    Vector::<F> {
+        x: a.y * b.z - a.z * b.y,
+        y: a.z * b.x - a.x * b.z,
+        z: a.x * b.y - a.y * b.x,
+    }
+}
+
+/// The unit vector along `a`, or zero where that has no direction. Scaled by the largest component first, so that
+/// tiny vectors do not underflow.
+#[cube]
+fn unit<F: Float + CubeElement>(a: Vector<F>) -> Vector<F> {
+    let largest = max(F::abs(a.x), max(F::abs(a.y), F::abs(a.z)));
+    let mut unit = Vector::<F> {
+        x: F::new(0.0),
+        y: F::new(0.0),
+        z: F::new(0.0),
+    };
+    if largest > F::new(0.0) && not_finite::<F>(largest) == 0u32 {
+        let b = Vector::<F> {
+            x: a.x / largest,
+            y: a.y / largest,
+            z: a.z / largest,
+        };
+        let length = F::sqrt(dot::<F>(b, b));
+        unit.x = b.x / length;
+        unit.y = b.y / length;
+        unit.z = b.z / length;
+    }
+    unit
+}
+
+/// Corner `k` of a face.
+#[cube]
+fn corner<F: Float + CubeElement>(mesh: &Triangles<F>, face: usize, k: usize) -> Vector<F> {
+    let at = 3 * mesh.faces[3 * face + k] as usize;
+    Vector::<F> {
+        x: mesh.vertices[at],
+        y: mesh.vertices[at + 1],
+        z: mesh.vertices[at + 2],
+    }
+}
+
+/// Centre of the box.
+#[cube]
+fn centre<F: Float + CubeElement>(mesh: &Triangles<F>) -> Vector<F> {
+    let half = F::new(0.5);
+    Vector::<F> {
+        x: half * mesh.bounds[0] + half * mesh.bounds[3],
+        y: half * mesh.bounds[1] + half * mesh.bounds[4],
+        z: half * mesh.bounds[2] + half * mesh.bounds[5],
+    }
+}
+
+#[cube(launch)]
+fn add_faces<F: Float + CubeElement>(
+    mesh: &Triangles<F>,
+    partial: &mut Array<F>,
+    partly_flat: &mut Array<u32>,
+    count: u32,
+    groups: u32,
+    #[comptime] block: usize,
+) {
+    let mut area = F::new(0.0);
+    let mut volume = F::new(0.0);
+    let mut flat = 0u32;
+    let from = centre::<F>(mesh);
+    let mut face = ABSOLUTE_POS;
+    while face < count as usize {
+        let a = corner::<F>(mesh, face, 0usize);
+        let b = minus::<F>(corner::<F>(mesh, face, 1usize), a);
+        let c = minus::<F>(corner::<F>(mesh, face, 2usize), a);
+        let normal = cross::<F>(b, c);
+        let direction = unit::<F>(normal);
+        area += dot::<F>(normal, direction) / F::new(2.0);
+        volume += dot::<F>(minus::<F>(a, from), normal) / F::new(6.0);
+        flat += select(dot::<F>(direction, direction) == F::new(0.0), 1u32, 0u32);
+        face += groups as usize * block;
+    }
+    let mut shared = SharedMemory::<F>::new(block);
+    let mut counts = SharedMemory::<u32>::new(block);
+    let area = tree_sum::<F>(&mut shared, area, block);
+    let volume = tree_sum::<F>(&mut shared, volume, block);
+    let flat = tree_sum::<u32>(&mut counts, flat, block);
+    if UNIT_POS == 0u32 {
+        partial[CUBE_POS] = area;
+        partial[CUBE_POS + groups as usize] = volume;
+        partly_flat[CUBE_POS] = flat;
+    }
+}
+
+/// With `n` the unit normal of a face `(a, b, c)`, `ā += A̅ (b − c) × n / 2` and `ā += V̅ b × c / 6`.
+#[cube(launch)]
+fn gather_faces<F: Float + CubeElement>(
+    mesh: &Triangles<F>,
+    corners: &Array<u32>,
+    first: &Array<u32>,
+    bars: &Array<F>,
+    vertices_bar: &mut Array<F>,
+    count: u32,
+) {
+    if ABSOLUTE_POS < count as usize {
+        let mut x = F::new(0.0);
+        let mut y = F::new(0.0);
+        let mut z = F::new(0.0);
+        let from = centre::<F>(mesh);
+        let of_area = bars[0] / F::new(2.0);
+        let of_volume = bars[1] / F::new(6.0);
+        for at in first[ABSOLUTE_POS]..first[ABSOLUTE_POS + 1] {
+            let place = corners[at as usize] as usize;
+            let face = place / 3;
+            let k = place % 3;
+            let a = corner::<F>(mesh, face, k);
+            let b = corner::<F>(mesh, face, (k + 1) % 3);
+            let c = corner::<F>(mesh, face, (k + 2) % 3);
+            let normal = unit::<F>(cross::<F>(minus::<F>(b, a), minus::<F>(c, a)));
+            let sweep = cross::<F>(minus::<F>(b, c), normal);
+            let cone = cross::<F>(minus::<F>(b, from), minus::<F>(c, from));
+            x += of_area * sweep.x + of_volume * cone.x;
+            y += of_area * sweep.y + of_volume * cone.y;
+            z += of_area * sweep.z + of_volume * cone.z;
+        }
+        vertices_bar[3 * ABSOLUTE_POS] = x;
+        vertices_bar[3 * ABSOLUTE_POS + 1] = y;
+        vertices_bar[3 * ABSOLUTE_POS + 2] = z;
+    }
+}

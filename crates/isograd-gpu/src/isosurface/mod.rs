@@ -1,0 +1,92 @@
+//! The isosurface stage: marching cubes on the lattice of cell centres.
+//!
+//! # Map
+//! That of [`isograd::isosurface`], with its table: the same vertices and faces in the same order.
+//! [`forward`] packs the signs into bits, counts the vertices and the triangles of every 32 cells of a row, sums
+//! the counts from the beginning, and writes each vertex and each triangle to its place. Work takes a fifth of
+//! the memory of a field in `f32`, most of it for a while only. One thing is downloaded: four whole numbers, from
+//! which the surface is known to exist and the sizes of its arrays.
+//!
+//! # Residual
+//! The field, the level, the lattice edges, and the signs and counts by which a cell finds the vertices on its
+//! edges: a quarter of a byte a cell.
+//!
+//! # Pullback
+//! [`pullback`]: each cell collects what the vertices on its six edges mean for it; the level and the grid get
+//! sums over all vertices, as a tree of fixed shape.
+//!
+//! [`measure`] is where the cotangents of vertices may come from: area and volume.
+
+mod ends;
+mod error;
+mod forward;
+pub mod measure;
+mod pullback;
+mod signs;
+mod sums;
+mod total;
+mod values;
+
+use cubecl::prelude::Runtime;
+use isograd::Grid;
+use isograd::isosurface::{Report, triangles};
+
+use crate::{Buffer, Device};
+
+pub use error::Error;
+pub use forward::{forward, forward_at};
+pub use pullback::{Cotangent, pullback};
+
+/// What every surface needs, made once.
+#[derive(Clone)]
+pub struct Plan {
+    /// Where the triangles of each of the 256 sign patterns begin, the end of the last, then the triangles: three
+    /// edges of the cube each, one a byte, from the lowest.
+    table: Buffer<u32>,
+}
+
+impl Plan {
+    /// A plan for a device.
+    ///
+    /// # Errors
+    /// [`TooLarge`](crate::Error::TooLarge).
+    pub fn new<R: Runtime>(device: &Device<R>) -> Result<Self, crate::Error> {
+        let mut starts = vec![0];
+        let mut packed = Vec::new();
+        for case in 0..=255 {
+            let edges = triangles(case).iter();
+            packed.extend(edges.map(|&[a, b, c]| u32::from_le_bytes([a, b, c, 0])));
+            starts.push(packed.len() as u32);
+        }
+        starts.extend(packed);
+        Ok(Self {
+            table: device.upload(&starts)?,
+        })
+    }
+}
+
+/// A surface on the device.
+#[derive(Clone)]
+pub struct Surface<T> {
+    /// `(V, 3)` vertices, in the user's unit.
+    pub vertices: Buffer<T>,
+    /// `(F, 3)` faces, counter-clockwise seen from the side where `χ ≥ c`.
+    pub faces: Buffer<u32>,
+    /// `(V,)` the lattice edge of each vertex, ascending: `3·cell + axis`, from the cell at that place in memory to
+    /// the next one along the axis. [`isograd::LatticeEdge`] of the two.
+    pub edges: Buffer<u32>,
+    /// What there is to say about it.
+    pub report: Report,
+}
+
+/// What the pullback needs.
+#[derive(Clone)]
+pub struct Residual<T> {
+    grid: Grid<T>,
+    chi: Buffer<T>,
+    level: Buffer<T>,
+    signs: signs::Bits,
+    /// Per word of the signs, the number of vertices before it.
+    before: Buffer<u32>,
+    edges: Buffer<u32>,
+}

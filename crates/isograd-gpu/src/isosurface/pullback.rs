@@ -1,0 +1,249 @@
+//! Cotangents of the vertices to cotangents of the indicator, the level and the grid.
+
+use cubecl::prelude::*;
+
+use super::Residual;
+use super::ends::ends;
+use super::signs::{BLOCK, Signs, inside, vertex_on};
+use super::sums::{fold, groups_for, tree_sum};
+use super::values::{Values, fraction_on, stride};
+use crate::device::check_length;
+use crate::element::crossing::bounded;
+use crate::{Buffer, Device, Error, Scalar};
+
+/// Sums over the vertices: of the level, of the low corner, of the spacing.
+const SUMS: usize = 5;
+
+/// What the vertices mean for the field, the level and the grid.
+#[derive(Clone)]
+pub struct Cotangent<T> {
+    /// `(nx, ny, nz)` cotangent of `χ`; 0 in cells without a vertex on any of their edges.
+    pub chi: Buffer<T>,
+    /// `(1,)` cotangent of the level.
+    pub level: Buffer<T>,
+    /// `(4,)` cotangent of the low corner of the grid and, that and the number of cells being held, of its spacing.
+    pub grid: Buffer<T>,
+    /// `(1,)` vertices on edges along which `χ` hardly changes: their derivative was bounded.
+    pub guarded: Buffer<u32>,
+}
+
+/// What the cotangents `(V, 3)` of the vertices mean for what [`forward`](super::forward) made them of:
+/// [`isograd::isosurface::pullback`], whose guard is used, with sums in `T`.
+///
+/// # Errors
+/// [`Error::Length`], [`Error::TooLarge`].
+pub fn pullback<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    residual: &Residual<T>,
+    vertices_bar: &Buffer<T>,
+) -> Result<Cotangent<T>, Error> {
+    let count = residual.edges.len();
+    check_length("the cotangent of the vertices", vertices_bar, 3 * count)?;
+    let ends = ends(device, &residual.chi, 1)?;
+    let dim = CubeDim::new_1d(BLOCK as u32);
+    let groups = groups_for(count);
+    let partial: Buffer<T> = device.empty(SUMS * groups)?;
+    let partly_guarded: Buffer<u32> = device.empty(groups)?;
+    let out = Cotangent {
+        chi: device.empty(residual.chi.len())?,
+        level: device.empty(1)?,
+        grid: device.empty(4)?,
+        guarded: device.empty(1)?,
+    };
+    gather_chi::launch::<T, R>(
+        device.client(),
+        device.groups(residual.signs.units(), BLOCK as u32),
+        dim,
+        residual.signs.arg(),
+        residual.before.arg(),
+        residual.values(device)?,
+        ends.arg(),
+        vertices_bar.arg(),
+        out.chi.arg(),
+    );
+    add_vertices::launch::<T, R>(
+        device.client(),
+        CubeCount::Static(groups as u32, 1, 1),
+        dim,
+        residual.signs.arg(),
+        residual.edges.arg(),
+        residual.values(device)?,
+        ends.arg(),
+        vertices_bar.arg(),
+        partial.arg(),
+        partly_guarded.arg(),
+        count as u32,
+        groups as u32,
+        BLOCK,
+    );
+    fold(device, &partial, groups, 0, &out.level);
+    fold(device, &partial, groups, 1, &out.grid);
+    fold(device, &partly_guarded, groups, 0, &out.guarded);
+    Ok(out)
+}
+
+/// A vertex seen from its edge.
+#[derive(CubeType)]
+struct OnEdge<F: Float + CubeElement> {
+    eta: F,
+    /// `s/(χ_q − χ_p)`, in which `s = ȳ·(q − p)`.
+    pull: F,
+    /// 1 where the difference was bounded and that matters.
+    guarded: u32,
+}
+
+/// The vertex of this number on the edge along `axis` from the cell at place `p` in memory.
+#[cube]
+fn on_edge<F: Float + CubeElement>(
+    signs: &Signs,
+    values: &Values<F>,
+    ends: &Array<F>,
+    bars: &Array<F>,
+    p: usize,
+    axis: u32,
+    vertex: u32,
+) -> OnEdge<F> {
+    let difference = values.chi[p + stride(signs, axis)] - values.chi[p];
+    let smallest = values.scales[4] * (ends[1] - ends[0]);
+    let s = bars[3 * vertex as usize + axis as usize] * values.scales[3];
+    OnEdge::<F> {
+        eta: fraction_on::<F>(signs, values, p, axis),
+        pull: s / bounded::<F>(difference, smallest),
+        guarded: select(
+            F::abs(difference) < smallest && s != F::new(0.0),
+            1u32,
+            0u32,
+        ),
+    }
+}
+
+/// One unit a cell adds up what the vertices on its edges mean for it, in the order of the edges.
+#[cube(launch)]
+fn gather_chi<F: Float + CubeElement>(
+    signs: &Signs,
+    before: &Array<u32>,
+    values: &Values<F>,
+    ends: &Array<F>,
+    bars: &Array<F>,
+    chi_bar: &mut Array<F>,
+) {
+    let word = ABSOLUTE_POS as u32 / 32u32;
+    let row = word / signs.words;
+    let k = 32u32 * (word % signs.words) + ABSOLUTE_POS as u32 % 32u32;
+    if row < signs.nx * signs.ny && k < signs.nz {
+        let mut sum = F::new(0.0);
+        if row / signs.ny > 0u32 {
+            let below = row - signs.ny;
+            sum += part::<F>(signs, before, values, ends, bars, below, k, 0u32, true);
+        }
+        if row % signs.ny > 0u32 {
+            let below = row - 1u32;
+            sum += part::<F>(signs, before, values, ends, bars, below, k, 1u32, true);
+        }
+        if k > 0u32 {
+            let below = k - 1u32;
+            sum += part::<F>(signs, before, values, ends, bars, row, below, 2u32, true);
+        }
+        if row / signs.ny + 1u32 < signs.nx {
+            sum += part::<F>(signs, before, values, ends, bars, row, k, 0u32, false);
+        }
+        if row % signs.ny + 1u32 < signs.ny {
+            sum += part::<F>(signs, before, values, ends, bars, row, k, 1u32, false);
+        }
+        if k + 1u32 < signs.nz {
+            sum += part::<F>(signs, before, values, ends, bars, row, k, 2u32, false);
+        }
+        chi_bar[(row * signs.nz + k) as usize] = sum;
+    }
+}
+
+/// What the vertex on the edge along `axis` from cell `k` of a row, if there is one, means for the cell at the
+/// edge's end or at its start.
+#[cube]
+fn part<F: Float + CubeElement>(
+    signs: &Signs,
+    before: &Array<u32>,
+    values: &Values<F>,
+    ends: &Array<F>,
+    bars: &Array<F>,
+    row: u32,
+    k: u32,
+    #[comptime] axis: u32,
+    #[comptime] at_end: bool,
+) -> F {
+    let next_row = row + select(axis == 0u32, signs.ny, select(axis == 1u32, 1u32, 0u32));
+    let next_k = k + select(axis == 2u32, 1u32, 0u32);
+    let mut part = F::new(0.0);
+    if inside(signs, row, k) != inside(signs, next_row, next_k) {
+        let vertex = vertex_on(signs, before, row, k, axis);
+        let p = (row * signs.nz + k) as usize;
+        let edge = on_edge::<F>(signs, values, ends, bars, p, axis, vertex);
+        if at_end {
+            part = -edge.pull * edge.eta;
+        } else {
+            part = edge.pull * (edge.eta - F::new(1.0));
+        }
+    }
+    part
+}
+
+/// The sums of each group, all of one kind side by side.
+#[cube(launch)]
+fn add_vertices<F: Float + CubeElement>(
+    signs: &Signs,
+    edges: &Array<u32>,
+    values: &Values<F>,
+    ends: &Array<F>,
+    bars: &Array<F>,
+    partial: &mut Array<F>,
+    partly_guarded: &mut Array<u32>,
+    count: u32,
+    groups: u32,
+    #[comptime] block: usize,
+) {
+    let mut level = F::new(0.0);
+    let mut lower_x = F::new(0.0);
+    let mut lower_y = F::new(0.0);
+    let mut lower_z = F::new(0.0);
+    let mut spacing = F::new(0.0);
+    let mut guarded = 0u32;
+    let mut vertex = ABSOLUTE_POS;
+    while vertex < count as usize {
+        let p = edges[vertex] / 3u32;
+        let axis = edges[vertex] % 3u32;
+        let edge = on_edge::<F>(signs, values, ends, bars, p as usize, axis, vertex as u32);
+        let row = p / signs.nz;
+        let x = bars[3 * vertex];
+        let y = bars[3 * vertex + 1];
+        let z = bars[3 * vertex + 2];
+        level += edge.pull;
+        lower_x += x;
+        lower_y += y;
+        lower_z += z;
+        // The place of the vertex in index coordinates: that of the cell's centre, and η along the edge.
+        let along = select(axis == 0u32, x, select(axis == 1u32, y, z));
+        spacing += x * (F::cast_from(row / signs.ny) + F::new(0.5))
+            + y * (F::cast_from(row % signs.ny) + F::new(0.5))
+            + z * (F::cast_from(p % signs.nz) + F::new(0.5))
+            + along * edge.eta;
+        guarded += edge.guarded;
+        vertex += groups as usize * block;
+    }
+    let mut shared = SharedMemory::<F>::new(block);
+    let mut counts = SharedMemory::<u32>::new(block);
+    let level = tree_sum::<F>(&mut shared, level, block);
+    let lower_x = tree_sum::<F>(&mut shared, lower_x, block);
+    let lower_y = tree_sum::<F>(&mut shared, lower_y, block);
+    let lower_z = tree_sum::<F>(&mut shared, lower_z, block);
+    let spacing = tree_sum::<F>(&mut shared, spacing, block);
+    let guarded = tree_sum::<u32>(&mut counts, guarded, block);
+    if UNIT_POS == 0u32 {
+        let next = groups as usize;
+        partial[CUBE_POS] = level;
+        partial[CUBE_POS + next] = lower_x;
+        partial[CUBE_POS + 2 * next] = lower_y;
+        partial[CUBE_POS + 3 * next] = lower_z;
+        partial[CUBE_POS + 4 * next] = spacing;
+        partly_guarded[CUBE_POS] = guarded;
+    }
+}

@@ -1,0 +1,60 @@
+//! The field, the level and the grid, as kernels see them.
+
+use cubecl::prelude::*;
+use isograd::isosurface::SMALLEST_DIFFERENCE;
+
+use super::Residual;
+use super::signs::Signs;
+use crate::element::crossing::crossing;
+use crate::{Device, Error, Scalar};
+
+#[derive(CubeType, CubeLaunch)]
+pub struct Values<F: Float + CubeElement> {
+    pub chi: Array<F>,
+    /// One number.
+    pub level: Array<F>,
+    /// Low corner and spacing of the grid; the share of the range of `χ` that a difference counts as, at least.
+    pub scales: Array<F>,
+}
+
+impl<T: Scalar> Residual<T> {
+    /// What the surface is made of, as an argument of a kernel.
+    pub(super) fn values<R: Runtime>(
+        &self,
+        device: &Device<R>,
+    ) -> Result<ValuesLaunch<T, R>, Error> {
+        let [x, y, z] = self.grid.lower();
+        let smallest = T::of(SMALLEST_DIFFERENCE);
+        let scales = device.upload(&[x, y, z, self.grid.spacing(), smallest])?;
+        Ok(ValuesLaunch::new(
+            self.chi.arg(),
+            self.level.arg(),
+            scales.arg(),
+        ))
+    }
+}
+
+/// How far along the lattice edge along `axis` from the cell at place `p` in memory the level is: as the CPU has it,
+/// and between 0 and 1 also where the device divides less exactly.
+#[cube]
+pub(super) fn fraction_on<F: Float + CubeElement>(
+    signs: &Signs,
+    values: &Values<F>,
+    p: usize,
+    axis: u32,
+) -> F {
+    let q = p + stride(signs, axis);
+    let eta = crossing::<F>(values.chi[p], values.chi[q], values.level[0]);
+    let mut fraction = F::new(0.0);
+    if eta > F::new(0.0) {
+        fraction = min(eta, F::new(1.0));
+    }
+    fraction
+}
+
+/// Distance in memory to the next cell along an axis.
+#[cube]
+pub(super) fn stride(signs: &Signs, axis: u32) -> usize {
+    let plane = signs.ny * signs.nz;
+    select(axis == 0u32, plane, select(axis == 1u32, signs.nz, 1u32)) as usize
+}
