@@ -3,4 +3,5 @@
 pub mod fill;
 pub mod reduce;
 pub mod scan;
+pub(crate) mod segments;
 pub mod sort;

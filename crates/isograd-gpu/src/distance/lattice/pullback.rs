@@ -1,0 +1,218 @@
+//! Cotangents of φ at the cells to cotangents of the vertices and the grid.
+//!
+//! The cells are sorted by their closest face, and the cells of a face summed in pieces; then each vertex gets
+//! what its corners have, in the order of the faces.
+
+use cubecl::prelude::*;
+
+use super::super::Error;
+use super::super::triangle::{closest, corners};
+use super::super::vector::{Vector3, choose, direction, dot, scale};
+use super::{Cotangents, Residual, centre};
+use crate::device::check_length;
+use crate::primitives::segments::{NO_SEGMENT, Pieces, Rows, join_pieces, sum_rows};
+use crate::primitives::sort;
+use crate::{Buffer, Device, Scalar};
+
+const BLOCK: u32 = 64;
+
+/// Numbers that a face has: the cotangents of its three corners, and what its cells are worth for the cell size.
+const FACE: usize = 10;
+
+/// Pulls the cotangents `phi_bar` of the distances, in memory order, back to the vertices and the grid. Cells
+/// beyond the band count for nothing: there `φ` is constant.
+///
+/// # Errors
+/// Those of the device.
+pub fn pullback<T: Scalar, R: Runtime>(
+    device: &Device<R>,
+    residual: &Residual<T>,
+    phi_bar: &Buffer<T>,
+) -> Result<Cotangents<T>, Error> {
+    check_length(
+        "the cotangent of the distances",
+        phi_bar,
+        residual.grid.cells(),
+    )?;
+    let of_faces = pull_faces(device, residual, phi_bar)?;
+    Ok(Cotangents {
+        vertices: gather_corners(device, residual, &of_faces)?,
+        grid: total(device, &of_faces)?,
+    })
+}
+
+/// What each face gets from its cells, `(F, 10)`.
+fn pull_faces<T: Scalar, R: Runtime>(
+    device: &Device<R>,
+    residual: &Residual<T>,
+    phi_bar: &Buffer<T>,
+) -> Result<Buffer<T>, Error> {
+    let (mesh, grid) = (&residual.mesh, &residual.grid);
+    let faces = mesh.faces.len() as u32 / 3;
+    let keys = device.empty(grid.cells())?;
+    key_cells::launch::<T, R>(
+        device.client(),
+        device.groups(grid.cells(), BLOCK),
+        CubeDim::new_1d(BLOCK),
+        residual.closest.arg(),
+        phi_bar.arg(),
+        keys.arg(),
+        faces,
+    );
+    let cells = sort::order(device, &keys, faces + 1)?;
+    let starts = sort::starts(device, &cells.keys, faces)?;
+    let pieces = Pieces::new(device, &starts, grid.cells())?;
+    let sums = device.empty(pieces.most() * FACE)?;
+    let ([x, y, z], [_, ny, nz]) = (grid.lower(), grid.shape());
+    pull_cells::launch::<T, R>(
+        device.client(),
+        device.groups(pieces.most(), BLOCK),
+        CubeDim::new_1d(BLOCK),
+        mesh.vertices.arg(),
+        mesh.faces.arg(),
+        residual.phi.arg(),
+        phi_bar.arg(),
+        cells.places.arg(),
+        pieces.table.arg(),
+        sums.arg(),
+        x,
+        y,
+        z,
+        grid.spacing(),
+        ny as u32,
+        nz as u32,
+        pieces.most() as u32,
+    );
+    Ok(join_pieces(device, sums, FACE, pieces, grid.cells())?)
+}
+
+/// The sum over the corners at each vertex, `(V, 3)`.
+fn gather_corners<T: Scalar, R: Runtime>(
+    device: &Device<R>,
+    residual: &Residual<T>,
+    of_faces: &Buffer<T>,
+) -> Result<Buffer<T>, Error> {
+    let mesh = &residual.mesh;
+    let vertices = mesh.vertices.len() as u32 / 3;
+    let corners = sort::order(device, &mesh.faces, vertices)?;
+    let starts = sort::starts(device, &corners.keys, vertices)?;
+    let rows = Rows {
+        width: 3,
+        group: 3,
+        pitch: FACE,
+    };
+    let (places, count) = (&corners.places, corners.places.len());
+    Ok(sum_rows(
+        device,
+        of_faces,
+        rows,
+        Some(places),
+        &starts,
+        count,
+    )?)
+}
+
+/// The sum over all faces, as the cotangent of the grid. The weights of a point have the sum 1, so that what
+/// the three corners get is, but for its sign, what the cell centre gets.
+fn total<T: Scalar, R: Runtime>(
+    device: &Device<R>,
+    of_faces: &Buffer<T>,
+) -> Result<Buffer<T>, Error> {
+    let faces = of_faces.len() / FACE;
+    let all = device.upload(&[0, faces as u32])?;
+    let sum = sum_rows(device, of_faces, Rows::dense(FACE), None, &all, faces)?;
+    let grid_bar = device.empty(4)?;
+    name_total::launch::<T, R>(
+        device.client(),
+        device.groups(4, BLOCK),
+        CubeDim::new_1d(BLOCK),
+        sum.arg(),
+        grid_bar.arg(),
+    );
+    Ok(grid_bar)
+}
+
+#[cube(launch)]
+fn name_total<F: Float>(sum: &Array<F>, grid_bar: &mut Array<F>) {
+    if ABSOLUTE_POS < 3 {
+        let axis = ABSOLUTE_POS;
+        grid_bar[axis] = -(sum[axis] + sum[axis + 3] + sum[axis + 6]);
+    }
+    if ABSOLUTE_POS == 3 {
+        grid_bar[3] = sum[9];
+    }
+}
+
+/// The closest face of each cell whose cotangent counts; else one past the last.
+#[cube(launch)]
+fn key_cells<F: Float>(found: &Array<u32>, phi_bar: &Array<F>, keys: &mut Array<u32>, faces: u32) {
+    if ABSOLUTE_POS < keys.len() {
+        let mut key = faces;
+        if !(phi_bar[ABSOLUTE_POS] == F::new(0.0)) {
+            key = min(found[ABSOLUTE_POS], faces);
+        }
+        keys[ABSOLUTE_POS] = key;
+    }
+}
+
+/// `−Σ β_k φ̄ ∇φ` for the corners of a face, and `Σ x̂ · φ̄ ∇φ`, over a piece of its cells.
+#[cube(launch)]
+fn pull_cells<F: Float + CubeElement>(
+    vertices: &Array<F>,
+    faces: &Array<u32>,
+    phi: &Array<F>,
+    phi_bar: &Array<F>,
+    cells: &Array<u32>,
+    table: &Array<u32>,
+    sums: &mut Array<F>,
+    x: F,
+    y: F,
+    z: F,
+    spacing: F,
+    ny: u32,
+    nz: u32,
+    most: u32,
+) {
+    if ABSOLUTE_POS < most as usize {
+        let face = table[ABSOLUTE_POS * 3];
+        if face != NO_SEGMENT {
+            let t = corners::<F>(vertices, faces, face, Vector3::<F> { x, y, z });
+            let mut sum = Array::<F>::new(10usize);
+            for number in 0..10usize {
+                sum[number] = F::new(0.0);
+            }
+            for element in table[ABSOLUTE_POS * 3 + 1]..table[ABSOLUTE_POS * 3 + 2] {
+                let cell = cells[element as usize];
+                let place = centre::<F>(cell, F::new(1.0), ny, nz);
+                let found = closest::<F>(t, scale::<F>(place, spacing));
+                let inside = phi[cell as usize] < F::new(0.0);
+                let slope = gradient::<F>(found.offset, found.normal, inside);
+                let pull = scale::<F>(slope, phi_bar[cell as usize]);
+                take::<F>(&mut sum, 0usize, scale::<F>(pull, found.weights.x));
+                take::<F>(&mut sum, 3usize, scale::<F>(pull, found.weights.y));
+                take::<F>(&mut sum, 6usize, scale::<F>(pull, found.weights.z));
+                sum[9] += dot::<F>(place, pull);
+            }
+            for number in 0..10usize {
+                sums[ABSOLUTE_POS * 10 + number] = sum[number];
+            }
+        }
+    }
+}
+
+/// Takes a vector off the three numbers from `at` on.
+#[cube]
+fn take<F: Float>(sum: &mut Array<F>, at: usize, less: Vector3<F>) {
+    sum[at] -= less.x;
+    sum[at + 1] -= less.y;
+    sum[at + 2] -= less.z;
+}
+
+/// `∇φ`: away from the closest point outside, towards it inside, and the normal of the face at distance 0.
+#[cube]
+fn gradient<F: Float>(offset: Vector3<F>, normal: Vector3<F>, inside: bool) -> Vector3<F> {
+    let away = direction::<F>(offset);
+    let sign = select(inside, F::new(-1.0), F::new(1.0));
+    let on_mesh = dot::<F>(away, away) == F::new(0.0);
+    choose::<F>(on_mesh, normal, scale::<F>(away, sign))
+}

@@ -1,0 +1,95 @@
+//! Signed distance to a triangle mesh on the device: at every cell centre of a grid, and at any point.
+//!
+//! # Map
+//! As in [`isograd::distance`]: `φ(q) = σ(q) · min_y |q − y|` over all points `y` of the mesh, in the user's
+//! unit, negative inside; exact but for rounding. [`lattice::forward`] takes the sign from `χ − c` at the cell.
+//! [`query::forward`] gives the distance without a sign, the closest point, its face and its weights.
+//! Triangles are found in a hierarchy of boxes that is made on the device; of triangles equally far, to the
+//! last bit, the lowest face is named.
+//!
+//! # Residual
+//! The closest face of every cell. The barycentric weights `β` of the closest point follow from it.
+//!
+//! # Pullback
+//! [`lattice::pullback`]. By the envelope theorem, with `β` held constant: `ȳ_k += −β_k φ̄ ∇φ`, with
+//! `∇φ = σ (q − y)/|q − y|`, or the normal of the face at distance 0. Every sum is cut into pieces of a fixed
+//! size, however many cells have the same closest face.
+//!
+//! # Not differentiable
+//! On the medial axis, where the closest point jumps, and on the mesh itself at its edges and corners. The sign
+//! is discrete.
+//!
+//! # Range
+//! All is computed in the number type of the mesh, squares of lengths too: in `f32` lengths, and cells, should
+//! be between about 1e-15 and 1e15 of the unit.
+
+pub mod lattice;
+pub mod query;
+mod search;
+mod tree;
+mod triangle;
+mod vector;
+
+pub use isograd::distance::{Band, NO_TRIANGLE};
+
+use crate::Buffer;
+
+/// A distance that no mesh has, squared.
+const FAR: f64 = 3e38;
+
+/// A triangle mesh on a device.
+#[derive(Clone, Debug)]
+pub struct Mesh<T> {
+    /// `(V, 3)`, in the user's unit.
+    pub vertices: Buffer<T>,
+    /// `(F, 3)`: each names three vertices, from 0. Not checked: a kernel that reads beyond the vertices gets
+    /// anything.
+    pub faces: Buffer<u32>,
+}
+
+impl<T> Mesh<T> {
+    /// The number of faces.
+    fn check(&self) -> Result<usize, Error> {
+        for (what, length) in [
+            ("the array of vertices", self.vertices.len()),
+            ("the array of faces", self.faces.len()),
+        ] {
+            if length % 3 != 0 {
+                return Err(Error::Triples { what, length });
+            }
+        }
+        if self.faces.is_empty() || self.vertices.is_empty() {
+            return Err(Error::Empty);
+        }
+        Ok(self.faces.len() / 3)
+    }
+}
+
+/// Why the distance stage refused its input.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// There is no triangle to be near to.
+    #[error(
+        "the mesh has no triangle, so there is no distance to it; check that the surface crosses the grid"
+    )]
+    Empty,
+    /// The width of the band is not a positive number.
+    #[error(
+        "a band of {cells} cells on either side has no width; give a positive number of cells, or ask for the full field"
+    )]
+    Band {
+        /// The width asked for, in cells.
+        cells: f64,
+    },
+    /// A flat `(N, 3)` array whose length is not 3N.
+    #[error("{what} has {length} numbers, which is not three for each")]
+    Triples {
+        /// Which array.
+        what: &'static str,
+        /// Its length.
+        length: usize,
+    },
+    /// The device can't, or the arrays do not fit together.
+    #[error(transparent)]
+    Device(#[from] crate::Error),
+}

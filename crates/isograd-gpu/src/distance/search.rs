@@ -1,0 +1,282 @@
+//! The closest triangle of cells and of points, by descent into a [`Tree`].
+//!
+//! The cells of a brick of 4 × 4 × 4 begin with the triangle that is closest to the centre of the brick, found
+//! in the same way on a lattice of the bricks, and so on up to a few bricks: a bound that is never further off
+//! than the brick is wide.
+
+use cubecl::prelude::*;
+
+use super::tree::{LEAF, NONE, Tree, point_order};
+use super::triangle::{distance_squared, load_frame};
+use super::vector::{Vector3, load};
+use super::{Error, FAR};
+use crate::{Buffer, Device, Scalar};
+
+/// Cells along the side of a brick, and units of a group, one a cell.
+const BRICK: usize = 4;
+const UNITS: u32 = 64;
+
+/// The coarsest lattice has at most so many cells: they begin with nothing.
+const COARSEST: usize = 64;
+
+/// Children that may wait: one for each bit of a key in the radix tree, 30 of the code and 32 of the place.
+const STACK: usize = 64;
+
+/// A lattice of cell centres, seen from its low corner.
+#[derive(Clone, Copy)]
+struct Level {
+    shape: [usize; 3],
+    spacing: f64,
+}
+
+/// The face closest to each cell centre of a lattice whose low corner is the origin of the tree, or [`NONE`]
+/// where it is further than `width`.
+pub(super) fn cells<T: Scalar, R: Runtime>(
+    device: &Device<R>,
+    tree: &Tree<T>,
+    shape: [usize; 3],
+    spacing: f64,
+    width: Option<f64>,
+) -> Result<Buffer<u32>, Error> {
+    let mut levels = vec![Level { shape, spacing }];
+    let mut finest = Level { shape, spacing };
+    while finest.shape.iter().product::<usize>() > COARSEST {
+        finest = Level {
+            shape: finest.shape.map(|n| n.div_ceil(BRICK)),
+            spacing: finest.spacing * BRICK as f64,
+        };
+        levels.push(finest);
+    }
+    let mut seeds = None;
+    while let Some(level) = levels.pop() {
+        let last = levels.is_empty();
+        // A brick may be as far beyond the band as its corners are from its centre.
+        let beyond = if last { 0.0 } else { 0.87 * level.spacing };
+        let bound = width.map_or(FAR, |width| (width + beyond).powi(2) * (1.0 + 1e-5));
+        seeds = Some(solve_level(device, tree, level, bound, seeds, last)?);
+    }
+    Ok(seeds.unwrap_or(device.empty(0)?))
+}
+
+fn solve_level<T: Scalar, R: Runtime>(
+    device: &Device<R>,
+    tree: &Tree<T>,
+    level: Level,
+    bound: f64,
+    seeds: Option<Buffer<u32>>,
+    last: bool,
+) -> Result<Buffer<u32>, Error> {
+    let [nx, ny, nz] = level.shape;
+    let found = device.empty(nx * ny * nz)?;
+    let bricks = level.shape.map(|n| n.div_ceil(BRICK));
+    let seeded = seeds.is_some();
+    nearest_of_cells::launch::<T, R>(
+        device.client(),
+        device.groups(bricks.iter().product::<usize>() * UNITS as usize, UNITS),
+        CubeDim::new_1d(UNITS),
+        tree.boxes.arg(),
+        tree.children.arg(),
+        tree.frames.arg(),
+        tree.faces.arg(),
+        seeds.unwrap_or(device.empty(0)?).arg(),
+        found.arg(),
+        T::of(level.spacing),
+        T::of(bound),
+        nx as u32,
+        ny as u32,
+        nz as u32,
+        seeded,
+        last,
+    );
+    Ok(found)
+}
+
+/// The face closest to each of the `(N, 3)` points. The tree has its origin at zero.
+pub(super) fn points<T: Scalar, R: Runtime>(
+    device: &Device<R>,
+    tree: &Tree<T>,
+    points: &Buffer<T>,
+) -> Result<Buffer<u32>, Error> {
+    let order = point_order(device, points, &tree.bounds)?;
+    let found = device.empty(points.len() / 3)?;
+    nearest_of_points::launch::<T, R>(
+        device.client(),
+        device.groups(found.len(), UNITS),
+        CubeDim::new_1d(UNITS),
+        tree.boxes.arg(),
+        tree.children.arg(),
+        tree.frames.arg(),
+        tree.faces.arg(),
+        points.arg(),
+        order.places.arg(),
+        found.arg(),
+        T::of(FAR),
+    );
+    Ok(found)
+}
+
+/// Squared distance from a place to the box whose low corner is vector `at` of `boxes`.
+#[cube]
+fn box_distance_squared<F: Float>(boxes: &Array<F>, at: u32, q: Vector3<F>) -> F {
+    let low = load::<F>(boxes, at);
+    let high = load::<F>(boxes, at + 1u32);
+    let zero = F::new(0.0);
+    let x = max(max(low.x - q.x, q.x - high.x), zero);
+    let y = max(max(low.y - q.y, q.y - high.y), zero);
+    let z = max(max(low.z - q.z, q.z - high.z), zero);
+    x * x + y * y + z * z
+}
+
+/// The triangle closest to `q`, as its place in Morton order: not further than the root of `bound`, else
+/// [`NONE`]; `seed` is a guess or [`NONE`]. Of triangles equally far the one of the lowest face, so that the
+/// seed does not matter.
+#[cube]
+fn nearest<F: Float>(
+    boxes: &Array<F>,
+    children: &Array<u32>,
+    frames: &Array<F>,
+    faces: &Array<u32>,
+    q: Vector3<F>,
+    bound: F,
+    seed: u32,
+) -> u32 {
+    let mut best = NONE.runtime();
+    let mut best_face = NONE.runtime();
+    let mut least = bound;
+    if seed != NONE {
+        let d = distance_squared::<F>(load_frame::<F>(frames, seed), q);
+        if d <= least {
+            least = d;
+            best = seed;
+            best_face = faces[seed as usize];
+        }
+    }
+    let mut waiting = Array::<u32>::new(STACK);
+    let mut distances = Array::<F>::new(STACK);
+    waiting[0] = 0u32;
+    distances[0] = F::new(0.0);
+    let mut height = 1u32.runtime();
+    while height > 0u32 {
+        height -= 1u32;
+        let node = waiting[height as usize];
+        if distances[height as usize] <= least {
+            if node >= LEAF {
+                let first = node & 0x0fff_ffffu32;
+                let count = ((node >> 28u32) & 7u32) + 1u32;
+                for place in first..first + count {
+                    let d = distance_squared::<F>(load_frame::<F>(frames, place), q);
+                    if d <= least {
+                        let face = faces[place as usize];
+                        if d < least || face < best_face {
+                            best = place;
+                            best_face = face;
+                        }
+                        least = d;
+                    }
+                }
+            } else {
+                let at = node as usize * 4;
+                let a = box_distance_squared::<F>(boxes, node * 4u32, q);
+                let b = box_distance_squared::<F>(boxes, node * 4u32 + 2u32, q);
+                let mut wanted_a = a < least;
+                let mut wanted_b = b < least;
+                if a == least {
+                    wanted_a = children[at + 2] < best_face;
+                }
+                if b == least {
+                    wanted_b = children[at + 3] < best_face;
+                }
+                // The nearer one on top.
+                let b_first = b < a;
+                if wanted_a && b_first {
+                    waiting[height as usize] = children[at];
+                    distances[height as usize] = a;
+                    height += 1u32;
+                }
+                if wanted_b {
+                    waiting[height as usize] = children[at + 1];
+                    distances[height as usize] = b;
+                    height += 1u32;
+                }
+                if wanted_a && !b_first {
+                    waiting[height as usize] = children[at];
+                    distances[height as usize] = a;
+                    height += 1u32;
+                }
+            }
+        }
+    }
+    best
+}
+
+/// A group is a brick of cells; `seeds` has one place a brick. Places are written for the lattice below, faces
+/// on the last one.
+#[cube(launch)]
+fn nearest_of_cells<F: Float + CubeElement>(
+    boxes: &Array<F>,
+    children: &Array<u32>,
+    frames: &Array<F>,
+    faces: &Array<u32>,
+    seeds: &Array<u32>,
+    found: &mut Array<u32>,
+    spacing: F,
+    bound: F,
+    nx: u32,
+    ny: u32,
+    nz: u32,
+    #[comptime] seeded: bool,
+    #[comptime] last: bool,
+) {
+    let across_y = (ny + 3u32) / 4u32;
+    let across_z = (nz + 3u32) / 4u32;
+    let brick = CUBE_POS as u32;
+    let i = brick / (across_y * across_z) * 4u32 + UNIT_POS / 16u32;
+    let j = brick / across_z % across_y * 4u32 + UNIT_POS / 4u32 % 4u32;
+    let k = brick % across_z * 4u32 + UNIT_POS % 4u32;
+    if i < nx && j < ny && k < nz {
+        let half = F::new(0.5);
+        let q = Vector3::<F> {
+            x: spacing * (F::cast_from(i) + half),
+            y: spacing * (F::cast_from(j) + half),
+            z: spacing * (F::cast_from(k) + half),
+        };
+        let mut seed = NONE.runtime();
+        if comptime!(seeded) {
+            seed = seeds[brick as usize];
+        }
+        let mut result = NONE.runtime();
+        if seed != NONE || !seeded {
+            result = nearest::<F>(boxes, children, frames, faces, q, bound, seed);
+        }
+        if comptime!(last) {
+            if result != NONE {
+                result = faces[result as usize];
+            }
+        }
+        found[((i * ny + j) * nz + k) as usize] = result;
+    }
+}
+
+/// The points are taken in Morton order, so that the units of a group go the same ways.
+#[cube(launch)]
+fn nearest_of_points<F: Float + CubeElement>(
+    boxes: &Array<F>,
+    children: &Array<u32>,
+    frames: &Array<F>,
+    faces: &Array<u32>,
+    points: &Array<F>,
+    order: &Array<u32>,
+    found: &mut Array<u32>,
+    bound: F,
+) {
+    if ABSOLUTE_POS < found.len() {
+        let point = order[ABSOLUTE_POS];
+        let q = load::<F>(points, point);
+        let place = nearest::<F>(boxes, children, frames, faces, q, bound, NONE.runtime());
+        let mut face = NONE.runtime();
+        if place != NONE {
+            face = faces[place as usize];
+        }
+        found[point as usize] = face;
+    }
+}

@@ -1,0 +1,489 @@
+//! A hierarchy of boxes over triangles, made on the device.
+//!
+//! The triangles are put in the order of the Morton codes of their centres (30 bits; equal codes stay in the
+//! order of the faces), and the hierarchy is the radix tree of that order, every node of it made on its own
+//! (T. Karras, *Maximizing parallelism in the construction of BVHs, octrees, and k-d trees*, 2012). The box of
+//! a node is that of a run of triangles, put together from the aligned runs of a pyramid: nothing waits for
+//! anything, and there are no atomics.
+
+use cubecl::prelude::*;
+
+use super::triangle::{FRAME, corners, frame, store_frame};
+use super::vector::{Vector3, load};
+use super::{Error, Mesh};
+use crate::primitives::sort;
+use crate::{Buffer, Device, Scalar};
+
+/// Units of a group.
+const BLOCK: u32 = 256;
+
+/// Boxes that one unit joins where the bounds of all are sought.
+const JOINED: usize = 64;
+
+/// Stands in `lowest` where there is no triangle; and for a cell without a seed or a result.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// Marks a child that is a run of triangles: above it, one less than their number, from bit 28 on; below, the
+/// first of them.
+pub(super) const LEAF: u32 = 1 << 31;
+
+/// Triangles of a run that is not cut further.
+const RUN: u32 = 2;
+
+/// The hierarchy. Places are seen from an origin, which the maker chooses.
+pub(super) struct Tree<T> {
+    /// For each node the boxes of its two children: low corner, high corner. Node 0 is the root.
+    pub boxes: Buffer<T>,
+    /// For each node: its two children, and the lowest face below each.
+    pub children: Buffer<u32>,
+    /// The frame of each triangle, in Morton order.
+    pub frames: Buffer<T>,
+    /// Its face.
+    pub faces: Buffer<u32>,
+    /// Low and high corner of all vertices.
+    pub bounds: Buffer<T>,
+}
+
+impl<T: Scalar> Tree<T> {
+    /// The hierarchy over the faces of a mesh.
+    pub fn new<R: Runtime>(
+        device: &Device<R>,
+        mesh: &Mesh<T>,
+        origin: [T; 3],
+    ) -> Result<Self, Error> {
+        let triangles = mesh.check()?;
+        let bounds = bounds(device, mesh, origin)?;
+        let order = morton_order(device, mesh, origin, &bounds)?;
+        // A lone triangle stands twice, so that there is a node.
+        let leaves = triangles.max(2);
+        let width = leaves.next_power_of_two();
+        let frames: Buffer<T> = device.empty(leaves * FRAME)?;
+        let faces = device.empty(leaves)?;
+        let pyramid: Buffer<T> = device.empty(2 * width * 6)?;
+        let lowest: Buffer<u32> = device.empty(2 * width)?;
+        let dim = CubeDim::new_1d(BLOCK);
+        place_triangles::launch::<T, R>(
+            device.client(),
+            device.groups(width, BLOCK),
+            dim,
+            mesh.vertices.arg(),
+            mesh.faces.arg(),
+            order.places.arg(),
+            frames.arg(),
+            faces.arg(),
+            pyramid.arg(),
+            lowest.arg(),
+            origin[0],
+            origin[1],
+            origin[2],
+            triangles as u32,
+            width as u32,
+        );
+        let mut level = width / 2;
+        while level > 0 {
+            join_pairs::launch::<T, R>(
+                device.client(),
+                device.groups(level, BLOCK),
+                dim,
+                pyramid.arg(),
+                lowest.arg(),
+                level as u32,
+            );
+            level /= 2;
+        }
+        let boxes: Buffer<T> = device.empty((leaves - 1) * 12)?;
+        let children = device.empty((leaves - 1) * 4)?;
+        make_nodes::launch::<T, R>(
+            device.client(),
+            device.groups(leaves - 1, BLOCK),
+            dim,
+            order.keys.arg(),
+            pyramid.arg(),
+            lowest.arg(),
+            boxes.arg(),
+            children.arg(),
+            leaves as u32,
+            triangles as u32,
+            width as u32,
+            RUN,
+        );
+        Ok(Self {
+            boxes,
+            children,
+            frames,
+            faces,
+            bounds,
+        })
+    }
+}
+
+/// Low and high corner of all vertices.
+fn bounds<T: Scalar, R: Runtime>(
+    device: &Device<R>,
+    mesh: &Mesh<T>,
+    origin: [T; 3],
+) -> Result<Buffer<T>, Error> {
+    let mut items = mesh.vertices.clone();
+    let mut count = items.len() / 3;
+    let mut points = true;
+    while points || count > 1 {
+        let joined = count.div_ceil(JOINED);
+        let boxes = device.empty(joined * 6)?;
+        join_runs::launch::<T, R>(
+            device.client(),
+            device.groups(joined, BLOCK),
+            CubeDim::new_1d(BLOCK),
+            items.arg(),
+            boxes.arg(),
+            origin[0],
+            origin[1],
+            origin[2],
+            count as u32,
+            JOINED as u32,
+            points,
+        );
+        (items, count, points) = (boxes, joined, false);
+    }
+    Ok(items)
+}
+
+/// The order of the faces by the Morton codes of their centres.
+fn morton_order<T: Scalar, R: Runtime>(
+    device: &Device<R>,
+    mesh: &Mesh<T>,
+    origin: [T; 3],
+    bounds: &Buffer<T>,
+) -> Result<sort::Order, Error> {
+    let count = mesh.faces.len() / 3;
+    let codes = device.empty(count)?;
+    code_centres::launch::<T, R>(
+        device.client(),
+        device.groups(count, BLOCK),
+        CubeDim::new_1d(BLOCK),
+        mesh.vertices.arg(),
+        mesh.faces.arg(),
+        bounds.arg(),
+        codes.arg(),
+        origin[0],
+        origin[1],
+        origin[2],
+    );
+    Ok(sort::order(device, &codes, 1 << 30)?)
+}
+
+/// The order of points by their Morton codes within `bounds`.
+pub(super) fn point_order<T: Scalar, R: Runtime>(
+    device: &Device<R>,
+    points: &Buffer<T>,
+    bounds: &Buffer<T>,
+) -> Result<sort::Order, Error> {
+    let count = points.len() / 3;
+    let codes = device.empty(count)?;
+    code_points::launch::<T, R>(
+        device.client(),
+        device.groups(count, BLOCK),
+        CubeDim::new_1d(BLOCK),
+        points.arg(),
+        bounds.arg(),
+        codes.arg(),
+    );
+    Ok(sort::order(device, &codes, 1 << 30)?)
+}
+
+/// The bounds of each run of `length` points, or of boxes.
+#[cube(launch)]
+fn join_runs<F: Float + CubeElement>(
+    items: &Array<F>,
+    boxes: &mut Array<F>,
+    x: F,
+    y: F,
+    z: F,
+    count: u32,
+    length: u32,
+    #[comptime] points: bool,
+) {
+    if ABSOLUTE_POS < boxes.len() / 6 {
+        let first = ABSOLUTE_POS as u32 * length;
+        let mut low = Array::<F>::new(3usize);
+        let mut high = Array::<F>::new(3usize);
+        for item in first..min(first + length, count) {
+            for axis in 0..3usize {
+                let mut from = item as usize * 6;
+                let mut shift = F::new(0.0);
+                let mut span = 3usize.runtime();
+                if comptime!(points) {
+                    from = item as usize * 3;
+                    shift = select(axis == 0, x, select(axis == 1, y, z));
+                    span = 0usize;
+                }
+                let a = items[from + axis] - shift;
+                let b = items[from + span + axis] - shift;
+                let fresh = item == first;
+                low[axis] = select(fresh, a, min(low[axis], a));
+                high[axis] = select(fresh, b, max(high[axis], b));
+            }
+        }
+        for axis in 0..3usize {
+            boxes[ABSOLUTE_POS * 6 + axis] = low[axis];
+            boxes[ABSOLUTE_POS * 6 + 3 + axis] = high[axis];
+        }
+    }
+}
+
+/// The lowest ten bits, two places apart.
+#[cube]
+fn spread(bits: u32) -> u32 {
+    let a = (bits | (bits << 16u32)) & 0x0300_00ffu32;
+    let b = (a | (a << 8u32)) & 0x0300_f00fu32;
+    let c = (b | (b << 4u32)) & 0x030c_30c3u32;
+    (c | (c << 2u32)) & 0x0924_9249u32
+}
+
+/// Ten bits of where `x` is between two numbers.
+#[cube]
+fn ten_bits<F: Float>(x: F, low: F, high: F) -> u32 {
+    let mut bits = 0u32.runtime();
+    if high > low {
+        let part = min(max((x - low) / (high - low), F::new(0.0)), F::new(1.0));
+        bits = min(u32::cast_from(part * F::new(1024.0)), 1023u32);
+    }
+    bits
+}
+
+/// Morton code of a place within bounds, 30 bits.
+#[cube]
+fn morton<F: Float>(place: Vector3<F>, bounds: &Array<F>) -> u32 {
+    let x = spread(ten_bits::<F>(place.x, bounds[0], bounds[3]));
+    let y = spread(ten_bits::<F>(place.y, bounds[1], bounds[4]));
+    let z = spread(ten_bits::<F>(place.z, bounds[2], bounds[5]));
+    (x << 2u32) | (y << 1u32) | z
+}
+
+#[cube(launch)]
+fn code_centres<F: Float + CubeElement>(
+    vertices: &Array<F>,
+    faces: &Array<u32>,
+    bounds: &Array<F>,
+    codes: &mut Array<u32>,
+    x: F,
+    y: F,
+    z: F,
+) {
+    if ABSOLUTE_POS < codes.len() {
+        let t = corners::<F>(
+            vertices,
+            faces,
+            ABSOLUTE_POS as u32,
+            Vector3::<F> { x, y, z },
+        );
+        let third = F::new(1.0) / F::new(3.0);
+        let centre = Vector3::<F> {
+            x: t.a.x * third + t.b.x * third + t.c.x * third,
+            y: t.a.y * third + t.b.y * third + t.c.y * third,
+            z: t.a.z * third + t.b.z * third + t.c.z * third,
+        };
+        codes[ABSOLUTE_POS] = morton::<F>(centre, bounds);
+    }
+}
+
+#[cube(launch)]
+fn code_points<F: Float>(points: &Array<F>, bounds: &Array<F>, codes: &mut Array<u32>) {
+    if ABSOLUTE_POS < codes.len() {
+        codes[ABSOLUTE_POS] = morton::<F>(load::<F>(points, ABSOLUTE_POS as u32), bounds);
+    }
+}
+
+/// Frames and boxes of the triangles in Morton order; boxes of nothing to the width of the pyramid.
+#[cube(launch)]
+fn place_triangles<F: Float + CubeElement>(
+    vertices: &Array<F>,
+    faces: &Array<u32>,
+    places: &Array<u32>,
+    frames: &mut Array<F>,
+    face_of: &mut Array<u32>,
+    pyramid: &mut Array<F>,
+    lowest: &mut Array<u32>,
+    x: F,
+    y: F,
+    z: F,
+    triangles: u32,
+    width: u32,
+) {
+    if ABSOLUTE_POS < width as usize {
+        let at = width as usize + ABSOLUTE_POS;
+        if ABSOLUTE_POS < face_of.len() {
+            let face = places[min(ABSOLUTE_POS as u32, triangles - 1u32) as usize];
+            let t = corners::<F>(vertices, faces, face, Vector3::<F> { x, y, z });
+            store_frame::<F>(frames, ABSOLUTE_POS, frame::<F>(t));
+            face_of[ABSOLUTE_POS] = face;
+            lowest[at] = face;
+            pyramid[at * 6] = min(t.a.x, min(t.b.x, t.c.x));
+            pyramid[at * 6 + 1] = min(t.a.y, min(t.b.y, t.c.y));
+            pyramid[at * 6 + 2] = min(t.a.z, min(t.b.z, t.c.z));
+            pyramid[at * 6 + 3] = max(t.a.x, max(t.b.x, t.c.x));
+            pyramid[at * 6 + 4] = max(t.a.y, max(t.b.y, t.c.y));
+            pyramid[at * 6 + 5] = max(t.a.z, max(t.b.z, t.c.z));
+        } else {
+            lowest[at] = NONE;
+            for axis in 0..3usize {
+                pyramid[at * 6 + axis] = F::new(3e38);
+                pyramid[at * 6 + 3 + axis] = F::new(-3e38);
+            }
+        }
+    }
+}
+
+/// The pyramid lies as a heap does: entry 1 is the box of all, and under entry `i` are `2i` and `2i + 1`.
+#[cube(launch)]
+fn join_pairs<F: Float>(pyramid: &mut Array<F>, lowest: &mut Array<u32>, level: u32) {
+    if ABSOLUTE_POS < level as usize {
+        let at = level as usize + ABSOLUTE_POS;
+        let (a, b) = (at * 12, at * 12 + 6);
+        for axis in 0..3usize {
+            pyramid[at * 6 + axis] = min(pyramid[a + axis], pyramid[b + axis]);
+            pyramid[at * 6 + 3 + axis] = max(pyramid[a + 3 + axis], pyramid[b + 3 + axis]);
+        }
+        lowest[at] = min(lowest[at * 2], lowest[at * 2 + 1]);
+    }
+}
+
+/// One more than the leading bits that the keys of two places in the order share, and 0 where the second is
+/// none: of the codes, and of the places where these are equal.
+#[cube]
+fn shared_bits(codes: &Array<u32>, a: i32, b: i32, leaves: i32, triangles: i32) -> i32 {
+    let mut bits = 0i32.runtime();
+    if b >= 0i32 && b < leaves {
+        let last = triangles - 1i32;
+        let differ = codes[min(a, last) as usize] ^ codes[min(b, last) as usize];
+        if differ == 0u32 {
+            bits = 33i32 + u32::leading_zeros(a as u32 ^ b as u32) as i32;
+        } else {
+            bits = 1i32 + u32::leading_zeros(differ) as i32;
+        }
+    }
+    bits
+}
+
+/// The node that begins or ends at place `ABSOLUTE_POS`: how far it reaches, and where it is cut in two.
+#[cube(launch)]
+fn make_nodes<F: Float>(
+    codes: &Array<u32>,
+    pyramid: &Array<F>,
+    lowest: &Array<u32>,
+    boxes: &mut Array<F>,
+    children: &mut Array<u32>,
+    leaves: u32,
+    triangles: u32,
+    width: u32,
+    #[comptime] run: u32,
+) {
+    if ABSOLUTE_POS < leaves as usize - 1 {
+        let (n, m) = (leaves as i32, triangles as i32);
+        let i = ABSOLUTE_POS as i32;
+        let after = shared_bits(codes, i, i + 1i32, n, m);
+        let before = shared_bits(codes, i, i - 1i32, n, m);
+        let way = select(after > before, 1i32, 0i32 - 1i32);
+        let outside = min(after, before);
+        // The reach: a bound by doubling, then bisection.
+        let mut bound = 2i32.runtime();
+        while shared_bits(codes, i, i + bound * way, n, m) > outside {
+            bound *= 2i32;
+        }
+        let mut reach = 0i32.runtime();
+        let mut step = bound / 2i32;
+        while step > 0i32 {
+            if shared_bits(codes, i, i + (reach + step) * way, n, m) > outside {
+                reach += step;
+            }
+            step /= 2i32;
+        }
+        let end = i + reach * way;
+        // The cut: the last place that shares more with this one than the end does.
+        let inside = shared_bits(codes, i, end, n, m);
+        let mut split = 0i32.runtime();
+        let mut half = reach;
+        let mut going = true;
+        while going {
+            half = (half + 1i32) / 2i32;
+            if shared_bits(codes, i, i + (split + half) * way, n, m) > inside {
+                split += half;
+            }
+            going = half > 1i32;
+        }
+        let cut = (i + split * way + min(way, 0i32)) as u32;
+        let first = min(i, end) as u32;
+        let last = max(i, end) as u32;
+        let node = ABSOLUTE_POS;
+        children[node * 4] = name_child(first, cut, cut, run);
+        children[node * 4 + 1] = name_child(cut + 1u32, last, cut + 1u32, run);
+        children[node * 4 + 2] =
+            join_range::<F>(pyramid, lowest, boxes, node * 12, first, cut, width);
+        children[node * 4 + 3] = join_range::<F>(
+            pyramid,
+            lowest,
+            boxes,
+            node * 12 + 6,
+            cut + 1u32,
+            last,
+            width,
+        );
+    }
+}
+
+/// A child that has the places from `first` to `last`: a run, or the node `node`.
+#[cube]
+fn name_child(first: u32, last: u32, node: u32, #[comptime] run: u32) -> u32 {
+    let more = last - first;
+    select(more < run, LEAF | (more << 28u32) | first, node)
+}
+
+/// Writes the box of the places from `first` to `last` at `to`, and returns the lowest face among them.
+#[cube]
+fn join_range<F: Float>(
+    pyramid: &Array<F>,
+    lowest: &Array<u32>,
+    boxes: &mut Array<F>,
+    to: usize,
+    first: u32,
+    last: u32,
+    width: u32,
+) -> u32 {
+    let mut low = Array::<F>::new(3usize);
+    let mut high = Array::<F>::new(3usize);
+    for axis in 0..3usize {
+        low[axis] = F::new(3e38);
+        high[axis] = F::new(-3e38);
+    }
+    let mut face = NONE.runtime();
+    // The aligned runs that make up the range, from both its ends.
+    let mut left = first + width;
+    let mut right = last + width + 1u32;
+    while left < right {
+        if left % 2u32 == 1u32 {
+            join_entry::<F>(pyramid, &mut low, &mut high, left);
+            face = min(face, lowest[left as usize]);
+            left += 1u32;
+        }
+        if right % 2u32 == 1u32 {
+            right -= 1u32;
+            join_entry::<F>(pyramid, &mut low, &mut high, right);
+            face = min(face, lowest[right as usize]);
+        }
+        left /= 2u32;
+        right /= 2u32;
+    }
+    for axis in 0..3usize {
+        boxes[to + axis] = low[axis];
+        boxes[to + 3 + axis] = high[axis];
+    }
+    face
+}
+
+#[cube]
+fn join_entry<F: Float>(pyramid: &Array<F>, low: &mut Array<F>, high: &mut Array<F>, entry: u32) {
+    let at = entry as usize * 6;
+    for axis in 0..3usize {
+        low[axis] = min(low[axis], pyramid[at + axis]);
+        high[axis] = max(high[axis], pyramid[at + 3 + axis]);
+    }
+}

@@ -1,0 +1,85 @@
+//! The distance, beside the CPU's stage and all triangles tried.
+
+mod lattice;
+mod meshes;
+mod pullback;
+mod query;
+
+use cubecl::prelude::Runtime;
+use isograd::distance::lattice::{Band, Scratch};
+use isograd::{Field, Grid, Mesh, Real};
+use isograd_gpu::distance::{self, lattice::Residual};
+use isograd_gpu::{Device, Scalar};
+
+use crate::devices::Numbers;
+
+/// Errors allowed in `f32`, in cells: the CPU computes in `f64`. In `f64` both do the same, but in another
+/// order.
+fn tolerance<T: Real>() -> f64 {
+    if T::NAME == "f32" { 1e-4 } else { 1e-10 }
+}
+
+/// Runs a check that is generic over the number in `f32`, and in `f64` where the device has it.
+macro_rules! for_each_number {
+    ($check:ident, $device:expr) => {
+        $check::<_, f32>($device);
+        match $device.check_number::<f64>() {
+            Ok(()) => $check::<_, f64>($device),
+            Err(reason) => println!("SKIPPED {} in f64: {reason}", stringify!($check)),
+        }
+    };
+}
+use for_each_number;
+
+/// A field of signs at random, with the level 0.1: the stage must take them as they are.
+fn signs<T: Real>(grid: Grid<T>) -> Field<T> {
+    let mut numbers = Numbers(5);
+    let values = (0..grid.cells()).map(|_| T::of(numbers.signed()));
+    Field::new(grid, values.collect()).unwrap()
+}
+
+fn grid<T: Real>(lower: [f64; 3], spacing: f64, shape: [usize; 3]) -> Grid<T> {
+    Grid::new(lower.map(T::of), T::of(spacing), shape).unwrap()
+}
+
+/// A mesh on the device.
+fn upload<R: Runtime, T: Scalar>(device: &Device<R>, mesh: &Mesh<T>) -> distance::Mesh<T> {
+    distance::Mesh {
+        vertices: device.upload(mesh.vertices().as_flattened()).unwrap(),
+        faces: device.upload(mesh.faces().as_flattened()).unwrap(),
+    }
+}
+
+/// `φ` and the closest faces that the device finds, and what it keeps.
+fn solve<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    mesh: &Mesh<T>,
+    chi: &Field<T>,
+    band: Band,
+) -> (Vec<T>, Vec<u32>, Residual<T>) {
+    let mesh = upload(device, mesh);
+    let signs = device.upload(chi.values()).unwrap();
+    let level = device.upload(&[T::of(0.1)]).unwrap();
+    let (phi, residual) =
+        distance::lattice::forward(device, &mesh, chi.grid(), &signs, &level, band).unwrap();
+    let closest = device.download(residual.closest()).unwrap();
+    (device.download(&phi).unwrap(), closest, residual)
+}
+
+/// The same of the CPU.
+fn solve_on_cpu<T: Real>(mesh: &Mesh<T>, chi: &Field<T>, band: Band) -> (Field<T>, Vec<u32>) {
+    let mut phi = Field::zeros(*chi.grid());
+    let mut closest = Vec::new();
+    let (level, mut scratch) = (T::of(0.1), Scratch::default());
+    isograd::distance::lattice::forward(
+        mesh,
+        chi,
+        level,
+        band,
+        &mut scratch,
+        &mut phi,
+        &mut closest,
+    )
+    .unwrap();
+    (phi, closest)
+}
