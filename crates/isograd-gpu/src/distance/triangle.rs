@@ -12,12 +12,16 @@ use super::vector::{Vector3, add, choose, cross, direction, dot, load, norm, sca
 /// Numbers of a frame in memory: origin, `u`, `v`, base, foot, height.
 pub(super) const FRAME: usize = 12;
 
-/// The corners of a triangle.
+/// The corners of a triangle, as seen from some origin, and its edges. These are taken between the corners as
+/// they stand in memory: a thin triangle would see the rounding of another origin.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Corners<F: Float> {
     pub a: Vector3<F>,
     pub b: Vector3<F>,
     pub c: Vector3<F>,
+    ab: Vector3<F>,
+    bc: Vector3<F>,
+    ca: Vector3<F>,
 }
 
 /// A triangle in its own plane; see the head of this file.
@@ -51,39 +55,45 @@ pub(super) fn corners<F: Float>(
     origin: Vector3<F>,
 ) -> Corners<F> {
     let at = face as usize * 3;
+    let a = load::<F>(vertices, faces[at]);
+    let b = load::<F>(vertices, faces[at + 1]);
+    let c = load::<F>(vertices, faces[at + 2]);
     Corners::<F> {
-        a: sub::<F>(load::<F>(vertices, faces[at]), origin),
-        b: sub::<F>(load::<F>(vertices, faces[at + 1]), origin),
-        c: sub::<F>(load::<F>(vertices, faces[at + 2]), origin),
+        a: sub::<F>(a, origin),
+        b: sub::<F>(b, origin),
+        c: sub::<F>(c, origin),
+        ab: sub::<F>(b, a),
+        bc: sub::<F>(c, b),
+        ca: sub::<F>(a, c),
     }
 }
 
 /// Which corner the longest edge begins at: the first of equals.
 #[cube]
 fn first_corner<F: Float>(t: Corners<F>) -> u32 {
-    let ab = sub::<F>(t.b, t.a);
-    let bc = sub::<F>(t.c, t.b);
-    let ca = sub::<F>(t.a, t.c);
-    let mut longest = dot::<F>(ab, ab);
-    let mut first = 0u32;
-    if dot::<F>(bc, bc) > longest {
-        longest = dot::<F>(bc, bc);
-        first = 1u32;
-    }
-    if dot::<F>(ca, ca) > longest {
-        first = 2u32;
-    }
-    first
+    let ab = dot::<F>(t.ab, t.ab);
+    let bc = dot::<F>(t.bc, t.bc);
+    let ca = dot::<F>(t.ca, t.ca);
+    let first = select(bc > ab, 1u32, 0u32);
+    select(ca > max(ab, bc), 2u32, first)
 }
 
 /// The corners from `first` on.
 #[cube]
 fn turned<F: Float>(t: Corners<F>, first: u32) -> Corners<F> {
     Corners::<F> {
-        a: choose::<F>(first == 0u32, t.a, choose::<F>(first == 1u32, t.b, t.c)),
-        b: choose::<F>(first == 0u32, t.b, choose::<F>(first == 1u32, t.c, t.a)),
-        c: choose::<F>(first == 0u32, t.c, choose::<F>(first == 1u32, t.a, t.b)),
+        a: one_of::<F>(first, t.a, t.b, t.c),
+        b: one_of::<F>(first, t.b, t.c, t.a),
+        c: one_of::<F>(first, t.c, t.a, t.b),
+        ab: one_of::<F>(first, t.ab, t.bc, t.ca),
+        bc: one_of::<F>(first, t.bc, t.ca, t.ab),
+        ca: one_of::<F>(first, t.ca, t.ab, t.bc),
     }
+}
+
+#[cube]
+fn one_of<F: Float>(which: u32, a: Vector3<F>, b: Vector3<F>, c: Vector3<F>) -> Vector3<F> {
+    choose::<F>(which == 0u32, a, choose::<F>(which == 1u32, b, c))
 }
 
 /// The frame of a triangle.
@@ -95,17 +105,19 @@ pub(super) fn frame<F: Float>(corners: Corners<F>) -> Frame<F> {
 /// The frame of a triangle whose longest edge runs from its first corner to its second.
 #[cube]
 fn frame_of_turned<F: Float>(t: Corners<F>) -> Frame<F> {
-    let side = sub::<F>(t.b, t.a);
-    let base = norm::<F>(side);
+    let base = norm::<F>(t.ab);
     let along_x = Vector3::<F> {
         x: F::new(1.0),
         y: F::new(0.0),
         z: F::new(0.0),
     };
-    let u = choose::<F>(base > F::new(0.0), direction::<F>(side), along_x);
-    let to_apex = sub::<F>(t.c, t.a);
-    let foot = dot::<F>(u, to_apex);
-    let rest = sub::<F>(to_apex, scale::<F>(u, foot));
+    let u = choose::<F>(base > F::new(0.0), direction::<F>(t.ab), along_x);
+    // From the nearer end of the base, where a needle keeps its direction.
+    let left = dot::<F>(t.ca, t.ca) <= dot::<F>(t.bc, t.bc);
+    let to_apex = choose::<F>(left, scale::<F>(t.ca, F::new(-1.0)), t.bc);
+    let run = dot::<F>(u, to_apex);
+    let foot = select(left, run, base + run);
+    let rest = sub::<F>(to_apex, scale::<F>(u, run));
     // Once more: what the first time leaves is a rounding error that a thin triangle would see. Where little
     // remains, the rest was nothing but that error: then any direction across `u`, and no height.
     let up = sub::<F>(rest, scale::<F>(u, dot::<F>(u, rest)));
@@ -249,9 +261,8 @@ pub(super) fn closest<F: Float>(corners: Corners<F>, q: Vector3<F>) -> Closest<F
     let near_b = !near_c && w.y > w.x;
     let corner = choose::<F>(near_c, t.c, choose::<F>(near_b, t.b, t.a));
     let from = sub::<F>(q, corner);
-    let start = choose::<F>(place.on_base || place.on_left, t.a, t.b);
-    let end = choose::<F>(place.on_base, t.b, t.c);
-    let unit = direction::<F>(sub::<F>(end, start));
+    let edge = choose::<F>(place.on_base, t.ab, choose::<F>(place.on_left, t.ca, t.bc));
+    let unit = direction::<F>(edge);
     let on_edge = place.along > F::new(0.0) && place.along < F::new(1.0);
     let from_edge = sub::<F>(from, scale::<F>(unit, dot::<F>(unit, from)));
     let from_face = scale::<F>(normal, dot::<F>(normal, from));
@@ -301,7 +312,7 @@ fn turned_back<F: Float>(w: Vector3<F>, first: u32) -> Vector3<F> {
 /// `Σ β_k y_k`, from the first corner.
 #[cube]
 pub(super) fn combine<F: Float>(t: Corners<F>, weights: Vector3<F>) -> Vector3<F> {
-    let b = scale::<F>(sub::<F>(t.b, t.a), weights.y);
-    let c = scale::<F>(sub::<F>(t.c, t.a), weights.z);
-    add::<F>(t.a, add::<F>(b, c))
+    let b = scale::<F>(t.ab, weights.y);
+    let c = scale::<F>(t.ca, weights.z);
+    add::<F>(t.a, sub::<F>(b, c))
 }

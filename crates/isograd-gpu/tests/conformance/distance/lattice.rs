@@ -4,7 +4,7 @@ use cubecl::prelude::Runtime;
 use isograd::distance::NO_TRIANGLE;
 use isograd::distance::lattice::Band;
 use isograd::distance::triangle::closest_point;
-use isograd::{Field, Grid, Mesh, Real};
+use isograd::{Field, Grid, Mesh};
 use isograd_gpu::distance::{self, Error};
 use isograd_gpu::{Device, Scalar};
 
