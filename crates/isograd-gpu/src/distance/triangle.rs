@@ -1,15 +1,15 @@
 //! One point and one triangle, in kernels.
 //!
 //! As on the CPU (`isograd::distance::triangle`) a triangle is described in its own plane frame: the longest
-//! edge is the base, along `u` from its first corner; the apex is at `(foot, height)` with
-//! `0 ≤ foot ≤ base`. The frame is orthonormal whatever the shape, so slivers, segments and single points
+//! edge is the base, along `u` from its first corner; the apex is at `(foot, height)`, and `back` before the
+//! other end, neither of them negative. Both are kept, as one of them may be much the shorter. The frame is orthonormal whatever the shape, so slivers, segments and single points
 //! need no case of their own.
 
 use cubecl::prelude::*;
 
 use super::vector::{Vector3, add, choose, cross, direction, dot, load, norm, scale, sub};
 
-/// Numbers of a frame in memory: origin, `u`, `v`, base, foot, height.
+/// Numbers of a frame in memory: origin, `u`, `v`, foot, back, height.
 pub(super) const FRAME: usize = 12;
 
 /// The corners of a triangle, as seen from some origin, and its edges. These are taken between the corners as
@@ -30,8 +30,8 @@ pub(super) struct Frame<F: Float> {
     pub origin: Vector3<F>,
     pub u: Vector3<F>,
     pub v: Vector3<F>,
-    pub base: F,
     pub foot: F,
+    pub back: F,
     pub height: F,
 }
 
@@ -116,7 +116,9 @@ fn frame_of_turned<F: Float>(t: Corners<F>) -> Frame<F> {
     let left = dot::<F>(t.ca, t.ca) <= dot::<F>(t.bc, t.bc);
     let to_apex = choose::<F>(left, scale::<F>(t.ca, F::new(-1.0)), t.bc);
     let run = dot::<F>(u, to_apex);
-    let foot = select(left, run, base + run);
+    let zero = F::new(0.0);
+    let foot = max(select(left, run, base + run), zero);
+    let back = max(select(left, base - run, -run), zero);
     let rest = sub::<F>(to_apex, scale::<F>(u, run));
     // Once more: what the first time leaves is a rounding error that a thin triangle would see. Where little
     // remains, the rest was nothing but that error: then any direction across `u`, and no height.
@@ -131,8 +133,8 @@ fn frame_of_turned<F: Float>(t: Corners<F>) -> Frame<F> {
         origin: t.a,
         u,
         v,
-        base,
-        foot: min(max(foot, F::new(0.0)), base),
+        foot,
+        back,
         height,
     }
 }
@@ -164,8 +166,8 @@ pub(super) fn store_frame<F: Float>(frames: &mut Array<F>, index: usize, frame: 
     frames[at + 6] = frame.v.x;
     frames[at + 7] = frame.v.y;
     frames[at + 8] = frame.v.z;
-    frames[at + 9] = frame.base;
-    frames[at + 10] = frame.foot;
+    frames[at + 9] = frame.foot;
+    frames[at + 10] = frame.back;
     frames[at + 11] = frame.height;
 }
 
@@ -177,8 +179,8 @@ pub(super) fn load_frame<F: Float>(frames: &Array<F>, index: u32) -> Frame<F> {
         origin: load::<F>(frames, first),
         u: load::<F>(frames, first + 1u32),
         v: load::<F>(frames, first + 2u32),
-        base: frames[at + 9],
-        foot: frames[at + 10],
+        foot: frames[at + 9],
+        back: frames[at + 10],
         height: frames[at + 11],
     }
 }
@@ -206,8 +208,9 @@ fn planar<F: Float>(frame: Frame<F>, x: F, y: F) -> Planar<F> {
     let above = max(y, zero);
     let below = y - above;
     let on_left = x < frame.foot;
-    let run = select(on_left, frame.foot, frame.base - frame.foot);
-    let way = select(on_left, x, frame.base - x);
+    let base = frame.foot + frame.back;
+    let run = select(on_left, frame.foot, frame.back);
+    let way = select(on_left, x, base - x);
     let across = run * above - frame.height * way;
     let length_squared = run * run + frame.height * frame.height;
     let mut along = zero;
@@ -221,8 +224,8 @@ fn planar<F: Float>(frame: Frame<F>, x: F, y: F) -> Planar<F> {
     let on_base = !(y > zero);
     if on_base {
         along = zero;
-        if frame.base > zero {
-            along = min(max(x / frame.base, zero), F::new(1.0));
+        if base > zero {
+            along = min(max(x / base, zero), F::new(1.0));
         }
     }
     Planar::<F> {
@@ -287,7 +290,10 @@ fn weights<F: Float>(frame: Frame<F>, place: Planar<F>, x: F, y: F) -> Vector3<F
     let mut c = zero;
     if place.inside {
         c = min(y / frame.height, one);
-        b = min(max((x - c * frame.foot) / frame.base, zero), one - c);
+        b = min(
+            max((x - c * frame.foot) / (frame.foot + frame.back), zero),
+            one - c,
+        );
         a = one - b - c;
     } else {
         if !place.on_base {
