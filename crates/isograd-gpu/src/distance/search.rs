@@ -3,6 +3,9 @@
 //! The cells of a brick of 4 × 4 × 4 begin with the triangle that is closest to the centre of the brick, found
 //! in the same way on a lattice of the bricks, and so on up to a few bricks: a bound that is never further off
 //! than the brick is wide.
+//!
+//! Near the centre of a sphere all triangles are about equally far, and a descent would try them all. One that
+//! takes too many steps is given up, and a whole group of units settles its cell.
 
 use cubecl::prelude::*;
 
@@ -10,6 +13,7 @@ use super::tree::{LEAF, NONE, Tree, point_order};
 use super::triangle::{distance_squared, load_frame};
 use super::vector::{Vector3, load};
 use super::{Error, FAR};
+use crate::primitives::scan::exclusive_sum;
 use crate::{Buffer, Device, Scalar};
 
 /// Cells along the side of a brick, and units of a group, one a cell.
@@ -21,6 +25,19 @@ const COARSEST: usize = 64;
 
 /// Children that may wait: one for each bit of a key in the radix tree, 30 of the code and 32 of the place.
 const STACK: usize = 64;
+
+/// Steps of a descent before it is given up.
+const STEPS: u32 = 2048;
+
+/// A result that is not the last word: above it, the place found so far, or [`NOTHING_YET`].
+const UNPROVEN: u32 = 1 << 31;
+const NOTHING_YET: u32 = UNPROVEN - 2;
+const NOT_UNPROVEN: u32 = UNPROVEN - 1;
+
+/// Groups that settle what descents have left, the units of each, and triangles that a unit takes at a time.
+const SETTLERS: u32 = 1024;
+const SETTLER_UNITS: u32 = 256;
+const TAKEN: usize = 64;
 
 /// A lattice of cell centres, seen from its low corner.
 #[derive(Clone, Copy)]
@@ -88,6 +105,14 @@ fn solve_level<T: Scalar, R: Runtime>(
         seeded,
         last,
     );
+    let queries = Queries {
+        points: device.empty(0)?,
+        of_points: false,
+        level,
+        bound,
+        last,
+    };
+    settle(device, tree, &queries, &found)?;
     Ok(found)
 }
 
@@ -112,7 +137,79 @@ pub(super) fn points<T: Scalar, R: Runtime>(
         found.arg(),
         T::of(FAR),
     );
+    let queries = Queries {
+        points: points.clone(),
+        of_points: true,
+        level: Level {
+            shape: [0; 3],
+            spacing: 0.0,
+        },
+        bound: FAR,
+        last: true,
+    };
+    settle(device, tree, &queries, &found)?;
     Ok(found)
+}
+
+/// What was asked, of points or of the cells of a lattice, and whether faces are the answer.
+struct Queries<T> {
+    points: Buffer<T>,
+    of_points: bool,
+    level: Level,
+    bound: f64,
+    last: bool,
+}
+
+/// Solves what descents have left in `found`, a group each.
+fn settle<T: Scalar, R: Runtime>(
+    device: &Device<R>,
+    tree: &Tree<T>,
+    queries: &Queries<T>,
+    found: &Buffer<u32>,
+) -> Result<(), Error> {
+    let count = found.len();
+    let (groups, dim) = (device.groups(count, UNITS), CubeDim::new_1d(UNITS));
+    let flags = device.empty(count)?;
+    flag_left::launch::<R>(
+        device.client(),
+        groups.clone(),
+        dim,
+        found.arg(),
+        flags.arg(),
+    );
+    let before = exclusive_sum(device, &flags)?;
+    let left: Buffer<u32> = device.empty(count)?;
+    list_left::launch::<R>(
+        device.client(),
+        groups,
+        dim,
+        found.arg(),
+        before.arg(),
+        left.arg(),
+    );
+    let taken = tree.width().min(TAKEN);
+    settle_left::launch::<T, R>(
+        device.client(),
+        CubeCount::Static(SETTLERS, 1, 1),
+        CubeDim::new_1d(SETTLER_UNITS),
+        tree.pyramid.arg(),
+        tree.frames.arg(),
+        tree.faces.arg(),
+        queries.points.arg(),
+        left.arg(),
+        before.arg(),
+        found.arg(),
+        T::of(queries.level.spacing),
+        T::of(queries.bound),
+        queries.level.shape[1] as u32,
+        queries.level.shape[2] as u32,
+        (tree.width() / taken) as u32,
+        taken as u32,
+        queries.of_points,
+        queries.last,
+        SETTLER_UNITS as usize,
+    );
+    Ok(())
 }
 
 /// Squared distance from a place to the box whose low corner is vector `at` of `boxes`.
@@ -128,7 +225,7 @@ fn box_distance_squared<F: Float>(boxes: &Array<F>, at: u32, q: Vector3<F>) -> F
 }
 
 /// The triangle closest to `q`, as its place in Morton order: not further than the root of `bound`, else
-/// [`NONE`]; `seed` is a guess or [`NONE`]. Of triangles equally far the one of the lowest face, so that the
+/// [`NONE`]; [`UNPROVEN`] where the descent was given up. `seed` is a guess or [`NONE`]. Of triangles equally far the one of the lowest face, so that the
 /// seed does not matter.
 #[cube]
 fn nearest<F: Float>(
@@ -156,8 +253,10 @@ fn nearest<F: Float>(
     waiting[0] = 0u32;
     distances[0] = F::new(0.0);
     let mut height = 1u32.runtime();
-    while height > 0u32 {
+    let mut steps = 0u32.runtime();
+    while height > 0u32 && steps < STEPS {
         height -= 1u32;
+        steps += 1u32;
         let node = waiting[height as usize];
         if distances[height as usize] <= least {
             if node >= LEAF {
@@ -206,6 +305,9 @@ fn nearest<F: Float>(
             }
         }
     }
+    if height > 0u32 {
+        best = UNPROVEN | min(best, NOTHING_YET);
+    }
     best
 }
 
@@ -249,7 +351,7 @@ fn nearest_of_cells<F: Float + CubeElement>(
             result = nearest::<F>(boxes, children, frames, faces, q, bound, seed);
         }
         if comptime!(last) {
-            if result != NONE {
+            if result < UNPROVEN {
                 result = faces[result as usize];
             }
         }
@@ -273,10 +375,131 @@ fn nearest_of_points<F: Float + CubeElement>(
         let point = order[ABSOLUTE_POS];
         let q = load::<F>(points, point);
         let place = nearest::<F>(boxes, children, frames, faces, q, bound, NONE.runtime());
-        let mut face = NONE.runtime();
-        if place != NONE {
-            face = faces[place as usize];
+        let mut result = place;
+        if place < UNPROVEN {
+            result = faces[place as usize];
         }
-        found[point as usize] = face;
+        found[point as usize] = result;
+    }
+}
+
+/// The centre of a cell in memory order, from the low corner of the grid.
+#[cube]
+pub(super) fn centre<F: Float>(cell: u32, spacing: F, ny: u32, nz: u32) -> Vector3<F> {
+    let half = F::new(0.5);
+    Vector3::<F> {
+        x: spacing * (F::cast_from(cell / (ny * nz)) + half),
+        y: spacing * (F::cast_from(cell / nz % ny) + half),
+        z: spacing * (F::cast_from(cell % nz) + half),
+    }
+}
+
+/// 1 where a descent was given up.
+#[cube(launch)]
+fn flag_left(found: &Array<u32>, flags: &mut Array<u32>) {
+    if ABSOLUTE_POS < found.len() {
+        let result = found[ABSOLUTE_POS];
+        flags[ABSOLUTE_POS] = select(result >= UNPROVEN && result != NONE, 1u32, 0u32);
+    }
+}
+
+/// Lists them.
+#[cube(launch)]
+fn list_left(found: &Array<u32>, before: &Array<u32>, left: &mut Array<u32>) {
+    if ABSOLUTE_POS < found.len() {
+        let own = before[ABSOLUTE_POS];
+        if before[ABSOLUTE_POS + 1] > own {
+            left[own as usize] = ABSOLUTE_POS as u32;
+        }
+    }
+}
+
+/// A group takes one query after another: each unit tries the triangles of some runs, those of entries `level`
+/// to `2 level` of the pyramid, and what is least among them all is the answer.
+#[cube(launch)]
+fn settle_left<F: Float + CubeElement>(
+    pyramid: &Array<F>,
+    frames: &Array<F>,
+    faces: &Array<u32>,
+    points: &Array<F>,
+    left: &Array<u32>,
+    before: &Array<u32>,
+    found: &mut Array<u32>,
+    spacing: F,
+    bound: F,
+    ny: u32,
+    nz: u32,
+    level: u32,
+    taken: u32,
+    #[comptime] of_points: bool,
+    #[comptime] last: bool,
+    #[comptime] units: usize,
+) {
+    let mut least_of = SharedMemory::<F>::new(units);
+    let mut face_of = SharedMemory::<u32>::new(units);
+    let mut place_of = SharedMemory::<u32>::new(units);
+    let unit = UNIT_POS as usize;
+    let count = before[before.len() - 1];
+    let mut turn = CUBE_POS as u32;
+    while turn < count {
+        let query = left[turn as usize];
+        let q = if comptime!(of_points) {
+            load::<F>(points, query)
+        } else {
+            centre::<F>(query, spacing, ny, nz)
+        };
+        let mut least = bound;
+        let mut best = NONE.runtime();
+        let mut best_face = NONE.runtime();
+        let guess = found[query as usize] & NOT_UNPROVEN;
+        if guess != NOTHING_YET {
+            best = guess;
+            best_face = faces[guess as usize];
+            least = distance_squared::<F>(load_frame::<F>(frames, guess), q);
+        }
+        let mut run = UNIT_POS;
+        while run < level {
+            if box_distance_squared::<F>(pyramid, (level + run) * 2u32, q) <= least {
+                let end = min((run + 1u32) * taken, faces.len() as u32);
+                for place in run * taken..end {
+                    let d = distance_squared::<F>(load_frame::<F>(frames, place), q);
+                    if d <= least {
+                        let face = faces[place as usize];
+                        if d < least || face < best_face {
+                            best = place;
+                            best_face = face;
+                        }
+                        least = d;
+                    }
+                }
+            }
+            run += comptime!(units as u32);
+        }
+        least_of[unit] = least;
+        face_of[unit] = best_face;
+        place_of[unit] = best;
+        sync_cube();
+        let mut half = (units / 2).runtime();
+        while half > 0 {
+            if unit < half {
+                let (a, b) = (least_of[unit], least_of[unit + half]);
+                if b < a || (b == a && face_of[unit + half] < face_of[unit]) {
+                    least_of[unit] = b;
+                    face_of[unit] = face_of[unit + half];
+                    place_of[unit] = place_of[unit + half];
+                }
+            }
+            sync_cube();
+            half /= 2;
+        }
+        if unit == 0 {
+            if comptime!(last) {
+                found[query as usize] = face_of[0];
+            } else {
+                found[query as usize] = place_of[0];
+            }
+        }
+        sync_cube();
+        turn += SETTLERS;
     }
 }

@@ -40,6 +40,8 @@ pub(super) struct Tree<T> {
     pub frames: Buffer<T>,
     /// Its face.
     pub faces: Buffer<u32>,
+    /// Boxes of aligned runs of them, as a heap: entry 1 is that of all.
+    pub pyramid: Buffer<T>,
     /// Low and high corner of all vertices.
     pub bounds: Buffer<T>,
 }
@@ -112,8 +114,14 @@ impl<T: Scalar> Tree<T> {
             children,
             frames,
             faces,
+            pyramid,
             bounds,
         })
+    }
+
+    /// Triangles that the pyramid has room for, a power of two.
+    pub fn width(&self) -> usize {
+        self.pyramid.len() / 12
     }
 }
 

@@ -3,11 +3,12 @@
 use cubecl::prelude::*;
 use isograd::Grid;
 
+use super::super::search::centre;
 use super::super::tree::{NONE, Tree};
 use super::super::triangle::{closest, corners};
 use super::super::vector::{Vector3, norm};
 use super::super::{Band, Error, FAR, Mesh, search};
-use super::{Residual, centre};
+use super::Residual;
 use crate::device::check_length;
 use crate::{Buffer, Device, Scalar};
 

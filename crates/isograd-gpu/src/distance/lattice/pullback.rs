@@ -6,9 +6,10 @@
 use cubecl::prelude::*;
 
 use super::super::Error;
+use super::super::search::centre;
 use super::super::triangle::{closest, corners};
 use super::super::vector::{Vector3, choose, direction, dot, scale};
-use super::{Cotangents, Residual, centre};
+use super::{Cotangents, Residual};
 use crate::device::check_length;
 use crate::primitives::segments::{NO_SEGMENT, Pieces, Rows, join_pieces, sum_rows};
 use crate::primitives::sort;
