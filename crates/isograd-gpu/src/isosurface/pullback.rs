@@ -131,12 +131,14 @@ fn gather_chi<F: Float + CubeElement>(
     let row = word / signs.words;
     let k = 32u32 * (word % signs.words) + ABSOLUTE_POS as u32 % 32u32;
     if row < signs.nx * signs.ny && k < signs.nz {
+        let i = row / signs.ny;
+        let j = row % signs.ny;
         let mut sum = F::new(0.0);
-        if row / signs.ny > 0u32 {
+        if i > 0u32 {
             let below = row - signs.ny;
             sum += part::<F>(signs, before, values, ends, bars, below, k, 0u32, true);
         }
-        if row % signs.ny > 0u32 {
+        if j > 0u32 {
             let below = row - 1u32;
             sum += part::<F>(signs, before, values, ends, bars, below, k, 1u32, true);
         }
@@ -144,10 +146,10 @@ fn gather_chi<F: Float + CubeElement>(
             let below = k - 1u32;
             sum += part::<F>(signs, before, values, ends, bars, row, below, 2u32, true);
         }
-        if row / signs.ny + 1u32 < signs.nx {
+        if i + 1u32 < signs.nx {
             sum += part::<F>(signs, before, values, ends, bars, row, k, 0u32, false);
         }
-        if row % signs.ny + 1u32 < signs.ny {
+        if j + 1u32 < signs.ny {
             sum += part::<F>(signs, before, values, ends, bars, row, k, 1u32, false);
         }
         if k + 1u32 < signs.nz {
