@@ -79,7 +79,7 @@ pub(crate) fn spread<R: Runtime, T: Scalar, P: Spread>(
     let bricks_x = nx.div_ceil(BRICK_X);
     let (bricks_y, bricks_z) = (ny.div_ceil(BRICK_Y), nz.div_ceil(BRICK_Z));
     let bricks = bricks_x as usize * bricks_y as usize * bricks_z as usize;
-    gather::launch::<T, P, R>(
+    gather_cells::launch::<T, P, R>(
         device.client(),
         device.groups(bricks * BLOCK as usize, BLOCK),
         dim,
@@ -192,7 +192,7 @@ fn is_run(keys: &Array<u32>, s: u32, length: u32, end: u32, key: u32) -> bool {
 
 /// Each cell adds up what the samples near it have for it.
 #[cube(launch)]
-fn gather<F: Float, P: Spread>(
+fn gather_cells<F: Float, P: Spread>(
     samples: &Array<F>,
     keys: &Array<u32>,
     rows: &Array<u32>,

@@ -37,7 +37,7 @@ pub fn pullback<R: Runtime, T: Scalar>(
     let blocks = count.div_ceil(BLOCK);
     let gathered = sorted(device, samples, residual, false)?;
     let grid_sums: Buffer<T> = device.empty(4 * blocks)?;
-    gather::launch::<T, R>(
+    gather_samples::launch::<T, R>(
         device.client(),
         groups.clone(),
         dim,
@@ -99,7 +99,7 @@ struct Vector<F: Float> {
 /// Replaces the offset and vector of each sample by the cotangents of the vector `a n`, and of the point; and
 /// sums what they mean for the grid, a group at a time.
 #[cube(launch)]
-fn gather<F: Float + CubeElement>(
+fn gather_samples<F: Float + CubeElement>(
     keys: &Array<u32>,
     b_bar: &Array<F>,
     samples: &mut Array<F>,
