@@ -24,8 +24,10 @@
 //! be between about 1e-15 and 1e15 of the unit.
 
 pub mod lattice;
+mod morton;
 pub mod query;
 mod search;
+mod settle;
 mod tree;
 mod triangle;
 mod vector;
@@ -54,7 +56,7 @@ impl<T> Mesh<T> {
             ("the array of vertices", self.vertices.len()),
             ("the array of faces", self.faces.len()),
         ] {
-            if length % 3 != 0 {
+            if !length.is_multiple_of(3) {
                 return Err(Error::Triples { what, length });
             }
         }

@@ -34,7 +34,7 @@ pub fn forward<T: Scalar, R: Runtime>(
 ) -> Result<Hits<T>, Error> {
     device.check_number::<T>()?;
     mesh.check()?;
-    if points.len() % 3 != 0 {
+    if !points.len().is_multiple_of(3) {
         return Err(Error::Triples {
             what: "the array of points",
             length: points.len(),

@@ -9,11 +9,12 @@
 
 use cubecl::prelude::*;
 
-use super::tree::{LEAF, NONE, Tree, point_order};
+use super::morton::point_order;
+use super::settle::{Queries, settle};
+use super::tree::{LEAF, NONE, Tree};
 use super::triangle::{distance_squared, load_frame};
 use super::vector::{Vector3, load};
 use super::{Error, FAR};
-use crate::primitives::scan::exclusive_sum;
 use crate::{Buffer, Device, Scalar};
 
 /// Cells along the side of a brick, and units of a group, one a cell.
@@ -30,20 +31,14 @@ const STACK: usize = 64;
 const STEPS: u32 = 2048;
 
 /// A result that is not the last word: above it, the place found so far, or [`NOTHING_YET`].
-const UNPROVEN: u32 = 1 << 31;
-const NOTHING_YET: u32 = UNPROVEN - 2;
-const NOT_UNPROVEN: u32 = UNPROVEN - 1;
-
-/// Groups that settle what descents have left, the units of each, and triangles that a unit takes at a time.
-const SETTLERS: u32 = 1024;
-const SETTLER_UNITS: u32 = 256;
-const TAKEN: usize = 64;
+pub(super) const UNPROVEN: u32 = 1 << 31;
+pub(super) const NOTHING_YET: u32 = UNPROVEN - 2;
 
 /// A lattice of cell centres, seen from its low corner.
 #[derive(Clone, Copy)]
-struct Level {
-    shape: [usize; 3],
-    spacing: f64,
+pub(super) struct Level {
+    pub shape: [usize; 3],
+    pub spacing: f64,
 }
 
 /// The face closest to each cell centre of a lattice whose low corner is the origin of the tree, or [`NONE`]
@@ -151,70 +146,9 @@ pub(super) fn points<T: Scalar, R: Runtime>(
     Ok(found)
 }
 
-/// What was asked, of points or of the cells of a lattice, and whether faces are the answer.
-struct Queries<T> {
-    points: Buffer<T>,
-    of_points: bool,
-    level: Level,
-    bound: f64,
-    last: bool,
-}
-
-/// Solves what descents have left in `found`, a group each.
-fn settle<T: Scalar, R: Runtime>(
-    device: &Device<R>,
-    tree: &Tree<T>,
-    queries: &Queries<T>,
-    found: &Buffer<u32>,
-) -> Result<(), Error> {
-    let count = found.len();
-    let (groups, dim) = (device.groups(count, UNITS), CubeDim::new_1d(UNITS));
-    let flags = device.empty(count)?;
-    flag_left::launch::<R>(
-        device.client(),
-        groups.clone(),
-        dim,
-        found.arg(),
-        flags.arg(),
-    );
-    let before = exclusive_sum(device, &flags)?;
-    let left: Buffer<u32> = device.empty(count)?;
-    list_left::launch::<R>(
-        device.client(),
-        groups,
-        dim,
-        found.arg(),
-        before.arg(),
-        left.arg(),
-    );
-    let taken = tree.width().min(TAKEN);
-    settle_left::launch::<T, R>(
-        device.client(),
-        CubeCount::Static(SETTLERS, 1, 1),
-        CubeDim::new_1d(SETTLER_UNITS),
-        tree.pyramid.arg(),
-        tree.frames.arg(),
-        tree.faces.arg(),
-        queries.points.arg(),
-        left.arg(),
-        before.arg(),
-        found.arg(),
-        T::of(queries.level.spacing),
-        T::of(queries.bound),
-        queries.level.shape[1] as u32,
-        queries.level.shape[2] as u32,
-        (tree.width() / taken) as u32,
-        taken as u32,
-        queries.of_points,
-        queries.last,
-        SETTLER_UNITS as usize,
-    );
-    Ok(())
-}
-
 /// Squared distance from a place to the box whose low corner is vector `at` of `boxes`.
 #[cube]
-fn box_distance_squared<F: Float>(boxes: &Array<F>, at: u32, q: Vector3<F>) -> F {
+pub(super) fn box_distance_squared<F: Float>(boxes: &Array<F>, at: u32, q: Vector3<F>) -> F {
     let low = load::<F>(boxes, at);
     let high = load::<F>(boxes, at + 1u32);
     let zero = F::new(0.0);
@@ -287,21 +221,24 @@ fn nearest<F: Float>(
                 }
                 // The nearer one on top.
                 let b_first = b < a;
-                if wanted_a && b_first {
-                    waiting[height as usize] = children[at];
-                    distances[height as usize] = a;
-                    height += 1u32;
-                }
-                if wanted_b {
-                    waiting[height as usize] = children[at + 1];
-                    distances[height as usize] = b;
-                    height += 1u32;
-                }
-                if wanted_a && !b_first {
-                    waiting[height as usize] = children[at];
-                    distances[height as usize] = a;
-                    height += 1u32;
-                }
+                let (left, right) = (children[at], children[at + 1]);
+                height = push::<F>(
+                    &mut waiting,
+                    &mut distances,
+                    height,
+                    wanted_a && b_first,
+                    left,
+                    a,
+                );
+                height = push::<F>(&mut waiting, &mut distances, height, wanted_b, right, b);
+                height = push::<F>(
+                    &mut waiting,
+                    &mut distances,
+                    height,
+                    wanted_a && !b_first,
+                    left,
+                    a,
+                );
             }
         }
     }
@@ -309,6 +246,23 @@ fn nearest<F: Float>(
         best = UNPROVEN | min(best, NOTHING_YET);
     }
     best
+}
+
+/// Puts a child on the stack if it is wanted, and returns the height.
+#[cube]
+fn push<F: Float>(
+    waiting: &mut Array<u32>,
+    distances: &mut Array<F>,
+    height: u32,
+    wanted: bool,
+    child: u32,
+    distance: F,
+) -> u32 {
+    if wanted {
+        waiting[height as usize] = child;
+        distances[height as usize] = distance;
+    }
+    select(wanted, height + 1u32, height)
 }
 
 /// A group is a brick of cells; `seeds` has one place a brick. Places are written for the lattice below, faces
@@ -329,8 +283,8 @@ fn nearest_of_cells<F: Float + CubeElement>(
     #[comptime] seeded: bool,
     #[comptime] last: bool,
 ) {
-    let across_y = (ny + 3u32) / 4u32;
-    let across_z = (nz + 3u32) / 4u32;
+    let across_y = (ny - 1u32) / 4u32 + 1u32;
+    let across_z = (nz - 1u32) / 4u32 + 1u32;
     let brick = CUBE_POS as u32;
     let i = brick / (across_y * across_z) * 4u32 + UNIT_POS / 16u32;
     let j = brick / across_z % across_y * 4u32 + UNIT_POS / 4u32 % 4u32;
@@ -350,10 +304,8 @@ fn nearest_of_cells<F: Float + CubeElement>(
         if seed != NONE || !seeded {
             result = nearest::<F>(boxes, children, frames, faces, q, bound, seed);
         }
-        if comptime!(last) {
-            if result < UNPROVEN {
-                result = faces[result as usize];
-            }
+        if last && result < UNPROVEN {
+            result = faces[result as usize];
         }
         found[((i * ny + j) * nz + k) as usize] = result;
     }
@@ -391,115 +343,5 @@ pub(super) fn centre<F: Float>(cell: u32, spacing: F, ny: u32, nz: u32) -> Vecto
         x: spacing * (F::cast_from(cell / (ny * nz)) + half),
         y: spacing * (F::cast_from(cell / nz % ny) + half),
         z: spacing * (F::cast_from(cell % nz) + half),
-    }
-}
-
-/// 1 where a descent was given up.
-#[cube(launch)]
-fn flag_left(found: &Array<u32>, flags: &mut Array<u32>) {
-    if ABSOLUTE_POS < found.len() {
-        let result = found[ABSOLUTE_POS];
-        flags[ABSOLUTE_POS] = select(result >= UNPROVEN && result != NONE, 1u32, 0u32);
-    }
-}
-
-/// Lists them.
-#[cube(launch)]
-fn list_left(found: &Array<u32>, before: &Array<u32>, left: &mut Array<u32>) {
-    if ABSOLUTE_POS < found.len() {
-        let own = before[ABSOLUTE_POS];
-        if before[ABSOLUTE_POS + 1] > own {
-            left[own as usize] = ABSOLUTE_POS as u32;
-        }
-    }
-}
-
-/// A group takes one query after another: each unit tries the triangles of some runs, those of entries `level`
-/// to `2 level` of the pyramid, and what is least among them all is the answer.
-#[cube(launch)]
-fn settle_left<F: Float + CubeElement>(
-    pyramid: &Array<F>,
-    frames: &Array<F>,
-    faces: &Array<u32>,
-    points: &Array<F>,
-    left: &Array<u32>,
-    before: &Array<u32>,
-    found: &mut Array<u32>,
-    spacing: F,
-    bound: F,
-    ny: u32,
-    nz: u32,
-    level: u32,
-    taken: u32,
-    #[comptime] of_points: bool,
-    #[comptime] last: bool,
-    #[comptime] units: usize,
-) {
-    let mut least_of = SharedMemory::<F>::new(units);
-    let mut face_of = SharedMemory::<u32>::new(units);
-    let mut place_of = SharedMemory::<u32>::new(units);
-    let unit = UNIT_POS as usize;
-    let count = before[before.len() - 1];
-    let mut turn = CUBE_POS as u32;
-    while turn < count {
-        let query = left[turn as usize];
-        let q = if comptime!(of_points) {
-            load::<F>(points, query)
-        } else {
-            centre::<F>(query, spacing, ny, nz)
-        };
-        let mut least = bound;
-        let mut best = NONE.runtime();
-        let mut best_face = NONE.runtime();
-        let guess = found[query as usize] & NOT_UNPROVEN;
-        if guess != NOTHING_YET {
-            best = guess;
-            best_face = faces[guess as usize];
-            least = distance_squared::<F>(load_frame::<F>(frames, guess), q);
-        }
-        let mut run = UNIT_POS;
-        while run < level {
-            if box_distance_squared::<F>(pyramid, (level + run) * 2u32, q) <= least {
-                let end = min((run + 1u32) * taken, faces.len() as u32);
-                for place in run * taken..end {
-                    let d = distance_squared::<F>(load_frame::<F>(frames, place), q);
-                    if d <= least {
-                        let face = faces[place as usize];
-                        if d < least || face < best_face {
-                            best = place;
-                            best_face = face;
-                        }
-                        least = d;
-                    }
-                }
-            }
-            run += comptime!(units as u32);
-        }
-        least_of[unit] = least;
-        face_of[unit] = best_face;
-        place_of[unit] = best;
-        sync_cube();
-        let mut half = (units / 2).runtime();
-        while half > 0 {
-            if unit < half {
-                let (a, b) = (least_of[unit], least_of[unit + half]);
-                if b < a || (b == a && face_of[unit + half] < face_of[unit]) {
-                    least_of[unit] = b;
-                    face_of[unit] = face_of[unit + half];
-                    place_of[unit] = place_of[unit + half];
-                }
-            }
-            sync_cube();
-            half /= 2;
-        }
-        if unit == 0 {
-            if comptime!(last) {
-                found[query as usize] = face_of[0];
-            } else {
-                found[query as usize] = place_of[0];
-            }
-        }
-        sync_cube();
-        turn += SETTLERS;
     }
 }

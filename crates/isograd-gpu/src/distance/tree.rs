@@ -8,17 +8,14 @@
 
 use cubecl::prelude::*;
 
+use super::morton::{bounds, face_order};
 use super::triangle::{FRAME, corners, frame, store_frame};
-use super::vector::{Vector3, load};
+use super::vector::Vector3;
 use super::{Error, Mesh};
-use crate::primitives::sort;
 use crate::{Buffer, Device, Scalar};
 
 /// Units of a group.
 const BLOCK: u32 = 256;
-
-/// Boxes that one unit joins where the bounds of all are sought.
-const JOINED: usize = 64;
 
 /// Stands in `lowest` where there is no triangle; and for a cell without a seed or a result.
 pub(super) const NONE: u32 = u32::MAX;
@@ -55,66 +52,31 @@ impl<T: Scalar> Tree<T> {
     ) -> Result<Self, Error> {
         let triangles = mesh.check()?;
         let bounds = bounds(device, mesh, origin)?;
-        let order = morton_order(device, mesh, origin, &bounds)?;
-        // A lone triangle stands twice, so that there is a node.
-        let leaves = triangles.max(2);
-        let width = leaves.next_power_of_two();
-        let frames: Buffer<T> = device.empty(leaves * FRAME)?;
-        let faces = device.empty(leaves)?;
-        let pyramid: Buffer<T> = device.empty(2 * width * 6)?;
-        let lowest: Buffer<u32> = device.empty(2 * width)?;
-        let dim = CubeDim::new_1d(BLOCK);
-        place_triangles::launch::<T, R>(
-            device.client(),
-            device.groups(width, BLOCK),
-            dim,
-            mesh.vertices.arg(),
-            mesh.faces.arg(),
-            order.places.arg(),
-            frames.arg(),
-            faces.arg(),
-            pyramid.arg(),
-            lowest.arg(),
-            origin[0],
-            origin[1],
-            origin[2],
-            triangles as u32,
-            width as u32,
-        );
-        let mut level = width / 2;
-        while level > 0 {
-            join_pairs::launch::<T, R>(
-                device.client(),
-                device.groups(level, BLOCK),
-                dim,
-                pyramid.arg(),
-                lowest.arg(),
-                level as u32,
-            );
-            level /= 2;
-        }
-        let boxes: Buffer<T> = device.empty((leaves - 1) * 12)?;
+        let order = face_order(device, mesh, origin, &bounds)?;
+        let placed = Placed::new(device, mesh, origin, &order.places)?;
+        let leaves = placed.faces.len();
+        let boxes = device.empty((leaves - 1) * 12)?;
         let children = device.empty((leaves - 1) * 4)?;
         make_nodes::launch::<T, R>(
             device.client(),
             device.groups(leaves - 1, BLOCK),
-            dim,
+            CubeDim::new_1d(BLOCK),
             order.keys.arg(),
-            pyramid.arg(),
-            lowest.arg(),
+            placed.pyramid.arg(),
+            placed.lowest.arg(),
             boxes.arg(),
             children.arg(),
             leaves as u32,
             triangles as u32,
-            width as u32,
+            (placed.lowest.len() / 2) as u32,
             RUN,
         );
         Ok(Self {
             boxes,
             children,
-            frames,
-            faces,
-            pyramid,
+            frames: placed.frames,
+            faces: placed.faces,
+            pyramid: placed.pyramid,
             bounds,
         })
     }
@@ -125,179 +87,62 @@ impl<T: Scalar> Tree<T> {
     }
 }
 
-/// Low and high corner of all vertices.
-fn bounds<T: Scalar, R: Runtime>(
-    device: &Device<R>,
-    mesh: &Mesh<T>,
-    origin: [T; 3],
-) -> Result<Buffer<T>, Error> {
-    let mut items = mesh.vertices.clone();
-    let mut count = items.len() / 3;
-    let mut points = true;
-    while points || count > 1 {
-        let joined = count.div_ceil(JOINED);
-        let boxes = device.empty(joined * 6)?;
-        join_runs::launch::<T, R>(
+/// The triangles in their order, and the pyramid over them.
+struct Placed<T> {
+    frames: Buffer<T>,
+    faces: Buffer<u32>,
+    pyramid: Buffer<T>,
+    /// The lowest face in each entry of the pyramid.
+    lowest: Buffer<u32>,
+}
+
+impl<T: Scalar> Placed<T> {
+    fn new<R: Runtime>(
+        device: &Device<R>,
+        mesh: &Mesh<T>,
+        origin: [T; 3],
+        places: &Buffer<u32>,
+    ) -> Result<Self, Error> {
+        // A lone triangle stands twice, so that there is a node.
+        let leaves = places.len().max(2);
+        let width = leaves.next_power_of_two();
+        let placed = Self {
+            frames: device.empty(leaves * FRAME)?,
+            faces: device.empty(leaves)?,
+            pyramid: device.empty(2 * width * 6)?,
+            lowest: device.empty(2 * width)?,
+        };
+        let dim = CubeDim::new_1d(BLOCK);
+        place_triangles::launch::<T, R>(
             device.client(),
-            device.groups(joined, BLOCK),
-            CubeDim::new_1d(BLOCK),
-            items.arg(),
-            boxes.arg(),
+            device.groups(width, BLOCK),
+            dim,
+            mesh.vertices.arg(),
+            mesh.faces.arg(),
+            places.arg(),
+            placed.frames.arg(),
+            placed.faces.arg(),
+            placed.pyramid.arg(),
+            placed.lowest.arg(),
             origin[0],
             origin[1],
             origin[2],
-            count as u32,
-            JOINED as u32,
-            points,
+            places.len() as u32,
+            width as u32,
         );
-        (items, count, points) = (boxes, joined, false);
-    }
-    Ok(items)
-}
-
-/// The order of the faces by the Morton codes of their centres.
-fn morton_order<T: Scalar, R: Runtime>(
-    device: &Device<R>,
-    mesh: &Mesh<T>,
-    origin: [T; 3],
-    bounds: &Buffer<T>,
-) -> Result<sort::Order, Error> {
-    let count = mesh.faces.len() / 3;
-    let codes = device.empty(count)?;
-    code_centres::launch::<T, R>(
-        device.client(),
-        device.groups(count, BLOCK),
-        CubeDim::new_1d(BLOCK),
-        mesh.vertices.arg(),
-        mesh.faces.arg(),
-        bounds.arg(),
-        codes.arg(),
-        origin[0],
-        origin[1],
-        origin[2],
-    );
-    Ok(sort::order(device, &codes, 1 << 30)?)
-}
-
-/// The order of points by their Morton codes within `bounds`.
-pub(super) fn point_order<T: Scalar, R: Runtime>(
-    device: &Device<R>,
-    points: &Buffer<T>,
-    bounds: &Buffer<T>,
-) -> Result<sort::Order, Error> {
-    let count = points.len() / 3;
-    let codes = device.empty(count)?;
-    code_points::launch::<T, R>(
-        device.client(),
-        device.groups(count, BLOCK),
-        CubeDim::new_1d(BLOCK),
-        points.arg(),
-        bounds.arg(),
-        codes.arg(),
-    );
-    Ok(sort::order(device, &codes, 1 << 30)?)
-}
-
-/// The bounds of each run of `length` points, or of boxes.
-#[cube(launch)]
-fn join_runs<F: Float + CubeElement>(
-    items: &Array<F>,
-    boxes: &mut Array<F>,
-    x: F,
-    y: F,
-    z: F,
-    count: u32,
-    length: u32,
-    #[comptime] points: bool,
-) {
-    if ABSOLUTE_POS < boxes.len() / 6 {
-        let first = ABSOLUTE_POS as u32 * length;
-        let mut low = Array::<F>::new(3usize);
-        let mut high = Array::<F>::new(3usize);
-        for item in first..min(first + length, count) {
-            for axis in 0..3usize {
-                let mut from = item as usize * 6;
-                let mut shift = F::new(0.0);
-                let mut span = 3usize.runtime();
-                if comptime!(points) {
-                    from = item as usize * 3;
-                    shift = select(axis == 0, x, select(axis == 1, y, z));
-                    span = 0usize;
-                }
-                let a = items[from + axis] - shift;
-                let b = items[from + span + axis] - shift;
-                let fresh = item == first;
-                low[axis] = select(fresh, a, min(low[axis], a));
-                high[axis] = select(fresh, b, max(high[axis], b));
-            }
+        let mut level = width / 2;
+        while level > 0 {
+            join_pairs::launch::<T, R>(
+                device.client(),
+                device.groups(level, BLOCK),
+                dim,
+                placed.pyramid.arg(),
+                placed.lowest.arg(),
+                level as u32,
+            );
+            level /= 2;
         }
-        for axis in 0..3usize {
-            boxes[ABSOLUTE_POS * 6 + axis] = low[axis];
-            boxes[ABSOLUTE_POS * 6 + 3 + axis] = high[axis];
-        }
-    }
-}
-
-/// The lowest ten bits, two places apart.
-#[cube]
-fn spread(bits: u32) -> u32 {
-    let a = (bits | (bits << 16u32)) & 0x0300_00ffu32;
-    let b = (a | (a << 8u32)) & 0x0300_f00fu32;
-    let c = (b | (b << 4u32)) & 0x030c_30c3u32;
-    (c | (c << 2u32)) & 0x0924_9249u32
-}
-
-/// Ten bits of where `x` is between two numbers.
-#[cube]
-fn ten_bits<F: Float>(x: F, low: F, high: F) -> u32 {
-    let mut bits = 0u32.runtime();
-    if high > low {
-        let part = min(max((x - low) / (high - low), F::new(0.0)), F::new(1.0));
-        bits = min(u32::cast_from(part * F::new(1024.0)), 1023u32);
-    }
-    bits
-}
-
-/// Morton code of a place within bounds, 30 bits.
-#[cube]
-fn morton<F: Float>(place: Vector3<F>, bounds: &Array<F>) -> u32 {
-    let x = spread(ten_bits::<F>(place.x, bounds[0], bounds[3]));
-    let y = spread(ten_bits::<F>(place.y, bounds[1], bounds[4]));
-    let z = spread(ten_bits::<F>(place.z, bounds[2], bounds[5]));
-    (x << 2u32) | (y << 1u32) | z
-}
-
-#[cube(launch)]
-fn code_centres<F: Float + CubeElement>(
-    vertices: &Array<F>,
-    faces: &Array<u32>,
-    bounds: &Array<F>,
-    codes: &mut Array<u32>,
-    x: F,
-    y: F,
-    z: F,
-) {
-    if ABSOLUTE_POS < codes.len() {
-        let t = corners::<F>(
-            vertices,
-            faces,
-            ABSOLUTE_POS as u32,
-            Vector3::<F> { x, y, z },
-        );
-        let third = F::new(1.0) / F::new(3.0);
-        let centre = Vector3::<F> {
-            x: t.a.x * third + t.b.x * third + t.c.x * third,
-            y: t.a.y * third + t.b.y * third + t.c.y * third,
-            z: t.a.z * third + t.b.z * third + t.c.z * third,
-        };
-        codes[ABSOLUTE_POS] = morton::<F>(centre, bounds);
-    }
-}
-
-#[cube(launch)]
-fn code_points<F: Float>(points: &Array<F>, bounds: &Array<F>, codes: &mut Array<u32>) {
-    if ABSOLUTE_POS < codes.len() {
-        codes[ABSOLUTE_POS] = morton::<F>(load::<F>(points, ABSOLUTE_POS as u32), bounds);
+        Ok(placed)
     }
 }
 

@@ -173,7 +173,8 @@ pub(crate) fn join_pieces<T: Scalar, R: Runtime>(
 fn count_pieces(starts: &Array<u32>, counts: &mut Array<u32>, segments: u32, piece: u32) {
     if ABSOLUTE_POS < segments as usize {
         let length = starts[ABSOLUTE_POS + 1] - starts[ABSOLUTE_POS];
-        counts[ABSOLUTE_POS] = (length + piece - 1u32) / piece;
+        let whole = length / piece;
+        counts[ABSOLUTE_POS] = select(whole * piece < length, whole + 1u32, whole);
     }
 }
 

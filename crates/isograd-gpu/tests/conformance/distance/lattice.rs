@@ -53,7 +53,7 @@ fn check_meshes_in<R: Runtime, T: Scalar>(device: &Device<R>) {
         (
             "sphere",
             // More triangles than a descent takes.
-            meshes::sphere(80, 81),
+            meshes::sphere(50, 51),
             grid([-0.95; 3], 0.1, [19; 3]),
         ),
         ("soup", meshes::soup(1, 1), coarse),
@@ -121,7 +121,7 @@ fn of_equal_triangles_the_first_is_named() {
 
 fn check_first_of_equals<R: Runtime>(device: &Device<R>) {
     let chi = signs(grid::<f32>([-1.0; 3], 0.2, [9, 10, 11]));
-    for mesh in [meshes::point(700), meshes::copies(1), meshes::copies(5000)] {
+    for mesh in [meshes::point(700), meshes::copies(1), meshes::copies(700)] {
         let (_, closest, _) = solve(device, &mesh, &chi, Band::Full);
         assert!(closest.iter().all(|&face| face == 0));
     }

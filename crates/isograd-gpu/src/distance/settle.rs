@@ -1,0 +1,221 @@
+//! The closest triangle where a descent would try nearly all of them: a group of units for each query.
+
+use cubecl::prelude::*;
+
+use super::Error;
+use super::search::{Level, NOTHING_YET, UNPROVEN, box_distance_squared, centre};
+use super::tree::{NONE, Tree};
+use super::triangle::{distance_squared, load_frame};
+use super::vector::{Vector3, load};
+use crate::primitives::scan::exclusive_sum;
+use crate::{Buffer, Device, Scalar};
+
+/// Units of a group that looks for what is left.
+const UNITS: u32 = 64;
+
+/// Groups that settle it, the units of each, and triangles that a unit takes at a time.
+const SETTLERS: u32 = 1024;
+const SETTLER_UNITS: u32 = 256;
+const TAKEN: usize = 64;
+
+/// What [`UNPROVEN`] marks, without the mark.
+const NOT_UNPROVEN: u32 = UNPROVEN - 1;
+
+/// What was asked, of points or of the cells of a lattice, and whether faces are the answer.
+pub(super) struct Queries<T> {
+    pub points: Buffer<T>,
+    pub of_points: bool,
+    pub level: Level,
+    /// Squared.
+    pub bound: f64,
+    pub last: bool,
+}
+
+/// Solves what descents have left in `found`, a group each.
+pub(super) fn settle<T: Scalar, R: Runtime>(
+    device: &Device<R>,
+    tree: &Tree<T>,
+    queries: &Queries<T>,
+    found: &Buffer<u32>,
+) -> Result<(), Error> {
+    let count = found.len();
+    let (groups, dim) = (device.groups(count, UNITS), CubeDim::new_1d(UNITS));
+    let flags = device.empty(count)?;
+    flag_left::launch::<R>(
+        device.client(),
+        groups.clone(),
+        dim,
+        found.arg(),
+        flags.arg(),
+    );
+    let before = exclusive_sum(device, &flags)?;
+    let left: Buffer<u32> = device.empty(count)?;
+    list_left::launch::<R>(
+        device.client(),
+        groups,
+        dim,
+        found.arg(),
+        before.arg(),
+        left.arg(),
+    );
+    let taken = tree.width().min(TAKEN);
+    settle_left::launch::<T, R>(
+        device.client(),
+        CubeCount::Static(SETTLERS, 1, 1),
+        CubeDim::new_1d(SETTLER_UNITS),
+        tree.pyramid.arg(),
+        tree.frames.arg(),
+        tree.faces.arg(),
+        queries.points.arg(),
+        left.arg(),
+        before.arg(),
+        found.arg(),
+        T::of(queries.level.spacing),
+        T::of(queries.bound),
+        queries.level.shape[1] as u32,
+        queries.level.shape[2] as u32,
+        (tree.width() / taken) as u32,
+        taken as u32,
+        queries.of_points,
+        queries.last,
+        SETTLER_UNITS as usize,
+    );
+    Ok(())
+}
+
+/// 1 where a descent was given up.
+#[cube(launch)]
+fn flag_left(found: &Array<u32>, flags: &mut Array<u32>) {
+    if ABSOLUTE_POS < found.len() {
+        let result = found[ABSOLUTE_POS];
+        flags[ABSOLUTE_POS] = select(result >= UNPROVEN && result != NONE, 1u32, 0u32);
+    }
+}
+
+/// Lists them.
+#[cube(launch)]
+fn list_left(found: &Array<u32>, before: &Array<u32>, left: &mut Array<u32>) {
+    if ABSOLUTE_POS < found.len() {
+        let own = before[ABSOLUTE_POS];
+        if before[ABSOLUTE_POS + 1] > own {
+            left[own as usize] = ABSOLUTE_POS as u32;
+        }
+    }
+}
+
+/// A group takes one query after another: each unit tries the triangles of some runs, and what is least among
+/// them all is the answer.
+#[cube(launch)]
+fn settle_left<F: Float + CubeElement>(
+    pyramid: &Array<F>,
+    frames: &Array<F>,
+    faces: &Array<u32>,
+    points: &Array<F>,
+    left: &Array<u32>,
+    before: &Array<u32>,
+    found: &mut Array<u32>,
+    spacing: F,
+    bound: F,
+    ny: u32,
+    nz: u32,
+    level: u32,
+    taken: u32,
+    #[comptime] of_points: bool,
+    #[comptime] last: bool,
+    #[comptime] units: usize,
+) {
+    let mut least_of = SharedMemory::<F>::new(units);
+    let mut face_of = SharedMemory::<u32>::new(units);
+    let mut place_of = SharedMemory::<u32>::new(units);
+    let unit = UNIT_POS as usize;
+    let count = before[before.len() - 1];
+    let mut turn = CUBE_POS as u32;
+    while turn < count {
+        let query = left[turn as usize];
+        let q = if comptime!(of_points) {
+            load::<F>(points, query)
+        } else {
+            centre::<F>(query, spacing, ny, nz)
+        };
+        let guess = found[query as usize] & NOT_UNPROVEN;
+        let own = try_runs::<F>(pyramid, frames, faces, q, bound, guess, level, taken, units);
+        least_of[unit] = own.least;
+        face_of[unit] = own.face;
+        place_of[unit] = own.place;
+        sync_cube();
+        let mut half = (units / 2).runtime();
+        while half > 0 {
+            if unit < half {
+                let (a, b) = (least_of[unit], least_of[unit + half]);
+                if b < a || (b == a && face_of[unit + half] < face_of[unit]) {
+                    least_of[unit] = b;
+                    face_of[unit] = face_of[unit + half];
+                    place_of[unit] = place_of[unit + half];
+                }
+            }
+            sync_cube();
+            half /= 2;
+        }
+        if unit == 0 {
+            found[query as usize] = select(last, face_of[0], place_of[0]);
+        }
+        sync_cube();
+        turn += SETTLERS;
+    }
+}
+
+/// The closest triangle that one unit knows.
+#[derive(CubeType, Clone, Copy)]
+struct Known<F: Float> {
+    /// Its squared distance.
+    least: F,
+    face: u32,
+    place: u32,
+}
+
+/// Tries the triangles of every so many-th run, those of entries `level` to `2 level` of the pyramid, `guess`
+/// being the place of one or [`NOTHING_YET`].
+#[cube]
+fn try_runs<F: Float>(
+    pyramid: &Array<F>,
+    frames: &Array<F>,
+    faces: &Array<u32>,
+    q: Vector3<F>,
+    bound: F,
+    guess: u32,
+    level: u32,
+    taken: u32,
+    #[comptime] units: usize,
+) -> Known<F> {
+    let mut least = bound;
+    let mut best = NONE.runtime();
+    let mut best_face = NONE.runtime();
+    if guess != NOTHING_YET {
+        best = guess;
+        best_face = faces[guess as usize];
+        least = distance_squared::<F>(load_frame::<F>(frames, guess), q);
+    }
+    let mut run = UNIT_POS;
+    while run < level {
+        if box_distance_squared::<F>(pyramid, (level + run) * 2u32, q) <= least {
+            let end = min((run + 1u32) * taken, faces.len() as u32);
+            for place in run * taken..end {
+                let d = distance_squared::<F>(load_frame::<F>(frames, place), q);
+                if d <= least {
+                    let face = faces[place as usize];
+                    if d < least || face < best_face {
+                        best = place;
+                        best_face = face;
+                    }
+                    least = d;
+                }
+            }
+        }
+        run += comptime!(units as u32);
+    }
+    Known::<F> {
+        least,
+        face: best_face,
+        place: best,
+    }
+}
