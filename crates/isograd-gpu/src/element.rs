@@ -6,11 +6,11 @@ pub(crate) use cubecl::prelude::Float as Element;
 #[path = "../../isograd/src/element/plane.rs"]
 pub(crate) mod plane;
 
+#[path = "../../isograd/src/element/crossing.rs"]
+pub(crate) mod crossing;
 #[path = "../../isograd/src/element/hat.rs"]
 pub(crate) mod hat;
 #[path = "../../isograd/src/element/linear.rs"]
 pub(crate) mod linear;
-#[path = "../../isograd/src/element/crossing.rs"]
-pub(crate) mod crossing;
 #[path = "../../isograd/src/element/spline.rs"]
 pub(crate) mod spline;

@@ -150,6 +150,8 @@ impl<R: Runtime> Device<R> {
         if buffer.is_empty() {
             return Ok(Vec::new());
         }
+        // Reading alone does not say that a kernel before it failed.
+        self.wait()?;
         let bytes = self.client.read_one(buffer.handle());
         let bytes = bytes.map_err(|e| self.failed(&e))?;
         let mut values = E::from_bytes(&bytes).to_vec();

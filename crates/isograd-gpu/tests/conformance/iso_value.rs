@@ -7,8 +7,8 @@ use isograd_gpu::iso_value::{forward, pullback};
 use isograd_gpu::splat::{self, SampleCotangent, Weights};
 use isograd_gpu::{Device, Error, Scalar};
 
-use crate::samples::{Cloud, assert_near, distance, report, upload_cotangent};
 use crate::devices::{Numbers, in_both_numbers, on_each_device};
+use crate::samples::{Cloud, assert_near, distance, report, upload_cotangent};
 
 /// Cells, samples, and samples in one cell.
 const CLOUDS: [([usize; 3], usize, usize); 4] = [

@@ -7,6 +7,7 @@ mod distance;
 mod iso_value;
 mod isosurface;
 mod normals;
+mod pipeline;
 mod poisson;
 mod primitives;
 mod reduce;

@@ -5,8 +5,8 @@ use isograd_gpu::primitives::fill;
 use isograd_gpu::primitives::reduce::{sum, sum_columns};
 use isograd_gpu::{Device, Error, Scalar};
 
-use crate::samples::distance;
 use crate::devices::{Numbers, in_both_numbers, on_each_device};
+use crate::samples::distance;
 
 #[test]
 fn sums_are_those_of_a_loop() {

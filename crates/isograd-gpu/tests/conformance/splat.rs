@@ -5,8 +5,8 @@ use isograd::Field;
 use isograd_gpu::splat::{Refused, SampleCotangent, Weights, forward, pullback};
 use isograd_gpu::{Device, Error, Scalar};
 
-use crate::samples::{Cloud, assert_near, upload_cotangent};
 use crate::devices::{Numbers, in_both_numbers, on_each_device};
+use crate::samples::{Cloud, assert_near, upload_cotangent};
 
 const BOTH: [Weights; 2] = [Weights::BSpline, Weights::Paper];
 

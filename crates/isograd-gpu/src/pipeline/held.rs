@@ -1,0 +1,121 @@
+//! What the CPU finds in a cloud, and the device then holds: no derivative goes through it.
+
+use cubecl::prelude::*;
+use isograd::neighbors::{Neighborhoods, Radius};
+use isograd::orient::{self, Method, Orientation};
+use isograd::{PointCloud, normals};
+
+use super::Error;
+use crate::device::check_length;
+use crate::{Buffer, Device, Scalar};
+
+/// The radii of a cloud's neighbourhoods, and which way is out at each of its points. Of a body that moves a
+/// little, those of an earlier step will do: see [`Held::facing`].
+#[derive(Clone, Debug)]
+pub struct Held<T> {
+    /// `(N,)` within which normals are found, in the user's unit.
+    pub radii: Buffer<T>,
+    /// `(N,)` within which areas are found.
+    pub area_radii: Buffer<T>,
+    /// The radius of every point that has enough neighbours within it.
+    pub common_radius: T,
+    /// `(N, 3)` roughly outward: a normal is turned to the side of its vector here.
+    pub outward: Buffer<T>,
+}
+
+impl<T: Scalar> Held<T> {
+    /// Finds all of it on the CPU. `method` is any but [`Method::Given`], for which there are no axes to turn,
+    /// and [`Method::Previous`], which [`Self::facing`] takes the place of.
+    ///
+    /// # Errors
+    /// What neighbours, normals or orientation say of the cloud; [`Error::Device`].
+    pub fn find<R: Runtime>(
+        device: &Device<R>,
+        cloud: &PointCloud<T>,
+        radius: Radius,
+        method: &Method,
+    ) -> Result<Self, Error> {
+        if matches!(method, Method::Given | Method::Previous) {
+            return Err(Error::Orientation);
+        }
+        let (mut near, mut axes) = (Neighborhoods::default(), normals::Residual::default());
+        normals::forward_with_neighborhoods(cloud.points(), radius, &mut near, &mut axes)?;
+        let mut found = Orientation::default();
+        let scratch = &mut orient::Scratch::default();
+        orient::forward(
+            cloud.points(),
+            &axes,
+            &near,
+            cloud,
+            method,
+            scratch,
+            &mut found,
+        )?;
+        Ok(Self {
+            radii: device.upload(&axes.radius)?,
+            area_radii: device.upload(&near.radius)?,
+            common_radius: near.common_radius,
+            outward: device.upload(found.normals.as_flattened())?,
+        })
+    }
+
+    /// The same radii, with sides told by other vectors: for the next step of a body that moves, the outward
+    /// normals of this one.
+    ///
+    /// # Errors
+    /// [`crate::Error::Length`].
+    pub fn facing(self, outward: Buffer<T>) -> Result<Self, crate::Error> {
+        check_length("the outward vectors", &outward, self.outward.len())?;
+        Ok(Self { outward, ..self })
+    }
+}
+
+/// Units of a group.
+const BLOCK: u32 = 256;
+
+/// `vectors` `(N, 3)`, each multiplied by the sign that turns its axis to the side of `outward`. Its own
+/// pullback.
+pub(super) fn turn<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    vectors: &Buffer<T>,
+    axes: &Buffer<T>,
+    outward: &Buffer<T>,
+) -> Result<Buffer<T>, crate::Error> {
+    check_length("the outward vectors", outward, axes.len())?;
+    check_length("the vectors to turn", vectors, axes.len())?;
+    let turned = device.empty(axes.len())?;
+    turn_vectors::launch::<T, R>(
+        device.client(),
+        device.groups(axes.len() / 3, BLOCK),
+        CubeDim::new_1d(BLOCK),
+        vectors.arg(),
+        axes.arg(),
+        outward.arg(),
+        turned.arg(),
+        (axes.len() / 3) as u32,
+    );
+    Ok(turned)
+}
+
+#[cube(launch)]
+fn turn_vectors<F: Float>(
+    vectors: &Array<F>,
+    axes: &Array<F>,
+    outward: &Array<F>,
+    turned: &mut Array<F>,
+    count: u32,
+) {
+    if ABSOLUTE_POS < count as usize {
+        let at = 3 * ABSOLUTE_POS;
+        let along = axes[at] * outward[at]
+            + axes[at + 1] * outward[at + 1]
+            + axes[at + 2] * outward[at + 2];
+        let mut sign = F::new(1.0);
+        if along < F::new(0.0) {
+            sign = F::new(-1.0);
+        }
+        for axis in 0..3usize {
+            turned[at + axis] = sign * vectors[at + axis];
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! The whole, forward and back, beside the CPU's.
+
+use cubecl::prelude::Runtime;
+use isograd::isosurface::Level;
+use isograd::neighbors::Radius;
+use isograd::orient::Method;
+use isograd::poisson::Smoothing;
+use isograd::{Cotangent, Grid, PointCloud, Real, Reconstructor, Resolution};
+use isograd_gpu::pipeline::{self, Error, Held};
+use isograd_gpu::{Device, Scalar};
+use isograd_shapes::Sampling;
+
+use crate::clouds::{has_number, real, relative};
+use crate::devices::{Numbers, on_each_device};
+
+#[test]
+fn phi_and_its_gradient_are_those_of_the_cpu() {
+    fn check<R: Runtime>(device: &Device<R>) {
+        compare::<R, f32>(device, 2e-4);
+        compare::<R, f64>(device, 1e-9);
+    }
+    on_each_device!(check);
+}
+
+fn cloud<T: Scalar>(name: &str, count: usize) -> PointCloud<T> {
+    let shape = isograd_shapes::by_name(name).unwrap();
+    let samples = shape.sample::<T>(count, &Sampling::default(), 3).unwrap();
+    PointCloud::new(samples.cloud.points().to_vec()).unwrap()
+}
+
+fn compare<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
+    if !has_number::<R, T>(device) {
+        return;
+    }
+    for (name, count, cells) in [("torus", 4000, 40), ("fish", 3000, 48)] {
+        let cloud = cloud::<T>(name, count);
+        let grid = Grid::fit(&cloud, Resolution::Cells(cells), real(0.1)).unwrap();
+        let options = isograd::Options {
+            level: Level::Mean,
+            smoothing: Smoothing::Cells(1.0),
+            ..isograd::Options::default()
+        };
+        let mut plan = Reconstructor::new(grid, options).unwrap();
+        let expected = plan.reconstruct(&cloud).unwrap();
+        let bar = weights::<T>(expected.sdf().values(), Real::f64(grid.spacing()));
+        let cotangent = Cotangent {
+            sdf: Some(&bar),
+            ..Cotangent::default()
+        };
+        let expected_bar = expected.pullback(&cloud, &cotangent).unwrap();
+
+        let plan = pipeline::Reconstructor::new(device.clone(), grid, Default::default()).unwrap();
+        let held = Held::find(device, &cloud, Radius::Auto, &Method::Auto).unwrap();
+        let points = device.upload(cloud.points().as_flattened()).unwrap();
+        let result = plan.reconstruct(&points, &held).unwrap();
+        let found = device.download(&result.sdf).unwrap();
+        let difference = relative(&found, expected.sdf().values());
+        assert!(
+            difference < tolerance,
+            "{name} {}: φ {difference:e}",
+            T::NAME
+        );
+
+        let bars = plan
+            .pullback(&result, &device.upload(&bar).unwrap())
+            .unwrap();
+        let found_bar = device.download(&bars.points).unwrap();
+        let difference = relative(&found_bar, expected_bar.points.as_flattened());
+        assert!(
+            difference < 5.0 * tolerance,
+            "{name} {}: x̄ {difference:e}",
+            T::NAME
+        );
+        let grid_bar = device.download(&bars.grid).unwrap();
+        let expected_grid = expected_bar.grid;
+        let [x, y, z] = expected_grid.lower;
+        let difference = relative(&grid_bar, &[x, y, z, expected_grid.spacing]);
+        assert!(
+            difference < 5.0 * tolerance,
+            "{name} {}: grid {difference:e}",
+            T::NAME
+        );
+
+        // The next step of a body that has not moved: the same bits, sides told by the normals before.
+        let held = held.facing(result.normals.clone()).unwrap();
+        let again = plan.reconstruct(&points, &held).unwrap();
+        assert_eq!(device.download(&again.sdf).unwrap(), found);
+        let bars = plan
+            .pullback(&again, &device.upload(&bar).unwrap())
+            .unwrap();
+        assert_eq!(device.download(&bars.points).unwrap(), found_bar);
+    }
+}
+
+/// Cotangents of φ near the surface, where the closest triangle does not jump.
+fn weights<T: Scalar>(phi: &[T], spacing: f64) -> Vec<T> {
+    let mut numbers = Numbers(11);
+    phi.iter()
+        .map(|&phi| {
+            let weight = numbers.signed();
+            let near = Real::f64(phi).abs() < 1.5 * spacing;
+            real(if near { weight } else { 0.0 })
+        })
+        .collect()
+}
+
+#[test]
+fn points_outside_the_grid_are_named() {
+    fn check<R: Runtime>(device: &Device<R>) {
+        let cloud = cloud::<f32>("torus", 500);
+        let grid = Grid::new([0.0; 3], 0.1, [12, 12, 12]).unwrap();
+        let plan = pipeline::Reconstructor::new(device.clone(), grid, Default::default()).unwrap();
+        let held = Held::find(device, &cloud, Radius::Auto, &Method::Auto).unwrap();
+        let points = device.upload(cloud.points().as_flattened()).unwrap();
+        match plan.reconstruct(&points, &held) {
+            Err(Error::Outside { count, first }) => assert!(count > 100 && first < 500),
+            other => panic!("{:?}", other.err()),
+        }
+    }
+    on_each_device!(check);
+}
