@@ -62,6 +62,16 @@ pub enum Error {
         /// The length that fits.
         expected: usize,
     },
+    /// An axis of a grid is longer than its transform can number.
+    #[error(
+        "an axis of {cells} cells is more than the {limit} that can be transformed; use a coarser grid, or the CPU"
+    )]
+    Axis {
+        /// Cells of the axis.
+        cells: usize,
+        /// Most that it may have.
+        limit: usize,
+    },
     /// The smoothing is negative or not finite.
     #[error("the smoothing is {smoothing} cells; it must be finite and 0 or more")]
     Smoothing {

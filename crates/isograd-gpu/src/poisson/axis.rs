@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use cubecl::prelude::Runtime;
 
 use super::gain::Gains;
-use super::lines;
+use super::{lines, products};
 use crate::{Buffer, Device, Error, Scalar};
 
 /// The largest prime factor that is left to the transforms of lines: its pass takes a time that grows with
@@ -82,6 +82,12 @@ impl<T: Scalar> Axis<T> {
     }
 
     pub(super) fn by_products<R: Runtime>(device: &Device<R>, n: usize) -> Result<Self, Error> {
+        if n > products::LONGEST {
+            return Err(Error::Axis {
+                cells: n,
+                limit: products::LONGEST,
+            });
+        }
         let cosine = |t: usize| T::of(2.0 * (PI * t as f64 / (2 * n) as f64).cos());
         let cosines: Vec<T> = (0..4 * n).map(cosine).collect();
         let way = Way::Products(Products {

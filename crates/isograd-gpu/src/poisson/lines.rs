@@ -378,7 +378,8 @@ fn next_place(tile: &Tile, j: usize) -> usize {
 /// Even places first, then odd places backwards.
 #[cube]
 fn makhoul(j: usize, n: usize) -> usize {
-    select(j % 2 == 0, j / 2, n - j.div_ceil(2))
+    let odd = j % 2;
+    select(odd == 1, n - j.div_ceil(2), j / 2)
 }
 
 /// Reads the tile into the first half of the shared memory. Lines that don't exist are 0.

@@ -105,7 +105,8 @@ impl<T: Scalar> Solver<T> {
     /// For grids of `(nx, ny, nz)` cells, of any size, primes included.
     ///
     /// # Errors
-    /// [`Error::NoNumber`] if the device doesn't calculate in `T`.
+    /// [`Error::NoNumber`] if the device doesn't calculate in `T`, or [`Error::Axis`] for an axis of more than
+    /// 741,455 cells.
     pub fn new<R: Runtime>(device: &Device<R>, shape: [usize; 3]) -> Result<Self, Error> {
         Self::of_axes(device, shape, Axis::new)
     }

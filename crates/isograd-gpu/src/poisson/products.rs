@@ -28,8 +28,11 @@ const DEPTH: usize = 16;
 /// Distance in shared memory from one term to the next: not a multiple of the number of banks.
 const PITCH: usize = SIDE + 1;
 
-/// Lines so long that products of two of their places don't fit in 32 bits.
+/// Above this many cells of a line, products of two of its places don't fit in 32 bits.
 const LONG: usize = 46_340;
+
+/// Above this many, a 256th of that doesn't, either.
+pub(super) const LONGEST: usize = 741_455;
 
 impl<T: Scalar> Products<T> {
     /// Lines → cosine transforms, times the gains.
@@ -403,5 +406,38 @@ fn load_lines<F: Float>(
             }
         }
         right[own_term * PITCH + own_line] = value;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_of_long_lines_are_products_modulo_four_lines() {
+        for n in [LONG + 1, 100_003, LONGEST] {
+            let lines = Lines {
+                n,
+                step: 1,
+                count: 1,
+            };
+            let kind = kind(lines, false);
+            assert!(kind.long);
+            for (k, j) in [
+                (0, 5),
+                (n - 1, n / 2),
+                (n / 3, n / 5),
+                (255, 1),
+                (256, n - 1),
+            ] {
+                let plain = k as u128 * (2 * j as u128 + 1) % (4 * n as u128);
+                assert_eq!(angle(k, j, n, kind) as u128, plain);
+                // In 32 bits, the largest numbers on the way to it.
+                let odd = u32::try_from(2 * j + 1).unwrap();
+                let part = (k as u32 / 256).checked_mul(odd).unwrap();
+                let high = (part % (4 * n as u32)).checked_mul(256).unwrap();
+                assert!(high.checked_add(k as u32 % 256 * odd).is_some());
+            }
+        }
     }
 }

@@ -259,6 +259,9 @@ fn what_does_not_fit_is_refused_and_no_cells_are_solved() {
         let refused = pullback(device, &solver, &residual, &cotangent);
         assert!(matches!(refused, Err(Error::Length { found: 61, .. })));
 
+        let refused = Solver::<f32>::new(device, [1, 800_011, 1]);
+        assert!(matches!(refused, Err(Error::Axis { cells: 800_011, .. })));
+
         let solver = Solver::<f32>::new(device, [0, 4, 5]).unwrap();
         let none = device.empty(0).unwrap();
         let (chi, residual) = forward(device, &solver, &none, 1.0).unwrap();
