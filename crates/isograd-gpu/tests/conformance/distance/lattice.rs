@@ -46,7 +46,9 @@ fn check_meshes_in<R: Runtime, T: Scalar>(device: &Device<R>) {
     let fine = grid::<T>([0.1, 0.2, -0.3], 0.004, [17, 33, 5]);
     let far = grid::<T>([-9.0, -8.0, 3.0], 0.9, [20, 19, 18]);
     let along = grid::<T>([-0.2, -0.3, -0.2], 0.025, [56, 24, 16]);
+    let long = grid::<T>([-1.0, -0.2, 0.1], 0.01, [400, 3, 5]);
     for (name, mesh, grid) in [
+        ("torus", meshes::torus::<T>(90, 31), long),
         ("torus", meshes::torus::<T>(90, 31), coarse),
         ("torus", meshes::torus(90, 31), far),
         ("fish", meshes::fish(12), along),
