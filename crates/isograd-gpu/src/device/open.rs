@@ -83,10 +83,8 @@ mod cuda {
                 reason,
                 remedy: REMEDY,
             })?;
-            Ok(Self::new(
-                CudaRuntime::client(&CudaDevice::new(index)),
-                name,
-            ))
+            let client = CudaRuntime::client(&CudaDevice::new(index));
+            Ok(Self::new(client, name).with_f64())
         }
     }
 

@@ -12,7 +12,7 @@ use recorder::{Paper, Recorder, sources};
 
 #[test]
 fn every_kernel_becomes_ptx() {
-    let device = Device::new(Recorder::client(&Paper), "an H100 on paper".into());
+    let device = Device::new(Recorder::client(&Paper), "an H100 on paper".into()).with_f64();
     stages::launch_all::<f32>(&device);
     stages::launch_all::<f64>(&device);
     device.wait().unwrap();
