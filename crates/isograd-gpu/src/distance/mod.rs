@@ -11,7 +11,7 @@
 //! The closest face of every cell. The barycentric weights `β` of the closest point follow from it.
 //!
 //! # Pullback
-//! [`lattice::pullback`]. By the envelope theorem, with `β` held constant: `ȳ_k += −β_k φ̄ ∇φ`, with
+//! [`lattice::pullback`], and [`query::pullback`] with `q̄ += φ̄ ∇φ` for the points. By the envelope theorem, with `β` held constant: `ȳ_k += −β_k φ̄ ∇φ`, with
 //! `∇φ = σ (q − y)/|q − y|`, or the normal of the face at distance 0. Every sum is cut into pieces of a fixed
 //! size, however many cells have the same closest face.
 //!
@@ -28,6 +28,7 @@ mod morton;
 pub mod query;
 mod search;
 mod settle;
+mod shares;
 mod tree;
 mod triangle;
 mod vector;

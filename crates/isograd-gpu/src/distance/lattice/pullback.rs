@@ -7,18 +7,15 @@ use cubecl::prelude::*;
 
 use super::super::Error;
 use super::super::search::centre;
+use super::super::shares::{FACE, add_share, by_face, gather_corners};
 use super::super::triangle::{closest, corners};
-use super::super::vector::{Vector3, choose, direction, dot, scale};
+use super::super::vector::{Vector3, dot, scale};
 use super::{Cotangents, Residual};
 use crate::device::check_length;
-use crate::primitives::segments::{NO_SEGMENT, Pieces, Rows, join_pieces, sum_rows};
-use crate::primitives::sort;
+use crate::primitives::segments::{NO_SEGMENT, Rows, join_pieces, sum_rows};
 use crate::{Buffer, Device, Scalar};
 
 const BLOCK: u32 = 64;
-
-/// Numbers that a face has: the cotangents of its three corners, and what its cells are worth for the cell size.
-const FACE: usize = 10;
 
 /// Pulls the cotangents `phi_bar` of the distances, in memory order, back to the vertices and the grid. Cells
 /// beyond the band count for nothing: there `φ` is constant.
@@ -37,7 +34,7 @@ pub fn pullback<T: Scalar, R: Runtime>(
     )?;
     let of_faces = pull_faces(device, residual, phi_bar)?;
     Ok(Cotangents {
-        vertices: gather_corners(device, residual, &of_faces)?,
+        vertices: gather_corners(device, &residual.mesh, &of_faces)?,
         grid: total(device, &of_faces)?,
     })
 }
@@ -49,20 +46,7 @@ fn pull_faces<T: Scalar, R: Runtime>(
     phi_bar: &Buffer<T>,
 ) -> Result<Buffer<T>, Error> {
     let (mesh, grid) = (&residual.mesh, &residual.grid);
-    let faces = mesh.faces.len() as u32 / 3;
-    let keys = device.empty(grid.cells())?;
-    key_cells::launch::<T, R>(
-        device.client(),
-        device.groups(grid.cells(), BLOCK),
-        CubeDim::new_1d(BLOCK),
-        residual.closest.arg(),
-        phi_bar.arg(),
-        keys.arg(),
-        faces,
-    );
-    let cells = sort::order(device, &keys, faces + 1)?;
-    let starts = sort::starts(device, &cells.keys, faces)?;
-    let pieces = Pieces::new(device, &starts, grid.cells())?;
+    let (cells, pieces) = by_face(device, mesh, &residual.closest, phi_bar)?;
     let sums = device.empty(pieces.most() * FACE)?;
     let ([x, y, z], [_, ny, nz]) = (grid.lower(), grid.shape());
     pull_cells::launch::<T, R>(
@@ -73,7 +57,7 @@ fn pull_faces<T: Scalar, R: Runtime>(
         mesh.faces.arg(),
         residual.phi.arg(),
         phi_bar.arg(),
-        cells.places.arg(),
+        cells.arg(),
         pieces.table.arg(),
         sums.arg(),
         x,
@@ -85,32 +69,6 @@ fn pull_faces<T: Scalar, R: Runtime>(
         pieces.most() as u32,
     );
     Ok(join_pieces(device, sums, FACE, pieces, grid.cells())?)
-}
-
-/// The sum over the corners at each vertex, `(V, 3)`.
-fn gather_corners<T: Scalar, R: Runtime>(
-    device: &Device<R>,
-    residual: &Residual<T>,
-    of_faces: &Buffer<T>,
-) -> Result<Buffer<T>, Error> {
-    let mesh = &residual.mesh;
-    let vertices = mesh.vertices.len() as u32 / 3;
-    let corners = sort::order(device, &mesh.faces, vertices)?;
-    let starts = sort::starts(device, &corners.keys, vertices)?;
-    let rows = Rows {
-        width: 3,
-        group: 3,
-        pitch: FACE,
-    };
-    let (places, count) = (&corners.places, corners.places.len());
-    Ok(sum_rows(
-        device,
-        of_faces,
-        rows,
-        Some(places),
-        &starts,
-        count,
-    )?)
 }
 
 /// The sum over all faces, as the cotangent of the grid. The weights of a point have the sum 1, so that what
@@ -141,18 +99,6 @@ fn name_total<F: Float>(sum: &Array<F>, grid_bar: &mut Array<F>) {
     }
     if ABSOLUTE_POS == 3 {
         grid_bar[3] = sum[9];
-    }
-}
-
-/// The closest face of each cell whose cotangent counts; else one past the last.
-#[cube(launch)]
-fn key_cells<F: Float>(found: &Array<u32>, phi_bar: &Array<F>, keys: &mut Array<u32>, faces: u32) {
-    if ABSOLUTE_POS < keys.len() {
-        let mut key = faces;
-        if !(phi_bar[ABSOLUTE_POS] == F::new(0.0)) {
-            key = min(found[ABSOLUTE_POS], faces);
-        }
-        keys[ABSOLUTE_POS] = key;
     }
 }
 
@@ -187,11 +133,7 @@ fn pull_cells<F: Float + CubeElement>(
                 let place = centre::<F>(cell, F::new(1.0), ny, nz);
                 let found = closest::<F>(t, scale::<F>(place, spacing));
                 let inside = phi[cell as usize] < F::new(0.0);
-                let slope = gradient::<F>(found.offset, found.normal, inside);
-                let pull = scale::<F>(slope, phi_bar[cell as usize]);
-                take::<F>(&mut sum, 0usize, scale::<F>(pull, found.weights.x));
-                take::<F>(&mut sum, 3usize, scale::<F>(pull, found.weights.y));
-                take::<F>(&mut sum, 6usize, scale::<F>(pull, found.weights.z));
+                let pull = add_share::<F>(&mut sum, found, inside, phi_bar[cell as usize]);
                 sum[9] += dot::<F>(place, pull);
             }
             for number in 0..10usize {
@@ -199,21 +141,4 @@ fn pull_cells<F: Float + CubeElement>(
             }
         }
     }
-}
-
-/// Takes a vector off the three numbers from `at` on.
-#[cube]
-fn take<F: Float>(sum: &mut Array<F>, at: usize, less: Vector3<F>) {
-    sum[at] -= less.x;
-    sum[at + 1] -= less.y;
-    sum[at + 2] -= less.z;
-}
-
-/// `∇φ`: away from the closest point outside, towards it inside, and the normal of the face at distance 0.
-#[cube]
-fn gradient<F: Float>(offset: Vector3<F>, normal: Vector3<F>, inside: bool) -> Vector3<F> {
-    let away = direction::<F>(offset);
-    let sign = select(inside, F::new(-1.0), F::new(1.0));
-    let on_mesh = dot::<F>(away, away) == F::new(0.0);
-    choose::<F>(on_mesh, normal, scale::<F>(away, sign))
 }

@@ -92,3 +92,67 @@ fn check_no_points<R: Runtime>(device: &Device<R>) {
     let error = query::forward(device, &mesh, &ragged).unwrap_err();
     assert!(matches!(error, Error::Triples { length: 4, .. }), "{error}");
 }
+
+#[test]
+fn cotangents_of_points_are_those_of_the_cpu() {
+    on_each_device!(check_pullback);
+}
+
+/// With the device's own faces; `isograd`'s query has signs, which the cotangents are given here as well.
+fn check_pullback<R: Runtime>(device: &Device<R>) {
+    let mesh = meshes::torus::<f32>(60, 21);
+    let mut numbers = Numbers(3);
+    let points: Vec<[f32; 3]> = (0..5000)
+        .map(|_| [(); 3].map(|()| 1.2 * numbers.signed() as f32))
+        .collect();
+    let on_cpu = isograd::distance::Query::new(mesh.clone()).unwrap();
+    let mut hits = on_cpu.query(&points, None);
+    // Close to an edge the direction to it is no better than ε over the distance.
+    let mut weigh = |hit: &isograd::distance::Hit<f32>| {
+        let far = hit.distance.abs() > 0.02;
+        if far { numbers.signed() as f32 } else { 0.0 }
+    };
+    let bar: Vec<f32> = hits.iter().map(&mut weigh).collect();
+    let on_device = upload(device, &mesh);
+    let places = device.upload(points.as_flattened()).unwrap();
+    let found = query::forward(device, &on_device, &places).unwrap();
+    let signed: Vec<f32> = bar
+        .iter()
+        .zip(&hits)
+        .map(|(b, hit)| b * hit.distance.signum())
+        .collect();
+    let signed = device.upload(&signed).unwrap();
+    let bars = query::pullback(device, &on_device, &places, &found, &signed).unwrap();
+    let triangles = device.download(&found.triangles).unwrap();
+    for ((hit, &face), &q) in hits.iter_mut().zip(&triangles).zip(&points) {
+        let corners = mesh.corners(face as usize).map(|p| p.map(f64::from));
+        let on_face = closest_point(q.map(f64::from), corners);
+        let sign = f64::from(hit.distance.signum());
+        hit.triangle = face;
+        hit.gradient = on_face.offset.map(|x| (sign * x / on_face.distance) as f32);
+        hit.barycentric = on_face.barycentric.map(|b| b as f32);
+    }
+    let (mut points_bar, mut vertices_bar) = (Vec::new(), Vec::new());
+    on_cpu
+        .pullback(
+            &points,
+            &hits,
+            &bar,
+            None,
+            &mut points_bar,
+            &mut vertices_bar,
+        )
+        .unwrap();
+    for (found, expected) in [(bars.points, points_bar), (bars.vertices, vertices_bar)] {
+        let found = device.download(&found).unwrap();
+        assert_eq!(found.len(), 3 * expected.len());
+        let largest = expected
+            .as_flattened()
+            .iter()
+            .fold(0.0f32, |m, x| m.max(x.abs()));
+        assert!(largest > 0.5);
+        for (a, b) in found.iter().zip(expected.as_flattened()) {
+            assert!((a - b).abs() <= 1e-4 * largest, "{a} for {b}");
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! What queries give the corners of their closest faces, and what vertices get of it.
+
+use cubecl::prelude::*;
+
+use super::triangle::Closest;
+use super::vector::{Vector3, choose, direction, dot, scale};
+use super::{Error, Mesh};
+use crate::primitives::segments::{Pieces, Rows, sum_rows};
+use crate::primitives::sort;
+use crate::{Buffer, Device, Scalar};
+
+const BLOCK: u32 = 64;
+
+/// Numbers that a face has: the cotangents of its three corners, and one for the caller.
+pub(super) const FACE: usize = 10;
+
+/// The queries in the order of their closest faces, without those whose cotangent is zero, and the pieces that
+/// they are summed in.
+pub(super) fn by_face<T: Scalar, R: Runtime>(
+    device: &Device<R>,
+    mesh: &Mesh<T>,
+    closest: &Buffer<u32>,
+    bar: &Buffer<T>,
+) -> Result<(Buffer<u32>, Pieces), Error> {
+    let (count, faces) = (closest.len(), mesh.faces.len() as u32 / 3);
+    let keys = device.empty(count)?;
+    key_queries::launch::<T, R>(
+        device.client(),
+        device.groups(count, BLOCK),
+        CubeDim::new_1d(BLOCK),
+        closest.arg(),
+        bar.arg(),
+        keys.arg(),
+        faces,
+    );
+    let order = sort::order(device, &keys, faces + 1)?;
+    let starts = sort::starts(device, &order.keys, faces)?;
+    let pieces = Pieces::new(device, &starts, count)?;
+    Ok((order.places, pieces))
+}
+
+/// The sum over the corners at each vertex, `(V, 3)`.
+pub(super) fn gather_corners<T: Scalar, R: Runtime>(
+    device: &Device<R>,
+    mesh: &Mesh<T>,
+    of_faces: &Buffer<T>,
+) -> Result<Buffer<T>, Error> {
+    let vertices = mesh.vertices.len() as u32 / 3;
+    let corners = sort::order(device, &mesh.faces, vertices)?;
+    let starts = sort::starts(device, &corners.keys, vertices)?;
+    let rows = Rows {
+        width: 3,
+        group: 3,
+        pitch: FACE,
+    };
+    let (places, count) = (&corners.places, corners.places.len());
+    Ok(sum_rows(
+        device,
+        of_faces,
+        rows,
+        Some(places),
+        &starts,
+        count,
+    )?)
+}
+
+/// The closest face of each query whose cotangent counts; else one past the last.
+#[cube(launch)]
+fn key_queries<F: Float>(
+    found: &Array<u32>,
+    phi_bar: &Array<F>,
+    keys: &mut Array<u32>,
+    faces: u32,
+) {
+    if ABSOLUTE_POS < keys.len() {
+        let mut key = faces;
+        if !(phi_bar[ABSOLUTE_POS] == F::new(0.0)) {
+            key = min(found[ABSOLUTE_POS], faces);
+        }
+        keys[ABSOLUTE_POS] = key;
+    }
+}
+
+/// Takes a vector off the three numbers from `at` on.
+#[cube]
+fn take<F: Float>(sum: &mut Array<F>, at: usize, less: Vector3<F>) {
+    sum[at] -= less.x;
+    sum[at + 1] -= less.y;
+    sum[at + 2] -= less.z;
+}
+
+/// Adds what one query gives the corners of its face, `−β_k φ̄ ∇φ`, and returns `φ̄ ∇φ`.
+#[cube]
+pub(super) fn add_share<F: Float>(
+    sum: &mut Array<F>,
+    found: Closest<F>,
+    inside: bool,
+    bar: F,
+) -> Vector3<F> {
+    let slope = gradient::<F>(found.offset, found.normal, inside);
+    let pull = scale::<F>(slope, bar);
+    take::<F>(sum, 0usize, scale::<F>(pull, found.weights.x));
+    take::<F>(sum, 3usize, scale::<F>(pull, found.weights.y));
+    take::<F>(sum, 6usize, scale::<F>(pull, found.weights.z));
+    pull
+}
+
+/// `∇φ`: away from the closest point outside, towards it inside, and the normal of the face at distance 0.
+#[cube]
+pub(super) fn gradient<F: Float>(
+    offset: Vector3<F>,
+    normal: Vector3<F>,
+    inside: bool,
+) -> Vector3<F> {
+    let away = direction::<F>(offset);
+    let sign = select(inside, F::new(-1.0), F::new(1.0));
+    let on_mesh = dot::<F>(away, away) == F::new(0.0);
+    choose::<F>(on_mesh, normal, scale::<F>(away, sign))
+}
