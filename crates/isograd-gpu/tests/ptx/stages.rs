@@ -131,7 +131,8 @@ fn distances<T: Scalar>(device: &Device<Recorder>) {
         let (phi, residual) = lattice::forward(device, &mesh, &grid(), &chi, &level, band).unwrap();
         lattice::pullback(device, &residual, &phi).unwrap();
     }
-    query::forward(device, &mesh, &mesh.vertices).unwrap();
+    let hits = query::forward(device, &mesh, &mesh.vertices).unwrap();
+    query::pullback(device, &mesh, &mesh.vertices, &hits, &hits.distances).unwrap();
 }
 
 fn whole<T: Scalar>(device: &Device<Recorder>) {
