@@ -17,7 +17,8 @@ use cubecl::prelude::*;
 
 use crate::device::check_length;
 use crate::element::plane;
-use crate::neighbors::{BLOCK, Neighborhoods, Vector3, end_of_leaf, first_of_leaf, next_leaf};
+use crate::neighbors::{BLOCK, Neighborhoods, end_of_leaf, first_of_leaf, next_leaf};
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// What the pullback needs of [`forward`].

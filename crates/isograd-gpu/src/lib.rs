@@ -26,6 +26,7 @@ pub mod poisson;
 pub mod primitives;
 pub mod splat;
 mod spread;
+mod vector;
 
 #[cfg(feature = "cuda")]
 pub use device::Cuda;

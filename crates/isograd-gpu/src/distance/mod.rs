@@ -31,7 +31,6 @@ mod settle;
 mod shares;
 mod tree;
 mod triangle;
-mod vector;
 
 pub use isograd::distance::{Band, NO_TRIANGLE};
 

@@ -3,9 +3,9 @@
 use cubecl::prelude::*;
 
 use super::triangle::corners;
-use super::vector::{Vector3, load};
 use super::{Error, Mesh};
 use crate::primitives::sort;
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
 /// Units of a group.
@@ -186,6 +186,6 @@ fn code_centres<F: Float + CubeElement>(
 #[cube(launch)]
 fn code_points<F: Float>(points: &Array<F>, bounds: &Array<F>, codes: &mut Array<u32>) {
     if ABSOLUTE_POS < codes.len() {
-        codes[ABSOLUTE_POS] = morton::<F>(load::<F>(points, ABSOLUTE_POS as u32), bounds);
+        codes[ABSOLUTE_POS] = morton::<F>(Vector3::<F>::at(points, ABSOLUTE_POS), bounds);
     }
 }

@@ -5,10 +5,10 @@ use cubecl::prelude::*;
 use super::shares::{FACE, add_share, by_face, gather_corners, gradient};
 use super::tree::Tree;
 use super::triangle::{closest, combine, corners};
-use super::vector::{load, norm, zero};
 use super::{Error, Mesh, search};
 use crate::device::check_length;
 use crate::primitives::segments::{NO_SEGMENT, join_pieces};
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
 const BLOCK: u32 = 64;
@@ -141,9 +141,14 @@ fn measure_points<F: Float>(
     barycentric: &mut Array<F>,
 ) {
     if ABSOLUTE_POS < triangles.len() {
-        let t = corners::<F>(vertices, faces, triangles[ABSOLUTE_POS], zero::<F>());
-        let found = closest::<F>(t, load::<F>(points, ABSOLUTE_POS as u32));
-        distances[ABSOLUTE_POS] = norm::<F>(found.offset);
+        let t = corners::<F>(
+            vertices,
+            faces,
+            triangles[ABSOLUTE_POS],
+            Vector3::<F>::zero(),
+        );
+        let found = closest::<F>(t, Vector3::<F>::at(points, ABSOLUTE_POS));
+        distances[ABSOLUTE_POS] = found.offset.norm();
         let place = combine::<F>(t, found.weights);
         let at = ABSOLUTE_POS * 3;
         on_mesh[at] = place.x;
@@ -165,8 +170,13 @@ fn pull_to_points<F: Float>(
     points_bar: &mut Array<F>,
 ) {
     if ABSOLUTE_POS < triangles.len() {
-        let t = corners::<F>(vertices, faces, triangles[ABSOLUTE_POS], zero::<F>());
-        let found = closest::<F>(t, load::<F>(points, ABSOLUTE_POS as u32));
+        let t = corners::<F>(
+            vertices,
+            faces,
+            triangles[ABSOLUTE_POS],
+            Vector3::<F>::zero(),
+        );
+        let found = closest::<F>(t, Vector3::<F>::at(points, ABSOLUTE_POS));
         let slope = gradient::<F>(found.offset, found.normal, false);
         let at = ABSOLUTE_POS * 3;
         points_bar[at] = slope.x * bar[ABSOLUTE_POS];
@@ -190,14 +200,14 @@ fn pull_to_faces<F: Float>(
     if ABSOLUTE_POS < most as usize {
         let face = table[ABSOLUTE_POS * 3];
         if face != NO_SEGMENT {
-            let t = corners::<F>(vertices, faces, face, zero::<F>());
+            let t = corners::<F>(vertices, faces, face, Vector3::<F>::zero());
             let mut sum = Array::<F>::new(10usize);
             for number in 0..10usize {
                 sum[number] = F::new(0.0);
             }
             for element in table[ABSOLUTE_POS * 3 + 1]..table[ABSOLUTE_POS * 3 + 2] {
                 let point = order[element as usize];
-                let found = closest::<F>(t, load::<F>(points, point));
+                let found = closest::<F>(t, Vector3::<F>::at(points, point as usize));
                 add_share::<F>(&mut sum, found, false, bar[point as usize]);
             }
             for number in 0..10usize {

@@ -13,8 +13,8 @@ use super::morton::point_order;
 use super::settle::{Queries, settle};
 use super::tree::{LEAF, NONE, Tree};
 use super::triangle::{distance_squared, load_frame};
-use super::vector::{Vector3, load};
 use super::{Error, FAR};
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
 /// Cells along the side of a brick, and units of a group, one a cell.
@@ -149,8 +149,8 @@ pub(super) fn points<T: Scalar, R: Runtime>(
 /// Squared distance from a place to the box whose low corner is vector `at` of `boxes`.
 #[cube]
 pub(super) fn box_distance_squared<F: Float>(boxes: &Array<F>, at: u32, q: Vector3<F>) -> F {
-    let low = load::<F>(boxes, at);
-    let high = load::<F>(boxes, at + 1u32);
+    let low = Vector3::<F>::at(boxes, at as usize);
+    let high = Vector3::<F>::at(boxes, (at + 1u32) as usize);
     let zero = F::new(0.0);
     let x = max(max(low.x - q.x, q.x - high.x), zero);
     let y = max(max(low.y - q.y, q.y - high.y), zero);
@@ -325,7 +325,7 @@ fn nearest_of_points<F: Float + CubeElement>(
 ) {
     if ABSOLUTE_POS < found.len() {
         let point = order[ABSOLUTE_POS];
-        let q = load::<F>(points, point);
+        let q = Vector3::<F>::at(points, point as usize);
         let place = nearest::<F>(boxes, children, frames, faces, q, bound, NONE.runtime());
         let mut result = place;
         if place < UNPROVEN {

@@ -6,8 +6,8 @@ use super::Error;
 use super::search::{Level, NOTHING_YET, UNPROVEN, box_distance_squared, centre};
 use super::tree::{NONE, Tree};
 use super::triangle::{distance_squared, load_frame};
-use super::vector::{Vector3, load};
 use crate::primitives::scan::exclusive_sum;
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
 /// Units of a group that looks for what is left.
@@ -133,7 +133,7 @@ fn settle_left<F: Float + CubeElement>(
     while turn < count {
         let query = left[turn as usize];
         let q = if comptime!(of_points) {
-            load::<F>(points, query)
+            Vector3::<F>::at(points, query as usize)
         } else {
             centre::<F>(query, spacing, ny, nz)
         };

@@ -3,10 +3,10 @@
 use cubecl::prelude::*;
 
 use super::triangle::Closest;
-use super::vector::{Vector3, choose, direction, dot, scale};
 use super::{Error, Mesh};
 use crate::primitives::segments::{Pieces, Rows, sum_rows};
 use crate::primitives::sort;
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
 const BLOCK: u32 = 64;
@@ -98,10 +98,10 @@ pub(super) fn add_share<F: Float>(
     bar: F,
 ) -> Vector3<F> {
     let slope = gradient::<F>(found.offset, found.normal, inside);
-    let pull = scale::<F>(slope, bar);
-    take::<F>(sum, 0usize, scale::<F>(pull, found.weights.x));
-    take::<F>(sum, 3usize, scale::<F>(pull, found.weights.y));
-    take::<F>(sum, 6usize, scale::<F>(pull, found.weights.z));
+    let pull = slope.scale(bar);
+    take::<F>(sum, 0usize, pull.scale(found.weights.x));
+    take::<F>(sum, 3usize, pull.scale(found.weights.y));
+    take::<F>(sum, 6usize, pull.scale(found.weights.z));
     pull
 }
 
@@ -112,8 +112,8 @@ pub(super) fn gradient<F: Float>(
     normal: Vector3<F>,
     inside: bool,
 ) -> Vector3<F> {
-    let away = direction::<F>(offset);
+    let away = offset.direction();
     let sign = select(inside, F::new(-1.0), F::new(1.0));
-    let on_mesh = dot::<F>(away, away) == F::new(0.0);
-    choose::<F>(on_mesh, normal, scale::<F>(away, sign))
+    let on_mesh = away.dot(away) == F::new(0.0);
+    normal.choose(on_mesh, away.scale(sign))
 }

@@ -10,8 +10,8 @@ use cubecl::prelude::*;
 
 use super::morton::{bounds, face_order};
 use super::triangle::{FRAME, corners, frame, store_frame};
-use super::vector::Vector3;
 use super::{Error, Mesh};
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
 /// Units of a group.

@@ -7,7 +7,7 @@
 
 use cubecl::prelude::*;
 
-use super::vector::{Vector3, add, choose, cross, direction, dot, load, norm, scale, sub};
+use crate::vector::Vector3;
 
 /// Numbers of a frame in memory: origin, `u`, `v`, foot, back, height.
 pub(super) const FRAME: usize = 12;
@@ -55,25 +55,25 @@ pub(super) fn corners<F: Float>(
     origin: Vector3<F>,
 ) -> Corners<F> {
     let at = face as usize * 3;
-    let a = load::<F>(vertices, faces[at]);
-    let b = load::<F>(vertices, faces[at + 1]);
-    let c = load::<F>(vertices, faces[at + 2]);
+    let a = Vector3::<F>::at(vertices, faces[at] as usize);
+    let b = Vector3::<F>::at(vertices, faces[at + 1] as usize);
+    let c = Vector3::<F>::at(vertices, faces[at + 2] as usize);
     Corners::<F> {
-        a: sub::<F>(a, origin),
-        b: sub::<F>(b, origin),
-        c: sub::<F>(c, origin),
-        ab: sub::<F>(b, a),
-        bc: sub::<F>(c, b),
-        ca: sub::<F>(a, c),
+        a: a.sub(origin),
+        b: b.sub(origin),
+        c: c.sub(origin),
+        ab: b.sub(a),
+        bc: c.sub(b),
+        ca: a.sub(c),
     }
 }
 
 /// Which corner the longest edge begins at: the first of equals.
 #[cube]
 fn first_corner<F: Float>(t: Corners<F>) -> u32 {
-    let ab = dot::<F>(t.ab, t.ab);
-    let bc = dot::<F>(t.bc, t.bc);
-    let ca = dot::<F>(t.ca, t.ca);
+    let ab = t.ab.dot(t.ab);
+    let bc = t.bc.dot(t.bc);
+    let ca = t.ca.dot(t.ca);
     let first = select(bc > ab, 1u32, 0u32);
     select(ca > max(ab, bc), 2u32, first)
 }
@@ -93,7 +93,7 @@ fn turned<F: Float>(t: Corners<F>, first: u32) -> Corners<F> {
 
 #[cube]
 fn one_of<F: Float>(which: u32, a: Vector3<F>, b: Vector3<F>, c: Vector3<F>) -> Vector3<F> {
-    choose::<F>(which == 0u32, a, choose::<F>(which == 1u32, b, c))
+    a.choose(which == 0u32, b.choose(which == 1u32, c))
 }
 
 /// The frame of a triangle.
@@ -105,29 +105,29 @@ pub(super) fn frame<F: Float>(corners: Corners<F>) -> Frame<F> {
 /// The frame of a triangle whose longest edge runs from its first corner to its second.
 #[cube]
 fn frame_of_turned<F: Float>(t: Corners<F>) -> Frame<F> {
-    let base = norm::<F>(t.ab);
+    let base = t.ab.norm();
     let along_x = Vector3::<F> {
         x: F::new(1.0),
         y: F::new(0.0),
         z: F::new(0.0),
     };
-    let u = choose::<F>(base > F::new(0.0), direction::<F>(t.ab), along_x);
+    let u = t.ab.direction().choose(base > F::new(0.0), along_x);
     // From the nearer end of the base, where a needle keeps its direction.
-    let left = dot::<F>(t.ca, t.ca) <= dot::<F>(t.bc, t.bc);
-    let to_apex = choose::<F>(left, scale::<F>(t.ca, F::new(-1.0)), t.bc);
-    let run = dot::<F>(u, to_apex);
+    let left = t.ca.dot(t.ca) <= t.bc.dot(t.bc);
+    let to_apex = t.ca.scale(F::new(-1.0)).choose(left, t.bc);
+    let run = u.dot(to_apex);
     let zero = F::new(0.0);
     let foot = max(select(left, run, base + run), zero);
     let back = max(select(left, base - run, -run), zero);
-    let rest = sub::<F>(to_apex, scale::<F>(u, run));
+    let rest = to_apex.sub(u.scale(run));
     // Once more: what the first time leaves is a rounding error that a thin triangle would see. Where little
     // remains, the rest was nothing but that error: then any direction across `u`, and no height.
-    let up = sub::<F>(rest, scale::<F>(u, dot::<F>(u, rest)));
-    let length = norm::<F>(up);
-    let has_area = length > F::new(0.5) * norm::<F>(rest);
-    let along = direction::<F>(up);
-    let straight = direction::<F>(sub::<F>(along, scale::<F>(u, dot::<F>(u, along))));
-    let v = choose::<F>(has_area, straight, any_across::<F>(u));
+    let up = rest.sub(u.scale(u.dot(rest)));
+    let length = up.norm();
+    let has_area = length > F::new(0.5) * rest.norm();
+    let along = up.direction();
+    let straight = along.sub(u.scale(u.dot(along))).direction();
+    let v = straight.choose(has_area, any_across::<F>(u));
     let height = select(has_area, length, F::new(0.0));
     Frame::<F> {
         origin: t.a,
@@ -150,7 +150,7 @@ fn any_across<F: Float>(u: Vector3<F>) -> Vector3<F> {
         y: select(along_y, F::new(1.0), F::new(0.0)),
         z: select(along_x || along_y, F::new(0.0), F::new(1.0)),
     };
-    direction::<F>(cross::<F>(u, axis))
+    u.cross(axis).direction()
 }
 
 /// Writes a frame as number `index` of `frames`.
@@ -176,9 +176,9 @@ pub(super) fn load_frame<F: Float>(frames: &Array<F>, index: u32) -> Frame<F> {
     let first = index * 4u32;
     let at = index as usize * 12;
     Frame::<F> {
-        origin: load::<F>(frames, first),
-        u: load::<F>(frames, first + 1u32),
-        v: load::<F>(frames, first + 2u32),
+        origin: Vector3::<F>::at(frames, first as usize),
+        u: Vector3::<F>::at(frames, (first + 1u32) as usize),
+        v: Vector3::<F>::at(frames, (first + 2u32) as usize),
         foot: frames[at + 9],
         back: frames[at + 10],
         height: frames[at + 11],
@@ -240,9 +240,9 @@ fn planar<F: Float>(frame: Frame<F>, x: F, y: F) -> Planar<F> {
 /// Squared distance from `q`. Its error is a few `ε` times that distance and the one to the frame's origin.
 #[cube]
 pub(super) fn distance_squared<F: Float>(frame: Frame<F>, q: Vector3<F>) -> F {
-    let p = sub::<F>(q, frame.origin);
-    let z = dot::<F>(cross::<F>(frame.u, frame.v), p);
-    let in_plane = planar::<F>(frame, dot::<F>(frame.u, p), dot::<F>(frame.v, p));
+    let p = q.sub(frame.origin);
+    let z = frame.u.cross(frame.v).dot(p);
+    let in_plane = planar::<F>(frame, frame.u.dot(p), frame.v.dot(p));
     z * z + in_plane.squared
 }
 
@@ -254,28 +254,28 @@ pub(super) fn closest<F: Float>(corners: Corners<F>, q: Vector3<F>) -> Closest<F
     let first = first_corner::<F>(corners);
     let t = turned::<F>(corners, first);
     let frame = frame_of_turned::<F>(t);
-    let p = sub::<F>(q, frame.origin);
-    let (x, y) = (dot::<F>(frame.u, p), dot::<F>(frame.v, p));
+    let p = q.sub(frame.origin);
+    let (x, y) = (frame.u.dot(p), frame.v.dot(p));
     let place = planar::<F>(frame, x, y);
     let w = weights::<F>(frame, place, x, y);
-    let normal = cross::<F>(frame.u, frame.v);
+    let normal = frame.u.cross(frame.v);
 
     let near_c = w.z > w.x && w.z > w.y;
     let near_b = !near_c && w.y > w.x;
-    let corner = choose::<F>(near_c, t.c, choose::<F>(near_b, t.b, t.a));
-    let from = sub::<F>(q, corner);
-    let edge = choose::<F>(place.on_base, t.ab, choose::<F>(place.on_left, t.ca, t.bc));
-    let unit = direction::<F>(edge);
+    let corner = t.c.choose(near_c, t.b.choose(near_b, t.a));
+    let from = q.sub(corner);
+    let edge = t.ab.choose(place.on_base, t.ca.choose(place.on_left, t.bc));
+    let unit = edge.direction();
     let on_edge = place.along > F::new(0.0) && place.along < F::new(1.0);
-    let from_edge = sub::<F>(from, scale::<F>(unit, dot::<F>(unit, from)));
-    let from_face = scale::<F>(normal, dot::<F>(normal, from));
-    let outside = choose::<F>(on_edge, from_edge, from);
-    let offset = choose::<F>(place.inside, from_face, outside);
+    let from_edge = from.sub(unit.scale(unit.dot(from)));
+    let from_face = normal.scale(normal.dot(from));
+    let outside = from_edge.choose(on_edge, from);
+    let offset = from_face.choose(place.inside, outside);
     let area = select(frame.height > F::new(0.0), F::new(1.0), F::new(0.0));
     Closest::<F> {
         weights: turned_back::<F>(w, first),
         offset,
-        normal: scale::<F>(normal, area),
+        normal: normal.scale(area),
     }
 }
 
@@ -318,7 +318,7 @@ fn turned_back<F: Float>(w: Vector3<F>, first: u32) -> Vector3<F> {
 /// `Σ β_k y_k`, from the first corner.
 #[cube]
 pub(super) fn combine<F: Float>(t: Corners<F>, weights: Vector3<F>) -> Vector3<F> {
-    let b = scale::<F>(t.ab, weights.y);
-    let c = scale::<F>(t.ca, weights.z);
-    add::<F>(t.a, sub::<F>(b, c))
+    let b = t.ab.scale(weights.y);
+    let c = t.ca.scale(weights.z);
+    t.a.add(b.sub(c))
 }

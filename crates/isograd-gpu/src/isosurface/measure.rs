@@ -21,6 +21,7 @@ use super::signs::{BLOCK, not_finite};
 use super::sums::{fold, groups_for, tree_sum};
 use crate::device::check_length;
 use crate::primitives::sort::{order, starts};
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// What there is to measure.
@@ -124,76 +125,24 @@ pub struct Triangles<F: Float + CubeElement> {
     bounds: Array<F>,
 }
 
-#[derive(CubeType, Clone, Copy)]
-struct Vector<F: Float + CubeElement> {
-    x: F,
-    y: F,
-    z: F,
-}
-
+/// The unit vector along `a`, or zero where that has no direction or is not finite.
 #[cube]
-fn minus<F: Float + CubeElement>(a: Vector<F>, b: Vector<F>) -> Vector<F> {
-    Vector::<F> {
-        x: a.x - b.x,
-        y: a.y - b.y,
-        z: a.z - b.z,
-    }
-}
-
-#[cube]
-fn dot<F: Float + CubeElement>(a: Vector<F>, b: Vector<F>) -> F {
-    a.x * b.x + a.y * b.y + a.z * b.z
-}
-
-#[cube]
-fn cross<F: Float + CubeElement>(a: Vector<F>, b: Vector<F>) -> Vector<F> {
-    Vector::<F> {
-        x: a.y * b.z - a.z * b.y,
-        y: a.z * b.x - a.x * b.z,
-        z: a.x * b.y - a.y * b.x,
-    }
-}
-
-/// The unit vector along `a`, or zero where that has no direction. Scaled by the largest component first, so that
-/// tiny vectors do not underflow.
-#[cube]
-fn unit<F: Float + CubeElement>(a: Vector<F>) -> Vector<F> {
-    let largest = max(F::abs(a.x), max(F::abs(a.y), F::abs(a.z)));
-    let mut unit = Vector::<F> {
-        x: F::new(0.0),
-        y: F::new(0.0),
-        z: F::new(0.0),
-    };
-    if largest > F::new(0.0) && not_finite::<F>(largest) == 0u32 {
-        let b = Vector::<F> {
-            x: a.x / largest,
-            y: a.y / largest,
-            z: a.z / largest,
-        };
-        let length = F::sqrt(dot::<F>(b, b));
-        unit.x = b.x / length;
-        unit.y = b.y / length;
-        unit.z = b.z / length;
-    }
-    unit
+fn unit<F: Float + CubeElement>(a: Vector3<F>) -> Vector3<F> {
+    let finite = not_finite::<F>(max(F::abs(a.x), max(F::abs(a.y), F::abs(a.z)))) == 0u32;
+    a.choose(finite, Vector3::<F>::zero()).direction()
 }
 
 /// Corner `k` of a face.
 #[cube]
-fn corner<F: Float + CubeElement>(mesh: &Triangles<F>, face: usize, k: usize) -> Vector<F> {
-    let at = 3 * mesh.faces[3 * face + k] as usize;
-    Vector::<F> {
-        x: mesh.vertices[at],
-        y: mesh.vertices[at + 1],
-        z: mesh.vertices[at + 2],
-    }
+fn corner<F: Float + CubeElement>(mesh: &Triangles<F>, face: usize, k: usize) -> Vector3<F> {
+    Vector3::<F>::at(&mesh.vertices, mesh.faces[3 * face + k] as usize)
 }
 
 /// Centre of the box.
 #[cube]
-fn centre<F: Float + CubeElement>(mesh: &Triangles<F>) -> Vector<F> {
+fn centre<F: Float + CubeElement>(mesh: &Triangles<F>) -> Vector3<F> {
     let half = F::new(0.5);
-    Vector::<F> {
+    Vector3::<F> {
         x: half * mesh.bounds[0] + half * mesh.bounds[3],
         y: half * mesh.bounds[1] + half * mesh.bounds[4],
         z: half * mesh.bounds[2] + half * mesh.bounds[5],
@@ -216,13 +165,13 @@ fn add_faces<F: Float + CubeElement>(
     let mut face = ABSOLUTE_POS;
     while face < count as usize {
         let a = corner::<F>(mesh, face, 0usize);
-        let b = minus::<F>(corner::<F>(mesh, face, 1usize), a);
-        let c = minus::<F>(corner::<F>(mesh, face, 2usize), a);
-        let normal = cross::<F>(b, c);
+        let b = corner::<F>(mesh, face, 1usize).sub(a);
+        let c = corner::<F>(mesh, face, 2usize).sub(a);
+        let normal = b.cross(c);
         let direction = unit::<F>(normal);
-        area += dot::<F>(normal, direction) / F::new(2.0);
-        volume += dot::<F>(minus::<F>(a, from), normal) / F::new(6.0);
-        flat += select(dot::<F>(direction, direction) == F::new(0.0), 1u32, 0u32);
+        area += normal.dot(direction) / F::new(2.0);
+        volume += a.sub(from).dot(normal) / F::new(6.0);
+        flat += select(direction.dot(direction) == F::new(0.0), 1u32, 0u32);
         face += groups as usize * block;
     }
     let mut shared = SharedMemory::<F>::new(block);
@@ -261,9 +210,9 @@ fn gather_faces<F: Float + CubeElement>(
             let a = corner::<F>(mesh, face, k);
             let b = corner::<F>(mesh, face, (k + 1) % 3);
             let c = corner::<F>(mesh, face, (k + 2) % 3);
-            let normal = unit::<F>(cross::<F>(minus::<F>(b, a), minus::<F>(c, a)));
-            let sweep = cross::<F>(minus::<F>(b, c), normal);
-            let cone = cross::<F>(minus::<F>(b, from), minus::<F>(c, from));
+            let normal = unit::<F>(b.sub(a).cross(c.sub(a)));
+            let sweep = b.sub(c).cross(normal);
+            let cone = b.sub(from).cross(c.sub(from));
             x += of_area * sweep.x + of_volume * cone.x;
             y += of_area * sweep.y + of_volume * cone.y;
             z += of_area * sweep.z + of_volume * cone.z;

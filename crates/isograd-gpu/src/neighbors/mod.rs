@@ -23,10 +23,8 @@
 
 mod order;
 mod tree;
-mod vector;
 mod walk;
 
-pub(crate) use vector::Vector3;
 pub(crate) use walk::{end_of_leaf, first_of_leaf, next_leaf};
 
 use cubecl::prelude::*;

@@ -4,7 +4,7 @@ use cubecl::prelude::*;
 
 use super::LEAF;
 use super::tree::{IS_LEAF, NODE};
-use super::vector::Vector3;
+use crate::vector::Vector3;
 
 /// The first leaf at or after node `from` that may hold points within `radius` of `x`, or, if `mutual`, points
 /// whose own radius reaches `x`; the number of nodes where there is none.

@@ -7,7 +7,7 @@
 
 use cubecl::prelude::*;
 
-use crate::neighbors::Vector3;
+use crate::vector::Vector3;
 
 /// A symmetric matrix.
 #[derive(CubeType, Clone, Copy)]

@@ -5,7 +5,8 @@ use cubecl::prelude::*;
 use super::eigen::{Symmetric, eigen};
 use super::{CENTROID, PLANE, Residual, TANGENT, VALUES, WEIGHT};
 use crate::element::plane::weight;
-use crate::neighbors::{BLOCK, Neighborhoods, Vector3, end_of_leaf, first_of_leaf, next_leaf};
+use crate::neighbors::{BLOCK, Neighborhoods, end_of_leaf, first_of_leaf, next_leaf};
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Sums over a neighbourhood: `Σ w`, `Σ w d` and `Σ w d dᵀ` (`xx, xy, xz, yy, yz, zz`), in units of the radius.

@@ -9,7 +9,8 @@ use super::forward::epsilon;
 use super::{CENTROID, Residual, SMALLEST_GAP, TANGENT, VALUES, WEIGHT};
 use crate::device::check_length;
 use crate::element::plane;
-use crate::neighbors::{BLOCK, Vector3, end_of_leaf, first_of_leaf, next_leaf};
+use crate::neighbors::{BLOCK, end_of_leaf, first_of_leaf, next_leaf};
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// What the cotangents `normals_bar` `(N, 3)` of the axes (with the sign that [`forward`](super::forward) gave

@@ -13,6 +13,7 @@ use crate::device::check_length;
 use crate::grid::{self, Lattice, cell_at, check_field};
 use crate::primitives::fill::add;
 use crate::primitives::reduce::{BLOCK, sum_columns};
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Adds to `out` what the cotangents `b_bar` of the right-hand side, `(nx, ny, nz)`, mean for the samples and
@@ -88,14 +89,6 @@ struct Weights3<F: Float> {
     z: Triple<F>,
 }
 
-/// Offset or vector of a sample.
-#[derive(CubeType, Clone, Copy)]
-struct Vector<F: Float> {
-    x: F,
-    y: F,
-    z: F,
-}
-
 /// Replaces the offset and vector of each sample by the cotangents of the vector `a n`, and of the point; and
 /// sums what they mean for the grid, a group at a time.
 #[cube(launch)]
@@ -117,8 +110,8 @@ fn gather_samples<F: Float + CubeElement>(
     if s < count as usize && keys[s] < grid.nx * grid.ny * grid.nz {
         let cell = cell_at(keys[s], grid.ny, grid.nz);
         let corner = keys[s] - REACH * ((grid.ny + 1u32) * grid.nz + 1u32);
-        let f = vector_at::<F>(samples, s * NUMBERS);
-        let v = vector_at::<F>(samples, s * NUMBERS + 3);
+        let f = Vector3::<F>::at(samples, s * NUMBERS / 3);
+        let v = Vector3::<F>::at(samples, s * NUMBERS / 3 + 1);
         let found = gather_sample::<F>(b_bar, corner, &grid, f, v, paper);
         let h = grid.spacing;
         bar_x = found.x / h;
@@ -140,15 +133,6 @@ fn gather_samples<F: Float + CubeElement>(
     subtract_from_grid::<F>(bar_x, bar_y, bar_z, bar_h, grid_sums);
 }
 
-#[cube]
-fn vector_at<F: Float>(values: &Array<F>, at: usize) -> Vector<F> {
-    Vector::<F> {
-        x: values[at],
-        y: values[at + 1],
-        z: values[at + 2],
-    }
-}
-
 /// Index coordinate at offset `f` from the centre of a cell.
 #[cube]
 fn to_place<F: Float>(f: F, cell: u32) -> F {
@@ -161,8 +145,8 @@ fn gather_sample<F: Float + CubeElement>(
     b_bar: &Array<F>,
     corner: u32,
     grid: &Lattice<F>,
-    f: Vector<F>,
-    v: Vector<F>,
+    f: Vector3<F>,
+    v: Vector3<F>,
     #[comptime] paper: bool,
 ) -> Gathered<F> {
     if comptime!(paper) {
@@ -201,7 +185,7 @@ fn gather_paper<F: Float + CubeElement>(
     grid: &Lattice<F>,
     w: Weights3<F>,
     d: Weights3<F>,
-    v: Vector<F>,
+    v: Vector3<F>,
 ) -> Gathered<F> {
     let one = central::<F>();
     let ones = Weights3::<F> {
@@ -243,7 +227,7 @@ fn gather_product<F: Float + CubeElement>(
     grid: &Lattice<F>,
     w: Weights3<F>,
     d: Weights3<F>,
-    v: Vector<F>,
+    v: Vector3<F>,
 ) -> Gathered<F> {
     let zero = F::new(0.0);
     let mut out = Gathered::<F> {

@@ -4,9 +4,8 @@ use cubecl::prelude::Runtime;
 use isograd::{Real, splat, vector};
 use isograd_gpu::{Device, Scalar, area, neighbors};
 
-use crate::clouds::{Cloud, clouds, has_number, real, relative, tolerance};
-use crate::devices::{Numbers, on_each_device};
-use crate::normals::in_each_number;
+use crate::clouds::{Cloud, clouds, real, relative};
+use crate::devices::{Numbers, in_each_number, on_each_device, tolerance};
 
 #[test]
 fn areas_and_their_pullback_are_those_of_the_cpu() {

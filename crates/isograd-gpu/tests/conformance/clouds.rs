@@ -88,11 +88,6 @@ pub fn clouds<T: Scalar>() -> Vec<Cloud<T>> {
     ]
 }
 
-/// What a stage may differ by from the CPU.
-pub fn tolerance<T: Scalar>() -> f64 {
-    if size_of::<T>() == 4 { 1e-4 } else { 1e-10 }
-}
-
 /// The largest difference, over the largest number that is expected.
 pub fn relative<T: Scalar>(found: &[T], expected: &[T]) -> f64 {
     assert_eq!(found.len(), expected.len());
@@ -105,15 +100,4 @@ pub fn relative<T: Scalar>(found: &[T], expected: &[T]) -> f64 {
     }
     assert!(size > f64::MIN_POSITIVE, "nothing is expected");
     difference / size
-}
-
-/// Whether the device has the number type; prints why not.
-pub fn has_number<R: Runtime, T: Scalar>(device: &Device<R>) -> bool {
-    match device.check_number::<T>() {
-        Ok(()) => true,
-        Err(reason) => {
-            println!("SKIPPED in {}: {reason}", T::NAME);
-            false
-        }
-    }
 }

@@ -47,12 +47,37 @@ impl Numbers {
 /// it in double, to 1e-10: `in_both_numbers!(device, function)` calls `function::<R, T>(device, tolerance)`.
 macro_rules! in_both_numbers {
     ($device:expr, $function:ident) => {{
-        $function::<R, f32>($device, 1e-4);
+        $function::<R, f32>($device, $crate::devices::tolerance::<f32>());
         match $device.check_number::<f64>() {
-            Ok(()) => $function::<R, f64>($device, 1e-10),
+            Ok(()) => $function::<R, f64>($device, $crate::devices::tolerance::<f64>()),
             Err(reason) => println!("SKIPPED in f64: {reason}"),
         }
     }};
 }
 
 pub(crate) use in_both_numbers;
+
+/// Runs a check that is generic over the number type in single precision, and where the device has it in
+/// double: `in_each_number!(device, check)` calls `check::<R, T>(device)`; without a device, on all of them.
+macro_rules! in_each_number {
+    ($check:ident) => {{
+        fn run<R: cubecl::prelude::Runtime>(device: &isograd_gpu::Device<R>) {
+            $crate::devices::in_each_number!(device, $check);
+        }
+        $crate::devices::on_each_device!(run);
+    }};
+    ($device:expr, $check:ident) => {{
+        $check::<_, f32>($device);
+        match $device.check_number::<f64>() {
+            Ok(()) => $check::<_, f64>($device),
+            Err(reason) => println!("SKIPPED in f64: {reason}"),
+        }
+    }};
+}
+
+pub(crate) use in_each_number;
+
+/// What a stage may differ by from the CPU.
+pub fn tolerance<T: isograd::Real>() -> f64 {
+    if T::NAME == "f32" { 1e-4 } else { 1e-10 }
+}

@@ -8,18 +8,7 @@ use isograd_gpu::isosurface::{
 };
 use isograd_gpu::{Device, Scalar};
 
-use crate::devices::{Numbers, on_each_device};
-
-/// Checks in `f32`, and in `f64` where the device has it.
-macro_rules! in_each_number {
-    ($device:expr, $check:ident) => {{
-        $check::<_, f32>($device);
-        match $device.check_number::<f64>() {
-            Ok(()) => $check::<_, f64>($device),
-            Err(reason) => println!("SKIPPED in f64: {reason}"),
-        }
-    }};
-}
+use crate::devices::{Numbers, in_each_number, on_each_device};
 
 /// Values at the cell centres of a grid that is not at the origin.
 fn field<T: Scalar>(shape: [usize; 3], f: impl FnMut([f64; 3]) -> f64) -> Field<T> {

@@ -4,25 +4,8 @@ use cubecl::prelude::Runtime;
 use isograd::{Real, vector};
 use isograd_gpu::{Device, Scalar, neighbors, normals};
 
-use crate::clouds::{Cloud, clouds, has_number, real, relative, tolerance};
-use crate::devices::{Numbers, on_each_device};
-
-/// Runs a check in both number types.
-macro_rules! in_each_number {
-    ($check:ident) => {{
-        fn run<R: Runtime>(device: &Device<R>) {
-            if has_number::<R, f32>(device) {
-                $check::<R, f32>(device);
-            }
-            if has_number::<R, f64>(device) {
-                $check::<R, f64>(device);
-            }
-        }
-        on_each_device!(run);
-    }};
-}
-
-pub(crate) use in_each_number;
+use crate::clouds::{Cloud, clouds, real, relative};
+use crate::devices::{Numbers, in_each_number, on_each_device, tolerance};
 
 #[test]
 fn neighbours_are_those_of_a_plain_loop() {

@@ -5,7 +5,7 @@ use isograd::poisson::{Plan, Scratch, smoothing};
 use isograd_gpu::poisson::{Solver, forward, pullback};
 use isograd_gpu::{Device, Error, Scalar};
 
-use crate::devices::{Numbers, on_each_device};
+use crate::devices::{Numbers, in_both_numbers, on_each_device};
 
 /// Powers of two, factors of every pass, primes with a pass of their own and without, single cells.
 const SHAPES: [[usize; 3]; 15] = [
@@ -25,17 +25,6 @@ const SHAPES: [[usize; 3]; 15] = [
     [3, 1, 2048],
     [2058, 1, 2],
 ];
-
-/// Runs a generic check in f32, and in f64 where the device has it.
-macro_rules! in_each_number {
-    ($check:ident, $device:expr) => {{
-        $check::<R, f32>($device, 1e-4);
-        match $device.check_number::<f64>() {
-            Ok(()) => $check::<R, f64>($device, 1e-10),
-            Err(reason) => println!("SKIPPED in f64: {reason}"),
-        }
-    }};
-}
 
 fn noise<T: Scalar>(cells: usize, seed: u64) -> Vec<T> {
     let mut numbers = Numbers(seed);
@@ -69,7 +58,7 @@ fn dot<T: Scalar>(a: &[T], b: &[T]) -> f64 {
 #[test]
 fn solutions_are_those_of_the_cpu() {
     fn check<R: Runtime>(device: &Device<R>) {
-        in_each_number!(check_solutions, device);
+        in_both_numbers!(device, check_solutions);
     }
     on_each_device!(check);
 }
@@ -161,7 +150,7 @@ fn stencil_gives_back_the_right_hand_side() {
 #[test]
 fn pullback_is_the_transpose() {
     fn check<R: Runtime>(device: &Device<R>) {
-        in_each_number!(check_pullback, device);
+        in_both_numbers!(device, check_pullback);
     }
     on_each_device!(check);
 }

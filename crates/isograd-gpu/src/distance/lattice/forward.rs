@@ -6,10 +6,10 @@ use isograd::Grid;
 use super::super::search::centre;
 use super::super::tree::{NONE, Tree};
 use super::super::triangle::{closest, corners};
-use super::super::vector::{Vector3, norm};
 use super::super::{Band, Error, FAR, Mesh, search};
 use super::Residual;
 use crate::device::check_length;
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
 const BLOCK: u32 = 64;
@@ -104,7 +104,7 @@ fn measure_cells<F: Float + CubeElement>(
         if face != NONE {
             let t = corners::<F>(vertices, faces, face, Vector3::<F> { x, y, z });
             let q = centre::<F>(ABSOLUTE_POS as u32, spacing, ny, nz);
-            let measured = norm::<F>(closest::<F>(t, q).offset);
+            let measured = closest::<F>(t, q).offset.norm();
             if measured > width {
                 found[ABSOLUTE_POS] = NONE;
             } else {

@@ -9,10 +9,10 @@ use super::super::Error;
 use super::super::search::centre;
 use super::super::shares::{FACE, add_share, by_face, gather_corners};
 use super::super::triangle::{closest, corners};
-use super::super::vector::{Vector3, dot, scale};
 use super::{Cotangents, Residual};
 use crate::device::check_length;
 use crate::primitives::segments::{NO_SEGMENT, Rows, join_pieces, sum_rows};
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
 const BLOCK: u32 = 64;
@@ -131,10 +131,10 @@ fn pull_cells<F: Float + CubeElement>(
             for element in table[ABSOLUTE_POS * 3 + 1]..table[ABSOLUTE_POS * 3 + 2] {
                 let cell = cells[element as usize];
                 let place = centre::<F>(cell, F::new(1.0), ny, nz);
-                let found = closest::<F>(t, scale::<F>(place, spacing));
+                let found = closest::<F>(t, place.scale(spacing));
                 let inside = phi[cell as usize] < F::new(0.0);
                 let pull = add_share::<F>(&mut sum, found, inside, phi_bar[cell as usize]);
-                sum[9] += dot::<F>(place, pull);
+                sum[9] += place.dot(pull);
             }
             for number in 0..10usize {
                 sums[ABSOLUTE_POS * 10 + number] = sum[number];

@@ -8,8 +8,8 @@ use isograd::{Field, Grid, Mesh};
 use isograd_gpu::distance::{self, Error};
 use isograd_gpu::{Device, Scalar};
 
-use super::{for_each_number, grid, meshes, signs, solve, solve_on_cpu, tolerance, upload};
-use crate::devices::on_each_device;
+use super::{grid, meshes, signs, solve, solve_on_cpu, upload};
+use crate::devices::{in_each_number, on_each_device, tolerance};
 
 /// The largest difference to the CPU's distances in cells; the signs must agree, and the faces named must be as
 /// near as those of the CPU.
@@ -38,7 +38,7 @@ fn distance_is_that_of_the_cpu() {
 }
 
 fn check_meshes<R: Runtime>(device: &Device<R>) {
-    for_each_number!(check_meshes_in, device);
+    in_each_number!(device, check_meshes_in);
 }
 
 fn check_meshes_in<R: Runtime, T: Scalar>(device: &Device<R>) {

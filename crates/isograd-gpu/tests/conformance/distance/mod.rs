@@ -13,24 +13,6 @@ use isograd_gpu::{Device, Scalar};
 
 use crate::devices::Numbers;
 
-/// Errors allowed in `f32`, in cells: the CPU computes in `f64`. In `f64` both do the same, but in another
-/// order.
-fn tolerance<T: Real>() -> f64 {
-    if T::NAME == "f32" { 1e-4 } else { 1e-10 }
-}
-
-/// Runs a check that is generic over the number in `f32`, and in `f64` where the device has it.
-macro_rules! for_each_number {
-    ($check:ident, $device:expr) => {
-        $check::<_, f32>($device);
-        match $device.check_number::<f64>() {
-            Ok(()) => $check::<_, f64>($device),
-            Err(reason) => println!("SKIPPED {} in f64: {reason}", stringify!($check)),
-        }
-    };
-}
-use for_each_number;
-
 /// A field of signs at random, with the level 0.1: the stage must take them as they are.
 fn signs<T: Real>(grid: Grid<T>) -> Field<T> {
     let mut numbers = Numbers(5);

@@ -6,8 +6,8 @@ use isograd::{Field, Grid, GridCotangent, Mesh, Real};
 use isograd_gpu::distance::lattice;
 use isograd_gpu::{Device, Scalar};
 
-use super::{for_each_number, grid, meshes, signs, solve, tolerance};
-use crate::devices::{Numbers, on_each_device};
+use super::{grid, meshes, signs, solve};
+use crate::devices::{Numbers, in_each_number, on_each_device, tolerance};
 
 /// A cotangent at random, a quarter of it zero.
 fn cotangent<T: Real>(cells: usize) -> Vec<T> {
@@ -92,7 +92,7 @@ fn cotangents_are_those_of_the_cpu() {
 }
 
 fn check_meshes<R: Runtime>(device: &Device<R>) {
-    for_each_number!(check_meshes_in, device);
+    in_each_number!(device, check_meshes_in);
 }
 
 fn check_meshes_in<R: Runtime, T: Scalar>(device: &Device<R>) {

@@ -6,8 +6,8 @@ use isograd::{Mesh, Real};
 use isograd_gpu::distance::{Error, query};
 use isograd_gpu::{Device, Scalar};
 
-use super::{for_each_number, meshes, tolerance, upload};
-use crate::devices::{Numbers, on_each_device};
+use super::{meshes, upload};
+use crate::devices::{Numbers, in_each_number, on_each_device, tolerance};
 
 #[test]
 fn hits_are_those_of_all_triangles_tried() {
@@ -15,7 +15,7 @@ fn hits_are_those_of_all_triangles_tried() {
 }
 
 fn check_hits<R: Runtime>(device: &Device<R>) {
-    for_each_number!(check_hits_in, device);
+    in_each_number!(device, check_hits_in);
 }
 
 fn check_hits_in<R: Runtime, T: Scalar>(device: &Device<R>) {

@@ -2,6 +2,7 @@
 
 use cubecl::prelude::*;
 
+/// Three numbers: a place, a direction, or one number for each corner of a triangle.
 #[derive(CubeType, Clone, Copy)]
 pub(crate) struct Vector3<F: Float> {
     pub x: F,
@@ -68,6 +69,38 @@ impl<F: Float> Vector3<F> {
             x: select(condition, self.x, other.x),
             y: select(condition, self.y, other.y),
             z: select(condition, self.z, other.z),
+        }
+    }
+
+    pub fn zero() -> Self {
+        Vector3::<F> {
+            x: F::new(0.0),
+            y: F::new(0.0),
+            z: F::new(0.0),
+        }
+    }
+
+    pub fn norm(self) -> F {
+        F::sqrt(self.dot(self))
+    }
+
+    /// Of length 1; zero where there is no direction. Divided by the largest component first, so that short
+    /// vectors keep theirs.
+    pub fn direction(self) -> Self {
+        let largest = max(max(F::abs(self.x), F::abs(self.y)), F::abs(self.z));
+        let scaled = self.divide(largest);
+        scaled.divide(scaled.norm())
+    }
+
+    /// Zero where the divisor is not positive.
+    pub fn divide(self, divisor: F) -> Self {
+        let zero = F::new(0.0);
+        let positive = divisor > zero;
+        let by = select(positive, divisor, F::new(1.0));
+        Vector3::<F> {
+            x: select(positive, self.x / by, zero),
+            y: select(positive, self.y / by, zero),
+            z: select(positive, self.z / by, zero),
         }
     }
 }
