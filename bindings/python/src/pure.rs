@@ -60,10 +60,6 @@ fn forward<'py, T: Number>(
 /// Cotangents of the points, and of the given normals where there are any, from that of φ.
 #[pyfunction]
 #[pyo3(signature = (settings, points, given, sdf, closest, normals, sdf_bar))]
-#[expect(
-    clippy::too_many_arguments,
-    reason = "a pure function: all it knows is what it is given"
-)]
 pub fn pullback_saved<'py>(
     settings: String,
     points: &Bound<'py, PyAny>,
