@@ -38,8 +38,13 @@ pub fn lint() -> Outcome {
 fn run(steps: &mut Steps, tally: &mut Tally) -> Outcome {
     lint_steps(steps)?;
     steps.step("docs", docs)?;
-    steps.step("tests", || tests(tally, &["--lib", "--bins", "--tests"]))?;
-    steps.step("doc tests", || tests(tally, &["--doc"]))?;
+    steps.step("tests", || {
+        let nvrtc = Nvrtc::fetch()
+            .inspect_err(|reason| println!("PTX tests are left out: {reason}"))
+            .ok();
+        tests(tally, &["--lib", "--bins", "--tests"], nvrtc.as_ref())
+    })?;
+    steps.step("doc tests", || tests(tally, &["--doc"], None))?;
     steps.step("Python", || python::run(tally))?;
     steps.step("examples", examples::run)?;
     steps.step("README commands", readme::run)
@@ -77,13 +82,12 @@ fn docs() -> Outcome<Vec<String>> {
 }
 
 /// Runs tests to the end, failures or not, and returns the lines of those left out by this call.
-fn tests(tally: &mut Tally, targets: &[&str]) -> Outcome<Vec<String>> {
+fn tests(tally: &mut Tally, targets: &[&str], nvrtc: Option<&Nvrtc>) -> Outcome<Vec<String>> {
     let before = tally.skipped_lines().len();
     let mut command = process::cargo(["test", "--workspace", "--no-fail-fast"]);
     command.args(targets).args(["--", "--show-output"]);
-    match Nvrtc::fetch() {
-        Ok(nvrtc) => nvrtc.tell(&mut command),
-        Err(reason) => println!("PTX tests are left out: {reason}"),
+    if let Some(nvrtc) = nvrtc {
+        nvrtc.tell(&mut command);
     }
     process::run_by_line(&mut command, |line| {
         if tally.read(line) {

@@ -14,10 +14,15 @@ pub(crate) struct Vector3<F: Float> {
 impl<F: Float> Vector3<F> {
     /// Row `i` of an `(N, 3)` array.
     pub fn at(array: &Array<F>, i: usize) -> Self {
+        Vector3::<F>::load(array, 3 * i)
+    }
+
+    /// Three numbers of an array, from `start` on.
+    pub fn load(array: &Array<F>, start: usize) -> Self {
         Vector3::<F> {
-            x: array[3 * i],
-            y: array[3 * i + 1],
-            z: array[3 * i + 2],
+            x: array[start],
+            y: array[start + 1],
+            z: array[start + 2],
         }
     }
 
@@ -70,6 +75,15 @@ impl<F: Float> Vector3<F> {
             y: select(condition, self.y, other.y),
             z: select(condition, self.z, other.z),
         }
+    }
+
+    /// Squared distance to the box between two corners; 0 inside.
+    pub fn to_box_squared(self, low: Self, high: Self) -> F {
+        let zero = F::new(0.0);
+        let x = max(max(low.x - self.x, self.x - high.x), zero);
+        let y = max(max(low.y - self.y, self.y - high.y), zero);
+        let z = max(max(low.z - self.z, self.z - high.z), zero);
+        x * x + y * y + z * z
     }
 
     pub fn zero() -> Self {

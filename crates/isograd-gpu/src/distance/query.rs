@@ -149,14 +149,8 @@ fn measure_points<F: Float>(
         );
         let found = closest::<F>(t, Vector3::<F>::at(points, ABSOLUTE_POS));
         distances[ABSOLUTE_POS] = found.offset.norm();
-        let place = combine::<F>(t, found.weights);
-        let at = ABSOLUTE_POS * 3;
-        on_mesh[at] = place.x;
-        on_mesh[at + 1] = place.y;
-        on_mesh[at + 2] = place.z;
-        barycentric[at] = found.weights.x;
-        barycentric[at + 1] = found.weights.y;
-        barycentric[at + 2] = found.weights.z;
+        combine::<F>(t, found.weights).write(on_mesh, ABSOLUTE_POS);
+        found.weights.write(barycentric, ABSOLUTE_POS);
     }
 }
 
@@ -178,10 +172,9 @@ fn pull_to_points<F: Float>(
         );
         let found = closest::<F>(t, Vector3::<F>::at(points, ABSOLUTE_POS));
         let slope = gradient::<F>(found.offset, found.normal, false);
-        let at = ABSOLUTE_POS * 3;
-        points_bar[at] = slope.x * bar[ABSOLUTE_POS];
-        points_bar[at + 1] = slope.y * bar[ABSOLUTE_POS];
-        points_bar[at + 2] = slope.z * bar[ABSOLUTE_POS];
+        slope
+            .scale(bar[ABSOLUTE_POS])
+            .write(points_bar, ABSOLUTE_POS);
     }
 }
 
@@ -201,8 +194,8 @@ fn pull_to_faces<F: Float>(
         let face = table[ABSOLUTE_POS * 3];
         if face != NO_SEGMENT {
             let t = corners::<F>(vertices, faces, face, Vector3::<F>::zero());
-            let mut sum = Array::<F>::new(10usize);
-            for number in 0..10usize {
+            let mut sum = Array::<F>::new(FACE);
+            for number in 0..FACE {
                 sum[number] = F::new(0.0);
             }
             for element in table[ABSOLUTE_POS * 3 + 1]..table[ABSOLUTE_POS * 3 + 2] {
@@ -210,8 +203,8 @@ fn pull_to_faces<F: Float>(
                 let found = closest::<F>(t, Vector3::<F>::at(points, point as usize));
                 add_share::<F>(&mut sum, found, false, bar[point as usize]);
             }
-            for number in 0..10usize {
-                sums[ABSOLUTE_POS * 10 + number] = sum[number];
+            for number in 0..FACE {
+                sums[ABSOLUTE_POS * FACE + number] = sum[number];
             }
         }
     }

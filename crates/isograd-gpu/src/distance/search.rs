@@ -14,6 +14,7 @@ use super::settle::{Queries, settle};
 use super::tree::{LEAF, NONE, Tree};
 use super::triangle::{distance_squared, load_frame};
 use super::{Error, FAR};
+use crate::grid::{Cell, cell_at};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
@@ -151,11 +152,7 @@ pub(super) fn points<T: Scalar, R: Runtime>(
 pub(super) fn box_distance_squared<F: Float>(boxes: &Array<F>, at: u32, q: Vector3<F>) -> F {
     let low = Vector3::<F>::at(boxes, at as usize);
     let high = Vector3::<F>::at(boxes, (at + 1u32) as usize);
-    let zero = F::new(0.0);
-    let x = max(max(low.x - q.x, q.x - high.x), zero);
-    let y = max(max(low.y - q.y, q.y - high.y), zero);
-    let z = max(max(low.z - q.z, q.z - high.z), zero);
-    x * x + y * y + z * z
+    q.to_box_squared(low, high)
 }
 
 /// The triangle closest to `q`, as its place in Morton order: not further than the root of `bound`, else
@@ -290,12 +287,7 @@ fn nearest_of_cells<F: Float + CubeElement>(
     let j = brick / across_z % across_y * 4u32 + UNIT_POS / 4u32 % 4u32;
     let k = brick % across_z * 4u32 + UNIT_POS % 4u32;
     if i < nx && j < ny && k < nz {
-        let half = F::new(0.5);
-        let q = Vector3::<F> {
-            x: spacing * (F::cast_from(i) + half),
-            y: spacing * (F::cast_from(j) + half),
-            z: spacing * (F::cast_from(k) + half),
-        };
+        let q = centre_of::<F>(Cell { i, j, k }, spacing);
         let mut seed = NONE.runtime();
         if comptime!(seeded) {
             seed = seeds[brick as usize];
@@ -338,10 +330,15 @@ fn nearest_of_points<F: Float + CubeElement>(
 /// The centre of a cell in memory order, from the low corner of the grid.
 #[cube]
 pub(super) fn centre<F: Float>(cell: u32, spacing: F, ny: u32, nz: u32) -> Vector3<F> {
+    centre_of::<F>(cell_at(cell, ny, nz), spacing)
+}
+
+#[cube]
+fn centre_of<F: Float>(cell: Cell, spacing: F) -> Vector3<F> {
     let half = F::new(0.5);
     Vector3::<F> {
-        x: spacing * (F::cast_from(cell / (ny * nz)) + half),
-        y: spacing * (F::cast_from(cell / nz % ny) + half),
-        z: spacing * (F::cast_from(cell % nz) + half),
+        x: spacing * (F::cast_from(cell.i) + half),
+        y: spacing * (F::cast_from(cell.j) + half),
+        z: spacing * (F::cast_from(cell.k) + half),
     }
 }

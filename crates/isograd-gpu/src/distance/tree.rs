@@ -8,9 +8,10 @@
 
 use cubecl::prelude::*;
 
-use super::morton::{bounds, face_order};
+use super::morton::face_order;
 use super::triangle::{FRAME, corners, frame, store_frame};
 use super::{Error, Mesh};
+use crate::primitives::ends::ends;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
@@ -51,8 +52,8 @@ impl<T: Scalar> Tree<T> {
         origin: [T; 3],
     ) -> Result<Self, Error> {
         let triangles = mesh.check()?;
-        let bounds = bounds(device, mesh, origin)?;
-        let order = face_order(device, mesh, origin, &bounds)?;
+        let bounds = ends(device, &mesh.vertices, 3)?;
+        let order = face_order(device, mesh, &bounds)?;
         let placed = Placed::new(device, mesh, origin, &order.places)?;
         let leaves = placed.faces.len();
         let boxes = device.empty((leaves - 1) * 12)?;

@@ -156,19 +156,15 @@ fn any_across<F: Float>(u: Vector3<F>) -> Vector3<F> {
 /// Writes a frame as number `index` of `frames`.
 #[cube]
 pub(super) fn store_frame<F: Float>(frames: &mut Array<F>, index: usize, frame: Frame<F>) {
-    let at = index * 12;
-    frames[at] = frame.origin.x;
-    frames[at + 1] = frame.origin.y;
-    frames[at + 2] = frame.origin.z;
-    frames[at + 3] = frame.u.x;
-    frames[at + 4] = frame.u.y;
-    frames[at + 5] = frame.u.z;
-    frames[at + 6] = frame.v.x;
-    frames[at + 7] = frame.v.y;
-    frames[at + 8] = frame.v.z;
-    frames[at + 9] = frame.foot;
-    frames[at + 10] = frame.back;
-    frames[at + 11] = frame.height;
+    frame.origin.write(frames, 4 * index);
+    frame.u.write(frames, 4 * index + 1);
+    frame.v.write(frames, 4 * index + 2);
+    let rest = Vector3::<F> {
+        x: frame.foot,
+        y: frame.back,
+        z: frame.height,
+    };
+    rest.write(frames, 4 * index + 3);
 }
 
 #[cube]

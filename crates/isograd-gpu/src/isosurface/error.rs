@@ -3,8 +3,8 @@
 use cubecl::prelude::*;
 use isograd::{Grid, isosurface};
 
-use super::ends::ends;
 use super::signs::{BLOCK, not_finite};
+use crate::primitives::ends::ends;
 use crate::{Buffer, Device, Scalar};
 
 /// Why there is no surface.

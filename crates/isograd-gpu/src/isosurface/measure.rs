@@ -16,10 +16,11 @@
 
 use cubecl::prelude::*;
 
-use super::ends::ends;
 use super::signs::{BLOCK, not_finite};
-use super::sums::{fold, groups_for, tree_sum};
+use super::sums::fold;
 use crate::device::check_length;
+use crate::primitives::ends::ends;
+use crate::primitives::reduce::{groups_for, sum_of_group};
 use crate::primitives::sort::{order, starts};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
@@ -176,9 +177,9 @@ fn add_faces<F: Float + CubeElement>(
     }
     let mut shared = SharedMemory::<F>::new(block);
     let mut counts = SharedMemory::<u32>::new(block);
-    let area = tree_sum::<F>(&mut shared, area, block);
-    let volume = tree_sum::<F>(&mut shared, volume, block);
-    let flat = tree_sum::<u32>(&mut counts, flat, block);
+    let area = sum_of_group::<F>(area, &mut shared);
+    let volume = sum_of_group::<F>(volume, &mut shared);
+    let flat = sum_of_group::<u32>(flat, &mut counts);
     if UNIT_POS == 0u32 {
         partial[CUBE_POS] = area;
         partial[CUBE_POS + groups as usize] = volume;

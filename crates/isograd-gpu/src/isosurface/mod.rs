@@ -17,7 +17,6 @@
 //!
 //! [`measure`] is where the cotangents of vertices may come from: area and volume.
 
-mod ends;
 mod error;
 mod forward;
 pub mod measure;

@@ -3,12 +3,13 @@
 use cubecl::prelude::*;
 
 use super::Residual;
-use super::ends::ends;
 use super::signs::{BLOCK, Signs, inside, vertex_on};
-use super::sums::{fold, groups_for, tree_sum};
+use super::sums::fold;
 use super::values::{Values, fraction_on, stride};
 use crate::device::check_length;
 use crate::element::crossing::bounded;
+use crate::primitives::ends::ends;
+use crate::primitives::reduce::{groups_for, sum_of_group};
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Sums over the vertices: of the level, of the low corner, of the spacing.
@@ -233,12 +234,12 @@ fn add_vertices<F: Float + CubeElement>(
     }
     let mut shared = SharedMemory::<F>::new(block);
     let mut counts = SharedMemory::<u32>::new(block);
-    let level = tree_sum::<F>(&mut shared, level, block);
-    let lower_x = tree_sum::<F>(&mut shared, lower_x, block);
-    let lower_y = tree_sum::<F>(&mut shared, lower_y, block);
-    let lower_z = tree_sum::<F>(&mut shared, lower_z, block);
-    let spacing = tree_sum::<F>(&mut shared, spacing, block);
-    let guarded = tree_sum::<u32>(&mut counts, guarded, block);
+    let level = sum_of_group::<F>(level, &mut shared);
+    let lower_x = sum_of_group::<F>(lower_x, &mut shared);
+    let lower_y = sum_of_group::<F>(lower_y, &mut shared);
+    let lower_z = sum_of_group::<F>(lower_z, &mut shared);
+    let spacing = sum_of_group::<F>(spacing, &mut shared);
+    let guarded = sum_of_group::<u32>(guarded, &mut counts);
     if UNIT_POS == 0u32 {
         let next = groups as usize;
         partial[CUBE_POS] = level;

@@ -6,13 +6,11 @@
 
 use cubecl::prelude::*;
 
+pub(super) use crate::primitives::reduce::BLOCK;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Cells in one word.
 pub(super) const WORD: usize = 32;
-
-/// Units of a group.
-pub(super) const BLOCK: usize = 256;
 
 /// Units that one kernel may have: the numbers of those in the last group must fit in 32 bits.
 const MOST_UNITS: usize = u32::MAX as usize - (1 << 25);

@@ -4,7 +4,8 @@ use cubecl::prelude::*;
 use isograd::isosurface::Report;
 
 use super::signs::{BLOCK, Bits, Signs, WORD, word_of};
-use super::sums::{groups_for, tree_sum};
+
+use crate::primitives::reduce::{groups_for, sum_of_group};
 use crate::{Buffer, Device, Error};
 
 /// How many there are of everything.
@@ -120,7 +121,7 @@ fn add_words(
         flags |= walls_of(signs, row, w) | (faults[word as usize] << 6u32);
         word += groups * block as u32;
     }
-    let sum = tree_sum::<u32>(&mut shared, inside, block);
+    let sum = sum_of_group::<u32>(inside, &mut shared);
     let any = tree_or(&mut shared, flags, block);
     if UNIT_POS == 0u32 {
         partial[2 * CUBE_POS] = sum;
@@ -146,7 +147,7 @@ fn add_groups(
         flags |= partial[2 * group + 1];
         group += block;
     }
-    let sum = tree_sum::<u32>(&mut shared, inside, block);
+    let sum = sum_of_group::<u32>(inside, &mut shared);
     let any = tree_or(&mut shared, flags, block);
     if UNIT_POS == 0u32 {
         total[0] = sum;
@@ -160,6 +161,8 @@ fn add_groups(
 #[cube]
 fn tree_or(shared: &mut SharedMemory<u32>, own: u32, #[comptime] block: usize) -> u32 {
     let unit = UNIT_POS as usize;
+    // What was there may still be read.
+    sync_cube();
     shared[unit] = own;
     sync_cube();
     let mut reach = (block / 2).runtime();

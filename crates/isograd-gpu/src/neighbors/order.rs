@@ -3,6 +3,7 @@
 use cubecl::prelude::*;
 
 use super::BLOCK;
+use crate::primitives::morton::spread_bits;
 use crate::primitives::sort::order;
 use crate::{Buffer, Device, Error, Scalar};
 
@@ -84,8 +85,8 @@ fn fill_keys<F: Float>(points: &Array<F>, high: &mut Array<u32>, low: &mut Array
         for axis in 0..3usize {
             let offset = points[3 * ABSOLUTE_POS + axis] - middle::<F>(points, axis);
             let bits = ordered_bits(f32::cast_from(offset)) >> 12u32;
-            upper |= spread(bits >> 10u32) << (axis as u32);
-            lower |= spread(bits & 1023u32) << (axis as u32);
+            upper |= spread_bits(bits >> 10u32) << (axis as u32);
+            lower |= spread_bits(bits) << (axis as u32);
         }
         high[ABSOLUTE_POS] = upper;
         low[ABSOLUTE_POS] = lower;
@@ -120,14 +121,4 @@ fn ordered_bits(x: f32) -> u32 {
     let bits = u32::reinterpret(x);
     let negative = bits >> 31u32;
     select(negative == 1u32, !bits, bits | 0x8000_0000u32)
-}
-
-/// The lowest ten bits, each followed by two zeros.
-#[cube]
-fn spread(bits: u32) -> u32 {
-    let mut x = bits & 1023u32;
-    x = (x | (x << 16u32)) & 0x0300_00ffu32;
-    x = (x | (x << 8u32)) & 0x0300_f00fu32;
-    x = (x | (x << 4u32)) & 0x030c_30c3u32;
-    (x | (x << 2u32)) & 0x0924_9249u32
 }

@@ -28,7 +28,9 @@ pub(crate) fn next_leaf<F: Float>(
         }
         // So much more that no rounding can shut out a neighbour.
         let limit = reach * reach * F::new(1.0001);
-        if box_distance_squared(nodes, node, x) <= limit {
+        let low = Vector3::<F>::load(nodes, NODE * node);
+        let high = Vector3::<F>::load(nodes, NODE * node + 3);
+        if x.to_box_squared(low, high) <= limit {
             if link >= IS_LEAF {
                 end = node;
             } else {
@@ -42,23 +44,6 @@ pub(crate) fn next_leaf<F: Float>(
     }
     // `end` is the leaf, where one was found.
     select(node < links.len(), node, links.len())
-}
-
-#[cube]
-fn box_distance_squared<F: Float>(nodes: &Array<F>, node: usize, x: Vector3<F>) -> F {
-    let dx = outside(nodes, node, 0usize, x.x);
-    let dy = outside(nodes, node, 1usize, x.y);
-    let dz = outside(nodes, node, 2usize, x.z);
-    dx * dx + dy * dy + dz * dz
-}
-
-/// How far a coordinate is outside a box, along one axis.
-#[cube]
-fn outside<F: Float>(nodes: &Array<F>, node: usize, #[comptime] axis: usize, x: F) -> F {
-    let below = nodes[NODE * node + axis] - x;
-    let above = x - nodes[NODE * node + 3 + axis];
-    let larger = select(below > above, below, above);
-    select(larger > F::new(0.0), larger, F::new(0.0))
 }
 
 /// The first point of a leaf.

@@ -2,9 +2,8 @@
 
 use std::f64::consts::PI;
 
-use cubecl::prelude::Runtime;
+use cubecl::prelude::*;
 
-use super::gain::Gains;
 use super::{lines, products};
 use crate::{Buffer, Device, Error, Scalar};
 
@@ -31,6 +30,12 @@ impl Lines {
             count: shape.iter().product::<usize>() / shape[axis],
         }
     }
+}
+
+/// Where cell `j` of a line is in the field; see [`Lines`].
+#[cube]
+pub(super) fn cell_of_line(n: usize, step: usize, line: usize, j: usize) -> usize {
+    (line / step) * (n * step) + line % step + j * step
 }
 
 /// An axis of `n` cells.
@@ -96,22 +101,21 @@ impl<T: Scalar> Axis<T> {
         Ok(Self { way })
     }
 
-    /// Lines → `Y_k = 2 Σ_j x_j cos(πk(2j+1)/2n)`, times the gains.
+    /// Lines → `Y_k = 2 Σ_j x_j cos(πk(2j+1)/2n)`.
     pub(super) fn forward<R: Runtime>(
         &self,
         device: &Device<R>,
         lines: Lines,
         from: &Buffer<T>,
         to: &Buffer<T>,
-        gains: Option<&Gains<T>>,
     ) {
         match &self.way {
-            Way::Fourier(fourier) => fourier.forward(device, lines, from, to),
-            Way::Products(products) => products.forward(device, lines, from, to, gains),
+            Way::Fourier(fourier) => fourier.transform(device, lines, from, to, false),
+            Way::Products(products) => products.forward(device, lines, from, to, None),
         }
     }
 
-    /// `2n` times the inverse of [`Self::forward`] without gains.
+    /// `2n` times the inverse of [`Self::forward`].
     pub(super) fn inverse<R: Runtime>(
         &self,
         device: &Device<R>,
@@ -120,7 +124,7 @@ impl<T: Scalar> Axis<T> {
         to: &Buffer<T>,
     ) {
         match &self.way {
-            Way::Fourier(fourier) => fourier.inverse(device, lines, from, to),
+            Way::Fourier(fourier) => fourier.transform(device, lines, from, to, true),
             Way::Products(products) => products.inverse(device, lines, from, to),
         }
     }

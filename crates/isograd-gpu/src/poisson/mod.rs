@@ -180,21 +180,20 @@ impl<T: Scalar> Solver<T> {
         let (first, others) = self.axes.split_first().expect("an axis");
         for (a, axis) in others.iter().rev() {
             let lines = Lines::new(self.turned, *a);
-            fields.step(device, |from, to| {
-                axis.forward(device, lines, from, to, None)
-            })?;
+            fields.step(device, |from, to| axis.forward(device, lines, from, to))?;
         }
         let (a, axis) = first;
         let lines = Lines::new(self.turned, *a);
-        if let Way::Fourier(fourier) = &axis.way {
-            fields.step(device, |from, to| {
+        match &axis.way {
+            Way::Fourier(fourier) => fields.step(device, |from, to| {
                 fourier.filter(device, lines, from, to, &gains)
-            })?;
-        } else {
-            fields.step(device, |from, to| {
-                axis.forward(device, lines, from, to, Some(&gains))
-            })?;
-            fields.step(device, |from, to| axis.inverse(device, lines, from, to))?;
+            })?,
+            Way::Products(products) => {
+                fields.step(device, |from, to| {
+                    products.forward(device, lines, from, to, Some(&gains))
+                })?;
+                fields.step(device, |from, to| products.inverse(device, lines, from, to))?;
+            }
         }
         for (a, axis) in others {
             let lines = Lines::new(self.turned, *a);

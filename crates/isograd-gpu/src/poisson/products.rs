@@ -9,7 +9,7 @@
 
 use cubecl::prelude::*;
 
-use super::axis::{Lines, Products};
+use super::axis::{Lines, Products, cell_of_line};
 use super::gain::{Gains, gain};
 use crate::{Buffer, Device, Scalar};
 
@@ -144,14 +144,14 @@ fn multiply<F: Float>(
         if row < n.div_ceil(2) && line < count {
             if comptime!(kind.inverse) {
                 let mirrored = n - 1 - row;
-                output[cell(&tile, line, row)] = even[own] + odd[own];
+                output[cell_of_line(tile.n, tile.step, line, row)] = even[own] + odd[own];
                 if mirrored != row {
-                    output[cell(&tile, line, mirrored)] = even[own] - odd[own];
+                    output[cell_of_line(tile.n, tile.step, line, mirrored)] = even[own] - odd[own];
                 }
             } else {
-                output[cell(&tile, line, 2 * row)] = even[own];
+                output[cell_of_line(tile.n, tile.step, line, 2 * row)] = even[own];
                 if 2 * row + 1 < n {
-                    output[cell(&tile, line, 2 * row + 1)] = odd[own];
+                    output[cell_of_line(tile.n, tile.step, line, 2 * row + 1)] = odd[own];
                 }
             }
         }
@@ -182,7 +182,7 @@ fn multiply_and_filter<F: Float>(
         let line = tile.line + own_line(own % OWN, kind);
         if row < n.div_ceil(2) && line < count {
             let k = 2 * row;
-            let at = cell(&tile, line, k);
+            let at = cell_of_line(tile.n, tile.step, line, k);
             output[at] = even[own] * gain(spectrum, gaussian, k, line, n, ny, nz);
             if k + 1 < n {
                 output[at + step] = odd[own] * gain(spectrum, gaussian, k + 1, line, n, ny, nz);
@@ -216,12 +216,6 @@ fn tile(n: usize, step: usize, count: usize) -> Tile {
         row: CUBE_POS % rows * SIDE,
         line: CUBE_POS / rows * SIDE,
     }
-}
-
-/// Where a cell of a line is in the field.
-#[cube]
-fn cell(tile: &Tile, line: usize, j: usize) -> usize {
-    (line / tile.step) * (tile.n * tile.step) + line % tile.step + j * tile.step
 }
 
 /// Row of the tile that is a unit's `i`th.
@@ -391,12 +385,12 @@ fn load_lines<F: Float>(
         let mut value = F::new(0.0);
         if term < terms && line < tile.count {
             if comptime!(kind.inverse) {
-                value = input[cell(tile, line, 2 * term + parity)];
+                value = input[cell_of_line(tile.n, tile.step, line, 2 * term + parity)];
             } else {
                 let mirrored = tile.n - 1 - term;
-                value = input[cell(tile, line, term)];
+                value = input[cell_of_line(tile.n, tile.step, line, term)];
                 if mirrored != term {
-                    let other = input[cell(tile, line, mirrored)];
+                    let other = input[cell_of_line(tile.n, tile.step, line, mirrored)];
                     if comptime!(parity == 0) {
                         value += other;
                     } else {

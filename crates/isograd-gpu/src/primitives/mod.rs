@@ -1,6 +1,8 @@
-//! What several stages need: sums from the beginning, orders, totals.
+//! What several stages need: sums from the beginning, orders, totals, extremes.
 
+pub(crate) mod ends;
 pub mod fill;
+pub(crate) mod morton;
 pub mod reduce;
 pub mod scan;
 pub(crate) mod segments;

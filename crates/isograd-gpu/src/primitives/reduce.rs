@@ -11,6 +11,14 @@ pub(crate) const BLOCK: usize = 256;
 /// Rows that one unit adds up before its group does.
 const STEPS: usize = 8;
 
+/// Most groups of a first step whose units go through the elements in strides.
+const GROUPS: usize = 512;
+
+/// How many groups sum `count` elements.
+pub(crate) fn groups_for(count: usize) -> usize {
+    count.div_ceil(BLOCK).clamp(1, GROUPS)
+}
+
 /// The sum of `values`, an array of one number. Of no values, it is 0.
 ///
 /// # Errors
@@ -79,7 +87,7 @@ fn sum_spans<F: Float>(
 
 /// The sum of the values that the `BLOCK` units of a group have, by halves. Every unit must call it.
 #[cube]
-pub(crate) fn sum_of_group<F: Float>(value: F, shared: &mut SharedMemory<F>) -> F {
+pub(crate) fn sum_of_group<N: Numeric>(value: N, shared: &mut SharedMemory<N>) -> N {
     let unit = UNIT_POS as usize;
     // What was there may still be read.
     sync_cube();

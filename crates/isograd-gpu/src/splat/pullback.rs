@@ -110,8 +110,8 @@ fn gather_samples<F: Float + CubeElement>(
     if s < count as usize && keys[s] < grid.nx * grid.ny * grid.nz {
         let cell = cell_at(keys[s], grid.ny, grid.nz);
         let corner = keys[s] - REACH * ((grid.ny + 1u32) * grid.nz + 1u32);
-        let f = Vector3::<F>::at(samples, s * NUMBERS / 3);
-        let v = Vector3::<F>::at(samples, s * NUMBERS / 3 + 1);
+        let f = Vector3::<F>::load(samples, s * NUMBERS);
+        let v = Vector3::<F>::load(samples, s * NUMBERS + 3);
         let found = gather_sample::<F>(b_bar, corner, &grid, f, v, paper);
         let h = grid.spacing;
         bar_x = found.x / h;

@@ -124,8 +124,8 @@ fn pull_cells<F: Float + CubeElement>(
         let face = table[ABSOLUTE_POS * 3];
         if face != NO_SEGMENT {
             let t = corners::<F>(vertices, faces, face, Vector3::<F> { x, y, z });
-            let mut sum = Array::<F>::new(10usize);
-            for number in 0..10usize {
+            let mut sum = Array::<F>::new(FACE);
+            for number in 0..FACE {
                 sum[number] = F::new(0.0);
             }
             for element in table[ABSOLUTE_POS * 3 + 1]..table[ABSOLUTE_POS * 3 + 2] {
@@ -136,8 +136,8 @@ fn pull_cells<F: Float + CubeElement>(
                 let pull = add_share::<F>(&mut sum, found, inside, phi_bar[cell as usize]);
                 sum[9] += place.dot(pull);
             }
-            for number in 0..10usize {
-                sums[ABSOLUTE_POS * 10 + number] = sum[number];
+            for number in 0..FACE {
+                sums[ABSOLUTE_POS * FACE + number] = sum[number];
             }
         }
     }

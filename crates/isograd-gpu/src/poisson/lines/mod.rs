@@ -65,13 +65,14 @@ impl Launch {
 }
 
 impl<T: Scalar> Fourier<T> {
-    /// Lines → cosine transforms.
-    pub(super) fn forward<R: Runtime>(
+    /// Lines → cosine transforms; or, if `inverse`, cosine transforms → lines times `2n`.
+    pub(super) fn transform<R: Runtime>(
         &self,
         device: &Device<R>,
         lines: Lines,
         from: &Buffer<T>,
         to: &Buffer<T>,
+        inverse: bool,
     ) {
         let launch = Launch::new::<R, T>(device, lines);
         transform::launch::<T, R>(
@@ -89,33 +90,7 @@ impl<T: Scalar> Fourier<T> {
             launch.pairs,
             launch.capacity,
             lines.step == 1,
-        );
-    }
-
-    /// Cosine transforms → lines times `2n`.
-    pub(super) fn inverse<R: Runtime>(
-        &self,
-        device: &Device<R>,
-        lines: Lines,
-        from: &Buffer<T>,
-        to: &Buffer<T>,
-    ) {
-        let launch = Launch::new::<R, T>(device, lines);
-        transform_back::launch::<T, R>(
-            device.client(),
-            launch.groups,
-            launch.dim,
-            from.arg(),
-            to.arg(),
-            self.roots.arg(),
-            self.radices.arg(),
-            self.radices.len(),
-            lines.n,
-            lines.step,
-            lines.count,
-            launch.pairs,
-            launch.capacity,
-            lines.step == 1,
+            inverse,
         );
     }
 
@@ -166,66 +141,49 @@ fn transform<F: Float>(
     pairs: usize,
     #[comptime] capacity: usize,
     #[comptime] contiguous: bool,
+    #[comptime] inverse: bool,
 ) {
     let tile = own_tile(n, step, count, pairs, contiguous);
     let mut re = SharedMemory::<F>::new(2 * capacity);
     let mut im = SharedMemory::<F>::new(2 * capacity);
-    load(input, &mut re, &mut im, &tile, true);
+    load(input, &mut re, &mut im, &tile, comptime!(!inverse));
+    let mut from = 0usize.runtime();
+    if comptime!(inverse) {
+        to_fourier(&mut re, &mut im, roots, &tile, from, capacity);
+        from = capacity - from;
+    }
     let at = transform_tile(
-        &mut re,
-        &mut im,
-        roots,
-        radices,
-        passes,
-        &tile,
-        0usize.runtime(),
-        capacity,
+        &mut re, &mut im, roots, radices, passes, &tile, from, capacity,
     );
-    let items = tile.pairs * tile.n;
-    let mut item = UNIT_POS as usize;
-    let mut pair = first_pair(&tile);
-    let mut k = first_place(&tile);
-    while item < items {
-        let y = cosine(&re, &im, roots, &tile, at, pair, k);
-        write(output, &tile, pair, k, y.re);
-        write(output, &tile, pair + tile.pairs, k, y.im);
-        item += BLOCK as usize;
-        pair = next_pair(&tile, pair, k);
-        k = next_place(&tile, k);
+    if comptime!(inverse) {
+        store(output, &re, &im, &tile, at);
+    } else {
+        store_cosines(output, &re, &im, roots, &tile, at);
     }
 }
 
-#[cube(launch)]
-fn transform_back<F: Float>(
-    input: &Array<F>,
+/// Writes the cosine transforms of the Fourier transforms at `at`.
+#[cube]
+fn store_cosines<F: Float>(
     output: &mut Array<F>,
+    re: &SharedMemory<F>,
+    im: &SharedMemory<F>,
     roots: &Array<F>,
-    radices: &Array<u32>,
-    passes: usize,
-    n: usize,
-    step: usize,
-    count: usize,
-    pairs: usize,
-    #[comptime] capacity: usize,
-    #[comptime] contiguous: bool,
+    tile: &Tile,
+    at: usize,
 ) {
-    let tile = own_tile(n, step, count, pairs, contiguous);
-    let mut re = SharedMemory::<F>::new(2 * capacity);
-    let mut im = SharedMemory::<F>::new(2 * capacity);
-    load(input, &mut re, &mut im, &tile, false);
-    let begin = 0usize.runtime();
-    to_fourier(&mut re, &mut im, roots, &tile, begin, capacity);
-    let at = transform_tile(
-        &mut re,
-        &mut im,
-        roots,
-        radices,
-        passes,
-        &tile,
-        capacity - begin,
-        capacity,
-    );
-    store(output, &re, &im, &tile, at);
+    let items = tile.pairs * tile.n;
+    let mut item = UNIT_POS as usize;
+    let mut pair = first_pair(tile);
+    let mut k = first_place(tile);
+    while item < items {
+        let y = cosine(re, im, roots, tile, at, pair, k);
+        write(output, tile, pair, k, y.re);
+        write(output, tile, pair + tile.pairs, k, y.im);
+        item += BLOCK as usize;
+        pair = next_pair(tile, pair, k);
+        k = next_place(tile, k);
+    }
 }
 
 #[cube(launch)]

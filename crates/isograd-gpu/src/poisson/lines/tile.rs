@@ -2,6 +2,7 @@
 
 use cubecl::prelude::*;
 
+use super::super::axis::cell_of_line;
 use super::BLOCK;
 
 /// The lines of a group: `pairs` of them from the first on, paired with as many behind those. In shared
@@ -54,7 +55,7 @@ fn cell(tile: &Tile, line: usize, j: usize) -> usize {
     if comptime!(tile.contiguous) {
         line * tile.n + j
     } else {
-        (line / tile.step) * (tile.n * tile.step) + line % tile.step + j * tile.step
+        cell_of_line(tile.n, tile.step, line, j)
     }
 }
 

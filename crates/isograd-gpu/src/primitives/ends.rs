@@ -2,12 +2,11 @@
 
 use cubecl::prelude::*;
 
-use super::signs::BLOCK;
-use super::sums::groups_for;
+use super::reduce::{BLOCK, groups_for};
 use crate::{Buffer, Device, Error, Scalar};
 
 /// The least of each component of `(N, width)` finite values, then the greatest of each; N is not 0.
-pub(super) fn ends<R: Runtime, T: Scalar>(
+pub(crate) fn ends<R: Runtime, T: Scalar>(
     device: &Device<R>,
     values: &Buffer<T>,
     width: usize,
