@@ -18,6 +18,7 @@ use cubecl::prelude::*;
 use crate::device::check_length;
 use crate::element::plane;
 use crate::neighbors::{BLOCK, Neighborhoods, end_of_leaf, first_of_leaf, next_leaf};
+use crate::primitives::reduce::{self, sum_of_group};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
@@ -105,6 +106,47 @@ pub fn pullback<R: Runtime, T: Scalar>(
         points_bar.arg(),
     );
     Ok(points_bar)
+}
+
+/// The mean of areas `(N,)` that are not 0, and how many those are: [`isograd::splat::area::mean`]. Waits for the
+/// device.
+///
+/// # Errors
+/// Those of the device.
+pub fn mean<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    areas: &Buffer<T>,
+) -> Result<(f64, usize), Error> {
+    let n = areas.len();
+    let parts: Buffer<T> = device.empty(2 * n.div_ceil(reduce::BLOCK))?;
+    sum_areas::launch::<T, R>(
+        device.client(),
+        device.groups(n, reduce::BLOCK as u32),
+        CubeDim::new_1d(reduce::BLOCK as u32),
+        areas.arg(),
+        parts.arg(),
+    );
+    let sums = device.download(&reduce::sum_columns(device, &parts, 2)?)?;
+    let [sum, count] = [sums[0], sums[1]].map(isograd::Real::f64);
+    Ok((sum / count, count as usize))
+}
+
+/// Of each group, the sum of the areas, and of ones where they are not 0.
+#[cube(launch)]
+fn sum_areas<F: Float>(areas: &Array<F>, sums: &mut Array<F>) {
+    let mut area = F::new(0.0);
+    let mut count = F::new(0.0);
+    if ABSOLUTE_POS < areas.len() {
+        area = areas[ABSOLUTE_POS];
+        count = select(area > F::new(0.0), F::new(1.0), F::new(0.0));
+    }
+    let mut shared = SharedMemory::<F>::new(reduce::BLOCK);
+    let area = sum_of_group::<F>(area, &mut shared);
+    let count = sum_of_group::<F>(count, &mut shared);
+    if UNIT_POS == 0 && 2 * CUBE_POS < sums.len() {
+        sums[2 * CUBE_POS] = area;
+        sums[2 * CUBE_POS + 1] = count;
+    }
 }
 
 #[cube(launch)]

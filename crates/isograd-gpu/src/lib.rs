@@ -26,6 +26,7 @@ pub mod poisson;
 pub mod primitives;
 pub mod splat;
 mod spread;
+mod trilinear;
 mod vector;
 
 #[cfg(feature = "cuda")]

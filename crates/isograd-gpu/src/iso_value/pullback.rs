@@ -8,14 +8,9 @@ use crate::grid::{self, Lattice, cell_at, check_field, from_centre, place};
 use crate::primitives::fill::add;
 use crate::primitives::reduce::{BLOCK, sum_columns};
 use crate::splat::{self, SampleCotangent, Samples, subtract_from_grid};
-use crate::spread::{Before, Spread, spread};
+use crate::spread::{Before, spread};
+use crate::trilinear::{NUMBERS, REACH, Trilinear};
 use crate::{Buffer, Device, Error, Scalar};
-
-/// Cells between that of a sample and the outermost between whose centres `χ` is interpolated.
-const REACH: u32 = 1;
-
-/// Numbers of a sample in the form that is spread: offset from the centre of its cell, and `s_i`.
-const NUMBERS: usize = 4;
 
 /// Adds to `chi_bar`, `(nx, ny, nz)`, and to `out` what the cotangent `bar` of the iso-value, an array of one
 /// number, and the cotangents `values_bar` `(N,)` of `χ(x_i)` mean for the indicator, the samples and the grid.
@@ -153,28 +148,4 @@ fn sort_shares<F: Float + CubeElement>(
         bar_h = x.x * bar_x + x.y * bar_y + x.z * bar_z;
     }
     subtract_from_grid::<F>(bar_x, bar_y, bar_z, bar_h, grid_sums);
-}
-
-/// By the weights of trilinear interpolation. Samples keep 2 cells from the walls, where it would end.
-struct Trilinear;
-
-#[cube]
-impl Spread for Trilinear {
-    fn part<F: Float>(samples: &Array<F>, s: usize, x: u32, y: u32, z: u32) -> F {
-        let at = s * NUMBERS;
-        let wx = tent::<F>(samples[at], x);
-        let wy = tent::<F>(samples[at + 1], y);
-        let wz = tent::<F>(samples[at + 2], z);
-        samples[at + 3] * wx * wy * wz
-    }
-}
-
-/// `max(0, 1 − |Δ|)` in the cell below (0), at (1) or above (2) that of a point `f` from its centre.
-#[cube]
-fn tent<F: Float>(f: F, cell: u32) -> F {
-    let zero = F::new(0.0);
-    let below = max(-f, zero);
-    let above = max(f, zero);
-    let at = F::new(1.0) - below - above;
-    select(cell == 1u32, at, select(cell == 0u32, below, above))
 }

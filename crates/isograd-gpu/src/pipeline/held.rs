@@ -19,6 +19,8 @@ pub struct Held<T> {
     pub area_radii: Buffer<T>,
     /// The radius of every point that has enough neighbours within it.
     pub common_radius: T,
+    /// Typical distance between neighbouring samples, which the smoothing follows where areas do not count.
+    pub spacing: T,
     /// `(N, 3)` roughly outward: a normal is turned to the side of its vector here.
     pub outward: Buffer<T>,
 }
@@ -55,6 +57,7 @@ impl<T: Scalar> Held<T> {
             radii: device.upload(&axes.radius)?,
             area_radii: device.upload(&near.radius)?,
             common_radius: near.common_radius,
+            spacing: near.spacing(),
             outward: device.upload(found.normals.as_flattened())?,
         })
     }

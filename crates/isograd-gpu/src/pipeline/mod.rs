@@ -3,25 +3,27 @@
 //! # Map
 //! points → axes, areas → outward normals → `b` → χ → iso-value → surface → φ. What the CPU chose for the
 //! cloud, radii and sides, is [`Held`]: found once, it does for the steps of a body that moves a little. After
-//! that nothing comes back to the host but a few counts.
+//! that nothing comes back to the host but a few counts, and the mean area where the smoothing follows it.
 //!
-//! The iso-value is the mean at the samples ([`isograd::isosurface::Level::Mean`]) and the smoothing a number of
-//! cells. Not on devices yet: the local iso-value, automatic smoothing, the screened equation, given normals.
+//! # Pullback
+//! As [`isograd::Reconstruction::pullback`], of any of the results: [`Reconstructor::pullback`].
 //!
 //! # Not differentiable
 //! What is held, and what the stages say of themselves.
 
 mod held;
+mod pullback;
 
 pub use held::Held;
+pub use pullback::{CloudCotangent, Cotangent};
 
 use cubecl::prelude::Runtime;
 use isograd::Grid;
+use isograd::poisson::Smoothing;
 
 use crate::distance::{self, Band, Mesh};
 use crate::isosurface::{self, Surface};
-use crate::primitives::fill::add;
-use crate::splat::{self, SampleCotangent, Samples, Weights};
+use crate::splat::{self, Refused, Samples, Weights};
 use crate::{Buffer, Device, Scalar, area, iso_value, neighbors, normals, poisson};
 
 /// Why there is no result.
@@ -41,6 +43,15 @@ pub enum Error {
         "given normals and those of the step before are no choice here: take signs of given normals, or Held::facing"
     )]
     Orientation,
+    /// The smoothing makes no sense.
+    #[error("the smoothing is {0:?}; it must be 0 or more cells, and finite")]
+    Smoothing(Smoothing),
+    /// The screening makes no sense.
+    #[error("the screening is {0}; it must be 0 or more, and finite")]
+    Screening(f64),
+    /// The screened equation.
+    #[error(transparent)]
+    Screened(#[from] poisson::screened::Error),
     /// Samples outside the grid.
     #[error(
         "{count} points, the first of them number {first}, are outside the grid or within 2 cells of its walls; use more padding or larger bounds, or remove them"
@@ -59,25 +70,38 @@ pub enum Error {
     Distance(#[from] distance::Error),
 }
 
-/// What a plan does.
+/// What a plan does: those of [`isograd::Options`] that are for devices too.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
     /// How samples are spread.
     pub weights: Weights,
-    /// Width of the smoothing, in cells; 0 for none.
-    pub smoothing: f64,
+    /// Whether each sample counts by the area of surface that it stands for.
+    pub area_weights: bool,
+    /// Width of the smoothing of the indicator.
+    pub smoothing: Smoothing,
+    /// `α` of the [screened](poisson::screened) equation; 0 for the plain one.
+    pub screening: f64,
     /// Where φ is computed.
     pub band: Band,
 }
 
 impl Default for Options {
-    /// B-splines, a smoothing of one cell, φ everywhere.
     fn default() -> Self {
         Self {
             weights: Weights::default(),
-            smoothing: 1.0,
+            area_weights: true,
+            smoothing: Smoothing::default(),
+            screening: 0.0,
             band: Band::default(),
         }
+    }
+}
+
+impl Options {
+    /// Whether the smoothing follows the areas of the samples, and has a derivative: of a screened solution, what
+    /// the smoothing was done to is not kept.
+    fn smoothing_follows(&self) -> bool {
+        self.smoothing == Smoothing::Auto && self.area_weights && self.screening == 0.0
     }
 }
 
@@ -102,7 +126,7 @@ pub struct Reconstruction<T: Scalar> {
     pub surface: Surface<T>,
     /// `(N, 3)` outward unit normals.
     pub normals: Buffer<T>,
-    /// `(N,)` areas, in that unit squared.
+    /// `(N,)` areas, in that unit squared; 1 where samples do not count by them.
     pub areas: Buffer<T>,
     points: Buffer<T>,
     axes: Buffer<T>,
@@ -110,21 +134,25 @@ pub struct Reconstruction<T: Scalar> {
     residuals: Residuals<T>,
 }
 
+/// What the stages kept for their pullbacks.
 struct Residuals<T: Scalar> {
     normals: normals::Residual<T>,
-    areas: area::Residual<T>,
+    /// None where samples do not count by their areas.
+    areas: Option<area::Residual<T>>,
     splat: splat::Residual<T>,
+    smoothing: Width,
     iso_value: iso_value::Residual<T>,
     surface: isosurface::Residual<T>,
     distance: distance::lattice::Residual<T>,
 }
 
-/// Cotangents of what a reconstruction was made of.
-pub struct Cotangent<T> {
-    /// `(N, 3)` of the points.
-    pub points: Buffer<T>,
-    /// `(4,)` of the low corner of the grid and of its cell size, at fixed points.
-    pub grid: Buffer<T>,
+/// Width of the smoothing, and the areas that it follows.
+#[derive(Clone, Copy)]
+struct Width {
+    /// In cells.
+    cells: f64,
+    /// Mean of the areas that are not 0, in the user's unit squared, and how many those are.
+    areas: (f64, usize),
 }
 
 impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
@@ -133,6 +161,12 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
     /// # Errors
     /// A grid that the device can't hold, or a number type that it does not have.
     pub fn new(device: Device<R>, grid: Grid<T>, options: Options) -> Result<Self, Error> {
+        if !options.smoothing.is_valid() {
+            return Err(Error::Smoothing(options.smoothing));
+        }
+        if !(options.screening >= 0.0 && options.screening.is_finite()) {
+            return Err(Error::Screening(options.screening));
+        }
         Ok(Self {
             solver: poisson::Solver::new(&device, grid.shape())?,
             surface: isosurface::Plan::new(&device)?,
@@ -156,34 +190,35 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         points: &Buffer<T>,
         held: &Held<T>,
     ) -> Result<Reconstruction<T>, Error> {
-        let (device, grid) = (&self.device, &self.grid);
+        let (device, grid, options) = (&self.device, &self.grid, &self.options);
         let near = neighbors::forward(device, points, &held.radii)?;
         let (axes, of_normals) = normals::forward(device, &near)?;
-        let near = neighbors::with_radii(device, &near, &held.area_radii)?;
-        let (areas, of_areas) = area::forward(device, &near, held.common_radius)?;
+        let (areas, of_areas) = self.areas(&near, held)?;
         let normals = held::turn(device, &axes, &axes, &held.outward)?;
+        let width = self.width(&areas, held)?;
         let samples = Samples {
             points,
             normals: &normals,
             areas: &areas,
         };
-        let (b, of_splat) = splat::forward(device, samples, grid, self.options.weights)?;
-        if let Some(refused) = of_splat.refused(device)? {
-            return Err(Error::Outside {
-                count: refused.count,
-                first: refused.first,
-            });
+        let (b, of_splat) = splat::forward(device, samples, grid, options.weights)?;
+        if let Some(Refused { count, first }) = of_splat.refused(device)? {
+            return Err(Error::Outside { count, first });
         }
-        let chi = self.solver.solve(device, &b, self.options.smoothing)?;
+        let chi = self.solver.solve(device, &b, width.cells)?;
+        drop(b);
+        if options.screening > 0.0 {
+            let equation = self.screened_equation(samples, &of_splat);
+            poisson::screened::forward(device, &equation, &chi)?;
+        }
         let (level, of_level) = iso_value::forward(device, &chi, grid, points, &areas)?;
         let (surface, of_surface) = isosurface::forward(device, &self.surface, &chi, &level, grid)?;
         let mesh = Mesh {
             vertices: surface.vertices.clone(),
             faces: surface.faces.clone(),
         };
-        let band = self.options.band;
         let (sdf, of_distance) =
-            distance::lattice::forward(device, &mesh, grid, &chi, &level, band)?;
+            distance::lattice::forward(device, &mesh, grid, &chi, &level, options.band)?;
         Ok(Reconstruction {
             sdf,
             indicator: chi,
@@ -198,6 +233,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
                 normals: of_normals,
                 areas: of_areas,
                 splat: of_splat,
+                smoothing: width,
                 iso_value: of_level,
                 surface: of_surface,
                 distance: of_distance,
@@ -205,48 +241,44 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         })
     }
 
-    /// What the cotangent `sdf_bar` `(nx, ny, nz)` of φ means for points and grid.
-    ///
-    /// # Errors
-    /// An array of another length, or [`crate::Error::TooLarge`].
-    pub fn pullback(
+    /// The areas that samples count by.
+    fn areas(
         &self,
-        result: &Reconstruction<T>,
-        sdf_bar: &Buffer<T>,
-    ) -> Result<Cotangent<T>, Error> {
-        let (device, residuals) = (&self.device, &result.residuals);
-        let samples = Samples {
-            points: &result.points,
-            normals: &result.normals,
-            areas: &result.areas,
-        };
-        let of_mesh = distance::lattice::pullback(device, &residuals.distance, sdf_bar)?;
-        let of_surface = isosurface::pullback(device, &residuals.surface, &of_mesh.vertices)?;
-        let bars = SampleCotangent::zeros(device, samples.len())?;
-        iso_value::pullback(
-            device,
-            &residuals.iso_value,
-            &residuals.splat,
+        near: &neighbors::Neighborhoods<T>,
+        held: &Held<T>,
+    ) -> Result<(Buffer<T>, Option<area::Residual<T>>), Error> {
+        let device = &self.device;
+        if !self.options.area_weights {
+            return Ok((device.upload(&vec![T::of(1.0); near.len()])?, None));
+        }
+        let near = neighbors::with_radii(device, near, &held.area_radii)?;
+        let (areas, residual) = area::forward(device, &near, held.common_radius)?;
+        Ok((areas, Some(residual)))
+    }
+
+    fn screened_equation<'a>(
+        &'a self,
+        samples: Samples<'a, T>,
+        splat: &'a splat::Residual<T>,
+    ) -> poisson::screened::Equation<'a, T> {
+        poisson::screened::Equation {
+            solver: &self.solver,
             samples,
-            &of_surface.level,
-            None,
-            &of_surface.chi,
-            &bars,
-        )?;
-        let b_bar = self
-            .solver
-            .solve(device, &of_surface.chi, self.options.smoothing)?;
-        splat::pullback(device, &residuals.splat, samples, &b_bar, &bars)?;
-        let axes_bar = held::turn(device, &bars.normals, &result.axes, &result.outward)?;
-        let by_axes = normals::pullback(device, &residuals.normals, &axes_bar)?;
-        let by_areas = area::pullback(device, &residuals.areas, &bars.areas)?;
-        add(device, &by_axes, &bars.points)?;
-        add(device, &by_areas, &bars.points)?;
-        add(device, &of_mesh.grid, &bars.grid)?;
-        add(device, &of_surface.grid, &bars.grid)?;
-        Ok(Cotangent {
-            points: bars.points,
-            grid: bars.grid,
-        })
+            area_weights: self.options.area_weights,
+            splat,
+            screening: self.options.screening,
+        }
+    }
+
+    /// How much the indicator is smoothed.
+    fn width(&self, areas: &Buffer<T>, held: &Held<T>) -> Result<Width, Error> {
+        let automatic = self.options.smoothing == Smoothing::Auto;
+        let areas = match automatic && self.options.area_weights {
+            true => area::mean(&self.device, areas)?,
+            false => (held.spacing.f64().powi(2), 0),
+        };
+        let apart = areas.0.sqrt() / self.grid.spacing().f64();
+        let cells = self.options.smoothing.cells(apart);
+        Ok(Width { cells, areas })
     }
 }

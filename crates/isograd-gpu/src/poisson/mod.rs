@@ -26,6 +26,7 @@ mod axis;
 mod gain;
 mod lines;
 mod products;
+pub mod screened;
 pub mod smoothing;
 
 use cubecl::prelude::Runtime;

@@ -6,12 +6,10 @@
 use cubecl::prelude::*;
 
 use crate::device::check_length;
+use crate::primitives::reduce::{self, BLOCK, sum_of_group};
 use crate::{Buffer, Device, Error, Scalar};
 
-/// Units of a group.
-const BLOCK: usize = 256;
-
-/// Cells or sums of a unit.
+/// Cells of a unit.
 const OWN: usize = 8;
 
 /// `σ χ·Lχ̄`, one number, which is `σ̄` for cotangents `chi_bar` of `chi`, both `(nx, ny, nz)` in C order.
@@ -33,12 +31,11 @@ pub fn pullback<R: Runtime, T: Scalar>(
         return device.upload(&[T::of(0.0)]);
     }
     let [nx, ny, nz] = shape;
-    let mut sums: Buffer<T> = device.empty(cells.div_ceil(BLOCK * OWN))?;
-    let dim = CubeDim::new_1d(BLOCK as u32);
+    let sums: Buffer<T> = device.empty(cells.div_ceil(BLOCK * OWN))?;
     sum_products::launch::<T, R>(
         device.client(),
         device.groups(sums.len() * BLOCK, BLOCK as u32),
-        dim,
+        CubeDim::new_1d(BLOCK as u32),
         chi.arg(),
         chi_bar.arg(),
         sums.arg(),
@@ -47,13 +44,7 @@ pub fn pullback<R: Runtime, T: Scalar>(
         ny,
         nz,
     );
-    while sums.len() > 1 {
-        let fewer = device.empty(sums.len().div_ceil(BLOCK * OWN))?;
-        let groups = device.groups(fewer.len() * BLOCK, BLOCK as u32);
-        sum::launch::<T, R>(device.client(), groups, dim, sums.arg(), fewer.arg());
-        sums = fewer;
-    }
-    Ok(sums)
+    reduce::sum(device, &sums)
 }
 
 /// Of the cells of a group, `factor` times the sum of products of differences.
@@ -85,40 +76,9 @@ fn sum_products<F: Float + CubeElement>(
             }
         }
     }
-    write_sum(factor * own, sums);
-}
-
-/// Of the values of a group, the sum.
-#[cube(launch)]
-fn sum<F: Float>(values: &Array<F>, sums: &mut Array<F>) {
-    let first = CUBE_POS * (BLOCK * OWN) + UNIT_POS as usize;
-    let mut own = F::new(0.0);
-    for i in 0..OWN {
-        let at = first + i * BLOCK;
-        if at < values.len() {
-            own += values[at];
-        }
-    }
-    write_sum(own, sums);
-}
-
-/// Adds what the units of a group have, as a tree, and writes that to the group's place.
-#[cube]
-fn write_sum<F: Float>(own: F, sums: &mut Array<F>) {
-    let unit = UNIT_POS as usize;
     let mut shared = SharedMemory::<F>::new(BLOCK);
-    shared[unit] = own;
-    sync_cube();
-    let mut half = (BLOCK / 2).runtime();
-    while half > 0 {
-        if unit < half {
-            let more = shared[unit + half];
-            shared[unit] += more;
-        }
-        sync_cube();
-        half /= 2;
-    }
-    if unit == 0 && CUBE_POS < sums.len() {
-        sums[CUBE_POS] = shared[0];
+    let total = sum_of_group::<F>(factor * own, &mut shared);
+    if UNIT_POS == 0 && CUBE_POS < sums.len() {
+        sums[CUBE_POS] = total;
     }
 }

@@ -27,9 +27,23 @@ pub fn add<R: Runtime, T: Scalar>(
     values: &Buffer<T>,
     out: &Buffer<T>,
 ) -> Result<(), Error> {
+    add_scaled(device, values, T::of(1.0), out)
+}
+
+/// Adds `factor` times `values` to `out`, one by one.
+///
+/// # Errors
+/// [`Error::Length`] where their lengths differ.
+pub fn add_scaled<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    values: &Buffer<T>,
+    factor: T,
+    out: &Buffer<T>,
+) -> Result<(), Error> {
     check_length("the array to add", values, out.len())?;
     let (groups, dim) = (device.groups(out.len(), BLOCK), CubeDim::new_1d(BLOCK));
-    add_values::launch::<T, R>(device.client(), groups, dim, values.arg(), out.arg());
+    let client = device.client();
+    add_values::launch::<T, R>(client, groups, dim, values.arg(), factor, out.arg());
     Ok(())
 }
 
@@ -41,8 +55,8 @@ fn fill_zeros<F: Float>(out: &mut Array<F>) {
 }
 
 #[cube(launch)]
-fn add_values<F: Float>(values: &Array<F>, out: &mut Array<F>) {
+fn add_values<F: Float + CubeElement>(values: &Array<F>, factor: F, out: &mut Array<F>) {
     if ABSOLUTE_POS < out.len() {
-        out[ABSOLUTE_POS] += values[ABSOLUTE_POS];
+        out[ABSOLUTE_POS] += factor * values[ABSOLUTE_POS];
     }
 }

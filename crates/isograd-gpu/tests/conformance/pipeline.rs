@@ -5,8 +5,10 @@ use isograd::isosurface::Level;
 use isograd::neighbors::Radius;
 use isograd::orient::Method;
 use isograd::poisson::Smoothing;
-use isograd::{Cotangent, Grid, PointCloud, Real, Reconstructor, Resolution};
-use isograd_gpu::pipeline::{self, Error, Held};
+use isograd::{Grid, PointCloud, Real, Reconstructor, Resolution};
+use isograd_gpu::distance::Band;
+use isograd_gpu::pipeline::{self, Error, Held, Options};
+use isograd_gpu::splat::Weights;
 use isograd_gpu::{Device, Scalar};
 use isograd_shapes::Sampling;
 
@@ -24,65 +26,210 @@ fn cloud<T: Scalar>(name: &str, count: usize) -> PointCloud<T> {
     PointCloud::new(samples.cloud.points().to_vec()).unwrap()
 }
 
-fn compare<R: Runtime, T: Scalar>(device: &Device<R>) {
-    let tolerance = if T::NAME == "f32" { 2e-4 } else { 1e-9 };
-    for (name, count, cells) in [("torus", 4000, 40), ("fish", 3000, 48)] {
-        let cloud = cloud::<T>(name, count);
-        let grid = Grid::fit(&cloud, Resolution::Cells(cells), real(0.1)).unwrap();
-        let options = isograd::Options {
-            level: Level::Mean,
-            smoothing: Smoothing::Cells(1.0),
-            ..isograd::Options::default()
-        };
-        let mut plan = Reconstructor::new(grid, options).unwrap();
-        let expected = plan.reconstruct(&cloud).unwrap();
-        let bar = weights::<T>(expected.sdf().values(), Real::f64(grid.spacing()));
-        let cotangent = Cotangent {
-            sdf: Some(&bar),
-            ..Cotangent::default()
-        };
-        let expected_bar = expected.pullback(&cloud, &cotangent).unwrap();
+/// The plan that is compared on a cloud.
+#[derive(Clone, Copy)]
+struct Case {
+    shape: &'static str,
+    samples: usize,
+    cells: usize,
+    options: Options,
+}
 
-        let plan = pipeline::Reconstructor::new(device.clone(), grid, Default::default()).unwrap();
+fn cases() -> [Case; 4] {
+    let torus = Case {
+        shape: "torus",
+        samples: 4000,
+        cells: 40,
+        options: Options::default(),
+    };
+    let small = Case {
+        samples: 2000,
+        cells: 28,
+        ..torus
+    };
+    [
+        torus,
+        Case {
+            shape: "fish",
+            samples: 3000,
+            cells: 48,
+            options: Options {
+                smoothing: Smoothing::Cells(1.0),
+                ..Options::default()
+            },
+        },
+        Case {
+            options: Options {
+                weights: Weights::Paper,
+                area_weights: false,
+                band: Band::Cells(3.0),
+                ..Options::default()
+            },
+            ..small
+        },
+        Case {
+            options: Options {
+                screening: 4.0,
+                ..Options::default()
+            },
+            ..small
+        },
+    ]
+}
+
+/// The CPU's, with the same choices.
+fn on_cpu(options: &Options) -> isograd::Options {
+    isograd::Options {
+        weights: options.weights,
+        area_weights: options.area_weights,
+        smoothing: options.smoothing,
+        screening: options.screening,
+        level: Level::Mean,
+        band: options.band,
+        ..isograd::Options::default()
+    }
+}
+
+/// Cotangents of all results.
+struct Bars<T> {
+    sdf: Vec<T>,
+    indicator: Vec<T>,
+    iso_value: T,
+    vertices: Vec<[T; 3]>,
+    normals: Vec<[T; 3]>,
+    areas: Vec<T>,
+}
+
+impl<T: Scalar> Bars<T> {
+    /// Of about equal weight, in the units of the results.
+    fn of(result: &isograd::Reconstruction<T>) -> Self {
+        let spacing = Real::f64(result.sdf().grid().spacing());
+        let mut numbers = Numbers(12);
+        let mut next = |scale: f64| real(scale * numbers.signed());
+        let (cells, samples) = (result.sdf().values().len(), result.normals().len());
+        Self {
+            sdf: weights(result.sdf().values(), spacing),
+            indicator: (0..cells).map(|_| next(0.01 * spacing)).collect(),
+            iso_value: next(10.0 * spacing),
+            vertices: (0..result.mesh().vertices().len())
+                .map(|_| [0; 3].map(|_| next(1.0)))
+                .collect(),
+            normals: (0..samples)
+                .map(|_| [0; 3].map(|_| next(0.1 * spacing)))
+                .collect(),
+            areas: (0..samples).map(|_| next(0.1 / spacing)).collect(),
+        }
+    }
+
+    fn on_cpu(&self) -> isograd::Cotangent<'_, T> {
+        isograd::Cotangent {
+            sdf: Some(&self.sdf),
+            indicator: Some(&self.indicator),
+            iso_value: self.iso_value,
+            vertices: Some(&self.vertices),
+            normals: Some(&self.normals),
+            areas: Some(&self.areas),
+            extensions: &[],
+        }
+    }
+}
+
+fn compare<R: Runtime, T: Scalar>(device: &Device<R>) {
+    // Of the whole chain; gradients pass twice as many stages.
+    let tolerance = if T::NAME == "f32" { 1e-4 } else { 1e-11 };
+    for Case {
+        shape: name,
+        samples,
+        cells,
+        options,
+    } in cases()
+    {
+        let cloud = cloud::<T>(name, samples);
+        let grid = Grid::fit(&cloud, Resolution::Cells(cells), real(0.1)).unwrap();
+        let mut plan = Reconstructor::new(grid, on_cpu(&options)).unwrap();
+        let expected = plan.reconstruct(&cloud).unwrap();
+
+        let plan = pipeline::Reconstructor::new(device.clone(), grid, options).unwrap();
         let held = Held::find(device, &cloud, Radius::Auto, &Method::Auto).unwrap();
         let points = device.upload(cloud.points().as_flattened()).unwrap();
         let result = plan.reconstruct(&points, &held).unwrap();
         let found = device.download(&result.sdf).unwrap();
         let difference = relative(&found, expected.sdf().values());
-        assert!(
-            difference < tolerance,
-            "{name} {}: φ {difference:e}",
-            T::NAME
-        );
+        println!("{name} {}: φ {difference:.1e}", T::NAME);
+        assert!(difference < tolerance, "{name}: {difference:e}");
 
-        let bars = plan
-            .pullback(&result, &device.upload(&bar).unwrap())
-            .unwrap();
-        let found_bar = device.download(&bars.points).unwrap();
-        let difference = relative(&found_bar, expected_bar.points.as_flattened());
-        assert!(
-            difference < 5.0 * tolerance,
-            "{name} {}: x̄ {difference:e}",
-            T::NAME
-        );
-        let grid_bar = device.download(&bars.grid).unwrap();
-        let expected_grid = expected_bar.grid;
-        let [x, y, z] = expected_grid.lower;
-        let difference = relative(&grid_bar, &[x, y, z, expected_grid.spacing]);
-        assert!(
-            difference < 5.0 * tolerance,
-            "{name} {}: grid {difference:e}",
-            T::NAME
-        );
+        let bars = Bars::of(expected);
+        let upload = |values: &[T]| device.upload(values).unwrap();
+        let all = [
+            upload(&bars.sdf),
+            upload(&bars.indicator),
+            upload(&[bars.iso_value]),
+            upload(bars.vertices.as_flattened()),
+            upload(bars.normals.as_flattened()),
+            upload(&bars.areas),
+        ];
+        let pull = |result: &pipeline::Reconstruction<T>, cotangent: [bool; 6]| {
+            let given = |k: usize| cotangent[k].then_some(&all[k]);
+            let cotangent = pipeline::Cotangent {
+                sdf: given(0),
+                indicator: given(1),
+                iso_value: given(2),
+                vertices: given(3),
+                normals: given(4),
+                areas: given(5),
+            };
+            let bars = plan.pullback(result, &cotangent).unwrap();
+            [&bars.points, &bars.grid].map(|bar| device.download(bar).unwrap())
+        };
+        for given in cotangents() {
+            let expected = expected.pullback(&cloud, &only(&bars.on_cpu(), given));
+            let expected = expected.unwrap();
+            let [x, y, z] = expected.grid.lower;
+            let [of_points, of_grid] = pull(&result, given);
+            let errors = [
+                relative(&of_points, expected.points.as_flattened()),
+                match given == [false, false, false, false, true, true] {
+                    // Neither axes nor areas know of the grid.
+                    true => of_grid.iter().map(|bar| Real::f64(bar.abs())).sum(),
+                    false => relative(&of_grid, &[x, y, z, expected.grid.spacing]),
+                },
+            ];
+            println!("{given:?}: x̄ and that of the grid {errors:?}");
+            let most = errors.into_iter().fold(0.0, f64::max);
+            assert!(most < 10.0 * tolerance, "{name} {given:?}: {most:e}");
+        }
 
         // The next step of a body that has not moved: the same bits, sides told by the normals before.
         let held = held.facing(result.normals.clone()).unwrap();
         let again = plan.reconstruct(&points, &held).unwrap();
         assert_eq!(device.download(&again.sdf).unwrap(), found);
-        let bars = plan
-            .pullback(&again, &device.upload(&bar).unwrap())
-            .unwrap();
-        assert_eq!(device.download(&bars.points).unwrap(), found_bar);
+        assert_eq!(pull(&again, [true; 6]), pull(&result, [true; 6]));
+    }
+}
+
+/// Which results have a cotangent: φ alone, all, none of the fields, the vertices alone.
+fn cotangents() -> [[bool; 6]; 4] {
+    let (yes, no) = (true, false);
+    [
+        [yes, no, no, no, no, no],
+        [yes; 6],
+        [no, no, no, no, yes, yes],
+        [no, no, no, yes, no, no],
+    ]
+}
+
+fn only<'a, T: Scalar>(
+    all: &isograd::Cotangent<'a, T>,
+    given: [bool; 6],
+) -> isograd::Cotangent<'a, T> {
+    isograd::Cotangent {
+        sdf: all.sdf.filter(|_| given[0]),
+        indicator: all.indicator.filter(|_| given[1]),
+        iso_value: if given[2] { all.iso_value } else { real(0.0) },
+        vertices: all.vertices.filter(|_| given[3]),
+        normals: all.normals.filter(|_| given[4]),
+        areas: all.areas.filter(|_| given[5]),
+        extensions: &[],
     }
 }
 

@@ -140,10 +140,48 @@ fn whole<T: Scalar>(device: &Device<Recorder>) {
         radii: numbers::<T>(device, SAMPLES),
         area_radii: numbers(device, SAMPLES),
         common_radius: <T as isograd::Real>::of(0.1),
+        spacing: <T as isograd::Real>::of(0.02),
         outward: numbers(device, 3 * SAMPLES),
     };
     let plan = pipeline::Reconstructor::new(device.clone(), grid(), Default::default()).unwrap();
-    answer(&[&[0, 0], &[100, 0, VERTICES as u32, FACES as u32]]);
+    // The areas, the samples outside, the surface.
+    answer(&[
+        &[1 << 30, 1 << 30, 1 << 30, 1 << 30],
+        &[0, 0],
+        &[100, 0, VERTICES as u32, FACES as u32],
+    ]);
     let result = plan.reconstruct(&held.outward, &held).unwrap();
-    plan.pullback(&result, &result.sdf).unwrap();
+    let sdf = Some(&result.sdf);
+    let cotangent = pipeline::Cotangent {
+        sdf,
+        ..Default::default()
+    };
+    plan.pullback(&result, &cotangent).unwrap();
+    screened(device, &held.outward);
+}
+
+fn screened<T: Scalar>(device: &Device<Recorder>, points: &Buffer<T>) {
+    let solver = poisson::Solver::<T>::new(device, SHAPE).unwrap();
+    let areas = numbers::<T>(device, SAMPLES);
+    let samples = Samples {
+        points,
+        normals: points,
+        areas: &areas,
+    };
+    let (chi, splat) = splat::forward(device, samples, &grid(), Weights::BSpline).unwrap();
+    let (_, level) = iso_value::forward(device, &chi, &grid(), points, &areas).unwrap();
+    let bars = SampleCotangent::zeros(device, SAMPLES).unwrap();
+    let equation = poisson::screened::Equation {
+        solver: &solver,
+        samples,
+        area_weights: true,
+        splat: &splat,
+        screening: 4.0,
+    };
+    // The area, what is left at first and after an iteration: 2 or more in both number types, then nothing.
+    let two: &[u32] = &[1 << 30, 1 << 30];
+    answer(&[two, two, &[]]);
+    poisson::screened::forward(device, &equation, &chi).unwrap();
+    answer(&[two, two, &[]]);
+    poisson::screened::pullback(device, &equation, &level, &chi, &bars).unwrap();
 }

@@ -41,7 +41,7 @@ use crate::splat::{self, Samples};
 use crate::{Grid, Real};
 
 /// Iterations after which something is wrong. At `α = 4` some 30 are needed, and they grow with `√α`.
-const MOST_ITERATIONS: usize = 2000;
+pub const MOST_ITERATIONS: usize = 2000;
 
 /// The equation, but for its right-hand side.
 #[derive(Clone, Copy)]

@@ -1,0 +1,211 @@
+//! The stages in reverse: cotangents of any of the results to those of points and grid.
+
+use cubecl::prelude::*;
+
+use super::{Error, Reconstruction, Reconstructor, held};
+use crate::device::check_length;
+use crate::primitives::fill::{add, zeros};
+use crate::splat::{self, SampleCotangent, Samples};
+use crate::{Buffer, Scalar, area, distance, iso_value, isosurface, normals, poisson};
+
+/// Units of a group.
+const BLOCK: u32 = 256;
+
+/// Cotangents of the results of a reconstruction: by how much a scalar (a loss) changes, a unit of each
+/// result. What is left out counts as zero.
+#[derive(Clone, Copy, Debug)]
+pub struct Cotangent<'a, T> {
+    /// `(nx, ny, nz)` of φ, in memory order.
+    pub sdf: Option<&'a Buffer<T>>,
+    /// `(nx, ny, nz)` of the indicator χ.
+    pub indicator: Option<&'a Buffer<T>>,
+    /// `(1,)` of the iso-value.
+    pub iso_value: Option<&'a Buffer<T>>,
+    /// `(V, 3)` of the vertices of the surface.
+    pub vertices: Option<&'a Buffer<T>>,
+    /// `(N, 3)` of the outward normals of the samples.
+    pub normals: Option<&'a Buffer<T>>,
+    /// `(N,)` of the areas of the samples.
+    pub areas: Option<&'a Buffer<T>>,
+}
+
+impl<T> Default for Cotangent<'_, T> {
+    fn default() -> Self {
+        Self {
+            sdf: None,
+            indicator: None,
+            iso_value: None,
+            vertices: None,
+            normals: None,
+            areas: None,
+        }
+    }
+}
+
+impl<T> Cotangent<'_, T> {
+    /// Whether anything beyond the normals and areas of the samples has a cotangent.
+    fn reaches_indicator(&self) -> bool {
+        let fields = [self.sdf, self.indicator, self.iso_value, self.vertices];
+        fields.iter().any(Option::is_some)
+    }
+}
+
+/// Cotangents of what a reconstruction was made from.
+#[derive(Clone, Debug)]
+pub struct CloudCotangent<T> {
+    /// `(N, 3)` of the points.
+    pub points: Buffer<T>,
+    /// `(4,)` of the low corner of the grid and of its cell size, at fixed points.
+    pub grid: Buffer<T>,
+}
+
+impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
+    /// Pulls cotangents of any of the results of this plan back to the points and the grid.
+    ///
+    /// # Errors
+    /// A cotangent of another length than its result, or [`crate::Error::TooLarge`].
+    pub fn pullback(
+        &self,
+        result: &Reconstruction<T>,
+        cotangent: &Cotangent<'_, T>,
+    ) -> Result<CloudCotangent<T>, Error> {
+        let (device, residuals) = (&self.device, &result.residuals);
+        let bars = SampleCotangent::zeros(device, result.areas.len())?;
+        for (given, sum) in [
+            (cotangent.normals, &bars.normals),
+            (cotangent.areas, &bars.areas),
+        ] {
+            if let Some(given) = given {
+                add(device, given, sum)?;
+            }
+        }
+        if cotangent.reaches_indicator() {
+            self.pull_indicator(result, cotangent, &bars)?;
+        }
+        let axes_bar = held::turn(device, &bars.normals, &result.axes, &result.outward)?;
+        let by_axes = normals::pullback(device, &residuals.normals, &axes_bar)?;
+        add(device, &by_axes, &bars.points)?;
+        if let Some(areas) = &residuals.areas {
+            let by_areas = area::pullback(device, areas, &bars.areas)?;
+            add(device, &by_areas, &bars.points)?;
+        }
+        Ok(CloudCotangent {
+            points: bars.points,
+            grid: bars.grid,
+        })
+    }
+
+    /// From φ, the surface, the indicator and the iso-value to samples and grid.
+    fn pull_indicator(
+        &self,
+        result: &Reconstruction<T>,
+        cotangent: &Cotangent<'_, T>,
+        bars: &SampleCotangent<T>,
+    ) -> Result<(), Error> {
+        let (device, residuals) = (&self.device, &result.residuals);
+        let samples = Samples {
+            points: &result.points,
+            normals: &result.normals,
+            areas: &result.areas,
+        };
+        let vertices_bar = self.pull_distance(result, cotangent, bars)?;
+        let isosurface::Cotangent {
+            chi, level, grid, ..
+        } = isosurface::pullback(device, &residuals.surface, &vertices_bar)?;
+        add(device, &grid, &bars.grid)?;
+        for (given, sum) in [(cotangent.indicator, &chi), (cotangent.iso_value, &level)] {
+            if let Some(given) = given {
+                add(device, given, sum)?;
+            }
+        }
+        iso_value::pullback(
+            device,
+            &residuals.iso_value,
+            &residuals.splat,
+            samples,
+            &level,
+            None,
+            &chi,
+            bars,
+        )?;
+        if self.options.screening > 0.0 {
+            let equation = self.screened_equation(samples, &residuals.splat);
+            poisson::screened::pullback(device, &equation, &residuals.iso_value, &chi, bars)?;
+        }
+        self.pull_smoothing(result, &chi, bars)?;
+        let b_bar = self.solver.solve(device, &chi, residuals.smoothing.cells)?;
+        drop(chi);
+        splat::pullback(device, &residuals.splat, samples, &b_bar, bars)?;
+        Ok(())
+    }
+
+    /// The cotangent of the vertices, and to the grid what φ has for it.
+    fn pull_distance(
+        &self,
+        result: &Reconstruction<T>,
+        cotangent: &Cotangent<'_, T>,
+        bars: &SampleCotangent<T>,
+    ) -> Result<Buffer<T>, Error> {
+        let (device, count) = (&self.device, result.surface.vertices.len());
+        if let Some(given) = cotangent.vertices {
+            check_length("the cotangent of the vertices", given, count)?;
+        }
+        let Some(sdf) = cotangent.sdf else {
+            return Ok(match cotangent.vertices {
+                Some(given) => given.clone(),
+                None => zeros(device, count)?,
+            });
+        };
+        let found = distance::lattice::pullback(device, &result.residuals.distance, sdf)?;
+        add(device, &found.grid, &bars.grid)?;
+        if let Some(given) = cotangent.vertices {
+            add(device, given, &found.vertices)?;
+        }
+        Ok(found.vertices)
+    }
+
+    /// From the smoothing, which goes with the root of the mean area, to areas and cell size.
+    fn pull_smoothing(
+        &self,
+        result: &Reconstruction<T>,
+        chi_bar: &Buffer<T>,
+        bars: &SampleCotangent<T>,
+    ) -> Result<(), Error> {
+        let width = result.residuals.smoothing;
+        let (mean, count) = width.areas;
+        if !(self.options.smoothing_follows() && mean > 0.0) {
+            return Ok(());
+        }
+        let (device, cells) = (&self.device, width.cells);
+        let (shape, chi) = (self.grid.shape(), &result.indicator);
+        let bar = poisson::smoothing::pullback(device, cells, shape, chi, chi_bar)?;
+        share_smoothing::launch::<T, R>(
+            device.client(),
+            device.groups(bars.areas.len(), BLOCK),
+            CubeDim::new_1d(BLOCK),
+            bar.arg(),
+            bars.areas.arg(),
+            bars.grid.arg(),
+            T::of(0.5 * cells / (mean * count as f64)),
+            T::of(cells / self.grid.spacing().f64()),
+        );
+        Ok(())
+    }
+}
+
+/// Adds to each area, and takes off the cell size, its share of the cotangent of the smoothing.
+#[cube(launch)]
+fn share_smoothing<F: Float + CubeElement>(
+    bar: &Array<F>,
+    areas_bar: &mut Array<F>,
+    grid_bar: &mut Array<F>,
+    of_area: F,
+    of_spacing: F,
+) {
+    if ABSOLUTE_POS < areas_bar.len() {
+        areas_bar[ABSOLUTE_POS] += bar[0] * of_area;
+    }
+    if ABSOLUTE_POS == 0 {
+        grid_bar[3] -= bar[0] * of_spacing;
+    }
+}
