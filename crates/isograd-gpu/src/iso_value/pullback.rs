@@ -171,7 +171,7 @@ impl Spread for Trilinear {
 
 /// `max(0, 1 − |Δ|)` in the cell below (0), at (1) or above (2) that of a point `f` from its centre.
 #[cube]
-fn tent<F: Float>(f: F, cell: u32) -> F {
+pub(super) fn tent<F: Float>(f: F, cell: u32) -> F {
     let zero = F::new(0.0);
     let below = max(-f, zero);
     let above = max(f, zero);

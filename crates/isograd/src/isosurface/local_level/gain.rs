@@ -70,12 +70,7 @@ impl Sums {
 
     /// Cotangents of the sums and of `flattened`, for those of `λ` and of the share that is gone after the pass. `λ` is
     /// not 0.
-    pub fn pullback(
-        &self,
-        flattened: f64,
-        gain_bar: f64,
-        flattened_bar: f64,
-    ) -> (Self, f64) {
+    pub fn pullback(&self, flattened: f64, gain_bar: f64, flattened_bar: f64) -> (Self, f64) {
         let share = self.share();
         let [up, down] = self.fit();
         let left = 1.0 - (flattened + share) / FLATTENED;
