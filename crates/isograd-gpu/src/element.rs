@@ -12,5 +12,7 @@ pub(crate) mod crossing;
 pub(crate) mod hat;
 #[path = "../../isograd/src/element/linear.rs"]
 pub(crate) mod linear;
+#[path = "../../isograd/src/element/plate.rs"]
+pub(crate) mod plate;
 #[path = "../../isograd/src/element/spline.rs"]
 pub(crate) mod spline;

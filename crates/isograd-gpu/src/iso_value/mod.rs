@@ -15,6 +15,7 @@
 //! `∇χ` jumps where a sample crosses a plane through cell centres; the gradient on its side is used.
 
 mod forward;
+pub mod local;
 mod pullback;
 
 pub use forward::forward;

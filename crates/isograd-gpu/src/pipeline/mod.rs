@@ -19,9 +19,11 @@ pub use pullback::{CloudCotangent, Cotangent};
 
 use cubecl::prelude::Runtime;
 use isograd::Grid;
+use isograd::isosurface::Level;
 use isograd::poisson::Smoothing;
 
 use crate::distance::{self, Band, Mesh};
+use crate::iso_value::local;
 use crate::isosurface::{self, Surface};
 use crate::splat::{self, Refused, Samples, Weights};
 use crate::{Buffer, Device, Scalar, area, iso_value, neighbors, normals, poisson};
@@ -81,6 +83,8 @@ pub struct Options {
     pub smoothing: Smoothing,
     /// `α` of the [screened](poisson::screened) equation; 0 for the plain one.
     pub screening: f64,
+    /// Which value of the indicator the surface is at.
+    pub level: Level,
     /// Where φ is computed.
     pub band: Band,
 }
@@ -92,6 +96,7 @@ impl Default for Options {
             area_weights: true,
             smoothing: Smoothing::default(),
             screening: 0.0,
+            level: Level::default(),
             band: Band::default(),
         }
     }
@@ -118,7 +123,7 @@ pub struct Reconstructor<R: Runtime, T: Scalar> {
 pub struct Reconstruction<T: Scalar> {
     /// `(nx, ny, nz)` φ, in the user's unit, negative inside.
     pub sdf: Buffer<T>,
-    /// `(nx, ny, nz)` χ.
+    /// `(nx, ny, nz)` χ, whose surface is at the iso-value.
     pub indicator: Buffer<T>,
     /// `(1,)` the level of the surface.
     pub iso_value: Buffer<T>,
@@ -142,6 +147,8 @@ struct Residuals<T: Scalar> {
     splat: splat::Residual<T>,
     smoothing: Width,
     iso_value: iso_value::Residual<T>,
+    /// None where the level is the mean.
+    local_level: Option<local::Residual<T>>,
     surface: isosurface::Residual<T>,
     distance: distance::lattice::Residual<T>,
 }
@@ -212,6 +219,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             poisson::screened::forward(device, &equation, &chi)?;
         }
         let (level, of_level) = iso_value::forward(device, &chi, grid, points, &areas)?;
+        let (chi, of_local_level) = self.local_level(chi, samples, width, &of_level, &of_splat)?;
         let (surface, of_surface) = isosurface::forward(device, &self.surface, &chi, &level, grid)?;
         let mesh = Mesh {
             vertices: surface.vertices.clone(),
@@ -235,6 +243,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
                 splat: of_splat,
                 smoothing: width,
                 iso_value: of_level,
+                local_level: of_local_level,
                 surface: of_surface,
                 distance: of_distance,
             },
@@ -268,6 +277,27 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             splat,
             screening: self.options.screening,
         }
+    }
+
+    /// The indicator whose surface is at the mean everywhere.
+    fn local_level(
+        &self,
+        chi: Buffer<T>,
+        samples: Samples<'_, T>,
+        width: Width,
+        mean: &iso_value::Residual<T>,
+        splat: &splat::Residual<T>,
+    ) -> Result<(Buffer<T>, Option<local::Residual<T>>), Error> {
+        if self.options.level == Level::Mean {
+            return Ok((chi, None));
+        }
+        let choice = local::Choice {
+            area_weights: self.options.area_weights,
+            smoothing: width.cells,
+            thin: self.options.level == Level::Thin,
+        };
+        let (chi, residual) = local::forward(&self.device, &chi, samples, choice, mean, splat)?;
+        Ok((chi, Some(residual)))
     }
 
     /// How much the indicator is smoothed.

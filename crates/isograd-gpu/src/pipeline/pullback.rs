@@ -4,6 +4,7 @@ use cubecl::prelude::*;
 
 use super::{Error, Reconstruction, Reconstructor, held};
 use crate::device::check_length;
+use crate::iso_value::local;
 use crate::primitives::fill::{add, zeros};
 use crate::splat::{self, SampleCotangent, Samples};
 use crate::{Buffer, Scalar, area, distance, iso_value, isosurface, normals, poisson};
@@ -118,13 +119,22 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
                 add(device, given, sum)?;
             }
         }
+        let local = match &residuals.local_level {
+            Some(residual) => {
+                let (splat, after) = (&residuals.splat, &result.indicator);
+                let found = local::pullback(device, residual, splat, samples, after, &chi, bars)?;
+                add(device, &found.level, &level)?;
+                Some(found)
+            }
+            None => None,
+        };
         iso_value::pullback(
             device,
             &residuals.iso_value,
             &residuals.splat,
             samples,
             &level,
-            None,
+            local.as_ref().map(|found| &found.values),
             &chi,
             bars,
         )?;
@@ -132,7 +142,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             let equation = self.screened_equation(samples, &residuals.splat);
             poisson::screened::pullback(device, &equation, &residuals.iso_value, &chi, bars)?;
         }
-        self.pull_smoothing(result, &chi, bars)?;
+        self.pull_smoothing(result, local, &chi, bars)?;
         let b_bar = self.solver.solve(device, &chi, residuals.smoothing.cells)?;
         drop(chi);
         splat::pullback(device, &residuals.splat, samples, &b_bar, bars)?;
@@ -168,6 +178,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
     fn pull_smoothing(
         &self,
         result: &Reconstruction<T>,
+        local: Option<local::Found<T>>,
         chi_bar: &Buffer<T>,
         bars: &SampleCotangent<T>,
     ) -> Result<(), Error> {
@@ -177,8 +188,12 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             return Ok(());
         }
         let (device, cells) = (&self.device, width.cells);
-        let (shape, chi) = (self.grid.shape(), &result.indicator);
-        let bar = poisson::smoothing::pullback(device, cells, shape, chi, chi_bar)?;
+        // As it was solved for, and what its level has of the smoothing besides.
+        let (chi, by_level) = match &local {
+            Some(found) => (&found.chi, found.smoothing),
+            None => (&result.indicator, 0.0),
+        };
+        let bar = poisson::smoothing::pullback(device, cells, self.grid.shape(), chi, chi_bar)?;
         share_smoothing::launch::<T, R>(
             device.client(),
             device.groups(bars.areas.len(), BLOCK),
@@ -186,6 +201,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             bar.arg(),
             bars.areas.arg(),
             bars.grid.arg(),
+            T::of(by_level),
             T::of(0.5 * cells / (mean * count as f64)),
             T::of(cells / self.grid.spacing().f64()),
         );
@@ -199,13 +215,14 @@ fn share_smoothing<F: Float + CubeElement>(
     bar: &Array<F>,
     areas_bar: &mut Array<F>,
     grid_bar: &mut Array<F>,
+    by_level: F,
     of_area: F,
     of_spacing: F,
 ) {
     if ABSOLUTE_POS < areas_bar.len() {
-        areas_bar[ABSOLUTE_POS] += bar[0] * of_area;
+        areas_bar[ABSOLUTE_POS] += (bar[0] + by_level) * of_area;
     }
     if ABSOLUTE_POS == 0 {
-        grid_bar[3] -= bar[0] * of_spacing;
+        grid_bar[3] -= (bar[0] + by_level) * of_spacing;
     }
 }

@@ -35,6 +35,7 @@ pub use forward::forward;
 pub use isograd::splat::Weights;
 pub use order::{Refused, SampleOrder};
 pub use pullback::pullback;
+pub(crate) use stencil::{bspline, bspline_slope, pick};
 
 use crate::device::check_length;
 use crate::{Buffer, Device, Error, Scalar};

@@ -17,7 +17,7 @@ pub(super) const NUMBERS: usize = 6;
 
 /// A number for each of three cells along an axis.
 #[derive(CubeType, Clone, Copy)]
-pub(super) struct Triple<F: Float> {
+pub(crate) struct Triple<F: Float> {
     pub below: F,
     pub centre: F,
     pub above: F,
@@ -25,7 +25,7 @@ pub(super) struct Triple<F: Float> {
 
 /// Weights of the quadratic B-spline.
 #[cube]
-pub(super) fn bspline<F: Float>(f: F) -> Triple<F> {
+pub(crate) fn bspline<F: Float>(f: F) -> Triple<F> {
     Triple::<F> {
         below: spline::below::<F>(f),
         centre: spline::centre::<F>(f),
@@ -35,7 +35,7 @@ pub(super) fn bspline<F: Float>(f: F) -> Triple<F> {
 
 /// Derivatives of [`bspline`].
 #[cube]
-pub(super) fn bspline_slope<F: Float>(f: F) -> Triple<F> {
+pub(crate) fn bspline_slope<F: Float>(f: F) -> Triple<F> {
     Triple::<F> {
         below: spline::below_slope::<F>(f),
         centre: spline::centre_slope::<F>(f),
@@ -100,7 +100,7 @@ pub(super) fn along<F: Float>(w: Triple<F>, cell: u32) -> Along<F> {
 
 /// The number of the cell `at − 3` cells from the central one: 0 beyond the three.
 #[cube]
-fn pick<F: Float>(w: Triple<F>, at: u32) -> F {
+pub(crate) fn pick<F: Float>(w: Triple<F>, at: u32) -> F {
     let zero = F::new(0.0);
     let last = select(at == 4u32, w.above, zero);
     select(at == 2u32, w.below, select(at == 3u32, w.centre, last))

@@ -6,6 +6,7 @@ mod devices;
 mod distance;
 mod iso_value;
 mod isosurface;
+mod local_level;
 mod normals;
 mod pipeline;
 mod poisson;

@@ -3,6 +3,7 @@
 use isograd::Grid;
 use isograd::splat::Weights;
 use isograd_gpu::distance::{Band, Mesh, lattice, query};
+use isograd_gpu::iso_value::local;
 use isograd_gpu::primitives::{reduce, scan, sort};
 use isograd_gpu::splat::{self, SampleCotangent, Samples};
 use isograd_gpu::{
@@ -24,6 +25,7 @@ pub fn launch_all<T: Scalar>(device: &Device<Recorder>) {
     primitives::<T>(device);
     points::<T>(device);
     samples::<T>(device);
+    local_levels::<T>(device);
     solves::<T>(device);
     surfaces::<T>(device);
     distances::<T>(device);
@@ -88,6 +90,47 @@ fn samples<T: Scalar>(device: &Device<Recorder>) {
             .unwrap();
         }
     }
+}
+
+/// The step of χ, and then what is taken off in each of three passes.
+fn local_levels<T: Scalar>(device: &Device<Recorder>) {
+    let (points, areas) = (
+        numbers::<T>(device, 3 * SAMPLES),
+        numbers::<T>(device, SAMPLES),
+    );
+    let samples = Samples {
+        points: &points,
+        normals: &points,
+        areas: &areas,
+    };
+    let bars = SampleCotangent::zeros(device, SAMPLES).unwrap();
+    let (chi, of_splat) = splat::forward(device, samples, &grid(), Weights::BSpline).unwrap();
+    let (_, mean) = iso_value::forward(device, &chi, &grid(), &points, &areas).unwrap();
+    for thin in [false, true] {
+        let choice = local::Choice {
+            area_weights: thin,
+            smoothing: 1.0,
+            thin,
+        };
+        let (step, pass) = (bits::<T>(&[1.0; 2]), bits::<T>(&[0.0, 1.0, 1.0, 1.0, 1.0]));
+        answer(&[&step, &pass, &pass, &pass]);
+        let (chi, residual) =
+            local::forward(device, &chi, samples, choice, &mean, &of_splat).unwrap();
+        assert_eq!(residual.gains().count(), local::PASSES);
+        local::pullback(device, &residual, &of_splat, samples, &chi, &chi, &bars).unwrap();
+    }
+}
+
+/// Numbers as a device would give them.
+fn bits<T: Scalar>(values: &[f64]) -> Vec<u32> {
+    let values: Vec<T> = values
+        .iter()
+        .map(|&x| <T as isograd::Real>::of(x))
+        .collect();
+    let words = T::as_bytes(&values).chunks_exact(4);
+    words
+        .map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]]))
+        .collect()
 }
 
 /// Lines of factors 2, 3, 4, 5 and others, and products with matrices.

@@ -7,6 +7,7 @@ pub mod crossing;
 pub mod hat;
 pub mod linear;
 pub mod plane;
+pub mod plate;
 pub mod spline;
 
 use std::ops::{Add, Div, Mul, Neg, Sub};

@@ -6,7 +6,8 @@ use rayon::prelude::*;
 use super::blocks::{Blocks, NODES, Overlap};
 use super::gain::Sums;
 use super::stencil::{CUBE, Stencil};
-use super::{LEAST_AREA, PASSES, Pass, Residual};
+use super::{PASSES, Pass, Residual};
+use crate::element::plate::least_area;
 use crate::isosurface::iso_value;
 use crate::splat::{self, Samples};
 use crate::{Field, Grid, Real, parallel, simd, vector};
@@ -210,7 +211,7 @@ impl<'a, T: Real> Near<'a, T> {
             );
         }
         for node in nodes {
-            node.area += T::of(LEAST_AREA);
+            node.area += least_area::<T>();
             node.mean /= node.area;
         }
     }
@@ -311,7 +312,7 @@ impl<T: Real> Node<T> {
     #[inline(always)]
     pub(super) fn without(self, weight: T, offset: T) -> [T; 2] {
         // At least ε, but for rounding.
-        let others = (self.area - weight).max(T::of(0.5 * LEAST_AREA));
+        let others = (self.area - weight).max(T::of(0.5) * least_area::<T>());
         [(self.mean * self.area - weight * offset) / others, others]
     }
 }

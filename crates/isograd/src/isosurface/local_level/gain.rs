@@ -4,21 +4,22 @@ use super::FLATTENED;
 
 /// Sums over the samples, each weighed by its area in cells².
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Sums {
+pub struct Sums {
     /// Of `w u`: slopes along the normals, of `e` and of `χ`.
-    pub(super) rise: f64,
+    pub rise: f64,
     /// Of `u²`.
-    pub(super) slope: f64,
+    pub slope: f64,
     /// Of `s p`: what is left, and its forecast.
-    pub(super) agreement: f64,
+    pub agreement: f64,
     /// Of `s²`.
-    pub(super) offset: f64,
+    pub offset: f64,
     /// Of `p²`.
-    pub(super) forecast: f64,
+    pub forecast: f64,
 }
 
 impl Sums {
-    pub(super) fn new([rise, slope, agreement, offset, forecast]: [f64; 5]) -> Self {
+    /// In the order of the fields.
+    pub fn new([rise, slope, agreement, offset, forecast]: [f64; 5]) -> Self {
         Self {
             rise,
             slope,
@@ -29,7 +30,7 @@ impl Sums {
     }
 
     /// As [`Self::new`] takes them.
-    pub(super) fn to_array(self) -> [f64; 5] {
+    pub fn to_array(self) -> [f64; 5] {
         [
             self.rise,
             self.slope,
@@ -40,7 +41,7 @@ impl Sums {
     }
 
     /// `ρ`: the share of the slope of `χ` that `e` would take.
-    pub(super) fn share(&self) -> f64 {
+    fn share(&self) -> f64 {
         (self.rise / self.slope).max(0.0)
     }
 
@@ -55,7 +56,7 @@ impl Sums {
 
     /// `λ`, and the share of the slope that is gone after the pass if `flattened` was before it. 0 where nothing is to
     /// be done, and where there is no number.
-    pub(super) fn gain(&self, flattened: f64) -> [f64; 2] {
+    pub fn gain(&self, flattened: f64) -> [f64; 2] {
         let share = self.share();
         let [up, down] = self.fit();
         let (fit, left) = (up / down, 1.0 - (flattened + share) / FLATTENED);
@@ -69,12 +70,7 @@ impl Sums {
 
     /// Cotangents of the sums and of `flattened`, for those of `λ` and of the share that is gone after the pass. `λ` is
     /// not 0.
-    pub(super) fn pullback(
-        &self,
-        flattened: f64,
-        gain_bar: f64,
-        flattened_bar: f64,
-    ) -> (Self, f64) {
+    pub fn pullback(&self, flattened: f64, gain_bar: f64, flattened_bar: f64) -> (Self, f64) {
         let share = self.share();
         let [up, down] = self.fit();
         let left = 1.0 - (flattened + share) / FLATTENED;

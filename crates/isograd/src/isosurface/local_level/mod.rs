@@ -68,14 +68,13 @@ mod tests;
 mod trust;
 
 pub use forward::{Choice, Scratch, forward};
+pub use gain::Sums;
 pub use pullback::{Found, PullbackScratch, pullback};
+pub use trust::{STEEPEST, Step};
 
 /// Passes; fewer where the samples say no more. The third takes the missed part of a thin trailing edge from
 /// 0.05 to 0.03 cells in the mean, a fourth to 0.029.
-const PASSES: usize = 3;
-
-/// `ε`: the area of samples, in cells², whose word counts half.
-const LEAST_AREA: f64 = 0.05;
+pub const PASSES: usize = 3;
 
 /// Thicknesses, in cells, between which `ω` goes from 0 to 1. Less than a cell here follows more of a thin wing, but
 /// the derivative of a fish whose tail ends in an edge then goes up and down within a cell, by 6 to 27 %. So it does, by 8 %,
@@ -86,7 +85,7 @@ const FOLLOWED: [f64; 2] = [1.0, 2.2];
 const FOLLOWED_THIN: [f64; 2] = [0.1, 0.3];
 
 /// What is thinner, in cells, is made that thick: lattice points are in it wherever it lies.
-const LEAST_THICKNESS: f64 = 1.0;
+pub const LEAST_THICKNESS: f64 = 1.0;
 
 /// Share of the slope of `χ` that the passes together stay below.
 const FLATTENED: f64 = 0.5;
@@ -96,7 +95,7 @@ const FLATTENED: f64 = 0.5;
 pub struct Residual<T> {
     /// `(N,)` `ω_i`.
     trust: Vec<T>,
-    step: trust::Step,
+    step: Step,
     /// `Σ â_i`.
     area: f64,
     passes: Vec<Pass<T>>,
@@ -107,7 +106,7 @@ pub struct Residual<T> {
 struct Pass<T> {
     /// `λ`.
     gain: f64,
-    sums: gain::Sums,
+    sums: Sums,
     /// Share of the slope of `χ` that was gone before it.
     flattened: f64,
     /// `(N,)` `s_i` before it.

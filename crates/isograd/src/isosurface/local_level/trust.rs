@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::forward::{Choice, Near};
 use super::stencil::Derivatives;
 use super::{FOLLOWED, FOLLOWED_THIN, LEAST_THICKNESS, Residual};
+use crate::element::plate;
 use crate::{Field, Real, parallel, vector};
 
 /// Variance in cells² of the step that `χ` and the gradient taken here make of a plane, but for the smoothing: the
@@ -12,7 +13,7 @@ use crate::{Field, Real, parallel, vector};
 const STEP: f64 = 0.75;
 
 /// Share of the usual slope above which the body counts as thick.
-const STEEPEST: f64 = 0.999;
+pub const STEEPEST: f64 = 0.999;
 
 impl<T: Real> Near<'_, T> {
     /// Fills `slopes` with the `u_i` of `chi` and `ω_i`, and adds `δ_i` to `now`.
@@ -40,12 +41,7 @@ impl<T: Real> Near<'_, T> {
             let (a, slope) = (self.area(i).f64(), rising(slopes[i]));
             [a * slope * slope, a]
         });
-        residual.step = Step {
-            usual: (sum / area).sqrt(),
-            width: (STEP + choice.smoothing * choice.smoothing).sqrt(),
-            smoothing: choice.smoothing,
-            thin: choice.thin,
-        };
+        residual.step = Step::new(sum, area, choice);
         residual.area = area;
         let step = residual.step;
         let trust = now.par_iter_mut().zip(slopes).map(|(now, slope)| {
@@ -97,16 +93,13 @@ impl<T: Real> Near<'_, T> {
         direct.collect_into_vec(bars);
         let [usual_bar, width_bar] =
             parallel::sum_array(slopes.len(), |i| [bars[i][1], bars[i][2]]);
-        let share = match usual_bar == 0.0 {
-            true => 0.0,
-            false => usual_bar / (step.usual * residual.area),
-        };
+        let share = step.usual_pullback(usual_bar, residual.area);
         bars.par_iter_mut().enumerate().for_each(|(i, bars)| {
             let (a, slope) = (self.area(i).f64(), rising(slopes[i]));
             bars[0] += share * a * slope;
             bars[1] = 0.5 * share * (slope * slope - step.usual * step.usual);
         });
-        width_bar * step.smoothing / step.width
+        step.width_pullback(width_bar)
     }
 }
 
@@ -117,17 +110,42 @@ fn rising<T: Real>(slope: T) -> f64 {
 
 /// The step of `χ` through the surface of a thick body: a Gaussian one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Step {
-    /// Its slope at the surface, per cell.
-    usual: f64,
-    /// Its standard deviation, in cells, and what the smoothing has of it.
-    width: f64,
-    smoothing: f64,
+pub struct Step {
+    /// `U`: its slope at the surface, per cell.
+    pub usual: f64,
+    /// `w`: its standard deviation, in cells.
+    pub width: f64,
+    /// What the smoothing has of that, in cells.
+    pub smoothing: f64,
     /// Whether parts thinner than a cell are followed and made thicker.
-    thin: bool,
+    pub thin: bool,
 }
 
 impl Step {
+    /// That of samples, for `Σ â u²` of slopes that rise and `Σ â`.
+    pub fn new(squares: f64, area: f64, choice: Choice) -> Self {
+        Self {
+            usual: (squares / area).sqrt(),
+            width: (STEP + choice.smoothing * choice.smoothing).sqrt(),
+            smoothing: choice.smoothing,
+            thin: choice.thin,
+        }
+    }
+
+    /// For the cotangent of the usual slope and the `area` of [`Self::new`]: `Ū/(U Σâ)`, by which a sample's `u` has
+    /// `â u` and its `â` has `½(u² − U²)`.
+    pub fn usual_pullback(self, usual_bar: f64, area: f64) -> f64 {
+        match usual_bar == 0.0 {
+            true => 0.0,
+            false => usual_bar / (self.usual * area),
+        }
+    }
+
+    /// The cotangent of the smoothing for that of the width.
+    pub fn width_pullback(self, width_bar: f64) -> f64 {
+        width_bar * self.smoothing / self.width
+    }
+
     /// `q`: the slope at a sample over that of a thick body. What is not a number counts as flat.
     fn share(self, slope: f64) -> f64 {
         let share = slope / self.usual;
@@ -145,17 +163,17 @@ impl Step {
 
     /// `ω`.
     fn trust(self, slope: f64) -> f64 {
-        let t = self.followed(slope);
-        t * t * (3.0 - 2.0 * t)
+        plate::trust(self.followed(slope))
     }
 
     /// From 0 to 1 as the thickness goes from where nothing is followed to where all is.
     fn followed(self, slope: f64) -> f64 {
         let [low, high] = self.range();
-        ((self.thickness(slope) - low) / (high - low)).clamp(0.0, 1.0)
+        plate::followed(self.thickness(slope), low, high)
     }
 
-    fn range(self) -> [f64; 2] {
+    /// The thicknesses, in cells, between which `ω` goes from 0 to 1.
+    pub fn range(self) -> [f64; 2] {
         match self.thin {
             true => FOLLOWED_THIN,
             false => FOLLOWED,
@@ -173,10 +191,11 @@ impl Step {
 
     /// How much less the dip is at the faces of the plate of least thickness, of its depth, if it is less.
     fn rise(self, thickness: f64) -> f64 {
-        (self.depth(thickness) - self.depth(LEAST_THICKNESS)).max(0.0)
+        plate::rise(self.depth(thickness), self.depth(LEAST_THICKNESS))
     }
 
-    fn depth(self, thickness: f64) -> f64 {
+    /// The dip of `χ` at the faces of a plate of this thickness, in cells, over that in its middle.
+    pub fn depth(self, thickness: f64) -> f64 {
         (-0.125 * (thickness / self.width).powi(2)).exp()
     }
 
@@ -187,19 +206,18 @@ impl Step {
             return [0.0; 3];
         }
         let ([low, high], t) = (self.range(), self.followed(slope));
-        let mut thickness_bar = trust_bar * 6.0 * t * (1.0 - t) / (high - low);
+        let mut thickness_bar = plate::trust_pullback(trust_bar, t, low, high);
         let (mut usual_bar, mut width_bar) = (0.0, 0.0);
         let (rise, w) = (self.rise(thickness), self.width);
         if self.thin && rise > 0.0 {
-            // How much a depth grows with the logarithm of the width.
-            let growth = |t: f64| 0.25 * (t / w).powi(2) * self.depth(t);
+            let growth = |t: f64| plate::growth(t, w, self.depth(t));
             thickness_bar += shift_bar * self.usual * (rise - growth(thickness));
             usual_bar += shift_bar * thickness * rise;
             let growth = growth(thickness) - growth(LEAST_THICKNESS);
             width_bar += shift_bar * self.usual * thickness * growth / w;
         }
         width_bar += thickness_bar * thickness / w;
-        let share_bar = thickness_bar * self.width * self.width / (thickness * (1.0 - share));
+        let share_bar = plate::share_pullback(thickness_bar, thickness, w, share);
         [
             share_bar / self.usual,
             usual_bar - share_bar * share / self.usual,

@@ -123,7 +123,7 @@ fn weight(f: fn(f64) -> f64, cell: [usize; 3], x: [f64; 3]) -> f64 {
 fn means(grid: &Grid<f64>, places: &[[f64; 3]], areas: &[f64], r: &[f64]) -> Vec<f64> {
     let at = |cell: usize| {
         let cell = grid.cell(cell);
-        let (mut sum, mut area) = (0.0, LEAST_AREA);
+        let (mut sum, mut area) = (0.0, 0.05);
         for i in 0..places.len() {
             let part = areas[i] * weight(bspline, cell, places[i]);
             sum += part * r[i];

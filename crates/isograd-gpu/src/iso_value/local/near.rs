@@ -1,0 +1,104 @@
+//! The samples on a device, and how they are spread.
+
+use cubecl::prelude::*;
+
+use super::cells::{BUMP, Bump, REACH};
+use super::sample::{STATE, sample};
+use crate::primitives::reduce::BLOCK;
+use crate::splat::SampleOrder;
+use crate::spread::{Before, Spread, spread};
+use crate::{Buffer, Device, Error, Scalar};
+
+/// The samples on their grid, in sorted order.
+pub(super) struct Near<'a, R: Runtime, T> {
+    pub device: &'a Device<R>,
+    pub grid: &'a isograd::Grid<T>,
+    pub order: &'a SampleOrder,
+    /// `(N, 8)`.
+    pub samples: &'a Buffer<T>,
+}
+
+impl<R: Runtime, T: Scalar> Near<'_, R, T> {
+    pub(super) fn count(&self) -> usize {
+        self.order.keys.len()
+    }
+
+    /// Groups of a kernel with a unit a sample; at least one.
+    pub(super) fn groups(&self) -> CubeCount {
+        self.device.groups(self.count(), BLOCK as u32)
+    }
+
+    /// Number of groups that have samples, each of which has its own sums.
+    pub(super) fn shares(&self) -> usize {
+        self.count().div_ceil(BLOCK).max(1)
+    }
+
+    /// Groups of a kernel with a unit a cell.
+    pub(super) fn cell_groups(&self) -> CubeCount {
+        self.device.groups(self.grid.cells(), BLOCK as u32)
+    }
+
+    /// A field that holds anything.
+    pub(super) fn field(&self) -> Result<Buffer<T>, Error> {
+        self.device.empty(self.grid.cells())
+    }
+
+    /// `D − ε` at every cell.
+    pub(super) fn areas(&self) -> Result<Buffer<T>, Error> {
+        let out = self.field()?;
+        self.bump(self.samples, true, &out)?;
+        Ok(out)
+    }
+
+    /// Writes `M` for these `(N, 2)` `s` and `u`.
+    pub(super) fn sums(&self, state: &Buffer<T>, out: &Buffer<T>) -> Result<(), Error> {
+        self.bump(state, false, out)
+    }
+
+    fn bump(&self, state: &Buffer<T>, ones: bool, out: &Buffer<T>) -> Result<(), Error> {
+        let bumps: Buffer<T> = self.device.empty(BUMP * self.count())?;
+        make_bumps::launch::<T, R>(
+            self.device.client(),
+            self.groups(),
+            CubeDim::new_1d(BLOCK as u32),
+            self.samples.arg(),
+            state.arg(),
+            bumps.arg(),
+            self.count() as u32,
+            ones,
+        );
+        self.spread::<Bump>(&bumps, Before::Replaced, out)
+    }
+
+    pub(super) fn spread<P: Spread>(
+        &self,
+        forms: &Buffer<T>,
+        before: Before,
+        out: &Buffer<T>,
+    ) -> Result<(), Error> {
+        spread::<R, T, P>(self.device, forms, self.order, REACH, before, out)
+    }
+}
+
+/// `â s` of each sample, or `â`, in the form that is spread.
+#[cube(launch)]
+fn make_bumps<F: Float>(
+    samples: &Array<F>,
+    state: &Array<F>,
+    bumps: &mut Array<F>,
+    count: u32,
+    #[comptime] ones: bool,
+) {
+    let s = ABSOLUTE_POS;
+    if s < count as usize {
+        let me = sample::<F>(samples, s);
+        let mut much = me.area;
+        if comptime!(!ones) {
+            much *= state[s * STATE];
+        }
+        bumps[s * BUMP] = me.f.x;
+        bumps[s * BUMP + 1] = me.f.y;
+        bumps[s * BUMP + 2] = me.f.z;
+        bumps[s * BUMP + 3] = much;
+    }
+}

@@ -1,0 +1,326 @@
+//! Cotangents of the indicator that came out to those of the one that went in, of its values at the samples, and of
+//! points, normals, areas and grid.
+
+use cubecl::prelude::*;
+use isograd::isosurface::local_level::{STEEPEST, Step, Sums};
+
+use super::cells::{FORM, Others, Taken, Tilt, pull_means, put_means_back};
+use super::near::Near;
+use super::plate;
+use super::pull_samples::{
+    BARS, GainBarsLaunch, add_bars, add_bars_of_grid, pull_cells, pull_plates, pull_seen_means,
+    pull_slopes, see_means_again,
+};
+use super::sample::SEEN;
+use super::{Pass, Residual};
+use crate::device::check_length;
+use crate::grid::{self, check_field};
+use crate::primitives::fill::{add, zeros};
+use crate::primitives::reduce::{BLOCK, sum, sum_columns};
+use crate::splat::{self, SampleCotangent, Samples};
+use crate::spread::Before;
+use crate::{Buffer, Device, Error, Scalar};
+
+/// What the pullback finds besides what it adds.
+#[derive(Clone, Debug)]
+pub struct Found<T> {
+    /// `(nx, ny, nz)` the indicator that went in, to rounding.
+    pub chi: Buffer<T>,
+    /// `(N,)` cotangents of `χ(x_i)`, which the pullback of the mean takes.
+    pub values: Buffer<T>,
+    /// `(1,)` cotangent of the iso-value `c`.
+    pub level: Buffer<T>,
+    /// Of the smoothing `σ`, in cells, as far as trust and shifts depend on it.
+    pub smoothing: f64,
+}
+
+/// Adds to `out` what the cotangents `chi_bar` `(nx, ny, nz)` of the indicator `chi` that came out mean for points,
+/// normals, areas and grid. `chi_bar` becomes that of the indicator that went in, but for what
+/// [`Found::values`] means for it. All else is as it was in [`forward`](super::forward()). Waits for the device once,
+/// and once a pass; not at all if there was none.
+///
+/// # Errors
+/// [`Error::Length`] where the arrays do not match, [`Error::TooLarge`], [`Error::Failed`].
+pub fn pullback<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    residual: &Residual<T>,
+    splat: &splat::Residual<T>,
+    samples: Samples<'_, T>,
+    chi: &Buffer<T>,
+    chi_bar: &Buffer<T>,
+    out: &SampleCotangent<T>,
+) -> Result<Found<T>, Error> {
+    let (grid, order, count) = (&splat.grid, &splat.order, samples.len());
+    samples.check()?;
+    check_length("the array of areas", samples.areas, order.keys.len())?;
+    check_field("the indicator", chi, grid)?;
+    check_field("the cotangent of the indicator", chi_bar, grid)?;
+    out.check(count)?;
+    let values: Buffer<T> = zeros(device, count)?;
+    let Some(first) = residual.passes.first() else {
+        return Ok(Found {
+            chi: chi.clone(),
+            values,
+            level: zeros(device, 1)?,
+            smoothing: 0.0,
+        });
+    };
+    let near = Near {
+        device,
+        grid,
+        order,
+        samples: &residual.samples,
+    };
+    let mut pulled = Pulled {
+        bars: zeros(device, BARS * count)?,
+        forms: device.empty(FORM * count)?,
+        areas: near.areas()?,
+        sums: near.field()?,
+        node_bars: near.field()?,
+        chi: chi.clone(),
+    };
+    let mut flattened_bar = 0.0;
+    for (k, pass) in residual.passes.iter().rev().enumerate() {
+        flattened_bar = pulled.pull_pass(&near, pass, chi_bar, flattened_bar, k == 0)?;
+    }
+    let smoothing = pulled.pull_trust(&near, &first.state, residual)?;
+    near.spread::<Tilt>(&pulled.forms, Before::Kept, chi_bar)?;
+    let level = pulled.add(&near, residual.area_weights, &values, out)?;
+    Ok(Found {
+        chi: pulled.chi,
+        values,
+        level,
+        smoothing,
+    })
+}
+
+/// What goes from pass to pass.
+struct Pulled<T> {
+    /// `(N, 10)` cotangents of the samples.
+    bars: Buffer<T>,
+    /// `(N, 23)` samples in the form that is spread.
+    forms: Buffer<T>,
+    /// `D − ε` at every cell.
+    areas: Buffer<T>,
+    /// `M`, then `D̄`.
+    sums: Buffer<T>,
+    /// `M̄`.
+    node_bars: Buffer<T>,
+    /// `χ` before the passes that were pulled.
+    chi: Buffer<T>,
+}
+
+impl<T: Scalar> Pulled<T> {
+    /// One pass backwards. Takes and returns the cotangent of the share of the slope that is gone.
+    fn pull_pass<R: Runtime>(
+        &mut self,
+        near: &Near<'_, R, T>,
+        pass: &Pass<T>,
+        chi_bar: &Buffer<T>,
+        flattened_bar: f64,
+        first: bool,
+    ) -> Result<f64, Error> {
+        near.sums(&pass.state, &self.sums)?;
+        let (seen, gain_bar) = self.see_again(near, pass, chi_bar, first)?;
+        let (bars, before_bar) = pass.sums.pullback(pass.flattened, gain_bar, flattened_bar);
+        self.pull_seen(near, pass, &seen, bars);
+        near.spread::<Tilt>(&self.forms, Before::Replaced, &self.node_bars)?;
+        pull_means::launch::<T, R>(
+            near.device.client(),
+            near.cell_groups(),
+            CubeDim::new_1d(BLOCK as u32),
+            self.areas.arg(),
+            chi_bar.arg(),
+            self.node_bars.arg(),
+            self.sums.arg(),
+            T::of(pass.gain),
+        );
+        near.spread::<Others>(&self.forms, Before::Kept, &self.node_bars)?;
+        near.spread::<Taken>(&self.forms, Before::Kept, &self.sums)?;
+        pull_cells::launch::<T, R>(
+            near.device.client(),
+            near.groups(),
+            CubeDim::new_1d(BLOCK as u32),
+            near.order.keys.arg(),
+            near.samples.arg(),
+            self.node_bars.arg(),
+            self.sums.arg(),
+            pass.state.arg(),
+            self.bars.arg(),
+            near.count() as u32,
+            grid::arg(near.grid),
+        );
+        Ok(before_bar)
+    }
+
+    /// `(N, 3)` what the pass said at the samples, and `λ̄` but for the share of the slope. `χ` becomes that before
+    /// the pass.
+    fn see_again<R: Runtime>(
+        &mut self,
+        near: &Near<'_, R, T>,
+        pass: &Pass<T>,
+        chi_bar: &Buffer<T>,
+        first: bool,
+    ) -> Result<(Buffer<T>, f64), Error> {
+        let (device, dim) = (near.device, CubeDim::new_1d(BLOCK as u32));
+        let seen: Buffer<T> = device.empty(SEEN * near.count())?;
+        let shares = near.shares();
+        let partial: Buffer<T> = device.empty(shares + near.grid.cells().div_ceil(BLOCK))?;
+        see_means_again::launch::<T, R>(
+            device.client(),
+            near.groups(),
+            dim,
+            near.order.keys.arg(),
+            near.samples.arg(),
+            self.areas.arg(),
+            self.sums.arg(),
+            pass.state.arg(),
+            self.bars.arg(),
+            seen.arg(),
+            partial.arg(),
+            near.count() as u32,
+            shares as u32,
+            grid::arg(near.grid),
+        );
+        // No array may be bound twice if one of the two is written.
+        let (from, out) = match first {
+            true => (&self.chi, near.field()?),
+            false => (&self.areas, self.chi.clone()),
+        };
+        put_means_back::launch::<T, R>(
+            device.client(),
+            near.cell_groups(),
+            dim,
+            from.arg(),
+            self.areas.arg(),
+            self.sums.arg(),
+            chi_bar.arg(),
+            out.arg(),
+            partial.arg(),
+            T::of(pass.gain),
+            shares as u32,
+            first,
+        );
+        self.chi = out;
+        let gain_bar = device.download(&sum(device, &partial)?)?[0];
+        Ok((seen, isograd::Real::f64(gain_bar)))
+    }
+
+    fn pull_seen<R: Runtime>(
+        &self,
+        near: &Near<'_, R, T>,
+        pass: &Pass<T>,
+        seen: &Buffer<T>,
+        bars: Sums,
+    ) {
+        pull_seen_means::launch::<T, R>(
+            near.device.client(),
+            near.groups(),
+            CubeDim::new_1d(BLOCK as u32),
+            near.order.keys.arg(),
+            near.samples.arg(),
+            self.areas.arg(),
+            self.sums.arg(),
+            seen.arg(),
+            pass.state.arg(),
+            self.bars.arg(),
+            self.forms.arg(),
+            near.count() as u32,
+            GainBarsLaunch::new(
+                T::of(pass.gain),
+                T::of(bars.rise),
+                T::of(bars.slope),
+                T::of(bars.agreement),
+                T::of(bars.offset),
+                T::of(bars.forecast),
+            ),
+            grid::arg(near.grid),
+        );
+    }
+
+    /// From trust, shifts and slopes before the first pass to places, normals and areas; and to cells, as forms to
+    /// spread. Returns the cotangent of the smoothing.
+    fn pull_trust<R: Runtime>(
+        &self,
+        near: &Near<'_, R, T>,
+        state: &Buffer<T>,
+        residual: &Residual<T>,
+    ) -> Result<f64, Error> {
+        let (device, dim) = (near.device, CubeDim::new_1d(BLOCK as u32));
+        let step: Step = residual.step;
+        let partial: Buffer<T> = device.empty(2 * near.shares())?;
+        pull_plates::launch::<T, R>(
+            device.client(),
+            near.groups(),
+            dim,
+            state.arg(),
+            self.bars.arg(),
+            partial.arg(),
+            near.count() as u32,
+            plate::arg(&step, STEEPEST),
+            step.thin,
+        );
+        let found = device.download(&sum_columns(device, &partial, 2)?)?;
+        let share = step.usual_pullback(isograd::Real::f64(found[0]), residual.area);
+        pull_slopes::launch::<T, R>(
+            device.client(),
+            near.groups(),
+            dim,
+            self.chi.arg(),
+            near.order.keys.arg(),
+            near.samples.arg(),
+            state.arg(),
+            self.bars.arg(),
+            self.forms.arg(),
+            near.count() as u32,
+            T::of(share),
+            plate::arg(&step, STEEPEST),
+            grid::arg(near.grid),
+            step.thin,
+        );
+        Ok(step.width_pullback(isograd::Real::f64(found[1])))
+    }
+
+    /// From index coordinates and areas in cells to those of the user, in the order of the input. Returns the
+    /// cotangent of the iso-value.
+    fn add<R: Runtime>(
+        &self,
+        near: &Near<'_, R, T>,
+        area_weights: bool,
+        values: &Buffer<T>,
+        out: &SampleCotangent<T>,
+    ) -> Result<Buffer<T>, Error> {
+        let (device, dim) = (near.device, CubeDim::new_1d(BLOCK as u32));
+        add_bars::launch::<T, R>(
+            device.client(),
+            near.groups(),
+            dim,
+            near.order.places.arg(),
+            self.bars.arg(),
+            values.arg(),
+            out.points.arg(),
+            out.normals.arg(),
+            out.areas.arg(),
+            near.count() as u32,
+            near.grid.spacing(),
+            area_weights,
+        );
+        let grid_sums: Buffer<T> = device.empty(4 * near.shares())?;
+        let level_sums: Buffer<T> = device.empty(near.shares())?;
+        add_bars_of_grid::launch::<T, R>(
+            device.client(),
+            near.groups(),
+            dim,
+            near.order.keys.arg(),
+            near.samples.arg(),
+            self.bars.arg(),
+            grid_sums.arg(),
+            level_sums.arg(),
+            near.count() as u32,
+            grid::arg(near.grid),
+            area_weights,
+        );
+        add(device, &sum_columns(device, &grid_sums, 4)?, &out.grid)?;
+        sum(device, &level_sums)
+    }
+}

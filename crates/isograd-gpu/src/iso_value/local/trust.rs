@@ -1,0 +1,196 @@
+//! The samples as the passes take them: how steep `χ` is there, and how far they are followed.
+
+use cubecl::prelude::*;
+use isograd::isosurface::local_level::{Choice, STEEPEST, Step};
+
+use super::near::Near;
+use super::plate::{self, Usual, plate_of, shift};
+use super::sample::{SAMPLE, STATE, corner, derivatives, is_held, sample};
+use crate::element::plate::trust;
+use crate::grid::{self, Lattice, cell_at, from_centre, place};
+use crate::iso_value;
+use crate::primitives::reduce::{BLOCK, sum_columns, sum_of_group};
+use crate::splat::Samples;
+use crate::vector::Vector3;
+use crate::{Buffer, Error, Scalar};
+
+impl<R: Runtime, T: Scalar> Near<'_, R, T> {
+    /// Fills the samples, but for `ω`.
+    pub(super) fn pack(&self, samples: Samples<'_, T>, area_weights: bool) {
+        pack_samples::launch::<T, R>(
+            self.device.client(),
+            self.groups(),
+            CubeDim::new_1d(BLOCK as u32),
+            samples.points.arg(),
+            samples.normals.arg(),
+            samples.areas.arg(),
+            self.order.keys.arg(),
+            self.order.places.arg(),
+            self.samples.arg(),
+            self.count() as u32,
+            grid::arg(self.grid),
+            area_weights,
+        );
+    }
+
+    /// `(N, 2)`: anything, and `u`; the step of `χ`, and `Σ â`.
+    pub(super) fn slopes(
+        &self,
+        chi: &Buffer<T>,
+        choice: Choice,
+    ) -> Result<(Buffer<T>, Step, f64), Error> {
+        let state: Buffer<T> = self.device.empty(STATE * self.count())?;
+        let partial: Buffer<T> = self.device.empty(2 * self.shares())?;
+        find_slopes::launch::<T, R>(
+            self.device.client(),
+            self.groups(),
+            CubeDim::new_1d(BLOCK as u32),
+            chi.arg(),
+            self.order.keys.arg(),
+            self.samples.arg(),
+            state.arg(),
+            partial.arg(),
+            self.count() as u32,
+            grid::arg(self.grid),
+        );
+        let found = sum_columns(self.device, &partial, 2)?;
+        let found = self.device.download(&found)?;
+        let (squares, area) = (isograd::Real::f64(found[0]), isograd::Real::f64(found[1]));
+        Ok((state, Step::new(squares, area, choice), area))
+    }
+
+    /// `(N,)` `χ(x_i) + δ_i − c`; and `ω`, among the samples.
+    pub(super) fn trust(
+        &self,
+        state: &Buffer<T>,
+        step: &Step,
+        mean: &iso_value::Residual<T>,
+    ) -> Result<Buffer<T>, Error> {
+        let now: Buffer<T> = self.device.empty(self.count())?;
+        trust_samples::launch::<T, R>(
+            self.device.client(),
+            self.groups(),
+            CubeDim::new_1d(BLOCK as u32),
+            state.arg(),
+            self.order.places.arg(),
+            mean.at_samples.arg(),
+            mean.sums.arg(),
+            self.samples.arg(),
+            now.arg(),
+            self.count() as u32,
+            plate::arg(step, STEEPEST),
+            step.thin,
+        );
+        Ok(now)
+    }
+}
+
+/// Samples in the form that is worked with. Those that are left out have no area.
+#[cube(launch)]
+fn pack_samples<F: Float + CubeElement>(
+    points: &Array<F>,
+    normals: &Array<F>,
+    areas: &Array<F>,
+    keys: &Array<u32>,
+    places: &Array<u32>,
+    samples: &mut Array<F>,
+    count: u32,
+    grid: Lattice<F>,
+    #[comptime] area_weights: bool,
+) {
+    let s = ABSOLUTE_POS;
+    if s < count as usize {
+        let i = places[s] as usize;
+        let mut f = Vector3::<F>::zero();
+        let mut normal = Vector3::<F>::zero();
+        let mut area = F::new(0.0);
+        if is_held::<F>(keys[s], &grid) {
+            let x = place::<F>(points, i, &grid);
+            let cell = cell_at(keys[s], grid.ny, grid.nz);
+            f.x = from_centre::<F>(x.x, cell.i);
+            f.y = from_centre::<F>(x.y, cell.j);
+            f.z = from_centre::<F>(x.z, cell.k);
+            normal.x = normals[3 * i];
+            normal.y = normals[3 * i + 1];
+            normal.z = normals[3 * i + 2];
+            area = areas[i];
+            if comptime!(area_weights) {
+                area = areas[i] / grid.spacing / grid.spacing;
+            }
+        }
+        let at = s * SAMPLE;
+        samples[at] = f.x;
+        samples[at + 1] = f.y;
+        samples[at + 2] = f.z;
+        samples[at + 3] = normal.x;
+        samples[at + 4] = normal.y;
+        samples[at + 5] = normal.z;
+        samples[at + 6] = area;
+        samples[at + 7] = F::new(0.0);
+    }
+}
+
+/// `u` of each sample, and `â u²` of those where `χ` rises and `â`, summed a group at a time.
+#[cube(launch)]
+fn find_slopes<F: Float + CubeElement>(
+    chi: &Array<F>,
+    keys: &Array<u32>,
+    samples: &Array<F>,
+    state: &mut Array<F>,
+    partial: &mut Array<F>,
+    count: u32,
+    grid: Lattice<F>,
+) {
+    let s = ABSOLUTE_POS;
+    let zero = F::new(0.0);
+    let mut square = zero;
+    let mut area = zero;
+    if s < count as usize {
+        let me = sample::<F>(samples, s);
+        let mut slope = zero;
+        if is_held::<F>(keys[s], &grid) {
+            let corner = corner::<F>(keys[s], &grid);
+            let found = derivatives::<F>(chi, chi, corner, &grid, me.f, false);
+            slope = found.gradient().dot(me.normal);
+        }
+        let rising = max(slope, zero);
+        area = me.area;
+        square = area * rising * rising;
+        state[s * STATE] = zero;
+        state[s * STATE + 1] = slope;
+    }
+    let mut shared = SharedMemory::<F>::new(BLOCK);
+    let square = sum_of_group::<F>(square, &mut shared);
+    let area = sum_of_group::<F>(area, &mut shared);
+    let own = CUBE_POS * 2;
+    if UNIT_POS == 0 && own < partial.len() {
+        partial[own] = square;
+        partial[own + 1] = area;
+    }
+}
+
+/// `ω` of each sample, and `χ(x_i) + δ_i − c`.
+#[cube(launch)]
+fn trust_samples<F: Float + CubeElement>(
+    state: &Array<F>,
+    places: &Array<u32>,
+    at_samples: &Array<F>,
+    mean_sums: &Array<F>,
+    samples: &mut Array<F>,
+    now: &mut Array<F>,
+    count: u32,
+    usual: Usual<F>,
+    #[comptime] thin: bool,
+) {
+    let s = ABSOLUTE_POS;
+    if s < count as usize {
+        let of = plate_of::<F>(state[s * STATE + 1], &usual);
+        samples[s * SAMPLE + 7] = trust::<F>(of.followed);
+        let c = mean_sums[0] / max(mean_sums[1], F::new(0.0));
+        let mut offset = at_samples[4 * places[s] as usize] - c;
+        if comptime!(thin) {
+            offset += shift::<F>(of, &usual);
+        }
+        now[s] = offset;
+    }
+}
