@@ -21,6 +21,7 @@ pub mod iso_value;
 pub mod isosurface;
 pub mod neighbors;
 pub mod normals;
+pub mod orient;
 pub mod pipeline;
 pub mod poisson;
 pub mod primitives;

@@ -3,7 +3,7 @@
 //! # Map
 //! Points `(N, 3)` and a radius `R_i > 0` for each → what finds the neighbourhoods
 //! `N_i = {j : |x_j − x_i| ≤ R_i}`, and the centres `{i : j ∈ N_i}` that have a point as a neighbour. Radii are
-//! chosen elsewhere ([`isograd::neighbors`]), and held constant by pullbacks.
+//! chosen on the CPU ([`isograd::neighbors`]) or here ([`radius`]), and held constant by pullbacks.
 //!
 //! Points are sorted along a Z-order curve and cut into leaves of eight; boxes round four leaves, round four of
 //! those, and so on, are a tree, which every unit walks from the root in the same order. Memory is a small
@@ -21,10 +21,15 @@
 //! None. Those of the stages gather: a node is visited where the radius at hand or the largest one below the
 //! node reaches the other, so that one walk meets both `N_k` and all centres of `k`.
 
+mod choice;
+mod nearest;
 mod order;
+pub mod radius;
 mod tree;
 mod walk;
 
+pub(crate) use nearest::{SURE_SHARE, about_nearest, any_within, reaches};
+pub(crate) use order::scatter;
 pub(crate) use walk::{end_of_leaf, first_of_leaf, next_leaf};
 
 use cubecl::prelude::*;

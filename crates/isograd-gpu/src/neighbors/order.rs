@@ -47,11 +47,11 @@ pub(super) fn gather<R: Runtime, E: Numeric + CubeElement>(
     places: &Buffer<u32>,
     width: usize,
 ) -> Result<Buffer<E>, Error> {
-    let gathered = device.empty(values.len())?;
-    if !values.is_empty() {
+    let gathered = device.empty(width * places.len())?;
+    if !gathered.is_empty() {
         gather_rows::launch::<E, R>(
             device.client(),
-            device.groups(values.len(), BLOCK),
+            device.groups(gathered.len(), BLOCK),
             CubeDim::new_1d(BLOCK),
             values.arg(),
             places.arg(),
@@ -60,6 +60,34 @@ pub(super) fn gather<R: Runtime, E: Numeric + CubeElement>(
         );
     }
     Ok(gathered)
+}
+
+/// The other way round: element `i` goes to `places[i]`.
+pub(crate) fn scatter<R: Runtime, E: Numeric + CubeElement>(
+    device: &Device<R>,
+    values: &Buffer<E>,
+    places: &Buffer<u32>,
+) -> Result<Buffer<E>, Error> {
+    let scattered = device.empty(values.len())?;
+    if !values.is_empty() {
+        scatter_elements::launch::<E, R>(
+            device.client(),
+            device.groups(values.len(), BLOCK),
+            CubeDim::new_1d(BLOCK),
+            values.arg(),
+            places.arg(),
+            scattered.arg(),
+        );
+    }
+    Ok(scattered)
+}
+
+#[cube(launch)]
+fn scatter_elements<E: Numeric>(values: &Array<E>, places: &Array<u32>, scattered: &mut Array<E>) {
+    if ABSOLUTE_POS < values.len() {
+        let place = places[ABSOLUTE_POS] as usize;
+        scattered[place] = values[ABSOLUTE_POS];
+    }
 }
 
 #[cube(launch)]
@@ -117,7 +145,7 @@ fn middle<F: Float>(points: &Array<F>, axis: usize) -> F {
 
 /// Bits whose order as whole numbers is that of the numbers.
 #[cube]
-fn ordered_bits(x: f32) -> u32 {
+pub(super) fn ordered_bits(x: f32) -> u32 {
     let bits = u32::reinterpret(x);
     let negative = bits >> 31u32;
     select(negative == 1u32, !bits, bits | 0x8000_0000u32)

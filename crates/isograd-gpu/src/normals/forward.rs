@@ -2,7 +2,7 @@
 
 use cubecl::prelude::*;
 
-use super::eigen::{Symmetric, eigen};
+use super::eigen::{Eigen, Symmetric, eigen};
 use super::{CENTROID, PLANE, Residual, TANGENT, VALUES, WEIGHT};
 use crate::element::plane::weight;
 use crate::neighbors::{BLOCK, Neighborhoods, end_of_leaf, first_of_leaf, next_leaf};
@@ -10,7 +10,7 @@ use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Sums over a neighbourhood: `Σ w`, `Σ w d` and `Σ w d dᵀ` (`xx, xy, xz, yy, yz, zz`), in units of the radius.
-const MOMENTS: usize = 10;
+pub(super) const MOMENTS: usize = 10;
 
 /// The axis `(N, 3)` of the surface at every point, in input order, and what the pullback needs; see the
 /// [module](super).
@@ -81,34 +81,9 @@ fn sum_moments<F: Float>(
     let n = radii.len();
     if ABSOLUTE_POS < n {
         let centre = Vector3::<F>::at(points, ABSOLUTE_POS);
-        let radius = radii[ABSOLUTE_POS];
-        let mut count = 0u32;
         let mut sums = Array::<F>::new(MOMENTS);
-        let mut of_leaf = Array::<F>::new(MOMENTS);
-        #[unroll]
-        for k in 0..MOMENTS {
-            sums[k] = F::new(0.0);
-        }
-        let mut node = next_leaf::<F>(nodes, links, centre, radius, 0usize, false);
-        while node < links.len() {
-            #[unroll]
-            for k in 0..MOMENTS {
-                of_leaf[k] = F::new(0.0);
-            }
-            let first = first_of_leaf(links, node);
-            for j in first..end_of_leaf(first, n) {
-                let offset = Vector3::<F>::at(points, j).sub(centre);
-                if offset.dot(offset) <= radius * radius {
-                    add_moments::<F>(offset.scale(F::new(1.0) / radius), &mut of_leaf);
-                    count += 1u32;
-                }
-            }
-            #[unroll]
-            for k in 0..MOMENTS {
-                sums[k] += of_leaf[k];
-            }
-            node = next_leaf::<F>(nodes, links, centre, radius, node + 1, false);
-        }
+        let radius = radii[ABSOLUTE_POS];
+        let count = moments_within::<F>(points, nodes, links, centre, radius, &mut sums);
         #[unroll]
         for k in 0..MOMENTS {
             moments[k * n + ABSOLUTE_POS] = sums[k];
@@ -116,6 +91,46 @@ fn sum_moments<F: Float>(
         let place = places[ABSOLUTE_POS] as usize;
         counts[place] = count;
     }
+}
+
+/// Sums over the points within a radius, and their number.
+#[cube]
+pub(super) fn moments_within<F: Float>(
+    points: &Array<F>,
+    nodes: &Array<F>,
+    links: &Array<u32>,
+    centre: Vector3<F>,
+    radius: F,
+    sums: &mut Array<F>,
+) -> u32 {
+    let n = points.len() / 3;
+    let mut count = 0u32.runtime();
+    let mut of_leaf = Array::<F>::new(MOMENTS);
+    #[unroll]
+    for k in 0..MOMENTS {
+        sums[k] = F::new(0.0);
+    }
+    let mut node = next_leaf::<F>(nodes, links, centre, radius, 0usize, false);
+    while node < links.len() {
+        #[unroll]
+        for k in 0..MOMENTS {
+            of_leaf[k] = F::new(0.0);
+        }
+        let first = first_of_leaf(links, node);
+        for j in first..end_of_leaf(first, n) {
+            let offset = Vector3::<F>::at(points, j).sub(centre);
+            if offset.dot(offset) <= radius * radius {
+                add_moments::<F>(offset.scale(F::new(1.0) / radius), &mut of_leaf);
+                count += 1u32;
+            }
+        }
+        #[unroll]
+        for k in 0..MOMENTS {
+            sums[k] += of_leaf[k];
+        }
+        node = next_leaf::<F>(nodes, links, centre, radius, node + 1, false);
+    }
+    count
 }
 
 /// Adds `w`, `w d` and `w d dᵀ` of an offset in units of the radius.
@@ -146,18 +161,8 @@ fn find_planes<F: Float>(
     let n = places.len();
     let at = ABSOLUTE_POS;
     if at < n {
-        let weight = moments[at];
-        let mx = moments[n + at] / weight;
-        let my = moments[2 * n + at] / weight;
-        let mz = moments[3 * n + at] / weight;
-        let found = eigen::<F>(Symmetric::<F> {
-            xx: moments[4 * n + at] / weight - mx * mx,
-            xy: moments[5 * n + at] / weight - mx * my,
-            xz: moments[6 * n + at] / weight - mx * mz,
-            yy: moments[7 * n + at] / weight - my * my,
-            yz: moments[8 * n + at] / weight - my * mz,
-            zz: moments[9 * n + at] / weight - mz * mz,
-        });
+        let fit = fit::<F>(moments, at, n);
+        let found = fit.eigen;
         let sign = sign::<F>(found.first);
         let normal = found.first.scale(sign);
         normal.write(normals, places[at] as usize);
@@ -165,19 +170,52 @@ fn find_planes<F: Float>(
         let tangent = found.second.scale(sign);
         write_rows::<F>(normal, planes, 0usize, n);
         write_rows::<F>(tangent, planes, TANGENT, n);
-        let centroid = Vector3::<F> {
+        write_rows::<F>(fit.centroid, planes, CENTROID, n);
+        write_rows::<F>(found.values, planes, VALUES, n);
+        planes[WEIGHT * n + at] = fit.weight;
+    }
+}
+
+/// `W`, `m` and the eigenvectors of `C`, whose eigenvalues are not negative; in units of the radius.
+#[derive(CubeType, Clone, Copy)]
+pub(super) struct Fit<F: Float> {
+    pub weight: F,
+    pub centroid: Vector3<F>,
+    pub eigen: Eigen<F>,
+}
+
+/// The plane of the moments at `at`, `at + pitch` and so on.
+#[cube]
+pub(super) fn fit<F: Float>(moments: &Array<F>, at: usize, pitch: usize) -> Fit<F> {
+    let weight = moments[at];
+    let mx = moments[pitch + at] / weight;
+    let my = moments[2 * pitch + at] / weight;
+    let mz = moments[3 * pitch + at] / weight;
+    let found = eigen::<F>(Symmetric::<F> {
+        xx: moments[4 * pitch + at] / weight - mx * mx,
+        xy: moments[5 * pitch + at] / weight - mx * my,
+        xz: moments[6 * pitch + at] / weight - mx * mz,
+        yy: moments[7 * pitch + at] / weight - my * my,
+        yz: moments[8 * pitch + at] / weight - my * mz,
+        zz: moments[9 * pitch + at] / weight - mz * mz,
+    });
+    Fit::<F> {
+        weight,
+        centroid: Vector3::<F> {
             x: mx,
             y: my,
             z: mz,
-        };
-        write_rows::<F>(centroid, planes, CENTROID, n);
-        let values = Vector3::<F> {
-            x: not_negative::<F>(found.values.x),
-            y: not_negative::<F>(found.values.y),
-            z: not_negative::<F>(found.values.z),
-        };
-        write_rows::<F>(values, planes, VALUES, n);
-        planes[WEIGHT * n + at] = weight;
+        },
+        eigen: Eigen::<F> {
+            values: Vector3::<F> {
+                x: not_negative::<F>(found.values.x),
+                y: not_negative::<F>(found.values.y),
+                z: not_negative::<F>(found.values.z),
+            },
+            first: found.first,
+            second: found.second,
+            third: found.third,
+        },
     }
 }
 

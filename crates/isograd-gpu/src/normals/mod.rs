@@ -1,5 +1,6 @@
 //! The axis of the surface at every sample: distance-weighted principal components (D-PCA). What it computes,
-//! and why, is on the page of [`isograd::normals`]; radii, which the CPU widens where samples scatter, are given.
+//! and why, is on the page of [`isograd::normals`]; radii are given, and [`widen()`] makes them wider where samples
+//! scatter, as the CPU does.
 //!
 //! # Map
 //! [`Neighborhoods`] → unit vectors `(N, 3)` along the surface normal, in input order, each with its component
@@ -21,9 +22,11 @@
 mod eigen;
 mod forward;
 mod pullback;
+mod widen;
 
 pub use forward::forward;
 pub use pullback::pullback;
+pub use widen::widen;
 
 use cubecl::prelude::*;
 

@@ -1,4 +1,4 @@
-//! What the CPU finds in a cloud, and the device then holds: no derivative goes through it.
+//! What is found in a cloud once, on the CPU or on the device, and then held: no derivative goes through it.
 
 use cubecl::prelude::*;
 use isograd::neighbors::{Neighborhoods, Radius};
@@ -7,6 +7,7 @@ use isograd::{PointCloud, normals};
 
 use super::Error;
 use crate::device::check_length;
+use crate::neighbors::radius;
 use crate::{Buffer, Device, Scalar};
 
 /// The radii of a cloud's neighbourhoods, and which way is out at each of its points. Of a body that moves a
@@ -23,6 +24,8 @@ pub struct Held<T> {
     pub spacing: T,
     /// `(N, 3)` roughly outward: a normal is turned to the side of its vector here.
     pub outward: Buffer<T>,
+    /// `(N,)` from 0 to 1, how sure that is: see [`Orientation::confidence`].
+    pub confidence: Buffer<T>,
 }
 
 impl<T: Scalar> Held<T> {
@@ -59,6 +62,37 @@ impl<T: Scalar> Held<T> {
             common_radius: near.common_radius,
             spacing: near.spacing(),
             outward: device.upload(found.normals.as_flattened())?,
+            confidence: device.upload(&found.confidence)?,
+        })
+    }
+
+    /// Finds all of it on the device, from `(N, 3)` points that are there: they never leave it. The automatic
+    /// orientation is on the CPU alone, in [`Self::find`].
+    ///
+    /// # Errors
+    /// What neighbours or orientation say of the cloud; [`Error::Device`].
+    pub fn find_on_device<R: Runtime>(
+        device: &Device<R>,
+        points: &Buffer<T>,
+        radius: Radius,
+        method: &crate::orient::Method<'_, T>,
+    ) -> Result<Self, Error> {
+        let found = radius::forward(device, points, radius)?;
+        let (mut axes, residual) = crate::normals::forward(device, &found.neighborhoods)?;
+        let mut radii = found.each.clone();
+        if radius == Radius::Auto {
+            radii = crate::normals::widen(device, &residual)?;
+            let wider = crate::neighbors::with_radii(device, &found.neighborhoods, &radii)?;
+            (axes, _) = crate::normals::forward(device, &wider)?;
+        }
+        let oriented = crate::orient::forward(device, &found.neighborhoods, &axes, method)?;
+        Ok(Self {
+            radii,
+            area_radii: found.each,
+            common_radius: found.common,
+            spacing: found.spacing,
+            outward: oriented.normals,
+            confidence: oriented.confidence,
         })
     }
 

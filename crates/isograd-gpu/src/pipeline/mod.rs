@@ -72,6 +72,24 @@ pub enum Error {
     Distance(#[from] distance::Error),
 }
 
+impl From<neighbors::radius::Error> for Error {
+    fn from(error: neighbors::radius::Error) -> Self {
+        match error {
+            neighbors::radius::Error::Cloud(error) => error.into(),
+            neighbors::radius::Error::Device(error) => error.into(),
+        }
+    }
+}
+
+impl From<crate::orient::Error> for Error {
+    fn from(error: crate::orient::Error) -> Self {
+        match error {
+            crate::orient::Error::Cloud(error) => error.into(),
+            crate::orient::Error::Device(error) => error.into(),
+        }
+    }
+}
+
 /// What a plan does: those of [`isograd::Options`] that are for devices too.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {

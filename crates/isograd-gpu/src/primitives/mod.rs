@@ -1,7 +1,8 @@
-//! What several stages need: sums from the beginning, orders, totals, extremes.
+//! What several stages need: sums from the beginning, orders, totals, extremes, flags.
 
 pub(crate) mod ends;
 pub mod fill;
+pub(crate) mod flags;
 pub(crate) mod morton;
 pub mod reduce;
 pub mod scan;

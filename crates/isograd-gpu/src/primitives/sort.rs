@@ -33,19 +33,28 @@ pub fn order<R: Runtime>(
     let count = keys.len();
     let mut order = Order {
         keys: keys.clone(),
-        places: device.empty(count)?,
+        places: as_they_are(device, count)?,
     };
-    let (groups, dim) = (
-        device.groups(count, BLOCK as u32),
-        CubeDim::new_1d(BLOCK as u32),
-    );
-    fill_places::launch::<R>(device.client(), groups, dim, order.places.arg());
     let mut shift = 0;
     while shift < 32 && (limit.saturating_sub(1) >> shift) > 0 {
         order = order.by_digit(device, shift)?;
         shift += BITS;
     }
     Ok(order)
+}
+
+/// `0, 1, 2 …`, so many of them.
+pub(crate) fn as_they_are<R: Runtime>(
+    device: &Device<R>,
+    count: usize,
+) -> Result<Buffer<u32>, Error> {
+    let places = device.empty(count)?;
+    let (groups, dim) = (
+        device.groups(count, BLOCK as u32),
+        CubeDim::new_1d(BLOCK as u32),
+    );
+    fill_places::launch::<R>(device.client(), groups, dim, places.arg());
+    Ok(places)
 }
 
 /// Where each key below `limit` begins among ascending `keys`: `limit + 1` places, the last of them the

@@ -18,7 +18,10 @@ pub struct Cloud<T> {
 
 impl<T: Scalar> Cloud<T> {
     fn new(name: &'static str, points: Vec<[f64; 3]>) -> Self {
-        let points: Vec<[T; 3]> = points.iter().map(|p| p.map(real)).collect();
+        Self::of(name, points.iter().map(|p| p.map(real)).collect())
+    }
+
+    pub fn of(name: &'static str, points: Vec<[T; 3]>) -> Self {
         let (mut near, mut axes) = Default::default();
         normals::forward_with_neighborhoods(&points, Radius::Auto, &mut near, &mut axes)
             .expect(name);

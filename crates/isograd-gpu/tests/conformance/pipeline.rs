@@ -3,13 +3,13 @@
 use cubecl::prelude::Runtime;
 use isograd::isosurface::Level;
 use isograd::neighbors::Radius;
-use isograd::orient::Method;
+use isograd::orient::{Method, ParityOptions};
 use isograd::poisson::Smoothing;
 use isograd::{Grid, PointCloud, Real, Reconstructor, Resolution};
 use isograd_gpu::distance::Band;
 use isograd_gpu::pipeline::{self, Error, Held, Options};
 use isograd_gpu::splat::Weights;
-use isograd_gpu::{Device, Scalar};
+use isograd_gpu::{Device, Scalar, orient};
 use isograd_shapes::Sampling;
 
 use crate::clouds::{real, relative};
@@ -55,6 +55,7 @@ fn cases() -> [Case; 4] {
             cells: 48,
             options: Options {
                 smoothing: Smoothing::Cells(1.0),
+                level: Level::Thin,
                 ..Options::default()
             },
         },
@@ -70,6 +71,7 @@ fn cases() -> [Case; 4] {
         Case {
             options: Options {
                 screening: 4.0,
+                level: Level::Mean,
                 ..Options::default()
             },
             ..small
@@ -84,7 +86,7 @@ fn on_cpu(options: &Options) -> isograd::Options {
         area_weights: options.area_weights,
         smoothing: options.smoothing,
         screening: options.screening,
-        level: Level::Mean,
+        level: options.level,
         band: options.band,
         ..isograd::Options::default()
     }
@@ -259,4 +261,76 @@ fn points_outside_the_grid_are_named() {
         }
     }
     on_each_device!(check);
+}
+
+#[test]
+fn what_the_device_finds_and_holds_is_what_the_cpu_finds() {
+    in_each_number!(compare_held);
+}
+
+/// Points go to the device, and nothing else does.
+fn compare_held<R: Runtime, T: Scalar>(device: &Device<R>) {
+    let (tight, loose) = if T::NAME == "f32" {
+        (1e-5, 2e-4)
+    } else {
+        (1e-12, 1e-9)
+    };
+    let shape = isograd_shapes::by_name("torus").unwrap();
+    let cloud = shape
+        .sample::<T>(4000, &Sampling::default(), 3)
+        .unwrap()
+        .cloud;
+    let grid = Grid::fit(&cloud, Resolution::Cells(40), real(0.1)).unwrap();
+    let plan = pipeline::Reconstructor::new(device.clone(), grid, Default::default()).unwrap();
+    let points = device.upload(cloud.points().as_flattened()).unwrap();
+    let normals = device
+        .upload(cloud.normals().unwrap().as_flattened())
+        .unwrap();
+    let parity = ParityOptions::default();
+    let methods = [
+        (Method::Signs, orient::Method::Signs(&normals)),
+        (Method::Parity(parity), orient::Method::Parity(parity)),
+    ];
+    for (on_cpu, on_device) in methods {
+        for radius in [Radius::Auto, Radius::Fixed(0.08)] {
+            let expected = Held::find(device, &cloud, radius, &on_cpu).unwrap();
+            let found = Held::find_on_device(device, &points, radius, &on_device).unwrap();
+            let common = Real::f64(found.common_radius) / Real::f64(expected.common_radius);
+            assert!((common - 1.0).abs() < tight, "{common}");
+            for (found, expected) in [
+                (&found.radii, &expected.radii),
+                (&found.area_radii, &expected.area_radii),
+                (&found.outward, &expected.outward),
+                (&found.confidence, &expected.confidence),
+            ] {
+                let [found, expected] = [found, expected].map(|b| device.download(b).unwrap());
+                let difference = relative(&found, &expected);
+                assert!(difference < loose, "{on_cpu:?}, {radius:?}: {difference:e}");
+            }
+            if radius != Radius::Auto {
+                continue;
+            }
+            let [found, expected] = [&found, &expected].map(|held| {
+                let result = plan.reconstruct(&points, held).unwrap();
+                device.download(&result.sdf).unwrap()
+            });
+            let difference = relative(&found, &expected);
+            println!("{on_cpu:?}, {radius:?}, {}: φ {difference:.1e}", T::NAME);
+            assert!(
+                difference < loose,
+                "{on_cpu:?}, {radius:?}: φ {difference:e}"
+            );
+        }
+    }
+    let none = device.upload::<T>(&[]).unwrap();
+    let method = orient::Method::Parity(parity);
+    assert!(matches!(
+        Held::find_on_device(device, &none, Radius::Auto, &method),
+        Err(Error::Neighbors(_))
+    ));
+    let short = orient::Method::Signs(&none);
+    assert!(matches!(
+        Held::find_on_device(device, &points, Radius::Auto, &short),
+        Err(Error::Device(_))
+    ));
 }

@@ -1,13 +1,17 @@
 //! Calls that launch every kernel. The data are nothing; counts that host code asks for are answered.
 
+use cubecl::prelude::CubeElement;
 use isograd::Grid;
+use isograd::isosurface::Level;
+use isograd::neighbors::Radius;
 use isograd::splat::Weights;
 use isograd_gpu::distance::{Band, Mesh, lattice, query};
 use isograd_gpu::iso_value::local;
 use isograd_gpu::primitives::{reduce, scan, sort};
 use isograd_gpu::splat::{self, SampleCotangent, Samples};
 use isograd_gpu::{
-    Buffer, Device, Scalar, area, iso_value, isosurface, neighbors, normals, pipeline, poisson,
+    Buffer, Device, Scalar, area, iso_value, isosurface, neighbors, normals, orient, pipeline,
+    poisson,
 };
 
 use crate::recorder::{Recorder, answer, forget_answers};
@@ -24,6 +28,7 @@ const SHAPE: [usize; 3] = [30, 31, 64];
 pub fn launch_all<T: Scalar>(device: &Device<Recorder>) {
     primitives::<T>(device);
     points::<T>(device);
+    held::<T>(device);
     samples::<T>(device);
     local_levels::<T>(device);
     solves::<T>(device);
@@ -66,6 +71,38 @@ fn points<T: Scalar>(device: &Device<Recorder>) {
     let radius = <T as isograd::Real>::of(0.1);
     let (areas, residual) = area::forward(device, &near, radius).unwrap();
     area::pullback(device, &residual, &areas).unwrap();
+}
+
+/// Radii and orientation, for a cloud in the unit cube: what is asked for are whether a point is not finite, the box,
+/// and how many reaches are positive, with their median.
+fn held<T: Scalar>(device: &Device<Recorder>) {
+    let points = numbers::<T>(device, 3 * SAMPLES);
+    let [unit_box, median] = [&[0.0, 0.0, 0.0, 1.0, 1.0, 1.0][..], &[100.0, 0.01]].map(words::<T>);
+    answer(&[
+        &[0, 0],
+        &unit_box,
+        &median,
+        &words::<T>(&[0.0, 0.01]),
+        &unit_box,
+    ]);
+    let parity = orient::Method::Parity(Default::default());
+    pipeline::Held::find_on_device(device, &points, Radius::Auto, &parity).unwrap();
+    forget_answers();
+    let near = neighbors::forward(device, &points, &numbers(device, SAMPLES)).unwrap();
+    neighbors::radius::census(device, &near, <T as isograd::Real>::of(0.1)).unwrap();
+    answer(&[&[0, 0]]);
+    orient::forward(device, &near, &points, &orient::Method::Signs(&points)).unwrap();
+    forget_answers();
+    orient::given::pullback(device, &points, &points).unwrap();
+}
+
+/// Numbers as they are in memory.
+fn words<T: Scalar>(numbers: &[f64]) -> Vec<u32> {
+    let numbers: Vec<T> = numbers
+        .iter()
+        .map(|&x| <T as isograd::Real>::of(x))
+        .collect();
+    u32::from_bytes(T::as_bytes(&numbers)).to_vec()
 }
 
 fn samples<T: Scalar>(device: &Device<Recorder>) {
@@ -185,8 +222,14 @@ fn whole<T: Scalar>(device: &Device<Recorder>) {
         common_radius: <T as isograd::Real>::of(0.1),
         spacing: <T as isograd::Real>::of(0.02),
         outward: numbers(device, 3 * SAMPLES),
+        confidence: numbers(device, SAMPLES),
     };
-    let plan = pipeline::Reconstructor::new(device.clone(), grid(), Default::default()).unwrap();
+    // The local level has its own call.
+    let options = pipeline::Options {
+        level: Level::Mean,
+        ..Default::default()
+    };
+    let plan = pipeline::Reconstructor::new(device.clone(), grid(), options).unwrap();
     // The areas, the samples outside, the surface.
     answer(&[
         &[1 << 30, 1 << 30, 1 << 30, 1 << 30],

@@ -27,6 +27,14 @@ pub fn area<F: Element>(pi: F, radius: F, crowd: F) -> F {
     pi * radius * radius / (F::new(3.0) * crowd)
 }
 
+/// `λ₁λ/(λ − λ₁)²`: what one of the two larger eigenvalues adds to the roughness of a neighbourhood; they differ
+/// from the smallest.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn roughness<F: Element>(first: F, value: F) -> F {
+    first * value / ((value - first) * (value - first))
+}
+
 /// `w² (g·e)(n·e)/r`: factor of the offset in its cotangent, 0 at distance 0.
 #[cfg_attr(cube, cube)]
 #[inline(always)]

@@ -26,6 +26,7 @@ mod census;
 mod gather;
 mod nearest;
 mod radius;
+pub mod rule;
 #[cfg(test)]
 pub(crate) mod tests;
 

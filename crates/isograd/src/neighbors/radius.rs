@@ -6,27 +6,10 @@ use super::candidates::Candidates;
 use super::cell_index::CellIndex;
 use super::cells::Search;
 use super::census::Census;
+use super::rule::{
+    self, AUTO_NEIGHBORS, AUTO_SAMPLES, FEWEST_NEIGHBORS, FEWEST_POINTS, GROWTH_MARGIN,
+};
 use crate::{Real, vector};
-
-/// Fewest points that can bound a volume.
-const FEWEST_POINTS: usize = 4;
-
-/// Fewest samples in a neighbourhood, its centre included: a plane through fewer is mostly chance.
-const FEWEST_NEIGHBORS: usize = 8;
-
-/// By how much a grown radius passes the neighbour that it has to reach, so that this one gets some of
-/// a weight that falls to 0 at the radius.
-const GROWTH_MARGIN: f64 = 1.05;
-
-/// Samples that the automatic radius holds at the median, the centre included.
-const AUTO_NEIGHBORS: usize = 24;
-
-/// By how much the automatic radius passes the median: else one sample would lie exactly on the radius of
-/// another, and the least motion would change their neighbourhoods.
-const AUTO_MARGIN: f64 = 1.001;
-
-/// Points that are asked for the automatic radius.
-const AUTO_SAMPLES: usize = 1024;
 
 /// Share of a neighbourhood whose own radius must reach back to the sample, or the sample is isolated.
 const SMALLEST_MUTUAL_SHARE: f64 = 0.125;
@@ -234,13 +217,9 @@ pub(crate) fn forward_with<T: Real, U: Copy + Default + Send + Sync>(
     out.index.rebuild(points);
     check_extent(&out.index)?;
     let automatic = automatic_radius(&out.index);
-    out.spacing =
-        automatic * T::of((std::f64::consts::PI / AUTO_NEIGHBORS.min(points.len()) as f64).sqrt());
+    out.spacing = rule::spacing(automatic, points.len());
     out.rule = radius;
-    out.common_radius = match radius {
-        Radius::Auto => automatic.max(smallest_radius()),
-        Radius::Fixed(radius) => fixed_radius(radius)?,
-    };
+    out.common_radius = rule::common(radius, automatic)?;
     grow(out, sorted, sum);
     find_isolated(out);
     Ok(())
@@ -296,44 +275,10 @@ fn check<T: Real>(points: &[[T; 3]]) -> Result<(), Error> {
 }
 
 fn check_extent<T: Real>(index: &CellIndex<T>) -> Result<(), Error> {
-    let (low, high) = index.bounds();
-    let extent = (0..3)
-        .map(|a| high[a].f64() - low[a].f64())
-        .fold(0.0, f64::max);
-    if extent == 0.0 {
-        return Err(Error::AllEqual {
-            points: index.len(),
-        });
-    }
-    // A millionth of the extent must still have a square, and a hundred extents too.
-    let square_root = |x: T| x.f64().sqrt();
-    if extent < 1e6 * square_root(T::min_positive_value())
-        || extent > 1e-2 * square_root(T::max_value())
-    {
-        return Err(Error::Extent {
-            extent,
-            type_name: T::NAME,
-        });
-    }
-    Ok(())
+    rule::check_extent(index.len(), index.bounds().into())
 }
 
-fn fixed_radius<T: Real>(radius: f64) -> Result<T, Error> {
-    let rounded = T::of(radius);
-    if rounded >= smallest_radius() && (rounded * rounded).is_finite() {
-        Ok(rounded)
-    } else {
-        Err(Error::Radius { radius })
-    }
-}
-
-/// The least radius whose square, and one over it, the number type can hold.
-fn smallest_radius<T: Real>() -> T {
-    T::of(8.0) * T::min_positive_value().sqrt()
-}
-
-/// Median, over a fixed stride of points, of the distance to the 24th sample. Points on which 24 samples
-/// lie have no say; where there are only such, the samples are spread evenly over the extent instead.
+/// By the median, over a fixed stride of points, of the distance to the 24th sample.
 fn automatic_radius<T: Real>(index: &CellIndex<T>) -> T {
     let n = index.len();
     let stride = n.div_ceil(AUTO_SAMPLES);
@@ -345,13 +290,12 @@ fn automatic_radius<T: Real>(index: &CellIndex<T>) -> T {
         })
         .filter(|&distance| distance > T::zero())
         .collect();
-    if distances.is_empty() {
-        let (low, high) = index.bounds();
-        return vector::norm(vector::sub(high, low)) / T::of_usize(n).sqrt();
-    }
     let middle = distances.len() / 2;
-    let median = distances.select_nth_unstable_by(middle, |a, b| a.f64().total_cmp(&b.f64()));
-    *median.1 * T::of(AUTO_MARGIN)
+    let median = (!distances.is_empty()).then(|| {
+        let order = |a: &T, b: &T| a.f64().total_cmp(&b.f64());
+        *distances.select_nth_unstable_by(middle, order).1
+    });
+    rule::automatic(median, n, index.bounds().into())
 }
 
 /// Writes radius, census and sum of every point: the common radius where it holds enough samples.

@@ -15,6 +15,7 @@ use rayon::prelude::*;
 
 use super::forward::{Moments, find_planes, moments};
 use super::{Plane, Residual};
+use crate::element::plane;
 use crate::neighbors::{Candidates, Census, Found as Sum, Neighborhoods, Radius, Search};
 use crate::{Real, simd, vector};
 
@@ -80,9 +81,11 @@ pub(super) fn repeat<T: Real>(
 /// `q`, see the [module](self); infinite where the axis is no better than another.
 fn roughness<T: Real>(plane: &Plane<T>) -> f64 {
     let [first, others @ ..] = plane.eigenvalues.map(|value| value.f64());
-    let term = |value: f64| first * value / ((value - first) * (value - first));
     match first > 0.0 {
-        true => others.map(term).into_iter().sum(),
+        true => others
+            .map(|value| plane::roughness(first, value))
+            .into_iter()
+            .sum(),
         false => 0.0,
     }
 }

@@ -34,6 +34,39 @@ impl Default for ParityOptions {
     }
 }
 
+impl ParityOptions {
+    /// Whether they are in range.
+    ///
+    /// # Errors
+    /// [`Error::Option`].
+    pub fn check(&self) -> Result<(), Error> {
+        for (name, value, least) in [("gamma", self.gamma, 1.0), ("step", self.step, 0.01)] {
+            if !(value >= least && value.is_finite()) {
+                return Err(Error::Option { name, value, least });
+            }
+        }
+        Ok(())
+    }
+
+    /// `r_d`, where `lonely` is how far the most lonely point is from its nearest other.
+    pub fn detection_radius(&self, lonely: f64) -> f64 {
+        self.gamma * 0.5 * lonely
+    }
+
+    /// `Δs` of the detection radius, for a cloud whose box has this diagonal.
+    ///
+    /// # Errors
+    /// [`Error::DetectionRadius`].
+    pub fn probe_step(&self, radius: f64, diagonal: f64) -> Result<f64, Error> {
+        let step = self.step * radius;
+        if diagonal <= MOST_PROBES * step {
+            Ok(step)
+        } else {
+            Err(Error::DetectionRadius { radius })
+        }
+    }
+}
+
 /// What a detection array says: `N_i` and `N_{i,one}`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Pattern {
@@ -44,7 +77,10 @@ pub(super) struct Pattern {
 }
 
 /// `r_d`, in the unit of the points.
-pub(super) fn detection_radius<T: Real>(neighborhoods: &Neighborhoods<T>, gamma: f64) -> f64 {
+pub(super) fn detection_radius<T: Real>(
+    neighborhoods: &Neighborhoods<T>,
+    options: &ParityOptions,
+) -> f64 {
     let index = &neighborhoods.index;
     let largest = (0..index.len())
         .into_par_iter()
@@ -54,7 +90,7 @@ pub(super) fn detection_radius<T: Real>(neighborhoods: &Neighborhoods<T>, gamma:
             nearest.get(1).map_or(T::zero(), |&(_, d2)| d2).f64()
         })
         .reduce(|| 0.0, f64::max);
-    gamma * 0.5 * largest.sqrt()
+    options.detection_radius(largest.sqrt())
 }
 
 /// The outcome for one axis.
@@ -75,15 +111,12 @@ pub(super) fn forward<T: Real>(
     options: &ParityOptions,
     verdicts: &mut Vec<Verdict>,
 ) -> Result<f64, Error> {
-    check(options)?;
+    options.check()?;
     let index = &neighborhoods.index;
-    let radius = detection_radius(neighborhoods, options.gamma);
+    let radius = detection_radius(neighborhoods, options);
     let (low, high) = index.bounds();
     let (low, high) = (vector::to_f64(low), vector::to_f64(high));
-    let step = options.step * radius;
-    if !(vector::norm(vector::sub(high, low)) <= MOST_PROBES * step) {
-        return Err(Error::DetectionRadius { radius });
-    }
+    let step = options.probe_step(radius, vector::norm(vector::sub(high, low)))?;
     let ray = Ray {
         radius,
         step,
@@ -102,15 +135,6 @@ pub(super) fn forward<T: Real>(
         verdict.closed = along.crossings % 2 != against.crossings % 2;
     });
     Ok(radius)
-}
-
-fn check(options: &ParityOptions) -> Result<(), Error> {
-    for (name, value, least) in [("gamma", options.gamma, 1.0), ("step", options.step, 0.01)] {
-        if !(value >= least && value.is_finite()) {
-            return Err(Error::Option { name, value, least });
-        }
-    }
-    Ok(())
 }
 
 /// The three iterations of the paper: whether the normal ends opposite to where it began.

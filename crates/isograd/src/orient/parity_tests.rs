@@ -77,7 +77,7 @@ fn signs_are_those_of_the_plain_transcription() {
                 step: 0.3,
             },
         ] {
-            let r_d = detection_radius(&neighborhoods, options.gamma);
+            let r_d = detection_radius(&neighborhoods, &options);
             let (mut scratch, mut out) = (Scratch::default(), Orientation::default());
             let method = Method::Parity(options);
             forward(
@@ -111,7 +111,8 @@ fn the_detection_radius_is_that_of_the_most_lonely_point() {
     ];
     let mut neighborhoods = Neighborhoods::default();
     neighbors::forward(&points, Radius::Auto, &mut neighborhoods).unwrap();
-    assert_eq!(detection_radius(&neighborhoods, 2.5), 2.5 * 0.5 * 2.0);
+    let options = ParityOptions::default();
+    assert_eq!(detection_radius(&neighborhoods, &options), 2.5 * 0.5 * 2.0);
 }
 
 #[test]

@@ -4,10 +4,10 @@ use cubecl::prelude::*;
 
 use super::sample::{lowest, mean};
 use crate::element::plate::least_area;
-use crate::trilinear::tent;
 use crate::primitives::reduce::{BLOCK, sum_of_group};
 use crate::splat::{bspline, bspline_slope, pick};
 use crate::spread::Spread;
+use crate::trilinear::tent;
 
 /// Cells between that of a sample and the outermost that it reaches.
 pub(super) const REACH: u32 = 1;

@@ -1,0 +1,214 @@
+//! The nearest points of a place, by walks down the tree.
+
+use cubecl::prelude::*;
+
+use super::tree::{IS_LEAF, NODE};
+use super::walk::{end_of_leaf, first_of_leaf};
+use super::{BLOCK, LEAF, Neighborhoods};
+use crate::vector::Vector3;
+use crate::{Buffer, Device, Error, Scalar};
+
+/// Points along the curve, round the leaf nearest to a place, that bound the distance to its nearest points.
+const WINDOW: usize = 32;
+
+/// Those of them before the leaf.
+const MARGIN: usize = (WINDOW - LEAF) / 2;
+
+/// The squared distance of each of the `(M, 3)` places to its `k`-th nearest point, `k` being at most [`WINDOW`] and
+/// the number of points. A point that is its own place is the first.
+pub(crate) fn reaches<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    neighborhoods: &Neighborhoods<T>,
+    places: &Buffer<T>,
+    k: usize,
+) -> Result<Buffer<T>, Error> {
+    debug_assert!(k > 0 && k <= WINDOW.min(neighborhoods.len()));
+    let squares = device.empty(places.len() / 3)?;
+    find_reaches::launch::<T, R>(
+        device.client(),
+        device.groups(squares.len(), BLOCK),
+        CubeDim::new_1d(BLOCK),
+        neighborhoods.points.arg(),
+        neighborhoods.nodes.arg(),
+        neighborhoods.links.arg(),
+        places.arg(),
+        squares.arg(),
+        k,
+    );
+    Ok(squares)
+}
+
+#[cube(launch)]
+fn find_reaches<F: Float>(
+    points: &Array<F>,
+    nodes: &Array<F>,
+    links: &Array<u32>,
+    places: &Array<F>,
+    squares: &mut Array<F>,
+    #[comptime] k: usize,
+) {
+    if ABSOLUTE_POS < squares.len() {
+        let x = Vector3::<F>::at(places, ABSOLUTE_POS);
+        let mut nearest = Array::<F>::new(k);
+        #[unroll]
+        for i in 0..k {
+            nearest[i] = F::max_value();
+        }
+        // Any k points bound the distance; those round the nearest leaf bound it well.
+        let n = points.len() / 3;
+        let first = first_of_leaf(links, leaf_towards::<F>(nodes, links, x));
+        let begin = min(first - min(first, MARGIN), n - min(n, WINDOW));
+        for j in begin..min(begin + WINDOW, n) {
+            insert::<F>(square_to::<F>(points, j, x), &mut nearest, k);
+        }
+        let bound = nearest[k - 1];
+        // However many points lie there, none is nearer.
+        if bound > F::new(0.0) {
+            #[unroll]
+            for i in 0..k {
+                nearest[i] = bound;
+            }
+            let mut node = 0usize.runtime();
+            while node < links.len() {
+                let inside = box_square::<F>(nodes, node, x) < nearest[k - 1];
+                if inside && links[node] >= IS_LEAF {
+                    let first = first_of_leaf(links, node);
+                    for j in first..end_of_leaf(first, n) {
+                        insert::<F>(square_to::<F>(points, j, x), &mut nearest, k);
+                    }
+                }
+                node = next_node(links, node, inside);
+            }
+        }
+        squares[ABSOLUTE_POS] = nearest[k - 1];
+    }
+}
+
+/// Squared distance from a place to a node's box.
+#[cube]
+fn box_square<F: Float>(nodes: &Array<F>, node: usize, x: Vector3<F>) -> F {
+    let low = Vector3::<F>::load(nodes, NODE * node);
+    let high = Vector3::<F>::load(nodes, NODE * node + 3);
+    x.to_box_squared(low, high)
+}
+
+#[cube]
+fn square_to<F: Float>(points: &Array<F>, j: usize, x: Vector3<F>) -> F {
+    let offset = Vector3::<F>::at(points, j).sub(x);
+    offset.dot(offset)
+}
+
+/// The node to look at after this one: below it, if it is to be entered, else after its subtree.
+#[cube]
+fn next_node(links: &Array<u32>, node: usize, enter: bool) -> usize {
+    let link = links[node];
+    let step = enter || link >= IS_LEAF;
+    select(step, node + 1, link as usize)
+}
+
+/// A leaf near a place: from the root always on to the nearest box.
+#[cube]
+fn leaf_towards<F: Float>(nodes: &Array<F>, links: &Array<u32>, x: Vector3<F>) -> usize {
+    let mut node = 0usize.runtime();
+    while links[node] < IS_LEAF {
+        let end = min(links[node] as usize, links.len());
+        let mut nearest = node + 1;
+        let mut least = box_square::<F>(nodes, nearest, x);
+        let mut child = next_node(links, node + 1, false);
+        while child < end {
+            let square = box_square::<F>(nodes, child, x);
+            if square < least {
+                least = square;
+                nearest = child;
+            }
+            child = next_node(links, child, false);
+        }
+        node = nearest;
+    }
+    node
+}
+
+/// Puts a number where it belongs among the `k` smallest so far.
+#[cube]
+fn insert<F: Float>(number: F, smallest: &mut Array<F>, #[comptime] k: usize) {
+    if number < smallest[k - 1] {
+        let mut moved = number;
+        #[unroll]
+        for i in 0..k {
+            let own = smallest[i];
+            let stays = own <= moved;
+            smallest[i] = select(stays, own, moved);
+            moved = select(stays, moved, own);
+        }
+    }
+}
+
+/// A point, and how far it is from a place, squared.
+#[derive(CubeType, Clone, Copy)]
+pub(crate) struct Near<F: Float> {
+    pub point: u32,
+    pub square: F,
+}
+
+/// No point is nearer to the place than this share of the distance to the one that [`about_nearest`] found.
+pub(crate) const SURE_SHARE: f32 = 0.7;
+
+/// A point that is about the nearest to `x`, beginning with `guess`. To know the nearest itself would take a look at
+/// most of the points where they are about equally far, as at the centre of a sphere; to know it to a third takes a
+/// few.
+#[cube]
+pub(crate) fn about_nearest<F: Float>(
+    points: &Array<F>,
+    nodes: &Array<F>,
+    links: &Array<u32>,
+    x: Vector3<F>,
+    guess: u32,
+) -> Near<F> {
+    let n = points.len() / 3;
+    let share = F::new(SURE_SHARE) * F::new(SURE_SHARE);
+    let mut point = guess;
+    let mut square = square_to::<F>(points, guess as usize, x);
+    let mut node = 0usize.runtime();
+    while node < links.len() {
+        let enter = box_square::<F>(nodes, node, x) < share * square;
+        if enter && links[node] >= IS_LEAF {
+            let first = first_of_leaf(links, node);
+            for j in first..end_of_leaf(first, n) {
+                let other = square_to::<F>(points, j, x);
+                if other < square {
+                    square = other;
+                    point = j as u32;
+                }
+            }
+        }
+        node = next_node(links, node, enter);
+    }
+    Near::<F> { point, square }
+}
+
+/// Whether any point is within the distance of `x` whose square is `limit`.
+#[cube]
+pub(crate) fn any_within<F: Float>(
+    points: &Array<F>,
+    nodes: &Array<F>,
+    links: &Array<u32>,
+    x: Vector3<F>,
+    limit: F,
+) -> bool {
+    let n = points.len() / 3;
+    let mut found = 0u32.runtime();
+    let mut node = 0usize.runtime();
+    while node < links.len() && found == 0u32 {
+        let enter = box_square::<F>(nodes, node, x) <= limit;
+        if enter && links[node] >= IS_LEAF {
+            let first = first_of_leaf(links, node);
+            for j in first..end_of_leaf(first, n) {
+                if square_to::<F>(points, j, x) <= limit {
+                    found = 1u32;
+                }
+            }
+        }
+        node = next_node(links, node, enter);
+    }
+    found == 1u32
+}

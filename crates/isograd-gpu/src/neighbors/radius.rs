@@ -1,0 +1,304 @@
+//! The radius of every point's neighbourhood, found on the device by the rules of [`isograd::neighbors`].
+//!
+//! # Map
+//! Points `(N, 3)` and a [`Radius`] → `R_i`: a radius common to all points, given or automatic, which grows where
+//! fewer than 8 samples are within it. The automatic one asks the same points as the CPU, and is the same but for
+//! the rounding of distances.
+//!
+//! # Pullback
+//! None: every pullback holds the radii constant.
+
+use cubecl::prelude::*;
+use isograd::neighbors::rule::{
+    self, AUTO_NEIGHBORS, FEWEST_NEIGHBORS, FEWEST_POINTS, GROWTH_MARGIN,
+};
+use isograd::neighbors::{Error as Refused, Radius};
+
+use super::nearest::reaches;
+use super::order::gather;
+use super::{
+    BLOCK, Neighborhoods, choice, end_of_leaf, first_of_leaf, forward as sort_points, next_leaf,
+    with_radii,
+};
+use crate::device::check_length;
+use crate::primitives::ends::ends;
+use crate::primitives::fill::zeros;
+use crate::primitives::flags;
+use crate::vector::Vector3;
+use crate::{Buffer, Device, Scalar};
+
+/// Why there are no radii.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The cloud has none.
+    #[error(transparent)]
+    Cloud(#[from] Refused),
+    /// The device can't find them.
+    #[error(transparent)]
+    Device(#[from] crate::Error),
+}
+
+/// Radii, and the neighbourhoods that they make.
+#[derive(Clone, Debug)]
+pub struct Radii<T> {
+    /// `(N,)` the `R_i` in input order, in the unit of the points; at least [`Self::common`].
+    pub each: Buffer<T>,
+    /// The radius of every point that has enough neighbours within it.
+    pub common: T,
+    /// Typical distance between neighbouring samples, as [`isograd::neighbors::Neighborhoods::spacing`] has it.
+    pub spacing: T,
+    /// The points, sorted, with these radii.
+    pub neighborhoods: Neighborhoods<T>,
+}
+
+/// What the neighbourhoods hold, in input order.
+#[derive(Clone, Debug)]
+pub struct Census {
+    /// `(N,)` number of samples within `R_i`, the point itself included.
+    pub count: Buffer<u32>,
+    /// `(N,)` 1 for outliers, of whose neighbours fewer than 1 in 8 have them as theirs; else 0.
+    pub isolated: Buffer<u32>,
+}
+
+/// The radii of `(N, 3)` points. Waits for the device: the checks of the points, their box and the automatic radius
+/// come to the host, eleven numbers in all.
+///
+/// # Errors
+/// What [`isograd::neighbors::forward`] says of the same points; [`crate::Error::Length`] where they are not whole;
+/// [`crate::Error::TooLarge`], [`crate::Error::Failed`].
+pub fn forward<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    points: &Buffer<T>,
+    radius: Radius,
+) -> Result<Radii<T>, Error> {
+    let n = points.len() / 3;
+    check_length("points", points, 3 * n)?;
+    if n < FEWEST_POINTS {
+        return Err(Refused::TooFew { points: n }.into());
+    }
+    check_finite(device, points)?;
+    let bounds = bounds(device, points)?;
+    rule::check_extent(n, bounds)?;
+    let sorted = sort_points(device, points, &zeros(device, n)?)?;
+    let automatic = automatic(device, points, &sorted, bounds)?;
+    let common = rule::common(radius, automatic)?;
+    let each = grow(device, &sorted, common)?;
+    Ok(Radii {
+        neighborhoods: with_radii(device, &sorted, &each)?,
+        each,
+        common,
+        spacing: rule::spacing(automatic, n),
+    })
+}
+
+/// Counts the samples of the neighbourhoods, and finds those that are isolated; `common` is [`Radii::common`].
+///
+/// # Errors
+/// [`crate::Error::TooLarge`].
+pub fn census<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    neighborhoods: &Neighborhoods<T>,
+    common: T,
+) -> Result<Census, crate::Error> {
+    let n = neighborhoods.len();
+    let census = Census {
+        count: device.empty(n)?,
+        isolated: device.empty(n)?,
+    };
+    if n > 0 {
+        count_neighbors::launch::<T, R>(
+            device.client(),
+            device.groups(n, BLOCK),
+            CubeDim::new_1d(BLOCK),
+            neighborhoods.points.arg(),
+            neighborhoods.radii.arg(),
+            neighborhoods.places.arg(),
+            neighborhoods.nodes.arg(),
+            neighborhoods.links.arg(),
+            census.count.arg(),
+            census.isolated.arg(),
+            common,
+        );
+    }
+    Ok(census)
+}
+
+fn check_finite<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    points: &Buffer<T>,
+) -> Result<(), Error> {
+    let bad: Buffer<u32> = device.empty(points.len() / 3)?;
+    flag_not_finite::launch::<T, R>(
+        device.client(),
+        device.groups(bad.len(), BLOCK),
+        CubeDim::new_1d(BLOCK),
+        points.arg(),
+        bad.arg(),
+    );
+    match flags::first(device, &bad)? {
+        Some(index) => Err(Refused::NotFinite { index }.into()),
+        None => Ok(()),
+    }
+}
+
+/// Low and high corner of the box round some points.
+pub(crate) fn bounds<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    points: &Buffer<T>,
+) -> Result<[[T; 3]; 2], crate::Error> {
+    let ends = device.download(&ends(device, points, 3)?)?;
+    Ok([[ends[0], ends[1], ends[2]], [ends[3], ends[4], ends[5]]])
+}
+
+fn automatic<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    points: &Buffer<T>,
+    neighborhoods: &Neighborhoods<T>,
+    bounds: [[T; 3]; 2],
+) -> Result<T, crate::Error> {
+    let n = neighborhoods.len();
+    let coordinates = bounds.as_flattened().iter();
+    let largest = coordinates.fold(0.0, |most: f64, &x| most.max(isograd::Real::f64(x).abs()));
+    let chosen = choice::choose(device, points, largest)?;
+    let asked = gather(device, points, &chosen, 3)?;
+    let squares = reaches(device, neighborhoods, &asked, AUTO_NEIGHBORS.min(n))?;
+    let found: Buffer<T> = device.empty(2)?;
+    find_median::launch::<T, R>(
+        device.client(),
+        device.groups(squares.len(), BLOCK),
+        CubeDim::new_1d(BLOCK),
+        squares.arg(),
+        found.arg(),
+    );
+    let found = device.download(&found)?;
+    let [positive, median] = [0, 1].map(|k| isograd::Real::f64(found[k]));
+    // The root of a number in single precision, taken in double, rounds to the same one.
+    let median = (positive > 0.0).then(|| <T as isograd::Real>::of(median.sqrt()));
+    Ok(rule::automatic(median, n, bounds))
+}
+
+/// The common radius, or what reaches the 8th sample with a margin, in input order.
+fn grow<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    neighborhoods: &Neighborhoods<T>,
+    common: T,
+) -> Result<Buffer<T>, crate::Error> {
+    let n = neighborhoods.len();
+    let squares = reaches(
+        device,
+        neighborhoods,
+        &neighborhoods.points,
+        FEWEST_NEIGHBORS.min(n),
+    )?;
+    let radii = device.empty(n)?;
+    grow_radii::launch::<T, R>(
+        device.client(),
+        device.groups(n, BLOCK),
+        CubeDim::new_1d(BLOCK),
+        squares.arg(),
+        neighborhoods.places.arg(),
+        radii.arg(),
+        common,
+        <T as isograd::Real>::of(GROWTH_MARGIN),
+    );
+    Ok(radii)
+}
+
+#[cube]
+pub(crate) fn is_finite<F: Float>(x: F) -> bool {
+    // Nothing that is compared with NaN is true.
+    x.abs() <= F::max_value()
+}
+
+#[cube(launch)]
+fn flag_not_finite<F: Float>(points: &Array<F>, bad: &mut Array<u32>) {
+    if ABSOLUTE_POS < bad.len() {
+        let finite = is_finite::<F>(points[3 * ABSOLUTE_POS])
+            && is_finite::<F>(points[3 * ABSOLUTE_POS + 1])
+            && is_finite::<F>(points[3 * ABSOLUTE_POS + 2]);
+        bad[ABSOLUTE_POS] = select(finite, 0u32, 1u32);
+    }
+}
+
+/// How many of a few numbers are positive, and the median of those: the upper one of two.
+#[cube(launch)]
+fn find_median<F: Float>(numbers: &Array<F>, found: &mut Array<F>) {
+    if ABSOLUTE_POS < numbers.len() {
+        let own = numbers[ABSOLUTE_POS];
+        let mut positive = 0u32.runtime();
+        let mut rank = 0u32.runtime();
+        for i in 0..numbers.len() {
+            let other = numbers[i];
+            if other > F::new(0.0) {
+                positive += 1u32;
+                if other < own || (other == own && i < ABSOLUTE_POS) {
+                    rank += 1u32;
+                }
+            }
+        }
+        if own > F::new(0.0) && rank == positive / 2u32 {
+            found[1] = own;
+        }
+        if ABSOLUTE_POS == 0 {
+            found[0] = F::cast_from(positive);
+        }
+    }
+}
+
+/// `squares` are those of the distances to the 8th sample, in sorted order.
+#[cube(launch)]
+fn grow_radii<F: Float + CubeElement>(
+    squares: &Array<F>,
+    places: &Array<u32>,
+    radii: &mut Array<F>,
+    common: F,
+    margin: F,
+) {
+    if ABSOLUTE_POS < places.len() {
+        let square = squares[ABSOLUTE_POS];
+        let mut radius = common;
+        if square > common * common {
+            radius = max(common, margin * F::sqrt(square));
+        }
+        let place = places[ABSOLUTE_POS] as usize;
+        radii[place] = radius;
+    }
+}
+
+#[cube(launch)]
+fn count_neighbors<F: Float + CubeElement>(
+    points: &Array<F>,
+    radii: &Array<F>,
+    places: &Array<u32>,
+    nodes: &Array<F>,
+    links: &Array<u32>,
+    counts: &mut Array<u32>,
+    isolated: &mut Array<u32>,
+    common: F,
+) {
+    let n = radii.len();
+    if ABSOLUTE_POS < n {
+        let centre = Vector3::<F>::at(points, ABSOLUTE_POS);
+        let radius = radii[ABSOLUTE_POS];
+        let mut count = 0u32.runtime();
+        let mut mutual = 0u32.runtime();
+        let mut node = next_leaf::<F>(nodes, links, centre, radius, 0usize, false);
+        while node < links.len() {
+            let first = first_of_leaf(links, node);
+            for j in first..end_of_leaf(first, n) {
+                let offset = Vector3::<F>::at(points, j).sub(centre);
+                let square = offset.dot(offset);
+                if square <= radius * radius {
+                    count += 1u32;
+                    let is_mutual = j != ABSOLUTE_POS && square <= radii[j] * radii[j];
+                    mutual += select(is_mutual, 1u32, 0u32);
+                }
+            }
+            node = next_leaf::<F>(nodes, links, centre, radius, node + 1, false);
+        }
+        let place = places[ABSOLUTE_POS] as usize;
+        let few = radius > common && 8u32 * mutual < max(count, 2u32) - 1u32;
+        counts[place] = count;
+        isolated[place] = select(few, 1u32, 0u32);
+    }
+}

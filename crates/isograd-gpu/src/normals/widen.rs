@@ -1,0 +1,161 @@
+//! Wider neighbourhoods for the axes of samples that scatter: `isograd`'s `normals/widen.rs`, which says why.
+
+use cubecl::prelude::*;
+
+use super::forward::{MOMENTS, fit, moments_within};
+use super::{Residual, VALUES};
+use crate::element::plane;
+use crate::neighbors::{BLOCK, scatter};
+use crate::primitives::flags;
+use crate::vector::Vector3;
+use crate::{Buffer, Device, Error, Scalar};
+
+/// Radii that are tried one after the other, in `R_i`; as on the CPU, and so are the numbers below.
+const STEPS: [f64; 3] = [
+    std::f64::consts::SQRT_2,
+    2.0,
+    2.0 * std::f64::consts::SQRT_2,
+];
+
+/// Hundredths of roughness up to which an axis is left alone.
+const ROUGH: f32 = 12.0;
+
+/// A wider neighbourhood is taken where its roughness is at most this share of the one at hand.
+const GAIN: f32 = 0.5;
+
+/// A neighbourhood is one-sided from here on: hundredths of the radius, squared.
+const RIM: f32 = 4.0;
+
+/// The radii `(N,)` within which axes are to be found, in input order: those of the residual, and wider ones where
+/// neighbourhoods are rough and wider ones far less so. For automatic radii; one that the user gave stays.
+///
+/// Only points that are still rough are tried again: their list stays on the device.
+///
+/// # Errors
+/// [`Error::TooLarge`].
+pub fn widen<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    residual: &Residual<T>,
+) -> Result<Buffer<T>, Error> {
+    let near = &residual.neighborhoods;
+    let n = near.len();
+    let (roughness, widened): (Buffer<T>, Buffer<T>) = (device.empty(n)?, device.empty(n)?);
+    if n == 0 {
+        return Ok(widened);
+    }
+    let (groups, dim) = (device.groups(n, BLOCK), CubeDim::new_1d(BLOCK));
+    begin_widening::launch::<T, R>(
+        device.client(),
+        groups.clone(),
+        dim,
+        residual.planes.arg(),
+        near.radii.arg(),
+        roughness.arg(),
+        widened.arg(),
+    );
+    for step in STEPS {
+        let rough: Buffer<u32> = device.empty(n)?;
+        flag_rough::launch::<T, R>(
+            device.client(),
+            groups.clone(),
+            dim,
+            roughness.arg(),
+            rough.arg(),
+        );
+        let listed = flags::list(device, &rough)?;
+        try_wider::launch::<T, R>(
+            device.client(),
+            groups.clone(),
+            dim,
+            near.points.arg(),
+            near.radii.arg(),
+            near.nodes.arg(),
+            near.links.arg(),
+            listed.indices.arg(),
+            listed.sums.arg(),
+            roughness.arg(),
+            widened.arg(),
+            <T as isograd::Real>::of(step),
+        );
+    }
+    scatter(device, &widened, &near.places)
+}
+
+/// Of ascending eigenvalues; as good as infinite where the smallest is no smaller than another.
+#[cube]
+fn roughness<F: Float>(values: Vector3<F>) -> F {
+    let mut found = F::new(0.0);
+    if values.x > F::new(0.0) {
+        found = share::<F>(values.x, values.y) + share::<F>(values.x, values.z);
+    }
+    found
+}
+
+#[cube]
+fn share<F: Float>(first: F, value: F) -> F {
+    let gap = value - first;
+    let mut share = F::new(1e30);
+    if gap * gap > F::new(0.0) {
+        share = plane::roughness::<F>(first, value);
+    }
+    share
+}
+
+#[cube(launch)]
+fn begin_widening<F: Float>(
+    planes: &Array<F>,
+    radii: &Array<F>,
+    rough: &mut Array<F>,
+    widened: &mut Array<F>,
+) {
+    let n = radii.len();
+    if ABSOLUTE_POS < n {
+        let values = Vector3::<F> {
+            x: planes[VALUES * n + ABSOLUTE_POS],
+            y: planes[(VALUES + 1) * n + ABSOLUTE_POS],
+            z: planes[(VALUES + 2) * n + ABSOLUTE_POS],
+        };
+        rough[ABSOLUTE_POS] = roughness::<F>(values);
+        widened[ABSOLUTE_POS] = radii[ABSOLUTE_POS];
+    }
+}
+
+#[cube(launch)]
+fn flag_rough<F: Float>(rough: &Array<F>, flags: &mut Array<u32>) {
+    if ABSOLUTE_POS < flags.len() {
+        let is_rough = rough[ABSOLUTE_POS] > F::new(ROUGH) / F::new(100.0);
+        flags[ABSOLUTE_POS] = select(is_rough, 1u32, 0u32);
+    }
+}
+
+/// One unit tries one of the listed points, of which the last of `sums` says how many there are.
+#[cube(launch)]
+fn try_wider<F: Float + CubeElement>(
+    points: &Array<F>,
+    radii: &Array<F>,
+    nodes: &Array<F>,
+    links: &Array<u32>,
+    listed: &Array<u32>,
+    sums: &Array<u32>,
+    rough: &mut Array<F>,
+    widened: &mut Array<F>,
+    step: F,
+) {
+    let count = sums[sums.len() - 1];
+    if ABSOLUTE_POS < count as usize {
+        let at = listed[ABSOLUTE_POS] as usize;
+        let centre = Vector3::<F>::at(points, at);
+        let radius = step * radii[at];
+        let mut sums = Array::<F>::new(MOMENTS);
+        moments_within::<F>(points, nodes, links, centre, radius, &mut sums);
+        let fit = fit::<F>(&sums, 0usize, 1usize);
+        let second = fit.eigen.second.dot(fit.centroid);
+        let third = fit.eigen.third.dot(fit.centroid);
+        let is_at_rim = F::new(100.0) * (second * second + third * third) > F::new(RIM);
+        let found = roughness::<F>(fit.eigen.values);
+        if found <= F::new(GAIN) * rough[at] && !is_at_rim {
+            rough[at] = found;
+            widened[at] = radius;
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! Which elements have a flag: the first of them, and all of them.
+
+use cubecl::prelude::*;
+
+use super::scan::exclusive_sum;
+use crate::{Buffer, Device, Error};
+
+const BLOCK: u32 = 256;
+
+/// The index of the first flag that is 1, the others being 0. Waits for the device.
+pub(crate) fn first<R: Runtime>(
+    device: &Device<R>,
+    flags: &Buffer<u32>,
+) -> Result<Option<usize>, Error> {
+    let sums = exclusive_sum(device, flags)?;
+    let found: Buffer<u32> = device.empty(2)?;
+    find_first::launch::<R>(
+        device.client(),
+        device.groups(sums.len(), BLOCK),
+        CubeDim::new_1d(BLOCK),
+        sums.arg(),
+        found.arg(),
+    );
+    let found = device.download(&found)?;
+    Ok((found[0] > 0).then_some(found[1] as usize))
+}
+
+/// The indices of the flags that are 1, ascending; only as many numbers are written. The sums end with how many.
+pub(crate) struct Listed {
+    pub indices: Buffer<u32>,
+    pub sums: Buffer<u32>,
+}
+
+/// Lists the flags that are 1, the others being 0. Nothing waits.
+pub(crate) fn list<R: Runtime>(device: &Device<R>, flags: &Buffer<u32>) -> Result<Listed, Error> {
+    let sums = exclusive_sum(device, flags)?;
+    let indices = device.empty(flags.len())?;
+    write_indices::launch::<R>(
+        device.client(),
+        device.groups(flags.len(), BLOCK),
+        CubeDim::new_1d(BLOCK),
+        sums.arg(),
+        indices.arg(),
+        flags.len() as u32,
+    );
+    Ok(Listed { indices, sums })
+}
+
+/// How many flags there are, and the first, where there is one: the only one with none before it.
+#[cube(launch)]
+fn find_first(sums: &Array<u32>, found: &mut Array<u32>) {
+    let last = sums.len() - 1;
+    if ABSOLUTE_POS < last {
+        if sums[ABSOLUTE_POS] == 0u32 && sums[ABSOLUTE_POS + 1] == 1u32 {
+            found[1] = ABSOLUTE_POS as u32;
+        }
+    } else if ABSOLUTE_POS == last {
+        found[0] = sums[last];
+    }
+}
+
+#[cube(launch)]
+fn write_indices(sums: &Array<u32>, indices: &mut Array<u32>, count: u32) {
+    if ABSOLUTE_POS < count as usize {
+        let to = sums[ABSOLUTE_POS];
+        if sums[ABSOLUTE_POS + 1] > to {
+            indices[to as usize] = ABSOLUTE_POS as u32;
+        }
+    }
+}
