@@ -16,7 +16,11 @@ fn plate<T: Scalar>(n: usize, noise: f64) -> Vec<[T; 3]> {
     let gap = 1.5 * (2.0 / n as f64).sqrt();
     let mut sample = |k: usize| {
         let height = gap * (k % 2) as f64;
-        let reach = if k % 10 == 0 { 5.0 * noise } else { noise };
+        let reach = if k.is_multiple_of(10) {
+            5.0 * noise
+        } else {
+            noise
+        };
         let noise = reach * numbers.signed();
         [numbers.unit() + 3.0, numbers.unit(), height + noise].map(real)
     };
