@@ -35,8 +35,8 @@ struct OfDevice<T> {
 }
 
 impl<T: Scalar> Setting<T> {
-    /// `crowd` more samples of less area are in one cell. Every fourth normal is turned anywhere: the indicator is as flat along it
-    /// as it is on thin parts.
+    /// `crowd` more samples of less area are in one cell. Every fourth normal is turned anywhere: the indicator is as
+    /// flat along it as it is on thin parts.
     fn new(count: usize, crowd: usize, choice: Choice) -> Self {
         let lower = [-1.41, -1.36, -0.81].map(T::of);
         let grid = Grid::new(lower, T::of(0.1), [29, 27, 17]).expect("a grid");
@@ -71,6 +71,25 @@ impl<T: Scalar> Setting<T> {
             chi: indicator(grid),
             cloud,
             choice,
+        }
+    }
+
+    /// The same in double precision.
+    fn exactly(&self) -> Setting<f64> {
+        let vectors = |of: &[[T; 3]]| of.iter().map(|v| v.map(|x| x.f64())).collect();
+        let numbers = |of: &[T]| of.iter().map(|x| x.f64()).collect();
+        let (lower, shape) = (self.cloud.grid.lower(), self.cloud.grid.shape());
+        let spacing = self.cloud.grid.spacing().f64();
+        let grid = Grid::new(lower.map(|x| x.f64()), spacing, shape).expect("a grid");
+        Setting {
+            cloud: Cloud {
+                grid,
+                points: vectors(&self.cloud.points),
+                normals: vectors(&self.cloud.normals),
+                areas: numbers(&self.cloud.areas),
+            },
+            chi: Field::new(grid, numbers(self.chi.values())).expect("sizes match"),
+            choice: self.choice,
         }
     }
 
@@ -211,7 +230,8 @@ fn check_pullbacks<R: Runtime>(device: &Device<R>) {
 
 fn check_pullbacks_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
     for_each_setting::<T>(|setting| {
-        let expected = setting.pull_on_cpu();
+        // In double precision: of thousands of samples in a cell, the CPU's sums in single precision are further off.
+        let expected = setting.exactly().pull_on_cpu().rounded();
         let found = setting.pull(device);
         found.compare(device, &setting, &expected, tolerance);
         let again = setting.pull(device);
@@ -308,6 +328,24 @@ impl<T: Scalar> Setting<T> {
     }
 }
 
+impl PulledOnCpu<f64> {
+    fn rounded<T: Scalar>(self) -> PulledOnCpu<T> {
+        let vectors = |of: &[[f64; 3]]| of.iter().map(|v| v.map(T::of)).collect();
+        let numbers = |of: &[f64]| of.iter().map(|&x| T::of(x)).collect();
+        PulledOnCpu {
+            chi_bar: numbers(&self.chi_bar),
+            values: numbers(&self.values),
+            found: self.found,
+            out: isograd::splat::SampleCotangent {
+                points: vectors(&self.out.points),
+                normals: vectors(&self.out.normals),
+                areas: numbers(&self.out.areas),
+                grid: self.out.grid,
+            },
+        }
+    }
+}
+
 impl<T: Scalar> Pulled<T> {
     fn compare<R: Runtime>(
         &self,
@@ -333,8 +371,9 @@ impl<T: Scalar> Pulled<T> {
         assert!(error < tolerance, "{level} {}", expected.found.level);
         let of_cpu = expected.found.smoothing;
         let error = (self.smoothing - of_cpu).abs();
-        report("smoothing", error / of_cpu.abs());
-        assert!(error <= tolerance * of_cpu.abs());
+        // That of its terms: they are about r̄ r, and r is some hundredths.
+        report("smoothing", error / (0.01 * size));
+        assert!(error < tolerance * 0.01 * size && of_cpu != 0.0);
     }
 }
 

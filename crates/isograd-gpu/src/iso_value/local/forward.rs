@@ -18,9 +18,9 @@ use crate::{Buffer, Device, Error, Scalar};
 const SUMS: usize = 5;
 
 /// `chi`, `(nx, ny, nz)`, with the local part of the iso-value taken off, so that the surface is where it equals the
-/// global one: a new array, or `chi` itself where the samples say nothing. `mean` is what
-/// [`iso_value::forward`] kept of `chi`, and `splat` what the splat of the same samples left, whose grid is that of `chi`. Waits
-/// for the device once, and once a pass.
+/// global one: a new array, or `chi` itself where the samples are not followed. `mean` is what [`iso_value::forward`]
+/// kept of `chi`; `splat` is what the splat of the same samples left, on the grid of `chi`. Waits for the device once,
+/// and once a pass.
 ///
 /// # Errors
 /// [`Error::Length`] where the arrays do not match, [`Error::TooLarge`], [`Error::Failed`].

@@ -11,7 +11,7 @@ use super::pull_samples::{
     BARS, GainBarsLaunch, add_bars, add_bars_of_grid, pull_cells, pull_plates, pull_seen_means,
     pull_slopes, see_means_again,
 };
-use super::sample::SEEN;
+use super::sample::{SAMPLE, SEEN};
 use super::{Pass, Residual};
 use crate::device::check_length;
 use crate::grid::{self, check_field};
@@ -24,7 +24,7 @@ use crate::{Buffer, Device, Error, Scalar};
 /// What the pullback finds besides what it adds.
 #[derive(Clone, Debug)]
 pub struct Found<T> {
-    /// `(nx, ny, nz)` the indicator that went in, to rounding.
+    /// `(nx, ny, nz)` the indicator that went in, to rounding; the array of the one that came out, if that is the same.
     pub chi: Buffer<T>,
     /// `(N,)` cotangents of `χ(x_i)`, which the pullback of the mean takes.
     pub values: Buffer<T>,
@@ -53,6 +53,7 @@ pub fn pullback<R: Runtime, T: Scalar>(
     let (grid, order, count) = (&splat.grid, &splat.order, samples.len());
     samples.check()?;
     check_length("the array of areas", samples.areas, order.keys.len())?;
+    check_length("the residual", &residual.samples, SAMPLE * count)?;
     check_field("the indicator", chi, grid)?;
     check_field("the cotangent of the indicator", chi_bar, grid)?;
     out.check(count)?;
