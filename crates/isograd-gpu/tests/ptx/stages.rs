@@ -2,6 +2,7 @@
 
 use isograd::Grid;
 use isograd::splat::Weights;
+use isograd_gpu::differential::{self, Differential, LocalCotangent};
 use isograd_gpu::distance::{Band, Mesh, lattice, query};
 use isograd_gpu::primitives::{reduce, scan, sort};
 use isograd_gpu::splat::{self, SampleCotangent, Samples};
@@ -27,6 +28,7 @@ pub fn launch_all<T: Scalar>(device: &Device<Recorder>) {
     solves::<T>(device);
     surfaces::<T>(device);
     distances::<T>(device);
+    derivatives::<T>(device);
     whole::<T>(device);
     forget_answers();
 }
@@ -133,6 +135,26 @@ fn distances<T: Scalar>(device: &Device<Recorder>) {
     }
     let hits = query::forward(device, &mesh, &mesh.vertices).unwrap();
     query::pullback(device, &mesh, &mesh.vertices, &hits, &hits.distances).unwrap();
+}
+
+fn derivatives<T: Scalar>(device: &Device<Recorder>) {
+    let (phi, points) = (
+        numbers::<T>(device, cells()),
+        numbers::<T>(device, 3 * SAMPLES),
+    );
+    let normals = differential::unit_normals(device, &phi, &grid()).unwrap();
+    differential::unit_normals_pullback(device, &phi, &grid(), &normals, &phi).unwrap();
+    let known = Differential::new(device, &phi, &grid(), &Default::default()).unwrap();
+    let local = known.at_points(device, &points).unwrap();
+    known.outside(device, &points).unwrap();
+    let bar = LocalCotangent {
+        gradient: Some(&local.gradient),
+        normal: Some(&local.normal),
+        curvature: Some(&local.curvature),
+    };
+    known
+        .pullback_at_points(device, &phi, &points, bar, &phi, &points)
+        .unwrap();
 }
 
 fn whole<T: Scalar>(device: &Device<Recorder>) {
