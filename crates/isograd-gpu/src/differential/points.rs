@@ -137,43 +137,53 @@ impl<T: Scalar> Differential<T> {
         phi_bar: &Buffer<T>,
         points_bar: &Buffer<T>,
     ) -> Result<(), Error> {
-        let count = points.len() / 3;
         check_length("the cotangent of the points", points_bar, points.len())?;
         check_field("the field", phi, &self.grid)?;
         check_field("the cotangent of the field", phi_bar, &self.grid)?;
-        let [x, y, z] = self.grid.upper();
         let order = self.order(device, points)?;
         let shares = self.pull_points(device, points, bar, points_bar)?;
-        let spread_column = |column| {
-            let samples: Buffer<T> = device.empty(NUMBERS * count)?;
-            sort_column::launch::<T, R>(
-                device.client(),
-                device.groups(count, BLOCK),
-                CubeDim::new_1d(BLOCK),
-                points.arg(),
-                shares.arg(),
-                order.keys.arg(),
-                order.places.arg(),
-                samples.arg(),
-                grid::arg(&self.grid),
-                CornerLaunch::new(x, y, z),
-                count as u32,
-                column,
-            );
-            let out = device.empty(self.grid.cells())?;
-            spread::<R, T, Corners>(device, &samples, &order, REACH, Before::Replaced, &out)?;
-            Ok::<_, Error>(out)
-        };
+        let column = |column| self.spread_column(device, points, &shares, &order, column);
         if bar.gradient.is_some() || bar.normal.is_some() {
-            let (x, y, z) = (spread_column(0)?, spread_column(1)?, spread_column(2)?);
+            let (x, y, z) = (column(0)?, column(1)?, column(2)?);
             add_gradient(device, &self.grid, [&x, &y, &z], false, phi_bar)?;
         }
         if bar.curvature.is_some() {
-            let of_curvature = spread_column(3)?;
+            let of_curvature = column(3)?;
             let (grid, options) = (&self.grid, &self.options);
             mean_curvature_pullback(device, phi, grid, options, &of_curvature, phi_bar)?;
         }
         Ok(())
+    }
+
+    /// One column of the `(N, 4)` shares of the points, spread over the cells.
+    fn spread_column<R: Runtime>(
+        &self,
+        device: &Device<R>,
+        points: &Buffer<T>,
+        shares: &Buffer<T>,
+        order: &SampleOrder,
+        column: u32,
+    ) -> Result<Buffer<T>, Error> {
+        let count = points.len() / 3;
+        let sorted: Buffer<T> = device.empty(NUMBERS * count)?;
+        let [x, y, z] = self.grid.upper();
+        sort_column::launch::<T, R>(
+            device.client(),
+            device.groups(count, BLOCK),
+            CubeDim::new_1d(BLOCK),
+            points.arg(),
+            shares.arg(),
+            order.keys.arg(),
+            order.places.arg(),
+            sorted.arg(),
+            grid::arg(&self.grid),
+            CornerLaunch::new(x, y, z),
+            count as u32,
+            column,
+        );
+        let out = device.empty(self.grid.cells())?;
+        spread::<R, T, Corners>(device, &sorted, order, REACH, Before::Replaced, &out)?;
+        Ok(out)
     }
 
     /// Cotangents of the interpolated gradient and curvature at each point, `(N, 4)`; adds those of the points.

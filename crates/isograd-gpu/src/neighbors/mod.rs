@@ -25,6 +25,7 @@ mod order;
 mod tree;
 mod walk;
 
+pub(crate) use order::gather;
 pub(crate) use walk::{end_of_leaf, first_of_leaf, next_leaf};
 
 use cubecl::prelude::*;

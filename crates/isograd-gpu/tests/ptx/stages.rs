@@ -133,8 +133,10 @@ fn distances<T: Scalar>(device: &Device<Recorder>) {
         let (phi, residual) = lattice::forward(device, &mesh, &grid(), &chi, &level, band).unwrap();
         lattice::pullback(device, &residual, &phi).unwrap();
     }
-    let hits = query::forward(device, &mesh, &mesh.vertices).unwrap();
-    query::pullback(device, &mesh, &mesh.vertices, &hits, &hits.distances).unwrap();
+    let (points, grid) = (&mesh.vertices, grid());
+    let hits = query::signed(device, &mesh, points, Some((&chi, &grid))).unwrap();
+    let bars = (&hits.distances, Some(&hits.points));
+    query::pullback(device, &mesh, points, &hits, bars.0, bars.1).unwrap();
 }
 
 fn derivatives<T: Scalar>(device: &Device<Recorder>) {
