@@ -382,7 +382,7 @@ fn check_outside<R: Runtime>(device: &Device<R>) {
     let (phi_bar, points_bar) = pull(&points);
     assert!(points_bar[3..15].iter().all(|&x| x == 0.0) && points_bar[0] != 0.0);
     let inside = device
-        .upload(&[places[0], places[5]].as_flattened())
+        .upload([places[0], places[5]].as_flattened())
         .unwrap();
     assert_eq!(phi_bar, pull(&inside).0);
     // No points at all.
