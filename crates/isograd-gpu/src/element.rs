@@ -8,6 +8,10 @@ pub(crate) mod plane;
 
 #[path = "../../isograd/src/element/crossing.rs"]
 pub(crate) mod crossing;
+#[path = "../../isograd/src/element/curvature.rs"]
+pub(crate) mod curvature;
+#[path = "../../isograd/src/element/difference.rs"]
+pub(crate) mod difference;
 #[path = "../../isograd/src/element/hat.rs"]
 pub(crate) mod hat;
 #[path = "../../isograd/src/element/linear.rs"]

@@ -14,6 +14,7 @@
 
 pub mod area;
 mod device;
+pub mod differential;
 pub mod distance;
 mod element;
 mod grid;

@@ -27,9 +27,14 @@ impl<F: Float> Vector3<F> {
     }
 
     pub fn write(self, array: &mut Array<F>, i: usize) {
-        array[3 * i] = self.x;
-        array[3 * i + 1] = self.y;
-        array[3 * i + 2] = self.z;
+        self.store(array, 3 * i);
+    }
+
+    /// Three numbers of an array, from `start` on.
+    pub fn store(self, array: &mut Array<F>, start: usize) {
+        array[start] = self.x;
+        array[start + 1] = self.y;
+        array[start + 2] = self.z;
     }
 
     pub fn add(self, other: Self) -> Self {
@@ -94,6 +99,10 @@ impl<F: Float> Vector3<F> {
         }
     }
 
+    pub fn is_finite(self) -> bool {
+        is_finite::<F>(self.x) && is_finite::<F>(self.y) && is_finite::<F>(self.z)
+    }
+
     pub fn norm(self) -> F {
         F::sqrt(self.dot(self))
     }
@@ -117,4 +126,11 @@ impl<F: Float> Vector3<F> {
             z: select(positive, self.z / by, zero),
         }
     }
+}
+
+/// Whether a number is neither infinite nor NaN.
+#[cube]
+pub(crate) fn is_finite<F: Float>(x: F) -> bool {
+    // Nothing that is compared with NaN is true.
+    x.abs() <= F::max_value()
 }

@@ -1,23 +1,33 @@
-//! Distance at any point.
+//! Distance at any point, with and without a sign.
 
 use cubecl::prelude::*;
+use isograd::Grid;
 
-use super::shares::{FACE, add_share, by_face, gather_corners, gradient};
+use super::pseudonormals::{FEATURES, pseudonormals};
+pub use super::query_pullback::{Cotangents, pullback};
+use super::shares::gradient;
 use super::tree::Tree;
 use super::triangle::{closest, combine, corners};
 use super::{Error, Mesh, search};
-use crate::device::check_length;
-use crate::primitives::segments::{NO_SEGMENT, join_pieces};
+use crate::grid::{self, Lattice, check_field, place};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
 const BLOCK: u32 = 64;
 
+/// Added to the number of a feature where the side is known without it.
+const OUTSIDE: u32 = 8;
+const INSIDE: u32 = 16;
+
 /// What a mesh says about points.
 #[derive(Clone, Debug)]
 pub struct Hits<T> {
-    /// `(N,)` distances, in the user's unit, without a sign.
+    /// `(N,)` distances, in the user's unit.
     pub distances: Buffer<T>,
+    /// `(N, 3)` their gradients with respect to the points, of unit length: away from the closest point, or towards it
+    /// where the distance is negative. At distance 0 the normal of the closest face. Zero only where that has
+    /// no area.
+    pub gradients: Buffer<T>,
     /// `(N, 3)` closest points of the mesh.
     pub points: Buffer<T>,
     /// `(N,)` faces that they lie on.
@@ -26,16 +36,8 @@ pub struct Hits<T> {
     pub barycentric: Buffer<T>,
 }
 
-/// What cotangents of the distances mean for the points and the mesh.
-#[derive(Clone, Debug)]
-pub struct Cotangents<T> {
-    /// `(N, 3)`, of the points.
-    pub points: Buffer<T>,
-    /// `(V, 3)`, of the vertices.
-    pub vertices: Buffer<T>,
-}
-
-/// What the mesh says about each of the `(N, 3)` points, in their order. The points must be finite.
+/// What the mesh says about each of the `(N, 3)` points, in their order, with distances without a sign. The points
+/// must be finite.
 ///
 /// # Errors
 /// [`Error::Empty`], [`Error::Triples`], and those of the device.
@@ -55,6 +57,7 @@ pub fn forward<T: Scalar, R: Runtime>(
     let count = points.len() / 3;
     let mut hits = Hits {
         distances: device.empty(count)?,
+        gradients: device.empty(3 * count)?,
         points: device.empty(3 * count)?,
         triangles: device.empty(count)?,
         barycentric: device.empty(3 * count)?,
@@ -73,61 +76,69 @@ pub fn forward<T: Scalar, R: Runtime>(
         points.arg(),
         hits.triangles.arg(),
         hits.distances.arg(),
+        hits.gradients.arg(),
         hits.points.arg(),
         hits.barycentric.arg(),
     );
     Ok(hits)
 }
 
-/// Pulls the `(N,)` cotangents of the distances back to the `(N, 3)` points and to the vertices; `hits` are those
-/// of [`forward`]. For a signed distance, give the cotangents times the sign. At distance 0 the slope is the
-/// normal of the face.
+/// The same with the sign of each side: negative inside, with the gradients turned towards the mesh there.
+///
+/// `field` is one that is negative inside, such as the distance on the lattice: where its eight values round a point
+/// agree, they give the sign. Elsewhere, and without it, the pseudonormal of the closest feature does, which is right
+/// for a closed mesh. Of an open mesh it tells the two sides near the surface and means nothing near its border.
 ///
 /// # Errors
-/// Those of [`forward`], and arrays that do not fit together.
-pub fn pullback<T: Scalar, R: Runtime>(
+/// Those of [`forward`], and a field that does not fit its grid.
+pub fn signed<T: Scalar, R: Runtime>(
     device: &Device<R>,
     mesh: &Mesh<T>,
     points: &Buffer<T>,
-    hits: &Hits<T>,
-    distance_bar: &Buffer<T>,
-) -> Result<Cotangents<T>, Error> {
-    mesh.check()?;
+    field: Option<(&Buffer<T>, &Grid<T>)>,
+) -> Result<Hits<T>, Error> {
+    let hits = forward(device, mesh, points)?;
+    if let Some((values, grid)) = field {
+        check_field("the field of signs", values, grid)?;
+    }
     let count = hits.triangles.len();
-    check_length("the array of points", points, 3 * count)?;
-    check_length("the cotangent of the distances", distance_bar, count)?;
-    let points_bar = device.empty(3 * count)?;
-    pull_to_points::launch::<T, R>(
+    if count == 0 {
+        return Ok(hits);
+    }
+    let (groups, dim) = (device.groups(count, BLOCK), CubeDim::new_1d(BLOCK));
+    let features: Buffer<u32> = device.empty(count)?;
+    find_features::launch::<T, R>(
         device.client(),
-        device.groups(count, BLOCK),
-        CubeDim::new_1d(BLOCK),
+        groups.clone(),
+        dim,
         mesh.vertices.arg(),
         mesh.faces.arg(),
         points.arg(),
         hits.triangles.arg(),
-        distance_bar.arg(),
-        points_bar.arg(),
+        features.arg(),
     );
-    let (order, pieces) = by_face(device, mesh, &hits.triangles, distance_bar)?;
-    let sums = device.empty(pieces.most() * FACE)?;
-    pull_to_faces::launch::<T, R>(
+    if let Some((values, grid)) = field {
+        ask_field::launch::<T, R>(
+            device.client(),
+            groups.clone(),
+            dim,
+            points.arg(),
+            values.arg(),
+            features.arg(),
+            grid::arg(grid),
+        );
+    }
+    take_sides::launch::<T, R>(
         device.client(),
-        device.groups(pieces.most(), BLOCK),
-        CubeDim::new_1d(BLOCK),
-        mesh.vertices.arg(),
-        mesh.faces.arg(),
-        points.arg(),
-        distance_bar.arg(),
-        order.arg(),
-        pieces.table.arg(),
-        sums.arg(),
-        pieces.most() as u32,
+        groups,
+        dim,
+        features.arg(),
+        hits.triangles.arg(),
+        pseudonormals(device, mesh)?.arg(),
+        hits.distances.arg(),
+        hits.gradients.arg(),
     );
-    let of_faces = join_pieces(device, sums, FACE, pieces, count)?;
-    Ok(Cotangents {
-        points: points_bar,
-        vertices: gather_corners(device, mesh, &of_faces)?,
-    })
+    Ok(hits)
 }
 
 #[cube(launch)]
@@ -137,6 +148,7 @@ fn measure_points<F: Float>(
     points: &Array<F>,
     triangles: &Array<u32>,
     distances: &mut Array<F>,
+    gradients: &mut Array<F>,
     on_mesh: &mut Array<F>,
     barycentric: &mut Array<F>,
 ) {
@@ -149,63 +161,92 @@ fn measure_points<F: Float>(
         );
         let found = closest::<F>(t, Vector3::<F>::at(points, ABSOLUTE_POS));
         distances[ABSOLUTE_POS] = found.offset.norm();
+        gradient::<F>(found.offset, found.normal, false).write(gradients, ABSOLUTE_POS);
         combine::<F>(t, found.weights).write(on_mesh, ABSOLUTE_POS);
         found.weights.write(barycentric, ABSOLUTE_POS);
     }
 }
 
+/// The feature of the face that each closest point lies on.
 #[cube(launch)]
-fn pull_to_points<F: Float>(
+fn find_features<F: Float>(
     vertices: &Array<F>,
     faces: &Array<u32>,
     points: &Array<F>,
     triangles: &Array<u32>,
-    bar: &Array<F>,
-    points_bar: &mut Array<F>,
+    features: &mut Array<u32>,
 ) {
-    if ABSOLUTE_POS < triangles.len() {
-        let t = corners::<F>(
-            vertices,
-            faces,
-            triangles[ABSOLUTE_POS],
-            Vector3::<F>::zero(),
-        );
+    if ABSOLUTE_POS < features.len() {
+        let zero = Vector3::<F>::zero();
+        let t = corners::<F>(vertices, faces, triangles[ABSOLUTE_POS], zero);
         let found = closest::<F>(t, Vector3::<F>::at(points, ABSOLUTE_POS));
-        let slope = gradient::<F>(found.offset, found.normal, false);
-        slope
-            .scale(bar[ABSOLUTE_POS])
-            .write(points_bar, ABSOLUTE_POS);
+        features[ABSOLUTE_POS] = found.feature;
     }
 }
 
-/// `−Σ β_k d̄ ∇d` for the corners of a face, over a piece of its points.
+/// Adds [`OUTSIDE`] or [`INSIDE`] to the feature of each point round which the field is of one sign.
 #[cube(launch)]
-fn pull_to_faces<F: Float>(
-    vertices: &Array<F>,
-    faces: &Array<u32>,
+fn ask_field<F: Float + CubeElement>(
     points: &Array<F>,
-    bar: &Array<F>,
-    order: &Array<u32>,
-    table: &Array<u32>,
-    sums: &mut Array<F>,
-    most: u32,
+    field: &Array<F>,
+    features: &mut Array<u32>,
+    grid: Lattice<F>,
 ) {
-    if ABSOLUTE_POS < most as usize {
-        let face = table[ABSOLUTE_POS * 3];
-        if face != NO_SEGMENT {
-            let t = corners::<F>(vertices, faces, face, Vector3::<F>::zero());
-            let mut sum = Array::<F>::new(FACE);
-            for number in 0..FACE {
-                sum[number] = F::new(0.0);
+    if ABSOLUTE_POS < features.len() {
+        let p = place::<F>(points, ABSOLUTE_POS, &grid);
+        let half = F::new(0.5);
+        let (x, y, z) = (p.x - half, p.y - half, p.z - half);
+        let within = is_between::<F>(x, grid.nx)
+            && is_between::<F>(y, grid.ny)
+            && is_between::<F>(z, grid.nz);
+        if within {
+            let (i, j, k) = (u32::cast_from(x), u32::cast_from(y), u32::cast_from(z));
+            let mut inside = 0u32;
+            for corner in 0u32..8u32 {
+                let row = (i + (corner & 1u32)) * grid.ny + j + ((corner >> 1u32) & 1u32);
+                let value = field[(row * grid.nz + k + (corner >> 2u32)) as usize];
+                inside += select(value < F::new(0.0), 1u32, 0u32);
             }
-            for element in table[ABSOLUTE_POS * 3 + 1]..table[ABSOLUTE_POS * 3 + 2] {
-                let point = order[element as usize];
-                let found = closest::<F>(t, Vector3::<F>::at(points, point as usize));
-                add_share::<F>(&mut sum, found, false, bar[point as usize]);
+            if inside == 0u32 {
+                features[ABSOLUTE_POS] += OUTSIDE;
             }
-            for number in 0..FACE {
-                sums[ABSOLUTE_POS * FACE + number] = sum[number];
+            if inside == 8u32 {
+                features[ABSOLUTE_POS] += INSIDE;
             }
         }
+    }
+}
+
+/// Whether there are cell centres on both sides of `x`, counted from the first.
+#[cube]
+fn is_between<F: Float>(x: F, cells: u32) -> bool {
+    x >= F::new(0.0) && x < F::cast_from(cells - 1u32)
+}
+
+/// Turns distances and gradients where the point is inside. At distance 0 the gradient is the normal of the face, or
+/// where that has no area, that of the feature.
+#[cube(launch)]
+fn take_sides<F: Float>(
+    features: &Array<u32>,
+    triangles: &Array<u32>,
+    normals: &Array<F>,
+    distances: &mut Array<F>,
+    gradients: &mut Array<F>,
+) {
+    if ABSOLUTE_POS < features.len() {
+        let known = features[ABSOLUTE_POS] / OUTSIDE;
+        let feature = (features[ABSOLUTE_POS] % OUTSIDE) as usize;
+        let row = triangles[ABSOLUTE_POS] as usize * FEATURES + feature;
+        let normal = Vector3::<F>::at(normals, row);
+        let away = Vector3::<F>::at(gradients, ABSOLUTE_POS);
+        let (zero, distance) = (F::new(0.0), distances[ABSOLUTE_POS]);
+        let behind = normal.dot(away) < zero;
+        let inside = (known == 0u32 && behind) || known == INSIDE / OUTSIDE;
+        let turn = inside && distance > zero;
+        distances[ABSOLUTE_POS] = select(turn, -distance, distance);
+        let sign = select(turn, F::new(-1.0), F::new(1.0));
+        let nowhere = away.dot(away) == zero;
+        let gradient = normal.direction().choose(nowhere, away.scale(sign));
+        gradient.write(gradients, ABSOLUTE_POS);
     }
 }

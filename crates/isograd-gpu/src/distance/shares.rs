@@ -14,13 +14,13 @@ const BLOCK: u32 = 64;
 /// Numbers that a face has: the cotangents of its three corners, and one for the caller.
 pub(super) const FACE: usize = 10;
 
-/// The queries in the order of their closest faces, without those whose cotangent is zero, and the pieces that
-/// they are summed in.
+/// The queries in the order of their closest faces, without those whose cotangent is zero where `bar` is given, and
+/// the pieces that they are summed in.
 pub(super) fn by_face<T: Scalar, R: Runtime>(
     device: &Device<R>,
     mesh: &Mesh<T>,
     closest: &Buffer<u32>,
-    bar: &Buffer<T>,
+    bar: Option<&Buffer<T>>,
 ) -> Result<(Buffer<u32>, Pieces), Error> {
     let (count, faces) = (closest.len(), mesh.faces.len() as u32 / 3);
     let keys = device.empty(count)?;
@@ -29,9 +29,10 @@ pub(super) fn by_face<T: Scalar, R: Runtime>(
         device.groups(count, BLOCK),
         CubeDim::new_1d(BLOCK),
         closest.arg(),
-        bar.arg(),
+        bar.unwrap_or(&device.empty(0)?).arg(),
         keys.arg(),
         faces,
+        bar.is_none(),
     );
     let order = sort::order(device, &keys, faces + 1)?;
     let starts = sort::starts(device, &order.keys, faces)?;
@@ -39,7 +40,7 @@ pub(super) fn by_face<T: Scalar, R: Runtime>(
     Ok((order.places, pieces))
 }
 
-/// The sum over the corners at each vertex, `(V, 3)`.
+/// The sum over the corners at each vertex, `(V, 3)`; `of_faces` begins the row of each face with its three corners.
 pub(super) fn gather_corners<T: Scalar, R: Runtime>(
     device: &Device<R>,
     mesh: &Mesh<T>,
@@ -51,7 +52,7 @@ pub(super) fn gather_corners<T: Scalar, R: Runtime>(
     let rows = Rows {
         width: 3,
         group: 3,
-        pitch: FACE,
+        pitch: of_faces.len() / (mesh.faces.len() / 3),
     };
     let (places, count) = (&corners.places, corners.places.len());
     Ok(sum_rows(
@@ -71,11 +72,12 @@ fn key_queries<F: Float>(
     phi_bar: &Array<F>,
     keys: &mut Array<u32>,
     faces: u32,
+    #[comptime] all: bool,
 ) {
     if ABSOLUTE_POS < keys.len() {
-        let mut key = faces;
-        if !(phi_bar[ABSOLUTE_POS] == F::new(0.0)) {
-            key = min(found[ABSOLUTE_POS], faces);
+        let mut key = min(found[ABSOLUTE_POS], faces);
+        if comptime!(!all) {
+            key = select(phi_bar[ABSOLUTE_POS] == F::new(0.0), faces, key);
         }
         keys[ABSOLUTE_POS] = key;
     }

@@ -19,9 +19,9 @@ pub(super) struct Corners<F: Float> {
     pub a: Vector3<F>,
     pub b: Vector3<F>,
     pub c: Vector3<F>,
-    ab: Vector3<F>,
-    bc: Vector3<F>,
-    ca: Vector3<F>,
+    pub ab: Vector3<F>,
+    pub bc: Vector3<F>,
+    pub ca: Vector3<F>,
 }
 
 /// A triangle in its own plane; see the head of this file.
@@ -35,6 +35,10 @@ pub(super) struct Frame<F: Float> {
     pub height: F,
 }
 
+/// The number of the face among the features of a triangle, after those of its corners a, b, c and of the edges
+/// from each to the next.
+pub(super) const FACE_ITSELF: u32 = 6;
+
 /// The point of a triangle that is closest to a query.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Closest<F: Float> {
@@ -44,6 +48,8 @@ pub(super) struct Closest<F: Float> {
     pub offset: Vector3<F>,
     /// Unit normal by the right-hand rule; zero where there is no area.
     pub normal: Vector3<F>,
+    /// Number of the feature that it lies on; see [`FACE_ITSELF`].
+    pub feature: u32,
 }
 
 /// The corners of a face, as seen from `origin`.
@@ -70,7 +76,7 @@ pub(super) fn corners<F: Float>(
 
 /// Which corner the longest edge begins at: the first of equals.
 #[cube]
-fn first_corner<F: Float>(t: Corners<F>) -> u32 {
+pub(super) fn first_corner<F: Float>(t: Corners<F>) -> u32 {
     let ab = t.ab.dot(t.ab);
     let bc = t.bc.dot(t.bc);
     let ca = t.ca.dot(t.ca);
@@ -80,7 +86,7 @@ fn first_corner<F: Float>(t: Corners<F>) -> u32 {
 
 /// The corners from `first` on.
 #[cube]
-fn turned<F: Float>(t: Corners<F>, first: u32) -> Corners<F> {
+pub(super) fn turned<F: Float>(t: Corners<F>, first: u32) -> Corners<F> {
     Corners::<F> {
         a: one_of::<F>(first, t.a, t.b, t.c),
         b: one_of::<F>(first, t.b, t.c, t.a),
@@ -268,10 +274,14 @@ pub(super) fn closest<F: Float>(corners: Corners<F>, q: Vector3<F>) -> Closest<F
     let outside = from_edge.choose(on_edge, from);
     let offset = from_face.choose(place.inside, outside);
     let area = select(frame.height > F::new(0.0), F::new(1.0), F::new(0.0));
+    let side = select(place.on_base, 0u32, select(place.on_left, 2u32, 1u32));
+    let tip = select(near_c, 2u32, select(near_b, 1u32, 0u32));
+    let outline = select(on_edge, 3u32 + (side + first) % 3u32, (tip + first) % 3u32);
     Closest::<F> {
         weights: turned_back::<F>(w, first),
         offset,
         normal: normal.scale(area),
+        feature: select(place.inside, FACE_ITSELF, outline),
     }
 }
 
@@ -303,7 +313,7 @@ fn weights<F: Float>(frame: Frame<F>, place: Planar<F>, x: F, y: F) -> Vector3<F
 
 /// Weights of corners from `first` on, in the order of the face.
 #[cube]
-fn turned_back<F: Float>(w: Vector3<F>, first: u32) -> Vector3<F> {
+pub(super) fn turned_back<F: Float>(w: Vector3<F>, first: u32) -> Vector3<F> {
     Vector3::<F> {
         x: select(first == 0u32, w.x, select(first == 1u32, w.z, w.y)),
         y: select(first == 0u32, w.y, select(first == 1u32, w.x, w.z)),

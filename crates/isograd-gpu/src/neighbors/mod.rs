@@ -29,7 +29,7 @@ mod tree;
 mod walk;
 
 pub(crate) use nearest::{SURE_SHARE, about_nearest, any_within, reaches};
-pub(crate) use order::scatter;
+pub(crate) use order::{gather, scatter};
 pub(crate) use walk::{end_of_leaf, first_of_leaf, next_leaf};
 
 use cubecl::prelude::*;

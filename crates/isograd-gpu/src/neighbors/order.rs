@@ -41,7 +41,7 @@ pub(super) fn along_curve<R: Runtime, T: Scalar>(
 }
 
 /// Row `i` of the result is row `places[i]` of `values`, rows having `width` elements.
-pub(super) fn gather<R: Runtime, E: Numeric + CubeElement>(
+pub(crate) fn gather<R: Runtime, E: Numeric + CubeElement>(
     device: &Device<R>,
     values: &Buffer<E>,
     places: &Buffer<u32>,

@@ -106,6 +106,18 @@ pub(crate) fn sum_rows<T: Scalar, R: Runtime>(
     elements: usize,
 ) -> Result<Buffer<T>, Error> {
     let pieces = Pieces::new(device, starts, elements)?;
+    sum_rows_in(device, values, rows, places, pieces, elements)
+}
+
+/// The same for segments that are cut already.
+pub(crate) fn sum_rows_in<T: Scalar, R: Runtime>(
+    device: &Device<R>,
+    values: &Buffer<T>,
+    rows: Rows,
+    places: Option<&Buffer<u32>>,
+    pieces: Pieces,
+    elements: usize,
+) -> Result<Buffer<T>, Error> {
     let sums = device.empty(pieces.most() * rows.width)?;
     sum_pieces::launch::<T, R>(
         device.client(),

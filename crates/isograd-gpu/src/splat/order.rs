@@ -6,6 +6,7 @@ use super::Samples;
 use crate::grid::{self, Lattice, place};
 use crate::primitives::sort;
 use crate::spread::first_at_least;
+use crate::vector::is_finite;
 use crate::{Buffer, Device, Error, Scalar};
 
 const BLOCK: u32 = 256;
@@ -53,8 +54,17 @@ impl SampleOrder {
             samples.len() as u32,
             grid::arg(grid),
         );
-        let sort::Order { keys, places } = sort::order(device, &keys, grid.cells() as u32 + 1)?;
-        let shape = grid.shape();
+        Self::from_keys(device, &keys, grid.shape())
+    }
+
+    /// Sorts samples by `keys`, the places in memory of their cells; the number of cells for those to be left out.
+    pub(crate) fn from_keys<R: Runtime>(
+        device: &Device<R>,
+        keys: &Buffer<u32>,
+        shape: [usize; 3],
+    ) -> Result<Self, Error> {
+        let cells = shape.iter().product::<usize>() as u32;
+        let sort::Order { keys, places } = sort::order(device, keys, cells + 1)?;
         let rows: Buffer<u32> = device.empty(shape[0] * shape[1] + 1)?;
         find_rows::launch::<R>(
             device.client(),
@@ -62,7 +72,7 @@ impl SampleOrder {
             CubeDim::new_1d(BLOCK),
             keys.arg(),
             rows.arg(),
-            samples.len() as u32,
+            keys.len() as u32,
             shape[2] as u32,
         );
         Ok(Self {
@@ -73,7 +83,7 @@ impl SampleOrder {
         })
     }
 
-    pub(super) fn refused<R: Runtime>(&self, device: &Device<R>) -> Result<Option<Refused>, Error> {
+    pub(crate) fn refused<R: Runtime>(&self, device: &Device<R>) -> Result<Option<Refused>, Error> {
         if self.keys.is_empty() {
             return Ok(None);
         }
@@ -132,12 +142,6 @@ fn holds<F: Float>(x: F, cells: u32) -> bool {
 #[cube]
 fn central_cell<F: Float>(x: F, cells: u32) -> u32 {
     min(u32::cast_from(x), cells - 3u32)
-}
-
-#[cube]
-fn is_finite<F: Float>(x: F) -> bool {
-    // Nothing that is compared with NaN is true.
-    x.abs() <= F::max_value()
 }
 
 /// Where each row of `nz` cells begins among ascending `keys`.

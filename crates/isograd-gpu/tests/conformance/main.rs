@@ -3,6 +3,7 @@
 mod areas;
 mod clouds;
 mod devices;
+mod differential;
 mod distance;
 mod iso_value;
 mod isosurface;

@@ -5,6 +5,7 @@ use isograd::Grid;
 use isograd::isosurface::Level;
 use isograd::neighbors::Radius;
 use isograd::splat::Weights;
+use isograd_gpu::differential::{self, Differential, LocalCotangent};
 use isograd_gpu::distance::{Band, Mesh, lattice, query};
 use isograd_gpu::iso_value::local;
 use isograd_gpu::primitives::{reduce, scan, sort};
@@ -34,6 +35,7 @@ pub fn launch_all<T: Scalar>(device: &Device<Recorder>) {
     solves::<T>(device);
     surfaces::<T>(device);
     distances::<T>(device);
+    derivatives::<T>(device);
     whole::<T>(device);
     forget_answers();
 }
@@ -211,8 +213,30 @@ fn distances<T: Scalar>(device: &Device<Recorder>) {
         let (phi, residual) = lattice::forward(device, &mesh, &grid(), &chi, &level, band).unwrap();
         lattice::pullback(device, &residual, &phi).unwrap();
     }
-    let hits = query::forward(device, &mesh, &mesh.vertices).unwrap();
-    query::pullback(device, &mesh, &mesh.vertices, &hits, &hits.distances).unwrap();
+    let (points, grid) = (&mesh.vertices, grid());
+    let hits = query::signed(device, &mesh, points, Some((&chi, &grid))).unwrap();
+    let bars = (&hits.distances, Some(&hits.points));
+    query::pullback(device, &mesh, points, &hits, bars.0, bars.1).unwrap();
+}
+
+fn derivatives<T: Scalar>(device: &Device<Recorder>) {
+    let (phi, points) = (
+        numbers::<T>(device, cells()),
+        numbers::<T>(device, 3 * SAMPLES),
+    );
+    let normals = differential::unit_normals(device, &phi, &grid()).unwrap();
+    differential::unit_normals_pullback(device, &phi, &grid(), &normals, &phi).unwrap();
+    let known = Differential::new(device, &phi, &grid(), &Default::default()).unwrap();
+    let local = known.at_points(device, &points).unwrap();
+    known.outside(device, &points).unwrap();
+    let bar = LocalCotangent {
+        gradient: Some(&local.gradient),
+        normal: Some(&local.normal),
+        curvature: Some(&local.curvature),
+    };
+    known
+        .pullback_at_points(device, &phi, &points, bar, &phi, &points)
+        .unwrap();
 }
 
 fn whole<T: Scalar>(device: &Device<Recorder>) {

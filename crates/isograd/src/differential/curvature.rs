@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::rows::{self, Order, Rows, Stencil};
 use crate::Real;
 use crate::data::Field;
+use crate::element::curvature as element;
 
 /// How curvature is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,12 +79,9 @@ pub(super) fn curvature<T: Real>(g: [T; 3], h: [T; 6]) -> T {
     }
     let length = squared.sqrt();
     let n = [g[0] / length, g[1] / length, g[2] / length];
-    // tr H − nᵀ H n, with the terms of equal second derivatives taken together.
-    let plain = h[0] * (n[1] * n[1] + n[2] * n[2])
-        + h[1] * (n[0] * n[0] + n[2] * n[2])
-        + h[2] * (n[0] * n[0] + n[1] * n[1]);
-    let mixed = h[3] * n[0] * n[1] + h[4] * n[0] * n[2] + h[5] * n[1] * n[2];
-    ((plain - two * mixed) / length).max(-two).min(two)
+    let plain = element::plain(h[0], h[1], h[2], n[0], n[1], n[2]);
+    let mixed = element::mixed(h[3], h[4], h[5], n[0], n[1], n[2]);
+    element::curvature(plain, mixed, length).max(-two).min(two)
 }
 
 /// Derivatives of one row. The second ones are times `h`.

@@ -9,6 +9,7 @@ use super::pullback::{PullbackScratch, add_finite, check_cells};
 use super::rows::{self, Order, Rows};
 use super::{Error, Options};
 use crate::data::Field;
+use crate::element::curvature as element;
 use crate::{Real, vector};
 
 /// Adds the cotangent of `φ` for that of its [`mean_curvature`](super::mean_curvature) with the same options:
@@ -81,12 +82,10 @@ fn pull<T: Real>(g: [T; 3], h: [T; 6], bar: T) -> Option<([T; 3], [T; 6])> {
         h[4] * n[0] + h[5] * n[1] + h[2] * n[2],
     ];
     let trace = h[0] + h[1] + h[2];
-    let of_gradient = |a: usize| {
-        let turned = two * (n[a] * trace - along[a]) / length;
-        per_length * (turned - (two + T::one()) * kappa * n[a])
-    };
-    let plain = |a: usize| per_length * (T::one() - n[a] * n[a]);
-    let mixed = |a: usize, b: usize| -two * per_length * n[a] * n[b];
+    let of_gradient =
+        |a: usize| element::gradient_bar(per_length, n[a], trace, along[a], length, kappa);
+    let plain = |a: usize| element::plain_bar(per_length, n[a]);
+    let mixed = |a: usize, b: usize| element::mixed_bar(per_length, n[a], n[b]);
     let gradient = [0, 1, 2].map(of_gradient);
     let [xx, yy, zz] = [0, 1, 2].map(plain);
     let hessian = [xx, yy, zz, mixed(0, 1), mixed(0, 2), mixed(1, 2)];

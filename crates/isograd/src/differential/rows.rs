@@ -5,6 +5,7 @@
 
 use crate::Real;
 use crate::data::Field;
+use crate::element::difference::{first_inward, second_inward};
 
 /// Which derivative.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,12 +38,9 @@ impl<T: Real> Stencil<T> {
         }
         // The sign of a first difference turns with the direction in which the cells are counted.
         let side = if i == 0 { 1.0 } else { -1.0 };
-        let weight = match (order, n) {
-            (Order::First, 0..3) => [side, 0.0, 0.0],
-            (Order::First, _) => [2.0 * side, -0.5 * side, 0.0],
-            (Order::Second, 0..3) => [0.0; 3],
-            (Order::Second, 3) => [-2.0, 1.0, 0.0],
-            (Order::Second, _) => [-5.0, 4.0, -1.0],
+        let weight = |step| match order {
+            Order::First => first_inward(n, step, side),
+            Order::Second => second_inward(n, step),
         };
         let inward = |steps: usize| {
             let steps = steps.min(n - 1);
@@ -50,7 +48,7 @@ impl<T: Real> Stencil<T> {
         };
         Self {
             at: [1, 2, 3].map(inward),
-            weight: weight.map(T::of),
+            weight: [1, 2, 3].map(|step| T::of(weight(step))),
         }
     }
 

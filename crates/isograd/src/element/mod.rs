@@ -4,6 +4,8 @@
 //! `cube` makes parts of kernels of the same lines.
 
 pub mod crossing;
+pub mod curvature;
+pub mod difference;
 pub mod hat;
 pub mod linear;
 pub mod plane;

@@ -46,7 +46,7 @@ fn pull_faces<T: Scalar, R: Runtime>(
     phi_bar: &Buffer<T>,
 ) -> Result<Buffer<T>, Error> {
     let (mesh, grid) = (&residual.mesh, &residual.grid);
-    let (cells, pieces) = by_face(device, mesh, &residual.closest, phi_bar)?;
+    let (cells, pieces) = by_face(device, mesh, &residual.closest, Some(phi_bar))?;
     let sums = device.empty(pieces.most() * FACE)?;
     let ([x, y, z], [_, ny, nz]) = (grid.lower(), grid.shape());
     pull_cells::launch::<T, R>(

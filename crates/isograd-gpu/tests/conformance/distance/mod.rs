@@ -4,6 +4,7 @@ mod lattice;
 mod meshes;
 mod pullback;
 mod query;
+mod sides;
 
 use cubecl::prelude::Runtime;
 use isograd::distance::lattice::{Band, Scratch};

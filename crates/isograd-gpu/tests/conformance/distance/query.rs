@@ -122,7 +122,7 @@ fn check_pullback<R: Runtime>(device: &Device<R>) {
         .map(|(b, hit)| b * hit.distance.signum())
         .collect();
     let signed = device.upload(&signed).unwrap();
-    let bars = query::pullback(device, &on_device, &places, &found, &signed).unwrap();
+    let bars = query::pullback(device, &on_device, &places, &found, &signed, None).unwrap();
     let triangles = device.download(&found.triangles).unwrap();
     for ((hit, &face), &q) in hits.iter_mut().zip(&triangles).zip(&points) {
         let corners = mesh.corners(face as usize).map(|p| p.map(f64::from));
