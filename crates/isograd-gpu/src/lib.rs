@@ -17,6 +17,7 @@ mod device;
 pub mod distance;
 mod element;
 mod grid;
+pub mod host;
 pub mod iso_value;
 pub mod isosurface;
 pub mod neighbors;
