@@ -135,6 +135,8 @@ impl Environment {
     fn install_package(&self, target: &Path, wheels: &Path) -> Outcome {
         remove_folder(wheels)?;
         let mut build = self.module("maturin", &["build", "--quiet", "--profile", "dev"]);
+        // Vulkan, which needs no GPU, with the driver that the tests of the kernels use.
+        build.args(["--features", "pyo3/extension-module,vulkan"]);
         // A wheel for this machine, now: neither checked for other machines nor compressed.
         build.args(["--compatibility", "linux", "--compression-method", "stored"]);
         build.arg("--interpreter").arg(&self.python);

@@ -1,6 +1,7 @@
 //! The extension module `isograd._core`. Users see it through the package `isograd`, which is in `python/`.
 
 mod arrays;
+mod backend;
 mod background;
 mod errors;
 mod files;

@@ -1,13 +1,14 @@
 //! Plans and their results, behind `isograd.Reconstructor` and `isograd.Reconstruction`.
 
 use std::ops::ControlFlow;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use isograd::data::Attribute;
-use isograd::{PointCloud, Reconstruction, Reconstructor, Sensors};
+use isograd::{Backend, PointCloud, Sensors};
 use pyo3::prelude::*;
 
 use crate::arrays::{self, Dtype, Either, Number};
+use crate::backend::{self, Failure};
 use crate::background;
 use crate::errors::value;
 use crate::result::{Kept, Outcome};
@@ -17,8 +18,10 @@ use crate::settings::Settings;
 #[pyclass(frozen)]
 pub struct Plan {
     settings: Settings,
-    single: Mutex<Option<Reconstructor<f32>>>,
-    double: Mutex<Option<Reconstructor<f64>>>,
+    single: Mutex<Option<backend::Plan<f32>>>,
+    double: Mutex<Option<backend::Plan<f64>>>,
+    /// Why the CPU computes, where that was left to the package.
+    note: Mutex<Option<String>>,
 }
 
 /// Name, components and values of an attribute, as `isograd.Reconstructor` passes it.
@@ -27,14 +30,27 @@ pub type AttributeArray<'py> = (String, usize, Bound<'py, PyAny>);
 #[pymethods]
 impl Plan {
     #[new]
-    fn new(settings: &str) -> PyResult<Self> {
+    fn new(py: Python<'_>, settings: &str) -> PyResult<Self> {
         let settings = Settings::parse(settings).map_err(value)?;
         settings.grid::<f64>().map_err(value)?;
-        Ok(Self {
-            settings,
+        let plan = Self {
             single: Mutex::default(),
             double: Mutex::default(),
-        })
+            note: Mutex::default(),
+            settings,
+        };
+        if plan.settings.backend()? != Backend::Cpu {
+            // A device that can't be had is said now.
+            let settings = plan.settings.clone();
+            let single = background::run(py, move |_| backend::Plan::new(&settings))??;
+            plan.keep(&plan.single, single);
+        }
+        Ok(plan)
+    }
+
+    /// Why the CPU computes, where that was left to the package; to be said once.
+    fn take_note(&self) -> Option<String> {
+        lock(&self.note).take()
     }
 
     /// Reconstructs a cloud: `points`, `normals` and `sensors` of one type.
@@ -66,30 +82,38 @@ impl Plan {
     /// interrupt leaves none behind.
     fn run<T: Number>(
         &self,
-        place: &Mutex<Option<Reconstructor<T>>>,
+        place: &Mutex<Option<backend::Plan<T>>>,
         py: Python<'_>,
         cloud: PointCloud<T>,
     ) -> PyResult<Kept<T>> {
-        let waiting = place.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let waiting = lock(place).take();
         let settings = self.settings.clone();
         let (plan, result) = background::run(py, move |stop| {
             let mut plan = match waiting {
                 Some(plan) => plan,
-                None => settings.plan()?,
+                None => backend::Plan::new(&settings)?,
             };
             let mut observer = |_| match stop.asked() {
                 true => ControlFlow::Break(()),
                 false => ControlFlow::Continue(()),
             };
-            let result = plan.reconstruct_observed(&cloud, &mut observer);
-            let result: Result<Reconstruction<T>, String> =
-                result.cloned().map_err(|e| e.to_string());
-            Ok::<_, String>((plan, result.map(|result| Kept { cloud, result })))
-        })?
-        .map_err(value)?;
-        *place.lock().unwrap_or_else(PoisonError::into_inner) = Some(plan);
-        result.map_err(value)
+            let result = plan.run(&cloud, &mut observer);
+            Ok::<_, Failure>((plan, result.map(|result| Kept { cloud, result })))
+        })??;
+        self.keep(place, plan);
+        Ok(result?)
     }
+
+    fn keep<T: Number>(&self, place: &Mutex<Option<backend::Plan<T>>>, mut plan: backend::Plan<T>) {
+        if let Some(note) = plan.take_note() {
+            *lock(&self.note) = Some(note);
+        }
+        *lock(place) = Some(plan);
+    }
+}
+
+fn lock<V>(place: &Mutex<V>) -> MutexGuard<'_, V> {
+    place.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A cloud from its arrays: `points` and `normals` `(N, 3)`.

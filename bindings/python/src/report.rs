@@ -7,8 +7,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 /// The report; see `isograd.Reconstruction.report`.
-pub fn dict<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'py, PyDict>> {
+pub fn dict<'py>(py: Python<'py>, backend: &str, report: &Report) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
+    dict.set_item("backend", backend)?;
     dict.set_item("points", report.points)?;
     dict.set_item("normals", normals(py, report)?)?;
     dict.set_item("orientation", orientation(py, report)?)?;

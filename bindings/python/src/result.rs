@@ -3,14 +3,13 @@
 use std::sync::Arc;
 
 use isograd::distance::extend;
-use isograd::{
-    CloudCotangent, Cotangent, ExtensionCotangent, PointCloud, PullbackError, Real, Reconstruction,
-};
+use isograd::{CloudCotangent, Cotangent, ExtensionCotangent, PointCloud, Real};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{self, Either, Number};
+use crate::backend::{Failure, Made};
 use crate::background;
 use crate::errors::value;
 use crate::report;
@@ -20,7 +19,7 @@ pub struct Kept<T: Number> {
     /// The cloud.
     pub cloud: PointCloud<T>,
     /// What was made of it.
-    pub result: Reconstruction<T>,
+    pub result: Made<T>,
 }
 
 /// In one of the two number types.
@@ -52,17 +51,27 @@ macro_rules! each {
 impl Outcome {
     /// One of the arrays, by name: a new one at each call.
     fn array<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-        each!(&self.0, kept => array(py, &kept.result, name))
+        each!(&self.0, kept => array(py, kept, name))
     }
 
     /// The level of the surface.
-    fn iso_value(&self) -> f64 {
-        each!(&self.0, kept => kept.result.iso_value().f64())
+    fn iso_value(&self) -> PyResult<f64> {
+        Ok(each!(&self.0, kept => Real::f64(kept.result.iso_value()?)))
+    }
+
+    /// Who computed: `cpu`, or a backend and its device.
+    fn backend(&self) -> &str {
+        each!(&self.0, kept => kept.result.backend())
     }
 
     /// The numbers of the report.
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        each!(&self.0, kept => report::dict(py, kept.result.report()))
+        each!(&self.0, kept => {
+            let of = kept.clone();
+            let made = background::run(py, move |_| of.result.report(&of.cloud).map(|_| ()))?;
+            made?;
+            report::dict(py, kept.result.backend(), kept.result.report(&kept.cloud)?)
+        })
     }
 
     /// Cotangents of the inputs, by name, from those of the results, by name.
@@ -117,20 +126,20 @@ impl<T: Number> Extended<T> {
 
 fn array<'py, T: Number>(
     py: Python<'py>,
-    result: &Reconstruction<T>,
+    kept: &Arc<Kept<T>>,
     name: &str,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let shape = result.sdf().grid().shape();
-    let count = result.normals().len();
+    let result = &kept.result;
+    let (shape, count) = (result.shape(), kept.cloud.len());
     match name {
-        "sdf" => arrays::shaped(py, result.sdf().values().to_vec(), shape),
-        "indicator" => arrays::shaped(py, result.indicator().values().to_vec(), shape),
-        "closest" => arrays::shaped(py, result.closest().to_vec(), shape),
-        "vertices" => Ok(arrays::of_vectors(py, result.mesh().vertices())),
-        "faces" => Ok(arrays::of_vectors(py, result.mesh().faces())),
-        "normals" => Ok(arrays::of_vectors(py, result.normals())),
+        "sdf" => arrays::shaped(py, result.sdf()?.to_vec(), shape),
+        "indicator" => arrays::shaped(py, result.indicator()?.to_vec(), shape),
+        "closest" => arrays::shaped(py, result.closest()?.to_vec(), shape),
+        "vertices" => Ok(arrays::of_vectors(py, result.mesh()?.vertices())),
+        "faces" => Ok(arrays::of_vectors(py, result.mesh()?.faces())),
+        "normals" => Ok(arrays::of_vectors(py, result.normals()?)),
         "confidence" => arrays::shaped(py, result.confidence().to_vec(), [count]),
-        "areas" => arrays::shaped(py, result.areas().to_vec(), [count]),
+        "areas" => arrays::shaped(py, result.areas()?.to_vec(), [count]),
         "neighbours" => arrays::shaped(py, result.neighbour_counts().to_vec(), [count]),
         _ => Err(PyKeyError::new_err(name.to_owned())),
     }
@@ -216,11 +225,11 @@ fn pull<'py, T: Typed>(
     };
     let kept = kept.clone();
     let out = background::run(py, move |_| bars.pull(&kept))?;
-    out_dict(py, &out.map_err(value)?)
+    out_dict(py, &out?)
 }
 
 impl<T: Number> Bars<T> {
-    fn pull(&self, kept: &Kept<T>) -> Result<CloudCotangent<T>, PullbackError> {
+    fn pull(&self, kept: &Kept<T>) -> Result<CloudCotangent<T>, Failure> {
         let extensions: Vec<ExtensionCotangent<'_, T>> = self
             .extensions
             .iter()
@@ -276,15 +285,17 @@ fn extended<T: Number>(
     let out = background::run(py, move |_| {
         let attributes = kept.cloud.attributes();
         let attribute = attributes.iter().find(|a| a.name == name).cloned();
-        let attribute = attribute.ok_or_else(|| extend::Error::Missing {
-            name,
-            known: attributes.iter().map(|a| a.name.clone()).collect(),
+        let attribute = attribute.ok_or_else(|| {
+            let known = attributes.iter().map(|a| a.name.clone()).collect();
+            extend::Error::Missing { name, known }.to_string()
         })?;
         let (mut residual, mut extension) = (Default::default(), Default::default());
         let scratch = &mut extend::Scratch::default();
-        kept.result
-            .extend_into(&attribute, band, scratch, &mut residual, &mut extension)?;
-        Ok::<_, extend::Error>(Extended {
+        let result = kept.result.on_cpu("to extend attributes")?;
+        result
+            .extend_into(&attribute, band, scratch, &mut residual, &mut extension)
+            .map_err(|error| error.to_string())?;
+        Ok::<_, String>(Extended {
             attribute,
             extension,
             residual,

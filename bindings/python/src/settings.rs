@@ -4,8 +4,13 @@
 use isograd::distance::Band;
 use isograd::neighbors::Radius;
 use isograd::poisson::Smoothing;
-use isograd::{Grid, GridError, Options, Real, Reconstructor, isosurface, orient, splat, vector};
+use isograd::{
+    Backend, Grid, GridError, Options, Real, Reconstructor, UnknownBackend, isosurface, orient,
+    splat, vector,
+};
 use serde::Deserialize;
+
+use crate::backend::Failure;
 
 /// What `isograd._settings.encode` writes.
 #[derive(Clone, Debug, Deserialize)]
@@ -23,6 +28,8 @@ pub struct Settings {
     level: Level,
     band: Option<f64>,
     checks: bool,
+    /// Of plans alone: pure functions are computed on the CPU.
+    backend: Option<String>,
 }
 
 /// `isograd.Orient`.
@@ -98,7 +105,17 @@ impl Settings {
         Grid::new(vector::of_f64(self.lower), T::of(self.spacing), self.shape)
     }
 
-    /// A plan for grid and options.
+    /// Where to compute.
+    ///
+    /// # Errors
+    /// A text that names no backend.
+    pub fn backend(&self) -> Result<Backend, Failure> {
+        let text = self.backend.as_deref().unwrap_or("cpu");
+        text.parse()
+            .map_err(|error: UnknownBackend| Failure::Value(error.to_string()))
+    }
+
+    /// A plan for grid and options, on the CPU.
     ///
     /// # Errors
     /// What the grid or the options say.

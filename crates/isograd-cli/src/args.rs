@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use isograd::Backend;
 
 mod fit;
 mod gradcheck;
@@ -92,6 +93,10 @@ pub struct Reconstruct {
     /// Number type of the computation and of the outputs
     #[arg(long, default_value = "f32", help_heading = "Running")]
     pub precision: Precision,
+    /// Where to compute: cpu, cuda (or cuda:1, the second device), vulkan, or auto: a GPU where there is one, else the
+    /// CPU. A program is built with --features vulkan,cuda for these
+    #[arg(long, default_value = "cpu", help_heading = "Running")]
+    pub backend: Backend,
     /// How to run.
     #[command(flatten)]
     pub running: Running,
@@ -411,6 +416,8 @@ mod tests {
             "isograd reconstruct a.ply --bounds 0 0 0 1 1",
             "isograd reconstruct a.ply --orient guess",
             "isograd reconstruct a.ply --threads 0",
+            "isograd reconstruct a.ply --backend gpu",
+            "isograd reconstruct a.ply --backend cuda:x",
             "isograd reconstruct a.ply -q -v",
             "isograd sample fish -o a.ply",
             "isograd sample fish -n 5 -o a.ply --param time",

@@ -107,6 +107,34 @@ pub enum Error {
         /// The checkpoint.
         file: String,
     },
+    /// A backend that this program was built without.
+    #[error(
+        "this program was built without {name}: build it with `cargo install --path crates/isograd-cli --features {feature}`, or give --backend cpu"
+    )]
+    NotBuilt {
+        /// Its name.
+        name: &'static str,
+        /// The feature of Cargo that builds it.
+        feature: &'static str,
+    },
+    /// A backend that can't be had, or not with these options.
+    #[cfg(feature = "gpu")]
+    #[error("--backend {backend}: {error}")]
+    Backend {
+        /// What was asked for.
+        backend: isograd::Backend,
+        /// What is wrong.
+        error: isograd_gpu::host::Error,
+    },
+    /// A device failed.
+    #[cfg(feature = "gpu")]
+    #[error("{file}: {source}")]
+    Device {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        source: isograd_gpu::host::Error,
+    },
     /// The threads could not be started.
     #[error("the threads could not be started: {0}; use fewer")]
     Threads(#[from] rayon::ThreadPoolBuildError),

@@ -2,6 +2,7 @@
 #![warn(missing_docs)]
 
 pub mod args;
+pub mod backend;
 pub mod error;
 pub mod fit;
 pub mod gradcheck;

@@ -4,10 +4,11 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
-use isograd::{Grid, PointCloud, Real, Reconstruction, Reconstructor, Stage};
+use isograd::{Grid, PointCloud, Real, Stage};
 use isograd_io::Geometry;
 
 use crate::args::{self, Precision};
+use crate::backend::{Number, Plan, Results};
 use crate::error::Error;
 use crate::outputs::{Outputs, write_report};
 use crate::plot;
@@ -117,7 +118,7 @@ impl Job<'_> {
         })
     }
 
-    fn run<T: Real>(
+    fn run<T: Number>(
         &self,
         geometry: &Geometry,
         progress: &mut Progress,
@@ -130,20 +131,20 @@ impl Job<'_> {
             grid.shape(),
             grid.spacing()
         ));
-        let failed = |source| Error::Reconstruct {
-            file: self.file(),
-            source,
-        };
         let options = self.args.method.options(grid.spacing().f64());
-        let mut plan = Reconstructor::new(grid, options).map_err(failed)?;
+        let plan = Plan::new(self.args.backend, grid, options, &self.file())?;
+        let backend = plan.name().to_string();
+        progress.detail(&format!("on {backend}"));
+        if let Some(note) = plan.note() {
+            progress.warn(note);
+        }
         let mut observer = |stage: Stage| {
             progress.step(stage.name());
             ControlFlow::Continue(())
         };
-        plan.reconstruct_observed(&cloud, &mut observer)
-            .map_err(failed)?;
-        let result = plan.into_reconstruction();
-        let mut report = Report::new(&self.args.cloud, &grid, result.report());
+        let made = plan.run(&cloud, &mut observer, &self.file())?;
+        let result = made.results(&cloud, &self.file())?;
+        let mut report = Report::new(&self.args.cloud, backend, &grid, result.report);
         for warning in &report.warnings {
             progress.warn(warning);
         }
@@ -158,7 +159,7 @@ impl Job<'_> {
     fn write<T: Real>(
         &self,
         cloud: &PointCloud<T>,
-        result: &Reconstruction<T>,
+        result: &Results<'_, T>,
         mut report: Report,
         progress: &Progress,
     ) -> Result<(), Error> {
@@ -167,11 +168,11 @@ impl Job<'_> {
         outputs.create_folder()?;
         let wrote = |path: &Path| progress.say(&format!("wrote {}", path.display()));
         if let Some(path) = &outputs.mesh {
-            isograd_io::write_mesh(path, result.mesh())?;
+            isograd_io::write_mesh(path, result.mesh)?;
             wrote(path);
         }
         if let Some(path) = &outputs.sdf {
-            isograd_io::write_field(path, result.sdf())?;
+            isograd_io::write_field(path, result.sdf)?;
             wrote(path);
         }
         if let Some(path) = &outputs.points {
@@ -179,7 +180,7 @@ impl Job<'_> {
             wrote(path);
         }
         if let Some(path) = &outputs.plot {
-            plot::write(path, &plot::slices(result.sdf()))?;
+            plot::write(path, &plot::slices(result.sdf))?;
             wrote(path);
         }
         if let Some(path) = &outputs.picture {
@@ -201,13 +202,11 @@ impl Job<'_> {
     fn oriented<T: Real>(
         &self,
         cloud: &PointCloud<T>,
-        result: &Reconstruction<T>,
+        result: &Results<'_, T>,
     ) -> Result<PointCloud<T>, Error> {
-        orient::oriented(cloud, result.normals(), result.confidence()).map_err(|source| {
-            Error::Cloud {
-                file: self.file(),
-                source,
-            }
+        orient::oriented(cloud, result.normals, result.confidence).map_err(|source| Error::Cloud {
+            file: self.file(),
+            source,
         })
     }
 
@@ -215,26 +214,26 @@ impl Job<'_> {
         &self,
         path: &Path,
         cloud: &PointCloud<T>,
-        result: &Reconstruction<T>,
+        result: &Results<'_, T>,
     ) -> Result<(), Error> {
         const WIDTH: usize = 1500;
         let camera = match self.args.view.as_deref() {
             Some(&[azimuth, elevation]) => plot::Camera { azimuth, elevation },
             _ => plot::Camera::default(),
         };
-        let picture = plot::overview(cloud, result.mesh(), result.sdf(), camera, WIDTH);
+        let picture = plot::overview(cloud, result.mesh, result.sdf, camera, WIDTH);
         Ok(plot::write(path, &picture)?)
     }
 
     /// The result in a few lines.
-    fn say<T: Real>(&self, progress: &Progress, result: &Reconstruction<T>) {
-        let report = result.report();
-        let surface = &report.surface;
-        let [nx, ny, nz] = result.sdf().grid().shape();
+    fn say<T: Real>(&self, progress: &Progress, result: &Results<'_, T>) {
+        let report = result.report;
+        let (surface, grid) = (&report.surface, result.sdf.grid());
+        let [nx, ny, nz] = grid.shape();
         progress.say(&format!(
             "{} points, {nx} × {ny} × {nz} cells of {:.4e}, {:.2} s",
             report.points,
-            result.sdf().grid().spacing(),
+            grid.spacing(),
             self.start.elapsed().as_secs_f64()
         ));
         progress.say(&format!(

@@ -13,6 +13,8 @@ use serde::Serialize;
 pub struct Report {
     /// Version of the program.
     pub version: &'static str,
+    /// Where it was computed: `cpu`, or a backend and its device, such as `vulkan: NVIDIA H100`.
+    pub backend: String,
     /// What was read.
     pub input: Input,
     /// The grid.
@@ -207,9 +209,15 @@ pub struct Seconds {
 
 impl Report {
     /// The report of a computation on `grid`; reading, writing and memory are still to be filled in.
-    pub fn new<T: Real>(path: &Path, grid: &Grid<T>, report: &isograd::Report) -> Self {
+    pub fn new<T: Real>(
+        path: &Path,
+        backend: String,
+        grid: &Grid<T>,
+        report: &isograd::Report,
+    ) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION"),
+            backend,
             input: Input::new(path, report.points),
             grid: GridReport {
                 shape: grid.shape(),

@@ -50,7 +50,7 @@ fn the_folder_gets_its_five_files_and_the_report_its_fields() {
     let report: Value = serde_json::from_slice(&bench.read("out/new/report.json")).expect("JSON");
     assert_keys(
         &report,
-        "version input grid normals orientation smoothing iso_value surface sdf seconds peak_memory_bytes warnings",
+        "version backend input grid normals orientation smoothing iso_value surface sdf seconds peak_memory_bytes warnings",
     );
     assert_keys(&report["input"], "path points");
     assert_keys(&report["grid"], "shape origin spacing");

@@ -18,6 +18,7 @@ pub mod differential;
 pub mod distance;
 mod element;
 mod grid;
+pub mod host;
 pub mod iso_value;
 pub mod isosurface;
 pub mod neighbors;

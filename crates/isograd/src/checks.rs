@@ -51,10 +51,10 @@ pub(crate) fn thin_and_missed<T: Real>(
 }
 
 /// Samples further apart than the grid resolves.
-pub(crate) fn sparse<T: Real>(sample_spacing: T, spacing: T) -> Option<Warning> {
-    (sample_spacing > T::of(SPARSE_CELLS) * spacing).then(|| Warning::Sparse {
-        sample_spacing: sample_spacing.f64(),
-        spacing: spacing.f64(),
+pub(crate) fn sparse(sample_spacing: f64, spacing: f64) -> Option<Warning> {
+    (sample_spacing > SPARSE_CELLS * spacing).then_some(Warning::Sparse {
+        sample_spacing,
+        spacing,
     })
 }
 

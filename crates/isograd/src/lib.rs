@@ -5,6 +5,7 @@
 //! finite differences.
 #![warn(missing_docs)]
 
+mod backend;
 mod checks;
 mod concrete;
 pub mod data;
@@ -29,6 +30,7 @@ pub mod splat;
 pub(crate) mod trilinear;
 pub mod vector;
 
+pub use backend::{Backend, UnknownBackend};
 pub use data::{
     Attribute, Field, FieldError, Grid, GridCotangent, GridError, LatticeEdge, Mesh, MeshError,
     PointCloud, PointCloudError, Resolution, Sensors,

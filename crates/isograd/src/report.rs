@@ -72,7 +72,8 @@ impl Seconds {
         self.0.iter().sum()
     }
 
-    pub(crate) fn set(&mut self, stage: Stage, seconds: f64) {
+    /// Notes how long a stage took.
+    pub fn set(&mut self, stage: Stage, seconds: f64) {
         self.0[stage as usize] = seconds;
     }
 }

@@ -27,6 +27,7 @@ def floats(values: object, name: str, shape: tuple[int | None, ...], dtype: DTyp
     """
     if isinstance(values, np.ma.MaskedArray):
         raise TypeError(f"{name} is a masked array; fill it or drop what is masked")
+    _check_memory(values, name)
     try:
         array = np.asarray(values)
     except (ValueError, TypeError, RuntimeError) as error:
@@ -76,6 +77,30 @@ def known(
         sensors = [sensors] if np.ndim(sensors) == 1 else sensors
         sensors = floats(sensors, "sensors", (None, 3), cloud.dtype)
     return normals, sensors
+
+
+# Numbers of DLPack: the memory of the CPU, and what it shares with devices of CUDA and ROCm.
+_OF_CPU = {1, 3, 11, 13}
+
+
+def _check_memory(values: object, name: str) -> None:
+    """Whether an array that says where it is, is where the CPU can read it.
+
+    Raises:
+        TypeError: where not: a copy is for the caller to make.
+    """
+    where = getattr(values, "__dlpack_device__", None)
+    if where is None or isinstance(values, np.ndarray):
+        return
+    try:
+        kind = int(where()[0])
+    except Exception:  # tracers, sharded arrays, and what else has the method but no one place
+        return
+    if kind not in _OF_CPU:
+        raise TypeError(
+            f"{name} is in the memory of a device, and this function takes arrays of the CPU: copy it, "
+            "with .cpu() of PyTorch, numpy.asarray of JAX, .get() of CuPy"
+        )
 
 
 def _check_shape(found: tuple[int, ...], name: str, shape: tuple[int | None, ...]) -> None:

@@ -79,6 +79,9 @@ class Result:
     def iso_value(self) -> float:
         """The level of the surface."""
 
+    def backend(self) -> str:
+        """Who computed."""
+
     def report(self) -> dict[str, Any]:
         """The numbers of the report."""
 
@@ -106,6 +109,9 @@ class Plan:
         attributes: _Attributes,
     ) -> Result:
         """Reconstructs a cloud: ``points``, ``normals`` and ``sensors`` of one type."""
+
+    def take_note(self) -> str | None:
+        """Why the CPU computes, where that was left to the package; once."""
 
 def orient(
     points: _Floats,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -144,6 +145,11 @@ class Reconstruction:
         return self._core.report()
 
     @property
+    def backend(self) -> str:
+        """Who computed: ``"cpu"``, or a backend and its device, such as ``"cuda: NVIDIA H100"``."""
+        return self._core.backend()
+
+    @property
     def warnings(self) -> list[str]:
         """What to know before trusting the result."""
         return list(self.report["warnings"])
@@ -235,12 +241,17 @@ class Reconstructor:
     time: each call follows the one before, and the result depends on them.
     """
 
-    def __init__(self, grid: Grid, options: Options | None = None, **changes: Any) -> None:
+    def __init__(
+        self, grid: Grid, options: Options | None = None, *, backend: str = "cpu", **changes: Any
+    ) -> None:
         self.options = resolve(options, changes)
         """What to compute, and how."""
         self.grid = grid
         """The grid of all results."""
-        self._plan = _core.Plan(encode(grid, self.options))
+        self.backend = _backend(backend)
+        """Where to compute, as it was asked for."""
+        self._plan = _core.Plan(encode(grid, self.options, self.backend))
+        self._say_note()
 
     def __call__(
         self,
@@ -255,9 +266,15 @@ class Reconstructor:
         normals, sensors = known(cloud, normals, sensors)
         check_known(self.options.orient, normals is not None, sensors is not None)
         core = self._plan.reconstruct(cloud, normals, sensors, _attributes(attributes, cloud))
+        self._say_note()
         return Reconstruction(core, self.grid, self.options, len(cloud), cloud.dtype)
 
     reconstruct = __call__
+
+    def _say_note(self) -> None:
+        note = self._plan.take_note()
+        if note is not None:
+            warnings.warn(note, RuntimeWarning, stacklevel=3)
 
 
 def reconstruct(
@@ -268,6 +285,7 @@ def reconstruct(
     sensors: ArrayLike | None = None,
     attributes: Mapping[str, ArrayLike] | None = None,
     options: Options | None = None,
+    backend: str = "cpu",
     **changes: Any,
 ) -> Reconstruction:
     """The signed distance field and the surface of a cloud.
@@ -282,15 +300,25 @@ def reconstruct(
         attributes: values of the samples, ``(N,)`` or ``(N, components)`` by name, for
             :meth:`Reconstruction.extend`.
         options: what to compute, and how.
+        backend: where to compute: ``"cpu"``, ``"cuda"`` (``"cuda:1"`` is the second device), ``"vulkan"``, or
+            ``"auto"``: a GPU where there is one, else the CPU with a ``RuntimeWarning`` that says why.
         changes: single options by name, such as ``orient="given"``.
 
     Raises:
         TypeError, ValueError: input that makes no surface, with the reason and the remedy.
+        RuntimeError: a backend that can't be had, with the reason and the remedy.
         KeyboardInterrupt: at once, where Ctrl-C is pressed.
     """
     cloud = floats(points, "points", (None, 3))
-    plan = Reconstructor(Grid.fit(cloud) if grid is None else grid, options, **changes)
+    grid = Grid.fit(cloud) if grid is None else grid
+    plan = Reconstructor(grid, options, backend=backend, **changes)
     return plan(cloud, normals=normals, sensors=sensors, attributes=attributes)
+
+
+def _backend(backend: object) -> str:
+    if not isinstance(backend, str):
+        raise TypeError(f"backend is a {type(backend).__name__}; give a text such as \"cpu\" or \"cuda\"")
+    return str(backend)
 
 
 def _attributes(

@@ -8,7 +8,7 @@ from ._grid import Grid
 from ._options import Level, Options, Orient, Splat, check_known, resolve
 
 
-def encode(grid: Grid, options: Options | None = None) -> str:
+def encode(grid: Grid, options: Options | None = None, backend: str | None = None) -> str:
     """The JSON text that the Rust side reads; numbers read back to the same bits.
 
     Raises:
@@ -33,6 +33,7 @@ def encode(grid: Grid, options: Options | None = None) -> str:
             "level": Level(options.level).value,
             "band": options.band,
             "checks": options.checks,
+            "backend": backend,
         }
     )
 

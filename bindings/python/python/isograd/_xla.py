@@ -102,7 +102,7 @@ def call(
     results: tuple[jax.ShapeDtypeStruct, ...],
     *arrays: jax.Array | None,
 ) -> tuple[jax.Array, ...]:
-    """Calls a target: by XLA on CPUs, elsewhere through Python."""
+    """Calls a target: by XLA, or through Python where that is asked for. Arrays on other devices are refused."""
     present = [array for array in arrays if array is not None]
     attributes: dict[str, Any] = {"settings": plan.settings}
     if plan.band is not None:
@@ -116,9 +116,25 @@ def call(
         handler = jax.ffi.ffi_call(name, results, vmap_method="broadcast_all")
         return tuple(handler(*arrays, **attributes))
 
+    def by_refusal(*arrays: jax.Array) -> tuple[jax.Array, ...]:
+        return jax.pure_callback(refuse, results, *arrays, vmap_method="broadcast_all")
+
     if not _has_handlers():
         return by_callback(*present)
-    return jax.lax.platform_dependent(*present, cpu=by_handler, default=by_callback)
+    return jax.lax.platform_dependent(*present, cpu=by_handler, default=by_refusal)
+
+
+def refuse(*_arrays: ArrayLike) -> tuple[np.ndarray, ...]:
+    """What becomes of arrays on a device: nobody has asked for copies.
+
+    Raises:
+        ValueError: always.
+    """
+    raise ValueError(
+        "isograd.jax computes on the CPU, and these arrays are on another device: put them on "
+        'jax.devices("cpu")[0], or set ISOGRAD_JAX_CALLBACK=1 in the environment, and they are copied to the CPU '
+        "and back at every call"
+    )
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,10 @@
     >>> gradient = jax.jit(jax.grad(loss))(points)   # (N, 3)
 
 Points and normals are arrays that are traced; grid and options are static. float32 and float64 stay what they are
-(float64 needs ``jax_enable_x64``), half precision becomes float32, whole numbers JAX's default float. On CPUs the
-work is done by handlers that XLA calls without Python. On other devices, and with the environment variable
-``ISOGRAD_JAX_CALLBACK=1``, it is done on the host through ``jax.pure_callback``, with the same bits.
+(float64 needs ``jax_enable_x64``), half precision becomes float32, whole numbers JAX's default float. The work is
+done on the CPU, by handlers that XLA calls without Python. Arrays on other devices are refused, unless the environment
+has ``ISOGRAD_JAX_CALLBACK=1``: then they are copied, and the work is done through ``jax.pure_callback``, with the same
+bits.
 
 What can be seen from types and shapes raises ``TypeError`` or ``ValueError`` at once. What depends on the values (a
 point that is not finite or off the grid) raises ``jax.errors.JaxRuntimeError`` or, as JAX chooses, ``ValueError``,

@@ -20,27 +20,54 @@ mod vulkan {
 
     const REMEDY: &str = "install a Vulkan driver (Debian: mesa-vulkan-drivers libvulkan1 has one that needs no GPU)";
 
+    /// What the driver says of the device that was opened.
+    struct Opened {
+        name: String,
+        /// It computes on the CPU.
+        is_software: bool,
+    }
+
     impl Device<Vulkan> {
         /// The fastest Vulkan device.
         ///
         /// # Errors
         /// [`Error::NoDevice`].
         pub fn vulkan() -> Result<Self, Error> {
-            // One device for the process: CubeCL keeps its own, and opening twice would leak the first.
-            static NAME: std::sync::OnceLock<Option<String>> = std::sync::OnceLock::new();
-            let name = NAME.get_or_init(open).clone();
-            let name = name.ok_or_else(|| Error::NoDevice {
-                backend: "Vulkan",
-                reason: "the loader lists none".into(),
-                remedy: REMEDY,
-            })?;
+            let name = opened()?.name.clone();
             let client = WgpuRuntime::client(&WgpuDevice::DefaultDevice);
             Ok(Self::new(client, name))
         }
+
+        /// The same, where it is a GPU: a driver that computes on the CPU is slower than the CPU's own code.
+        ///
+        /// # Errors
+        /// [`Error::NoDevice`].
+        pub fn vulkan_gpu() -> Result<Self, Error> {
+            let opened = opened()?;
+            if opened.is_software {
+                return Err(Error::NoDevice {
+                    backend: "Vulkan",
+                    reason: format!("the only one, {}, computes on the CPU", opened.name),
+                    remedy: "install the driver of the GPU",
+                });
+            }
+            Self::vulkan()
+        }
     }
 
-    /// Opens the default device; its name, if there is one.
-    fn open() -> Option<String> {
+    /// One device for the process: CubeCL keeps its own, and opening twice would leak the first.
+    fn opened() -> Result<&'static Opened, Error> {
+        static OPENED: std::sync::OnceLock<Option<Opened>> = std::sync::OnceLock::new();
+        let opened = OPENED.get_or_init(open).as_ref();
+        opened.ok_or_else(|| Error::NoDevice {
+            backend: "Vulkan",
+            reason: "the loader lists none".into(),
+            remedy: REMEDY,
+        })
+    }
+
+    /// Opens the default device, if there is one.
+    fn open() -> Option<Opened> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
             backends: wgpu::Backends::VULKAN,
             ..wgpu::InstanceDescriptor::new_without_display_handle()
@@ -54,7 +81,11 @@ mod vulkan {
             &WgpuDevice::DefaultDevice,
             RuntimeOptions::default(),
         );
-        Some(setup.adapter.get_info().name)
+        let info = setup.adapter.get_info();
+        Some(Opened {
+            is_software: info.device_type == wgpu::DeviceType::Cpu,
+            name: info.name,
+        })
     }
 }
 

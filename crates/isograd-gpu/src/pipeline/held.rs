@@ -56,6 +56,19 @@ impl<T: Scalar> Held<T> {
             scratch,
             &mut found,
         )?;
+        Ok(Self::of(device, &near, &axes, &found)?)
+    }
+
+    /// What the CPU found already, by its stages or by [`isograd::Orienter`].
+    ///
+    /// # Errors
+    /// [`crate::Error::TooLarge`].
+    pub fn of<R: Runtime>(
+        device: &Device<R>,
+        near: &Neighborhoods<T>,
+        axes: &normals::Residual<T>,
+        found: &Orientation<T>,
+    ) -> Result<Self, crate::Error> {
         Ok(Self {
             radii: device.upload(&axes.radius)?,
             area_radii: device.upload(&near.radius)?,

@@ -17,10 +17,12 @@ mod pullback;
 pub use held::Held;
 pub use pullback::{CloudCotangent, Cotangent};
 
+use std::ops::ControlFlow;
+
 use cubecl::prelude::Runtime;
-use isograd::Grid;
 use isograd::isosurface::Level;
 use isograd::poisson::Smoothing;
+use isograd::{Grid, Stage};
 
 use crate::distance::{self, Band, Mesh};
 use crate::iso_value::local;
@@ -64,6 +66,9 @@ pub enum Error {
         /// Index of the first.
         first: usize,
     },
+    /// The observer asked to stop.
+    #[error("stopped before the stage '{}'", .0.name())]
+    Interrupted(Stage),
     /// The surface.
     #[error(transparent)]
     Isosurface(#[from] isosurface::Error),
@@ -180,6 +185,19 @@ struct Width {
     areas: (f64, usize),
 }
 
+impl<T: Scalar> Reconstruction<T> {
+    /// `(nx, ny, nz)` the face of the surface closest to each cell centre, in C order;
+    /// [`NO_TRIANGLE`](distance::NO_TRIANGLE) outside the band.
+    pub fn closest(&self) -> &Buffer<u32> {
+        self.residuals.distance.closest()
+    }
+
+    /// Width of the smoothing of the indicator, in cells.
+    pub fn smoothing(&self) -> f64 {
+        self.residuals.smoothing.cells
+    }
+}
+
 impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
     /// A plan for a grid.
     ///
@@ -215,6 +233,25 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         points: &Buffer<T>,
         held: &Held<T>,
     ) -> Result<Reconstruction<T>, Error> {
+        self.reconstruct_observed(points, held, &mut |_| ControlFlow::Continue(()))
+    }
+
+    /// The same, calling `observer` before each stage is queued; where it breaks, so does the work. One that wants
+    /// to know how long a stage takes must [wait](Device::wait).
+    ///
+    /// # Errors
+    /// As [`Self::reconstruct`], and [`Error::Interrupted`] where the observer breaks.
+    pub fn reconstruct_observed(
+        &self,
+        points: &Buffer<T>,
+        held: &Held<T>,
+        observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
+    ) -> Result<Reconstruction<T>, Error> {
+        let mut begin = |stage| match observer(stage) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(Error::Interrupted(stage)),
+        };
+        begin(Stage::Normals)?;
         let (device, grid, options) = (&self.device, &self.grid, &self.options);
         let near = neighbors::forward(device, points, &held.radii)?;
         let (axes, of_normals) = normals::forward(device, &near)?;
@@ -226,10 +263,12 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             normals: &normals,
             areas: &areas,
         };
+        begin(Stage::Splat)?;
         let (b, of_splat) = splat::forward(device, samples, grid, options.weights)?;
         if let Some(Refused { count, first }) = of_splat.refused(device)? {
             return Err(Error::Outside { count, first });
         }
+        begin(Stage::Poisson)?;
         let chi = self.solver.solve(device, &b, width.cells)?;
         drop(b);
         if options.screening > 0.0 {
@@ -238,11 +277,13 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         }
         let (level, of_level) = iso_value::forward(device, &chi, grid, points, &areas)?;
         let (chi, of_local_level) = self.local_level(chi, samples, width, &of_level, &of_splat)?;
+        begin(Stage::Isosurface)?;
         let (surface, of_surface) = isosurface::forward(device, &self.surface, &chi, &level, grid)?;
         let mesh = Mesh {
             vertices: surface.vertices.clone(),
             faces: surface.faces.clone(),
         };
+        begin(Stage::Distance)?;
         let (sdf, of_distance) =
             distance::lattice::forward(device, &mesh, grid, &chi, &level, options.band)?;
         Ok(Reconstruction {

@@ -58,6 +58,8 @@ pub struct CloudCotangent<T> {
     pub points: Buffer<T>,
     /// `(4,)` of the low corner of the grid and of its cell size, at fixed points.
     pub grid: Buffer<T>,
+    /// `(1,)` vertices whose derivative has no bound, and a bounded one was taken; none where none was asked for.
+    pub guarded: Option<Buffer<u32>>,
 }
 
 impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
@@ -80,9 +82,10 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
                 add(device, given, sum)?;
             }
         }
-        if cotangent.reaches_indicator() {
-            self.pull_indicator(result, cotangent, &bars)?;
-        }
+        let guarded = match cotangent.reaches_indicator() {
+            true => Some(self.pull_indicator(result, cotangent, &bars)?),
+            false => None,
+        };
         let axes_bar = held::turn(device, &bars.normals, &result.axes, &result.outward)?;
         let by_axes = normals::pullback(device, &residuals.normals, &axes_bar)?;
         add(device, &by_axes, &bars.points)?;
@@ -93,16 +96,17 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         Ok(CloudCotangent {
             points: bars.points,
             grid: bars.grid,
+            guarded,
         })
     }
 
-    /// From φ, the surface, the indicator and the iso-value to samples and grid.
+    /// From φ, the surface, the indicator and the iso-value to samples and grid; how many vertices were guarded.
     fn pull_indicator(
         &self,
         result: &Reconstruction<T>,
         cotangent: &Cotangent<'_, T>,
         bars: &SampleCotangent<T>,
-    ) -> Result<(), Error> {
+    ) -> Result<Buffer<u32>, Error> {
         let (device, residuals) = (&self.device, &result.residuals);
         let samples = Samples {
             points: &result.points,
@@ -111,7 +115,10 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         };
         let vertices_bar = self.pull_distance(result, cotangent, bars)?;
         let isosurface::Cotangent {
-            chi, level, grid, ..
+            chi,
+            level,
+            grid,
+            guarded,
         } = isosurface::pullback(device, &residuals.surface, &vertices_bar)?;
         add(device, &grid, &bars.grid)?;
         for (given, sum) in [(cotangent.indicator, &chi), (cotangent.iso_value, &level)] {
@@ -146,7 +153,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         let b_bar = self.solver.solve(device, &chi, residuals.smoothing.cells)?;
         drop(chi);
         splat::pullback(device, &residuals.splat, samples, &b_bar, bars)?;
-        Ok(())
+        Ok(guarded)
     }
 
     /// The cotangent of the vertices, and to the grid what φ has for it.

@@ -107,6 +107,37 @@ pub enum PullbackError {
 }
 
 impl<T: Real> Cotangent<'_, T> {
+    /// Whether every cotangent has the length of its result, on a grid of so many cells, a surface of so many
+    /// vertices and a cloud of so many samples, and is finite.
+    ///
+    /// # Errors
+    /// [`PullbackError::Length`], [`PullbackError::NotFinite`].
+    pub fn check(
+        &self,
+        cells: usize,
+        vertices: usize,
+        samples: usize,
+    ) -> Result<(), PullbackError> {
+        check_numbers("φ", self.sdf, cells)?;
+        check_numbers("the indicator", self.indicator, cells)?;
+        check_numbers("the iso-value", Some(&[self.iso_value]), 1)?;
+        check_vectors("the vertices", self.vertices, vertices)?;
+        check_vectors("the normals", self.normals, samples)?;
+        check_numbers("the areas", self.areas, samples)?;
+        for ExtensionCotangent {
+            extension,
+            vertices,
+            values,
+            ..
+        } in self.extensions
+        {
+            let (at_vertices, in_band) = (extension.vertices.len(), extension.values.len());
+            check_numbers("an attribute at the vertices", *vertices, at_vertices)?;
+            check_numbers("an attribute in the band", *values, in_band)?;
+        }
+        Ok(())
+    }
+
     /// Whether anything beyond the normals and areas of the samples has a cotangent.
     pub(super) fn reaches_indicator(&self) -> bool {
         let fields = self.sdf.is_some() || self.indicator.is_some();
@@ -131,33 +162,6 @@ impl<T: Real> Reconstruction<T> {
             true => Ok(()),
             false => Err(PullbackError::Cloud { found, expected }),
         }
-    }
-
-    /// Whether every cotangent has the length of its result, and is finite.
-    pub(super) fn check_cotangent(
-        &self,
-        cotangent: &Cotangent<'_, T>,
-    ) -> Result<(), PullbackError> {
-        let cells = self.sdf.values().len();
-        let (vertices, samples) = (self.mesh.vertices().len(), self.areas.len());
-        check_numbers("φ", cotangent.sdf, cells)?;
-        check_numbers("the indicator", cotangent.indicator, cells)?;
-        check_numbers("the iso-value", Some(&[cotangent.iso_value]), 1)?;
-        check_vectors("the vertices", cotangent.vertices, vertices)?;
-        check_vectors("the normals", cotangent.normals, samples)?;
-        check_numbers("the areas", cotangent.areas, samples)?;
-        for ExtensionCotangent {
-            extension,
-            vertices,
-            values,
-            ..
-        } in cotangent.extensions
-        {
-            let (at_vertices, in_band) = (extension.vertices.len(), extension.values.len());
-            check_numbers("an attribute at the vertices", *vertices, at_vertices)?;
-            check_numbers("an attribute in the band", *values, in_band)?;
-        }
-        Ok(())
     }
 }
 

@@ -6,7 +6,8 @@ use super::stages::{check_samples, find_axes};
 use super::{Error, Residuals};
 use crate::Real;
 use crate::data::PointCloud;
-use crate::neighbors::Radius;
+use crate::neighbors::{Neighborhoods, Radius};
+use crate::normals;
 use crate::orient::{self, Method, Orientation};
 use crate::report::{Report, Stage};
 
@@ -14,14 +15,20 @@ use crate::report::{Report, Stage};
 /// call uses again.
 ///
 /// [`Reconstructor`]: crate::Reconstructor
-#[derive(Default)]
 pub struct Orienter<T: Real> {
     radius: Radius,
     method: Method,
     residuals: Residuals<T>,
+    checks: bool,
     scratch: orient::Scratch,
     orientation: Orientation<T>,
     report: Report,
+}
+
+impl<T: Real> Default for Orienter<T> {
+    fn default() -> Self {
+        Self::new(Radius::default(), Method::default())
+    }
 }
 
 impl<T: Real> Orienter<T> {
@@ -30,8 +37,17 @@ impl<T: Real> Orienter<T> {
         Self {
             radius,
             method,
-            ..Self::default()
+            checks: true,
+            residuals: Residuals::default(),
+            scratch: orient::Scratch::default(),
+            orientation: Orientation::default(),
+            report: Report::default(),
         }
+    }
+
+    /// The same; `checks` says whether its calls measure the samples and look for reasons not to trust them.
+    pub fn with_checks(self, checks: bool) -> Self {
+        Self { checks, ..self }
     }
 
     /// Outward unit normals of a cloud, and the confidence in each.
@@ -81,9 +97,21 @@ impl<T: Real> Orienter<T> {
         report.orientation = orientation.method.name();
         report.flipped = orientation.flipped;
         let start = done(report, Stage::Orient, start);
-        check_samples(cloud.points(), neighborhoods, orientation, report);
+        if self.checks {
+            check_samples(cloud.points(), neighborhoods, orientation, report);
+        }
         done(report, Stage::Checks, start);
         Ok(())
+    }
+
+    /// The neighbourhoods of the last cloud.
+    pub fn neighborhoods(&self) -> &Neighborhoods<T> {
+        &self.residuals.neighborhoods
+    }
+
+    /// The axes of the last cloud, before they were turned outward; empty with [`Method::Given`].
+    pub fn axes(&self) -> &normals::Residual<T> {
+        &self.residuals.normals
     }
 
     /// The last result.

@@ -76,7 +76,8 @@ impl<T: Real> Reconstruction<T> {
         out: &mut CloudCotangent<T>,
     ) -> Result<(), PullbackError> {
         self.check_cloud(cloud)?;
-        self.check_cotangent(cotangent)?;
+        let cells = self.sdf.values().len();
+        cotangent.check(cells, self.mesh.vertices().len(), self.areas.len())?;
         scratch.start(cotangent, cloud.len(), self.mesh.vertices().len());
         out.guarded = 0;
         self.pull_extensions(cotangent, scratch, out)?;

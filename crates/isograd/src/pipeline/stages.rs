@@ -1,7 +1,7 @@
 //! The stages of a plan, each from the results of those before it.
 
 use super::{Error, Reconstruction, Reconstructor, Residuals};
-use crate::data::PointCloud;
+use crate::data::{Field, Mesh, PointCloud};
 use crate::isosurface::{Level, local_level, measure};
 use crate::neighbors::{Neighborhoods, Radius};
 use crate::orient::Orientation;
@@ -242,15 +242,30 @@ impl<T: Real> Reconstructor<T> {
             ..
         } = &mut self.result;
         let (points, neighborhoods) = (cloud.points(), &residuals.neighborhoods);
-        report.measure_field(sdf);
-        report.surface = measure::measure(mesh, &mut self.scratch.measure);
-        let warnings = &mut report.warnings;
-        warnings.extend(checks::thin_and_missed(points, &orientation.normals, sdf));
-        let spacing = sdf.grid().spacing();
-        warnings.extend(checks::sparse(neighborhoods.spacing(), spacing));
-        warnings.extend(checks::components(report.surface.components));
-        warnings.extend(checks::rounded(points, spacing));
+        let scratch = &mut self.scratch.measure;
+        report.check_field(points, &orientation.normals, sdf, mesh, scratch);
         check_samples(points, neighborhoods, orientation, report);
+    }
+}
+
+impl Report {
+    /// Measures φ and the surface, and looks for reasons not to trust them: for results that were not made by a
+    /// [`Reconstructor`]. `normals` are those of the points, outward; [`Report::sample_spacing`] is there already.
+    pub fn check_field<T: Real>(
+        &mut self,
+        points: &[[T; 3]],
+        normals: &[[T; 3]],
+        sdf: &Field<T>,
+        mesh: &Mesh<T>,
+        scratch: &mut measure::Scratch,
+    ) {
+        self.measure_field(sdf);
+        self.surface = measure::measure(mesh, scratch);
+        let (warnings, spacing) = (&mut self.warnings, sdf.grid().spacing());
+        warnings.extend(checks::thin_and_missed(points, normals, sdf));
+        warnings.extend(checks::sparse(self.sample_spacing, spacing.f64()));
+        warnings.extend(checks::components(self.surface.components));
+        warnings.extend(checks::rounded(points, spacing));
     }
 }
 

@@ -1,0 +1,178 @@
+//! `isograd reconstruct --backend`.
+
+mod common;
+
+use common::Bench;
+use serde_json::Value;
+
+fn sphere() -> Bench {
+    let bench = Bench::new();
+    bench.done("sample sphere -n 2000 -o cloud.ply");
+    bench
+}
+
+fn report(bench: &Bench, name: &str) -> Value {
+    serde_json::from_slice(&bench.read(name)).expect("JSON")
+}
+
+#[test]
+fn a_backend_that_was_left_out_says_how_to_build_with_it() {
+    let bench = sphere();
+    let lines = [
+        #[cfg(not(feature = "cuda"))]
+        ("cuda", "built without CUDA"),
+        #[cfg(not(feature = "cuda"))]
+        ("cuda:1", "--features cuda"),
+        #[cfg(not(feature = "vulkan"))]
+        ("vulkan", "built without Vulkan"),
+        #[cfg(not(feature = "vulkan"))]
+        ("vulkan", "--features vulkan"),
+    ];
+    let lines: &[(&str, &str)] = &lines;
+    for (backend, part) in lines {
+        let line = format!("reconstruct cloud.ply --mesh m.ply --backend {backend}");
+        bench.run(&line).says(1, &[part, "--backend cpu"]);
+    }
+    assert_eq!(bench.files(), ["cloud.ply"]);
+}
+
+#[test]
+fn a_backend_that_is_none_is_a_wrong_command_line() {
+    let run = sphere().run("reconstruct cloud.ply --mesh m.ply --backend gpu");
+    run.says(2, &["cpu, cuda (or cuda:1", "vulkan or auto"]);
+}
+
+#[test]
+fn the_report_says_that_the_cpu_did_it() {
+    let bench = sphere();
+    bench.done("reconstruct cloud.ply --report r.json --resolution 24 -q");
+    assert_eq!(report(&bench, "r.json")["backend"], "cpu");
+}
+
+#[test]
+fn auto_takes_a_gpu_or_the_cpu_and_then_says_why() {
+    let bench = sphere();
+    let line = "reconstruct cloud.ply --report r.json --resolution 24 --backend auto";
+    let run = bench.done(line);
+    let report = report(&bench, "r.json");
+    match report["backend"].as_str().expect("a text") {
+        "cpu" => run.says(0, &["computed on the CPU: ", "built into this program"]),
+        device => println!("there is a GPU: {device}"),
+    }
+}
+
+#[cfg(feature = "vulkan")]
+mod vulkan {
+    use super::{Bench, Value, report, sphere};
+
+    const METHOD: &str = "--resolution 32";
+
+    /// Whether there is a device.
+    fn is_here() -> bool {
+        match isograd_gpu::Device::vulkan() {
+            Ok(_) => true,
+            Err(error) => {
+                println!("SKIPPED: {error}");
+                false
+            }
+        }
+    }
+
+    fn numbers(bench: &Bench, name: &str) -> Vec<f64> {
+        let field = isograd_io::read_field(&bench.path(name)).expect("reads");
+        field.field.values().to_vec()
+    }
+
+    #[test]
+    fn the_outputs_are_those_of_the_cpu() {
+        if !is_here() {
+            return;
+        }
+        let bench = sphere();
+        bench.done(&format!("reconstruct cloud.ply -o cpu {METHOD}"));
+        let run = bench.done(&format!(
+            "reconstruct cloud.ply -o gpu {METHOD} --backend vulkan"
+        ));
+        assert!(run.stderr.is_empty(), "{run:?}");
+        let files = bench.files();
+        let of = |folder: &str| {
+            let names = files.iter().filter_map(|f| f.strip_prefix(folder));
+            names.map(String::from).collect::<Vec<_>>()
+        };
+        assert_eq!(of("gpu/"), of("cpu/"));
+        let (cpu, gpu) = (
+            numbers(&bench, "cpu/sdf.vti"),
+            numbers(&bench, "gpu/sdf.vti"),
+        );
+        let largest = cpu.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+        let pairs = cpu.iter().zip(&gpu);
+        let difference = pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+        assert!(difference < 2e-4 * largest, "{difference:e}");
+        let mesh = |name: &str| isograd_io::read_mesh(&bench.path(name)).expect("reads");
+        assert_eq!(mesh("gpu/mesh.ply").faces, mesh("cpu/mesh.ply").faces);
+        let points = |name: &str| isograd_io::read_geometry(&bench.path(name)).expect("reads");
+        let (cpu, gpu) = (points("cpu/points.ply"), points("gpu/points.ply"));
+        assert_eq!((gpu.points, gpu.attributes), (cpu.points, cpu.attributes));
+        assert!(gpu.normals.is_some());
+        same_report(
+            &report(&bench, "cpu/report.json"),
+            &report(&bench, "gpu/report.json"),
+        );
+    }
+
+    fn same_report(cpu: &Value, gpu: &Value) {
+        let backend = gpu["backend"].as_str().expect("a text");
+        assert!(backend.starts_with("vulkan: "), "{backend}");
+        for part in [
+            "version",
+            "input",
+            "grid",
+            "normals",
+            "orientation",
+            "warnings",
+        ] {
+            assert_eq!(cpu[part], gpu[part], "{part}");
+        }
+        for part in ["faces", "components", "euler", "closed"] {
+            assert_eq!(cpu["surface"][part], gpu["surface"][part], "{part}");
+        }
+        for part in [
+            "normals",
+            "orient",
+            "splat",
+            "poisson",
+            "isosurface",
+            "distance",
+        ] {
+            assert!(gpu["seconds"][part].as_f64() > Some(0.0), "{part}");
+        }
+    }
+
+    #[test]
+    fn an_option_that_devices_do_not_have_is_named_and_auto_goes_round_it() {
+        if !is_here() {
+            return;
+        }
+        let bench = sphere();
+        let line = "reconstruct cloud.ply --report r.json --resolution 24 --orient given";
+        let run = bench.run(&format!("{line} --backend vulkan"));
+        run.says(1, &["--backend vulkan", "given normals", "on the CPU"]);
+        let run = bench.done(&format!("{line} --backend auto"));
+        run.says(0, &["computed on the CPU: "]);
+        assert_eq!(report(&bench, "r.json")["backend"], "cpu");
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_cloud_is_said_as_on_the_cpu() {
+        if !is_here() {
+            return;
+        }
+        let bench = sphere();
+        let line = "reconstruct cloud.ply --mesh m.ply --resolution 24 --bounds 0 0 0 1 1 1";
+        bench
+            .run(line)
+            .says(1, &["cloud.ply: ", "outside the grid"]);
+        let run = bench.run(&format!("{line} --backend vulkan"));
+        run.says(1, &["cloud.ply: ", "outside the grid"]);
+    }
+}

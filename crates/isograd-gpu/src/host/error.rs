@@ -1,0 +1,58 @@
+//! Why a host gets nothing.
+
+use isograd::{Backend, PullbackError, Stage};
+
+use crate::pipeline;
+
+/// Why there is no plan, no result or no gradient.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// This program has no such backend.
+    #[error("{0} is not built into this program")]
+    NotBuilt(Backend),
+    /// A choice that is no device.
+    #[error("{0} is no device; give cuda or vulkan")]
+    NoDevice(Backend),
+    /// Something that is not for devices yet.
+    #[error("{option} is not for devices yet; {remedy}, or compute on the CPU")]
+    Option {
+        /// What was asked for.
+        option: &'static str,
+        /// What to ask for instead.
+        remedy: &'static str,
+    },
+    /// The device.
+    #[error(transparent)]
+    Device(#[from] crate::Error),
+    /// The device's stages.
+    #[error(transparent)]
+    Pipeline(pipeline::Error),
+    /// The stages that run on the CPU.
+    #[error(transparent)]
+    Host(#[from] isograd::Error),
+    /// Cotangents.
+    #[error(transparent)]
+    Pullback(#[from] PullbackError),
+    /// Stopped by the observer.
+    #[error("stopped before the stage '{}'", .0.name())]
+    Interrupted(Stage),
+    /// What came back from the device makes no result.
+    #[error("{device} gave a result that is none ({reason}); compute on the CPU")]
+    Result {
+        /// Its name.
+        device: String,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+impl From<pipeline::Error> for Error {
+    fn from(error: pipeline::Error) -> Self {
+        match error {
+            pipeline::Error::Device(error) => Self::Device(error),
+            pipeline::Error::Interrupted(stage) => Self::Interrupted(stage),
+            error => Self::Pipeline(error),
+        }
+    }
+}

@@ -1,0 +1,289 @@
+//! Results on a device, each copied when it is first asked for.
+
+use std::sync::{Arc, OnceLock};
+use std::time::Instant;
+
+use isograd::isosurface::measure;
+use isograd::{
+    CloudCotangent, Cotangent, Field, Grid, Mesh, Options, Orienter, PointCloud, PullbackError,
+    Report, Seconds, Stage, Warning,
+};
+
+use super::work::{Work, vectors_of};
+use super::{Error, Number};
+use crate::{Buffer, pipeline};
+
+/// What was found on the CPU of the samples.
+pub struct Samples<T> {
+    /// The part of the report that is about them, without warnings.
+    pub report: Report,
+    warnings: Vec<Warning>,
+    confidence: Vec<T>,
+    counts: Vec<u32>,
+}
+
+impl<T: Number> Samples<T> {
+    /// What the orienter has found.
+    pub fn of(orienter: &Orienter<T>) -> Self {
+        let mut report = orienter.report().clone();
+        Self {
+            warnings: std::mem::take(&mut report.warnings),
+            report,
+            confidence: orienter.orientation().confidence.clone(),
+            counts: orienter.neighborhoods().count.clone(),
+        }
+    }
+
+    /// The same for the next step.
+    pub fn kept(&self) -> Self {
+        Self {
+            report: Report {
+                orientation: "previous",
+                flipped: 0,
+                seconds: Seconds::default(),
+                ..self.report.clone()
+            },
+            warnings: self.warnings.clone(),
+            confidence: self.confidence.clone(),
+            counts: self.counts.clone(),
+        }
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.counts.len()
+    }
+}
+
+/// What a plan made of a cloud, on the device: [`isograd::Reconstruction`] there. What is asked for is copied, once.
+pub struct Reconstruction<T: Number> {
+    device: Arc<dyn Work<T>>,
+    result: pipeline::Reconstruction<T>,
+    grid: Grid<T>,
+    checks: bool,
+    /// As far as nothing has to be copied for it.
+    begun: Report,
+    samples: Arc<Samples<T>>,
+    copies: Copies<T>,
+}
+
+/// What was asked for.
+struct Copies<T> {
+    sdf: OnceLock<Field<T>>,
+    indicator: OnceLock<Field<T>>,
+    iso_value: OnceLock<T>,
+    mesh: OnceLock<Mesh<T>>,
+    closest: OnceLock<Vec<u32>>,
+    normals: OnceLock<Vec<[T; 3]>>,
+    areas: OnceLock<Vec<T>>,
+    report: OnceLock<Report>,
+}
+
+impl<T> Default for Copies<T> {
+    fn default() -> Self {
+        Self {
+            sdf: OnceLock::new(),
+            indicator: OnceLock::new(),
+            iso_value: OnceLock::new(),
+            mesh: OnceLock::new(),
+            closest: OnceLock::new(),
+            normals: OnceLock::new(),
+            areas: OnceLock::new(),
+            report: OnceLock::new(),
+        }
+    }
+}
+
+impl<T: Number> Reconstruction<T> {
+    pub(super) fn new(
+        device: Arc<dyn Work<T>>,
+        result: pipeline::Reconstruction<T>,
+        grid: Grid<T>,
+        options: &Options,
+        begun: Report,
+        samples: Arc<Samples<T>>,
+    ) -> Self {
+        Self {
+            device,
+            result,
+            grid,
+            checks: options.checks,
+            begun,
+            samples,
+            copies: Copies::default(),
+        }
+    }
+
+    /// The grid of all fields.
+    pub fn grid(&self) -> &Grid<T> {
+        &self.grid
+    }
+
+    /// Number of points.
+    pub fn points(&self) -> usize {
+        self.samples.len()
+    }
+
+    /// The signed distance φ at every cell centre, in the cloud's unit, negative inside.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn sdf(&self) -> Result<&Field<T>, Error> {
+        once(&self.copies.sdf, || self.field(&self.result.sdf))
+    }
+
+    /// The indicator χ at every cell centre: below the iso-value inside, above it outside.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn indicator(&self) -> Result<&Field<T>, Error> {
+        once(&self.copies.indicator, || {
+            self.field(&self.result.indicator)
+        })
+    }
+
+    /// The level `c` of the surface `χ = c`.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn iso_value(&self) -> Result<T, Error> {
+        once(&self.copies.iso_value, || {
+            Ok(self.device.numbers(&self.result.iso_value)?[0])
+        })
+        .copied()
+    }
+
+    /// The surface, in the cloud's coordinates; its vertices do not name their lattice edges.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn mesh(&self) -> Result<&Mesh<T>, Error> {
+        once(&self.copies.mesh, || {
+            let surface = &self.result.surface;
+            let vertices = self.vectors(&surface.vertices)?;
+            let faces = vectors_of(&self.device.indices(&surface.faces)?);
+            Mesh::new(vertices, faces).map_err(|e| self.none(&e))
+        })
+    }
+
+    /// For each cell, in C order, the face of the surface closest to its centre;
+    /// [`NO_TRIANGLE`](crate::distance::NO_TRIANGLE) outside the band.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn closest(&self) -> Result<&[u32], Error> {
+        let closest = once(&self.copies.closest, || {
+            self.device.indices(self.result.closest())
+        });
+        closest.map(Vec::as_slice)
+    }
+
+    /// `(N, 3)` outward unit normals of the samples, in their order.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn normals(&self) -> Result<&[[T; 3]], Error> {
+        let normals = once(&self.copies.normals, || self.vectors(&self.result.normals));
+        normals.map(Vec::as_slice)
+    }
+
+    /// `(N,)` area of surface that each sample stands for, in unit length²; 1 without area weights.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn areas(&self) -> Result<&[T], Error> {
+        let areas = once(&self.copies.areas, || {
+            self.device.numbers(&self.result.areas)
+        });
+        areas.map(Vec::as_slice)
+    }
+
+    /// `(N,)` confidence in the sign of each normal, from 0 to 1, when it was found.
+    pub fn confidence(&self) -> &[T] {
+        &self.samples.confidence
+    }
+
+    /// `(N,)` number of samples in the neighbourhood of each, itself included, when its radius was found.
+    pub fn neighbour_counts(&self) -> &[u32] {
+        &self.samples.counts
+    }
+
+    /// Numbers, times and warnings about the reconstruction of `cloud`, the one that it was made of. With
+    /// [`Options::checks`] φ, the surface and the normals are copied for it.
+    ///
+    /// # Errors
+    /// Those of the device; [`PullbackError::Cloud`] for a cloud of another size.
+    pub fn report(&self, cloud: &PointCloud<T>) -> Result<&Report, Error> {
+        once(&self.copies.report, || self.make_report(cloud))
+    }
+
+    fn make_report(&self, cloud: &PointCloud<T>) -> Result<Report, Error> {
+        let (found, expected) = (cloud.len(), self.points());
+        if found != expected {
+            return Err(PullbackError::Cloud { found, expected }.into());
+        }
+        let start = Instant::now();
+        let mut report = self.begun.clone();
+        report.smoothing = self.result.smoothing();
+        report.iso_value = isograd::Real::f64(self.iso_value()?);
+        if self.result.surface.report.touches_wall {
+            report.warnings.push(Warning::TouchesWall);
+        }
+        if self.checks {
+            let scratch = &mut measure::Scratch::default();
+            let (normals, mesh) = (self.normals()?, self.mesh()?);
+            report.check_field(cloud.points(), normals, self.sdf()?, mesh, scratch);
+        }
+        report.warnings.extend_from_slice(&self.samples.warnings);
+        let before = report.seconds.of(Stage::Checks);
+        let seconds = before + start.elapsed().as_secs_f64();
+        report.seconds.set(Stage::Checks, seconds);
+        Ok(report)
+    }
+
+    /// Pulls cotangents of any of the results back to the points and the grid, on the device, as
+    /// [`isograd::Reconstruction::pullback`] does. Of the samples whose axis is guarded all are counted, those without a
+    /// cotangent too.
+    ///
+    /// # Errors
+    /// Those of the device; a cotangent of another length, or that is not finite; [`Error::Option`] for extended
+    /// attributes.
+    pub fn pullback(&self, cotangent: &Cotangent<'_, T>) -> Result<CloudCotangent<T>, Error> {
+        if !cotangent.extensions.is_empty() {
+            return Err(Error::Option {
+                option: "to extend attributes",
+                remedy: "leave them out",
+            });
+        }
+        let vertices = self.result.surface.vertices.len() / 3;
+        cotangent.check(self.grid.cells(), vertices, self.points())?;
+        let mut found = self.device.pullback(&self.result, cotangent)?;
+        found.guarded += self.begun.guarded;
+        Ok(found)
+    }
+
+    fn field(&self, buffer: &Buffer<T>) -> Result<Field<T>, Error> {
+        let values = self.device.numbers(buffer)?;
+        Field::new(self.grid, values).map_err(|e| self.none(&e))
+    }
+
+    fn vectors(&self, buffer: &Buffer<T>) -> Result<Vec<[T; 3]>, Error> {
+        Ok(vectors_of(&self.device.numbers(buffer)?))
+    }
+
+    fn none(&self, reason: &dyn std::fmt::Display) -> Error {
+        Error::Result {
+            device: self.device.name().into(),
+            reason: reason.to_string(),
+        }
+    }
+}
+
+/// What is there already, or what `make` makes.
+fn once<V>(place: &OnceLock<V>, make: impl FnOnce() -> Result<V, Error>) -> Result<&V, Error> {
+    if let Some(value) = place.get() {
+        return Ok(value);
+    }
+    let made = make()?;
+    Ok(place.get_or_init(|| made))
+}

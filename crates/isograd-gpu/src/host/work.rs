@@ -1,0 +1,211 @@
+//! A pipeline on any runtime, behind one type.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use cubecl::prelude::{CubeElement, Runtime};
+use isograd::{Backend, CloudCotangent, Cotangent, Grid, GridCotangent, Orienter, Stage};
+
+use super::Error;
+use crate::pipeline::{self, Held, Options, Reconstruction, Reconstructor};
+use crate::{Buffer, Device, Scalar};
+
+/// What is done on a device, whose runtime is not named.
+pub trait Work<T: Scalar>: Send + Sync {
+    /// The name that its driver gives the device.
+    fn name(&self) -> &str;
+
+    /// What was found on the CPU, on the device.
+    ///
+    /// # Errors
+    /// Those of the device.
+    fn hold(&self, found: &Orienter<T>) -> Result<Held<T>, Error>;
+
+    /// All stages; `observer` is called before each, when those before it are done.
+    ///
+    /// # Errors
+    /// Those of the pipeline.
+    fn reconstruct(
+        &self,
+        points: &[[T; 3]],
+        held: &Held<T>,
+        observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
+    ) -> Result<Reconstruction<T>, Error>;
+
+    /// Cotangents in the host's memory to such cotangents.
+    ///
+    /// # Errors
+    /// Those of the pipeline.
+    fn pullback(
+        &self,
+        result: &Reconstruction<T>,
+        cotangent: &Cotangent<'_, T>,
+    ) -> Result<CloudCotangent<T>, Error>;
+
+    /// A copy of numbers.
+    ///
+    /// # Errors
+    /// Those of the device.
+    fn numbers(&self, buffer: &Buffer<T>) -> Result<Vec<T>, Error>;
+
+    /// A copy of indices.
+    ///
+    /// # Errors
+    /// Those of the device.
+    fn indices(&self, buffer: &Buffer<u32>) -> Result<Vec<u32>, Error>;
+}
+
+/// `f32` and `f64`, compiled here.
+pub trait Number: Scalar {
+    /// A pipeline on a device.
+    ///
+    /// # Errors
+    /// Those of the device and the pipeline.
+    #[doc(hidden)]
+    fn open(
+        backend: Backend,
+        grid: Grid<Self>,
+        options: Options,
+    ) -> Result<Arc<dyn Work<Self>>, Error>;
+}
+
+macro_rules! number {
+    ($($number:ty),*) => {$(
+        impl Number for $number {
+            fn open(
+                backend: Backend,
+                grid: Grid<Self>,
+                options: Options,
+            ) -> Result<Arc<dyn Work<Self>>, Error> {
+                open(backend, grid, options)
+            }
+        }
+    )*};
+}
+
+number!(f32, f64);
+
+fn open<T: Scalar>(
+    backend: Backend,
+    grid: Grid<T>,
+    options: Options,
+) -> Result<Arc<dyn Work<T>>, Error> {
+    match backend {
+        Backend::Cpu | Backend::Auto => Err(Error::NoDevice(backend)),
+        #[cfg(feature = "cuda")]
+        Backend::Cuda(number) => on(Device::cuda(number)?, grid, options),
+        #[cfg(feature = "wgpu")]
+        Backend::Vulkan => on(Device::vulkan()?, grid, options),
+        #[allow(unreachable_patterns)] // with both features
+        backend => Err(Error::NotBuilt(backend)),
+    }
+}
+
+fn on<R: Runtime, T: Scalar>(
+    device: Device<R>,
+    grid: Grid<T>,
+    options: Options,
+) -> Result<Arc<dyn Work<T>>, Error> {
+    device.check_number::<T>()?;
+    Ok(Arc::new(Reconstructor::new(device, grid, options)?))
+}
+
+impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
+    fn name(&self) -> &str {
+        self.device().name()
+    }
+
+    fn hold(&self, found: &Orienter<T>) -> Result<Held<T>, Error> {
+        Ok(Held::of(
+            self.device(),
+            found.neighborhoods(),
+            found.axes(),
+            found.orientation(),
+        )?)
+    }
+
+    fn reconstruct(
+        &self,
+        points: &[[T; 3]],
+        held: &Held<T>,
+        observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
+    ) -> Result<Reconstruction<T>, Error> {
+        let device = self.device();
+        let points = device.upload(points.as_flattened())?;
+        let mut failed = None;
+        let mut waiting = |stage| match device.wait() {
+            Ok(()) => observer(stage),
+            Err(error) => {
+                failed = Some(error);
+                ControlFlow::Break(())
+            }
+        };
+        let result = self.reconstruct_observed(&points, held, &mut waiting);
+        match failed {
+            Some(error) => Err(error.into()),
+            None => {
+                device.wait()?;
+                Ok(result?)
+            }
+        }
+    }
+
+    fn pullback(
+        &self,
+        result: &Reconstruction<T>,
+        bars: &Cotangent<'_, T>,
+    ) -> Result<CloudCotangent<T>, Error> {
+        let device = self.device();
+        let vectors = |given: Option<&[[T; 3]]>| upload(device, given.map(<[_]>::as_flattened));
+        let level = (bars.iso_value != T::of(0.0)).then_some([bars.iso_value]);
+        let (sdf, indicator) = (upload(device, bars.sdf)?, upload(device, bars.indicator)?);
+        let (areas, level) = (
+            upload(device, bars.areas)?,
+            upload(device, level.as_ref().map(|l| &l[..]))?,
+        );
+        let (vertices, normals) = (vectors(bars.vertices)?, vectors(bars.normals)?);
+        let cotangent = pipeline::Cotangent {
+            sdf: sdf.as_ref(),
+            indicator: indicator.as_ref(),
+            iso_value: level.as_ref(),
+            vertices: vertices.as_ref(),
+            normals: normals.as_ref(),
+            areas: areas.as_ref(),
+        };
+        let found = Reconstructor::pullback(self, result, &cotangent)?;
+        let grid = device.download(&found.grid)?;
+        let guarded = match &found.guarded {
+            Some(count) => device.download(count)?[0] as usize,
+            None => 0,
+        };
+        Ok(CloudCotangent {
+            points: vectors_of(&device.download(&found.points)?),
+            grid: GridCotangent {
+                lower: [grid[0], grid[1], grid[2]],
+                spacing: grid[3],
+            },
+            guarded,
+            ..CloudCotangent::default()
+        })
+    }
+
+    fn numbers(&self, buffer: &Buffer<T>) -> Result<Vec<T>, Error> {
+        Ok(self.device().download(buffer)?)
+    }
+
+    fn indices(&self, buffer: &Buffer<u32>) -> Result<Vec<u32>, Error> {
+        Ok(self.device().download(buffer)?)
+    }
+}
+
+fn upload<R: Runtime, E: CubeElement>(
+    device: &Device<R>,
+    given: Option<&[E]>,
+) -> Result<Option<Buffer<E>>, crate::Error> {
+    given.map(|values| device.upload(values)).transpose()
+}
+
+/// `(N, 3)` from 3N numbers.
+pub fn vectors_of<E: Copy>(numbers: &[E]) -> Vec<[E; 3]> {
+    numbers.as_chunks().0.to_vec()
+}

@@ -1,0 +1,305 @@
+//! The front for hosts, beside the CPU's plan.
+
+#![cfg(feature = "wgpu")]
+
+use isograd::orient::Method;
+use isograd::{
+    Backend, Cotangent, Grid, Options, PointCloud, PullbackError, Real, Reconstructor, Resolution,
+    Stage,
+};
+use isograd_gpu::host::{Choice, Error, Number, Plan, choose};
+use isograd_shapes::Sampling;
+
+/// Whether there is a Vulkan device for this number type.
+fn is_here<T: Number>() -> bool {
+    match isograd_gpu::Device::vulkan().and_then(|device| device.check_number::<T>()) {
+        Ok(()) => true,
+        Err(error) => {
+            println!("SKIPPED {}: {error}", T::NAME);
+            false
+        }
+    }
+}
+
+fn real<T: Number>(value: f64) -> T {
+    <T as Real>::of(value)
+}
+
+fn cloud<T: Number>(count: usize) -> PointCloud<T> {
+    let shape = isograd_shapes::by_name("torus").unwrap();
+    let samples = shape.sample::<T>(count, &Sampling::default(), 3).unwrap();
+    PointCloud::new(samples.cloud.points().to_vec()).unwrap()
+}
+
+fn grid<T: Number>(cloud: &PointCloud<T>) -> Grid<T> {
+    Grid::fit(cloud, Resolution::Cells(32), real(0.1)).unwrap()
+}
+
+fn options() -> Options {
+    Options::default()
+}
+
+/// The largest difference, of the largest number.
+fn relative<T: Number>(found: &[T], expected: &[T]) -> f64 {
+    assert_eq!(found.len(), expected.len());
+    let pairs = found.iter().zip(expected);
+    let largest = expected
+        .iter()
+        .fold(0.0f64, |m, &x| m.max(Real::f64(x).abs()));
+    pairs.fold(0.0f64, |m, (&a, &b)| m.max(Real::f64(a - b).abs())) / largest
+}
+
+#[test]
+fn all_that_is_asked_for_is_what_the_cpu_gives() {
+    fn check<T: Number>(tolerance: f64) {
+        if !is_here::<T>() {
+            return;
+        }
+        let cloud = cloud::<T>(2000);
+        let grid = grid(&cloud);
+        let mut plan = Reconstructor::new(grid, options()).unwrap();
+        let expected = plan.reconstruct(&cloud).unwrap();
+        let mut plan = Plan::new(Backend::Vulkan, grid, options()).unwrap();
+        assert!(plan.name().starts_with("vulkan: "), "{}", plan.name());
+        let found = plan.reconstruct(&cloud).unwrap();
+        let close = |what: &str, found: &[T], expected: &[T]| {
+            let difference = relative(found, expected);
+            assert!(difference < tolerance, "{what} {}: {difference:e}", T::NAME);
+        };
+        let sdf = expected.sdf().values();
+        close("φ", found.sdf().unwrap().values(), sdf);
+        let chi = expected.indicator().values();
+        close("χ", found.indicator().unwrap().values(), chi);
+        close("c", &[found.iso_value().unwrap()], &[expected.iso_value()]);
+        let vertices = expected.mesh().vertices().as_flattened();
+        let mesh = found.mesh().unwrap();
+        close("vertices", mesh.vertices().as_flattened(), vertices);
+        assert_eq!(mesh.faces(), expected.mesh().faces());
+        let normals = expected.normals().as_flattened();
+        close("normals", found.normals().unwrap().as_flattened(), normals);
+        close("areas", found.areas().unwrap(), expected.areas());
+        assert_eq!(found.confidence(), expected.confidence());
+        assert_eq!(found.neighbour_counts(), expected.neighbour_counts());
+        let same = found.closest().unwrap().iter().zip(expected.closest());
+        let other = same.filter(|(a, b)| a != b).count();
+        // Where two faces share the closest point, rounding chooses.
+        assert!(
+            other * 2 < sdf.len(),
+            "{other} closest faces of {}",
+            sdf.len()
+        );
+
+        let (report, wanted) = (found.report(&cloud).unwrap(), expected.report());
+        assert_eq!(report.points, 2000);
+        assert_eq!(report.radius, wanted.radius);
+        assert_eq!(report.neighbours, wanted.neighbours);
+        assert_eq!(report.doubt, wanted.doubt);
+        assert_eq!(report.surface.euler, wanted.surface.euler);
+        assert_eq!(report.surface.faces, wanted.surface.faces);
+        assert_eq!(report.warnings, wanted.warnings);
+        assert!((report.surface.volume / wanted.surface.volume - 1.0).abs() < tolerance);
+        assert!((report.smoothing / wanted.smoothing - 1.0).abs() < tolerance);
+        for stage in Stage::ALL {
+            assert!(report.seconds.of(stage) > 0.0, "{stage:?}");
+        }
+    }
+    check::<f32>(2e-4);
+    check::<f64>(1e-9);
+}
+
+#[test]
+fn any_cotangent_comes_back_as_on_the_cpu() {
+    fn check<T: Number>(tolerance: f64) {
+        if !is_here::<T>() {
+            return;
+        }
+        let cloud = cloud::<T>(1500);
+        let grid = grid(&cloud);
+        let mut plan = Reconstructor::new(grid, options()).unwrap();
+        let expected = plan.reconstruct(&cloud).unwrap();
+        let mut plan = Plan::new(Backend::Vulkan, grid, options()).unwrap();
+        let found = plan.reconstruct(&cloud).unwrap();
+        let near = |phi: &T| Real::f64(*phi).abs() < 1.5 * Real::f64(grid.spacing());
+        let sdf = expected.sdf().values().iter();
+        let sdf: Vec<T> = sdf
+            .map(|phi| if near(phi) { *phi } else { real(0.0) })
+            .collect();
+        let indicator = expected.indicator().values();
+        let vectors = |n: usize| -> Vec<[T; 3]> {
+            let wave = |i: usize| real((0.7 * i as f64).sin());
+            (0..n)
+                .map(|i| [wave(i), wave(i + 1), wave(i + 2)])
+                .collect()
+        };
+        let (vertices, normals) = (vectors(expected.mesh().vertices().len()), vectors(1500));
+        let none = Cotangent::<T>::default();
+        for (what, bar) in [
+            (
+                "φ",
+                Cotangent {
+                    sdf: Some(&sdf),
+                    ..none
+                },
+            ),
+            (
+                "χ",
+                Cotangent {
+                    indicator: Some(indicator),
+                    ..none
+                },
+            ),
+            (
+                "c",
+                Cotangent {
+                    iso_value: real(1.0),
+                    ..none
+                },
+            ),
+            (
+                "vertices",
+                Cotangent {
+                    vertices: Some(&vertices),
+                    ..none
+                },
+            ),
+            (
+                "normals",
+                Cotangent {
+                    normals: Some(&normals),
+                    ..none
+                },
+            ),
+            (
+                "areas",
+                Cotangent {
+                    areas: Some(expected.areas()),
+                    ..none
+                },
+            ),
+        ] {
+            let wanted = expected.pullback(&cloud, &bar).unwrap();
+            let back = found.pullback(&bar).unwrap();
+            assert_eq!(back.guarded, wanted.guarded, "{what}");
+            let (a, b) = (back.points.as_flattened(), wanted.points.as_flattened());
+            let difference = relative(a, b);
+            assert!(difference < tolerance, "{what} {}: {difference:e}", T::NAME);
+        }
+        let short = &sdf[1..];
+        let bar = Cotangent {
+            sdf: Some(short),
+            ..none
+        };
+        let refused = found.pullback(&bar);
+        assert!(matches!(
+            refused,
+            Err(Error::Pullback(PullbackError::Length { .. }))
+        ));
+    }
+    check::<f32>(2e-3);
+    check::<f64>(1e-8);
+}
+
+#[test]
+fn previous_takes_the_sides_of_the_call_before() {
+    if !is_here::<f32>() {
+        return;
+    }
+    let cloud = cloud::<f32>(1500);
+    let options = Options {
+        orientation: Method::Previous,
+        ..options()
+    };
+    let mut plan = Plan::new(Backend::Vulkan, grid(&cloud), options).unwrap();
+    let first = plan.reconstruct(&cloud).unwrap();
+    let second = plan.reconstruct(&cloud).unwrap();
+    let method =
+        |of: &isograd_gpu::host::Reconstruction<f32>| of.report(&cloud).unwrap().orientation;
+    assert_eq!([method(&first), method(&second)], ["auto", "previous"]);
+    assert_eq!(first.sdf().unwrap(), second.sdf().unwrap());
+    // Another number of points is another cloud.
+    let fewer = PointCloud::new(cloud.points()[..1400].to_vec()).unwrap();
+    let third = plan.reconstruct(&fewer).unwrap();
+    assert_eq!(third.report(&fewer).unwrap().orientation, "auto");
+    assert_eq!(third.normals().unwrap().len(), 1400);
+}
+
+#[test]
+fn a_call_with_other_points_finds_their_sides_anew() {
+    if !is_here::<f32>() {
+        return;
+    }
+    let cloud = cloud::<f32>(1500);
+    let reversed = cloud.points().iter().rev().copied().collect();
+    let reversed = PointCloud::new(reversed).unwrap();
+    let mut plan = Plan::new(Backend::Vulkan, grid(&cloud), options()).unwrap();
+    plan.reconstruct(&cloud).unwrap();
+    let again = plan.reconstruct(&reversed).unwrap();
+    assert!(again.report(&reversed).unwrap().surface.closed);
+}
+
+#[test]
+fn what_devices_do_not_have_is_named() {
+    if !is_here::<f32>() {
+        return;
+    }
+    let cloud = cloud::<f32>(500);
+    let refused = |options: Options| {
+        let plan = Plan::new(Backend::Vulkan, grid(&cloud), options);
+        plan.err().expect("refused").to_string()
+    };
+    let text = refused(Options {
+        orientation: Method::Given,
+        ..options()
+    });
+    assert!(text.contains("given normals"), "{text}");
+    let text = refused(Options {
+        screening: -1.0,
+        ..options()
+    });
+    assert!(text.contains("0 or more"), "{text}");
+    let plan = Plan::new(Backend::Cpu, grid(&cloud), options());
+    assert!(matches!(plan.err(), Some(Error::NoDevice(Backend::Cpu))));
+}
+
+#[test]
+fn a_choice_that_is_left_to_the_program_never_fails() {
+    let cloud = cloud::<f32>(500);
+    match choose(Backend::Auto, grid(&cloud), &options()) {
+        Ok(Choice::Cpu(Some(note))) => {
+            assert!(note.contains("Vulkan"), "{note}");
+            #[cfg(not(feature = "cuda"))]
+            assert!(
+                note.contains("cuda is not built into this program"),
+                "{note}"
+            );
+        }
+        Ok(Choice::Cpu(None)) => panic!("no reason"),
+        Ok(Choice::Device(plan)) => println!("there is a GPU: {}", plan.name()),
+        Err(error) => panic!("{error}"),
+    }
+}
+
+#[test]
+fn an_observer_that_breaks_stops_the_work() {
+    use std::ops::ControlFlow::{Break, Continue};
+    if !is_here::<f32>() {
+        return;
+    }
+    let cloud = cloud::<f32>(500);
+    for stop in [Stage::Normals, Stage::Orient, Stage::Splat, Stage::Distance] {
+        let mut plan = Plan::new(Backend::Vulkan, grid(&cloud), options()).unwrap();
+        let mut seen = Vec::new();
+        let mut observer = |stage| {
+            seen.push(stage);
+            if stage == stop {
+                Break(())
+            } else {
+                Continue(())
+            }
+        };
+        let stopped = plan.reconstruct_observed(&cloud, &mut observer).err();
+        assert!(matches!(stopped, Some(Error::Interrupted(stage)) if stage == stop));
+        let place = Stage::ALL.iter().position(|&stage| stage == stop).unwrap();
+        assert_eq!(seen, Stage::ALL[..=place]);
+    }
+}
