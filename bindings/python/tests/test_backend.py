@@ -61,10 +61,16 @@ def test_a_plan_on_a_device_is_used_again_and_follows_its_body():
     assert methods == ["auto", "previous", "previous"]
 
 
+def test_given_normals_on_a_device_have_gradients():
+    normals = isograd.sample("torus", 2000).normals.astype(np.float32)
+    found, expected = (plan(b, orient="given")(POINTS, normals=normals) for b in ("vulkan", "cpu"))
+    assert off(found.sdf, expected.sdf) < 2e-4
+    near = np.where(np.abs(expected.sdf) < 1.5 * GRID.spacing, expected.sdf, 0)
+    a, b = found.pullback(near), expected.pullback(near)
+    assert off(a.points, b.points) < 2e-3 and off(a.normals, b.normals) < 2e-3
+
+
 def test_what_devices_do_not_have_is_named():
-    plan("vulkan")
-    with pytest.raises(ValueError, match="given normals"):
-        isograd.Reconstructor(GRID, OPTIONS, backend="vulkan", orient="given")
     result = plan("vulkan")(POINTS, attributes={"a": POINTS})
     with pytest.raises(ValueError, match="not for devices yet"):
         result.extend("a", band=3.0)

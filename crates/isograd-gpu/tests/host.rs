@@ -238,6 +238,49 @@ fn a_call_with_other_points_finds_their_sides_anew() {
 }
 
 #[test]
+fn given_normals_are_taken_and_have_cotangents() {
+    if !is_here::<f32>() {
+        return;
+    }
+    let cloud = cloud::<f32>(2000);
+    let grid = grid(&cloud);
+    let options = Options {
+        orientation: Method::Given,
+        ..options()
+    };
+    let mut plan = Plan::new(Backend::Vulkan, grid, options.clone()).unwrap();
+    let text = plan.reconstruct(&cloud).err().expect("refused").to_string();
+    assert!(text.contains("no normals"), "{text}");
+    // A little off, and of length 2.
+    let shape = isograd_shapes::by_name("torus").unwrap();
+    let samples = shape.sample::<f32>(2000, &Sampling::default(), 3).unwrap();
+    let given = samples.cloud.normals().unwrap().iter();
+    let given = given.map(|&[x, y, z]| [2.0 * x + 0.1, 2.0 * y, 2.0 * z - 0.1]);
+    let cloud = cloud.with_normals(given.collect()).unwrap();
+    let found = plan.reconstruct(&cloud).unwrap();
+    let mut plan = Reconstructor::new(grid, options).unwrap();
+    let expected = plan.reconstruct(&cloud).unwrap();
+    let sdf = expected.sdf().values();
+    let difference = relative(found.sdf().unwrap().values(), sdf);
+    assert!(difference < 2e-4, "{difference:e}");
+    let near = |&phi: &f32| if phi.abs() < grid.spacing() { phi } else { 0.0 };
+    let bar: Vec<f32> = sdf.iter().map(near).collect();
+    let cotangent = Cotangent {
+        sdf: Some(&bar),
+        ..Cotangent::default()
+    };
+    let found = found.pullback(&cotangent).unwrap();
+    let expected = expected.pullback(&cloud, &cotangent).unwrap();
+    for (found, expected) in [
+        (&found.points, &expected.points),
+        (&found.normals, &expected.normals),
+    ] {
+        let difference = relative(found.as_flattened(), expected.as_flattened());
+        assert!(difference < 2e-3, "{difference:e}");
+    }
+}
+
+#[test]
 fn what_devices_do_not_have_is_named() {
     if !is_here::<f32>() {
         return;
@@ -247,11 +290,6 @@ fn what_devices_do_not_have_is_named() {
         let plan = Plan::new(Backend::Vulkan, grid(&cloud), options);
         plan.err().expect("refused").to_string()
     };
-    let text = refused(Options {
-        orientation: Method::Given,
-        ..options()
-    });
-    assert!(text.contains("given normals"), "{text}");
     let text = refused(Options {
         screening: -1.0,
         ..options()

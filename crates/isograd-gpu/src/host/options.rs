@@ -1,7 +1,5 @@
 //! Options of the CPU's pipeline as those of the device's.
 
-use isograd::orient::Method;
-
 use super::Error;
 use crate::pipeline;
 
@@ -15,12 +13,6 @@ pub fn translate(options: &isograd::Options) -> Result<pipeline::Options, Error>
     }
     if !(options.screening >= 0.0) || !options.screening.is_finite() {
         return Err(isograd::Error::Screening(options.screening).into());
-    }
-    if options.orientation == Method::Given {
-        return Err(Error::Option {
-            option: "to take given normals as they are",
-            remedy: "take their sides alone (signs)",
-        });
     }
     Ok(pipeline::Options {
         weights: options.weights,

@@ -98,8 +98,11 @@ impl<T: Number> Plan<T> {
                 stage => observer(stage),
             }
         };
-        let points = cloud.points();
-        let result = self.device.reconstruct(points, &held, &mut timed)?;
+        let is_given = self.options.orientation == Method::Given;
+        let given = cloud.normals().filter(|_| is_given);
+        let result = self
+            .device
+            .reconstruct(cloud.points(), given, &held, &mut timed)?;
         clock.note(&mut report, stage_before);
         if self.options.orientation == Method::Previous {
             let held = held.facing(result.normals.clone())?;

@@ -21,13 +21,14 @@ pub trait Work<T: Scalar>: Send + Sync {
     /// Those of the device.
     fn hold(&self, found: &Orienter<T>) -> Result<Held<T>, Error>;
 
-    /// All stages; `observer` is called before each, when those before it are done.
+    /// All stages, with given normals or without; `observer` is called before each, when those before it are done.
     ///
     /// # Errors
     /// Those of the pipeline.
     fn reconstruct(
         &self,
         points: &[[T; 3]],
+        given: Option<&[[T; 3]]>,
         held: &Held<T>,
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
     ) -> Result<Reconstruction<T>, Error>;
@@ -127,11 +128,13 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
     fn reconstruct(
         &self,
         points: &[[T; 3]],
+        given: Option<&[[T; 3]]>,
         held: &Held<T>,
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
     ) -> Result<Reconstruction<T>, Error> {
         let device = self.device();
         let points = device.upload(points.as_flattened())?;
+        let given = upload(device, given.map(<[_]>::as_flattened))?;
         let mut failed = None;
         let mut waiting = |stage| match device.wait() {
             Ok(()) => observer(stage),
@@ -140,7 +143,7 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
                 ControlFlow::Break(())
             }
         };
-        let result = self.reconstruct_observed(&points, held, &mut waiting);
+        let result = self.reconstruct_observed(&points, given.as_ref(), held, &mut waiting);
         match failed {
             Some(error) => Err(error.into()),
             None => {
@@ -178,8 +181,13 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
             Some(count) => device.download(count)?[0] as usize,
             None => 0,
         };
+        let normals = match &found.normals {
+            Some(normals) => vectors_of(&device.download(normals)?),
+            None => Vec::new(),
+        };
         Ok(CloudCotangent {
             points: vectors_of(&device.download(&found.points)?),
+            normals,
             grid: GridCotangent {
                 lower: [grid[0], grid[1], grid[2]],
                 spacing: grid[3],

@@ -29,8 +29,9 @@ pub struct Held<T> {
 }
 
 impl<T: Scalar> Held<T> {
-    /// Finds all of it on the CPU. `method` is any but [`Method::Given`], for which there are no axes to turn,
-    /// and [`Method::Previous`], which [`Self::facing`] takes the place of.
+    /// Finds all of it on the CPU. `method` is any but [`Method::Previous`], which [`Self::facing`] takes the place
+    /// of. With [`Method::Given`] there are no axes to turn: it is what
+    /// [`reconstruct_given`](super::Reconstructor::reconstruct_given) holds.
     ///
     /// # Errors
     /// What neighbours, normals or orientation say of the cloud; [`Error::Device`].
@@ -40,11 +41,12 @@ impl<T: Scalar> Held<T> {
         radius: Radius,
         method: &Method,
     ) -> Result<Self, Error> {
-        if matches!(method, Method::Given | Method::Previous) {
-            return Err(Error::Orientation);
-        }
         let (mut near, mut axes) = (Neighborhoods::default(), normals::Residual::default());
-        normals::forward_with_neighborhoods(cloud.points(), radius, &mut near, &mut axes)?;
+        match method {
+            Method::Previous => return Err(Error::Orientation),
+            Method::Given => isograd::neighbors::forward(cloud.points(), radius, &mut near)?,
+            _ => normals::forward_with_neighborhoods(cloud.points(), radius, &mut near, &mut axes)?,
+        }
         let mut found = Orientation::default();
         let scratch = &mut orient::Scratch::default();
         orient::forward(
@@ -69,8 +71,13 @@ impl<T: Scalar> Held<T> {
         axes: &normals::Residual<T>,
         found: &Orientation<T>,
     ) -> Result<Self, crate::Error> {
+        // Empty where all normals were given.
+        let radii = match axes.radius.is_empty() {
+            true => &near.radius,
+            false => &axes.radius,
+        };
         Ok(Self {
-            radii: device.upload(&axes.radius)?,
+            radii: device.upload(radii)?,
             area_radii: device.upload(&near.radius)?,
             common_radius: near.common_radius,
             spacing: near.spacing(),

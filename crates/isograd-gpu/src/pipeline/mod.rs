@@ -11,23 +11,23 @@
 //! # Not differentiable
 //! What is held, and what the stages say of themselves.
 
+mod forward;
 mod held;
 mod pullback;
 
+pub use forward::Observer;
 pub use held::Held;
 pub use pullback::{CloudCotangent, Cotangent};
-
-use std::ops::ControlFlow;
 
 use cubecl::prelude::Runtime;
 use isograd::isosurface::Level;
 use isograd::poisson::Smoothing;
 use isograd::{Grid, Stage};
 
-use crate::distance::{self, Band, Mesh};
+use crate::distance::{self, Band};
 use crate::iso_value::local;
 use crate::isosurface::{self, Surface};
-use crate::splat::{self, Refused, Samples, Weights};
+use crate::splat::{self, Weights};
 use crate::{Buffer, Device, Scalar, area, iso_value, neighbors, normals, poisson};
 
 /// Why there is no result.
@@ -42,10 +42,8 @@ pub enum Error {
     /// The orientation.
     #[error(transparent)]
     Orient(#[from] isograd::orient::Error),
-    /// A way to orient that has nothing to turn.
-    #[error(
-        "given normals and those of the step before are no choice here: take signs of given normals, or Held::facing"
-    )]
+    /// A way to orient that needs a step before.
+    #[error("there is no step before here: take its normals by Held::facing")]
     Orientation,
     /// The smoothing makes no sense.
     #[error("the smoothing is {0:?}; it must be 0 or more cells, and finite")]
@@ -157,14 +155,12 @@ pub struct Reconstruction<T: Scalar> {
     /// `(N,)` areas, in that unit squared; 1 where samples do not count by them.
     pub areas: Buffer<T>,
     points: Buffer<T>,
-    axes: Buffer<T>,
-    outward: Buffer<T>,
     residuals: Residuals<T>,
 }
 
 /// What the stages kept for their pullbacks.
 struct Residuals<T: Scalar> {
-    normals: normals::Residual<T>,
+    normals: Source<T>,
     /// None where samples do not count by their areas.
     areas: Option<area::Residual<T>>,
     splat: splat::Residual<T>,
@@ -174,6 +170,18 @@ struct Residuals<T: Scalar> {
     local_level: Option<local::Residual<T>>,
     surface: isosurface::Residual<T>,
     distance: distance::lattice::Residual<T>,
+}
+
+/// Where the outward normals come from.
+enum Source<T> {
+    /// From axes, turned to the side of `outward`.
+    Axes {
+        axes: Buffer<T>,
+        outward: Buffer<T>,
+        residual: normals::Residual<T>,
+    },
+    /// From vectors that were given.
+    Given(Buffer<T>),
 }
 
 /// Width of the smoothing, and the areas that it follows.
@@ -222,152 +230,5 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
     /// Where it works.
     pub fn device(&self) -> &Device<R> {
         &self.device
-    }
-
-    /// The reconstruction of `points` `(N, 3)`, finite, in the user's unit.
-    ///
-    /// # Errors
-    /// As [`Error`] lists.
-    pub fn reconstruct(
-        &self,
-        points: &Buffer<T>,
-        held: &Held<T>,
-    ) -> Result<Reconstruction<T>, Error> {
-        self.reconstruct_observed(points, held, &mut |_| ControlFlow::Continue(()))
-    }
-
-    /// The same, calling `observer` before each stage is queued; where it breaks, so does the work. One that wants
-    /// to know how long a stage takes must [wait](Device::wait).
-    ///
-    /// # Errors
-    /// As [`Self::reconstruct`], and [`Error::Interrupted`] where the observer breaks.
-    pub fn reconstruct_observed(
-        &self,
-        points: &Buffer<T>,
-        held: &Held<T>,
-        observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
-    ) -> Result<Reconstruction<T>, Error> {
-        let mut begin = |stage| match observer(stage) {
-            ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(Error::Interrupted(stage)),
-        };
-        begin(Stage::Normals)?;
-        let (device, grid, options) = (&self.device, &self.grid, &self.options);
-        let near = neighbors::forward(device, points, &held.radii)?;
-        let (axes, of_normals) = normals::forward(device, &near)?;
-        let (areas, of_areas) = self.areas(&near, held)?;
-        let normals = held::turn(device, &axes, &axes, &held.outward)?;
-        let width = self.width(&areas, held)?;
-        let samples = Samples {
-            points,
-            normals: &normals,
-            areas: &areas,
-        };
-        begin(Stage::Splat)?;
-        let (b, of_splat) = splat::forward(device, samples, grid, options.weights)?;
-        if let Some(Refused { count, first }) = of_splat.refused(device)? {
-            return Err(Error::Outside { count, first });
-        }
-        begin(Stage::Poisson)?;
-        let chi = self.solver.solve(device, &b, width.cells)?;
-        drop(b);
-        if options.screening > 0.0 {
-            let equation = self.screened_equation(samples, &of_splat);
-            poisson::screened::forward(device, &equation, &chi)?;
-        }
-        let (level, of_level) = iso_value::forward(device, &chi, grid, points, &areas)?;
-        let (chi, of_local_level) = self.local_level(chi, samples, width, &of_level, &of_splat)?;
-        begin(Stage::Isosurface)?;
-        let (surface, of_surface) = isosurface::forward(device, &self.surface, &chi, &level, grid)?;
-        let mesh = Mesh {
-            vertices: surface.vertices.clone(),
-            faces: surface.faces.clone(),
-        };
-        begin(Stage::Distance)?;
-        let (sdf, of_distance) =
-            distance::lattice::forward(device, &mesh, grid, &chi, &level, options.band)?;
-        Ok(Reconstruction {
-            sdf,
-            indicator: chi,
-            iso_value: level,
-            surface,
-            points: points.clone(),
-            outward: held.outward.clone(),
-            axes,
-            normals,
-            areas,
-            residuals: Residuals {
-                normals: of_normals,
-                areas: of_areas,
-                splat: of_splat,
-                smoothing: width,
-                iso_value: of_level,
-                local_level: of_local_level,
-                surface: of_surface,
-                distance: of_distance,
-            },
-        })
-    }
-
-    /// The areas that samples count by.
-    fn areas(
-        &self,
-        near: &neighbors::Neighborhoods<T>,
-        held: &Held<T>,
-    ) -> Result<(Buffer<T>, Option<area::Residual<T>>), Error> {
-        let device = &self.device;
-        if !self.options.area_weights {
-            return Ok((device.upload(&vec![T::of(1.0); near.len()])?, None));
-        }
-        let near = neighbors::with_radii(device, near, &held.area_radii)?;
-        let (areas, residual) = area::forward(device, &near, held.common_radius)?;
-        Ok((areas, Some(residual)))
-    }
-
-    fn screened_equation<'a>(
-        &'a self,
-        samples: Samples<'a, T>,
-        splat: &'a splat::Residual<T>,
-    ) -> poisson::screened::Equation<'a, T> {
-        poisson::screened::Equation {
-            solver: &self.solver,
-            samples,
-            area_weights: self.options.area_weights,
-            splat,
-            screening: self.options.screening,
-        }
-    }
-
-    /// The indicator whose surface is at the mean everywhere.
-    fn local_level(
-        &self,
-        chi: Buffer<T>,
-        samples: Samples<'_, T>,
-        width: Width,
-        mean: &iso_value::Residual<T>,
-        splat: &splat::Residual<T>,
-    ) -> Result<(Buffer<T>, Option<local::Residual<T>>), Error> {
-        if self.options.level == Level::Mean {
-            return Ok((chi, None));
-        }
-        let choice = local::Choice {
-            area_weights: self.options.area_weights,
-            smoothing: width.cells,
-            thin: self.options.level == Level::Thin,
-        };
-        let (chi, residual) = local::forward(&self.device, &chi, samples, choice, mean, splat)?;
-        Ok((chi, Some(residual)))
-    }
-
-    /// How much the indicator is smoothed.
-    fn width(&self, areas: &Buffer<T>, held: &Held<T>) -> Result<Width, Error> {
-        let automatic = self.options.smoothing == Smoothing::Auto;
-        let areas = match automatic && self.options.area_weights {
-            true => area::mean(&self.device, areas)?,
-            false => (held.spacing.f64().powi(2), 0),
-        };
-        let apart = areas.0.sqrt() / self.grid.spacing().f64();
-        let cells = self.options.smoothing.cells(apart);
-        Ok(Width { cells, areas })
     }
 }

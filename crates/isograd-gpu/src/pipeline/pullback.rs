@@ -2,12 +2,12 @@
 
 use cubecl::prelude::*;
 
-use super::{Error, Reconstruction, Reconstructor, held};
+use super::{Error, Reconstruction, Reconstructor, Source, held};
 use crate::device::check_length;
 use crate::iso_value::local;
 use crate::primitives::fill::{add, zeros};
 use crate::splat::{self, SampleCotangent, Samples};
-use crate::{Buffer, Scalar, area, distance, iso_value, isosurface, normals, poisson};
+use crate::{Buffer, Scalar, area, distance, iso_value, isosurface, normals, orient, poisson};
 
 /// Units of a group.
 const BLOCK: u32 = 256;
@@ -56,6 +56,8 @@ impl<T> Cotangent<'_, T> {
 pub struct CloudCotangent<T> {
     /// `(N, 3)` of the points.
     pub points: Buffer<T>,
+    /// `(N, 3)` of the given normals; none where the normals were found.
+    pub normals: Option<Buffer<T>>,
     /// `(4,)` of the low corner of the grid and of its cell size, at fixed points.
     pub grid: Buffer<T>,
     /// `(1,)` vertices whose derivative has no bound, and a bounded one was taken; none where none was asked for.
@@ -86,15 +88,26 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             true => Some(self.pull_indicator(result, cotangent, &bars)?),
             false => None,
         };
-        let axes_bar = held::turn(device, &bars.normals, &result.axes, &result.outward)?;
-        let by_axes = normals::pullback(device, &residuals.normals, &axes_bar)?;
-        add(device, &by_axes, &bars.points)?;
+        let given = match &residuals.normals {
+            Source::Axes {
+                axes,
+                outward,
+                residual,
+            } => {
+                let axes_bar = held::turn(device, &bars.normals, axes, outward)?;
+                let by_axes = normals::pullback(device, residual, &axes_bar)?;
+                add(device, &by_axes, &bars.points)?;
+                None
+            }
+            Source::Given(given) => Some(orient::given::pullback(device, given, &bars.normals)?),
+        };
         if let Some(areas) = &residuals.areas {
             let by_areas = area::pullback(device, areas, &bars.areas)?;
             add(device, &by_areas, &bars.points)?;
         }
         Ok(CloudCotangent {
             points: bars.points,
+            normals: given,
             grid: bars.grid,
             guarded,
         })

@@ -1,0 +1,253 @@
+//! The stages in order.
+
+use std::ops::ControlFlow;
+
+use cubecl::prelude::Runtime;
+use isograd::Stage;
+use isograd::isosurface::Level;
+use isograd::poisson::Smoothing;
+
+use super::{Error, Held, Reconstruction, Reconstructor, Residuals, Source, Width, held};
+use crate::distance::{self, Mesh};
+use crate::iso_value::local;
+use crate::splat::{self, Refused, Samples};
+use crate::{Buffer, Scalar, area, iso_value, isosurface, neighbors, normals, orient, poisson};
+
+/// Called before each stage is queued; where it breaks, so does the work. One that wants to know how long a stage
+/// takes must [wait](crate::Device::wait).
+pub type Observer<'a> = dyn FnMut(Stage) -> ControlFlow<()> + 'a;
+
+/// What the first stages found of the samples.
+struct Found<T> {
+    normals: Buffer<T>,
+    areas: Buffer<T>,
+    source: Source<T>,
+    of_areas: Option<area::Residual<T>>,
+    width: Width,
+}
+
+/// The indicator whose surface is at the level, and what its pullback needs.
+struct Solved<T> {
+    chi: Buffer<T>,
+    level: Buffer<T>,
+    of_level: iso_value::Residual<T>,
+    of_local_level: Option<local::Residual<T>>,
+}
+
+impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
+    /// The reconstruction of `points` `(N, 3)`, finite, in the user's unit.
+    ///
+    /// # Errors
+    /// As [`Error`] lists.
+    pub fn reconstruct(
+        &self,
+        points: &Buffer<T>,
+        held: &Held<T>,
+    ) -> Result<Reconstruction<T>, Error> {
+        self.reconstruct_observed(points, None, held, &mut |_| ControlFlow::Continue(()))
+    }
+
+    /// The same with outward normals that are `given`: `(N, 3)` of any length but 0. Of `held`, what areas need is used.
+    ///
+    /// # Errors
+    /// As [`Error`] lists.
+    pub fn reconstruct_given(
+        &self,
+        points: &Buffer<T>,
+        given: &Buffer<T>,
+        held: &Held<T>,
+    ) -> Result<Reconstruction<T>, Error> {
+        let observer = &mut |_| ControlFlow::Continue(());
+        self.reconstruct_observed(points, Some(given), held, observer)
+    }
+
+    /// The same, with or without given normals, and an observer.
+    ///
+    /// # Errors
+    /// As [`Error`] lists; [`Error::Interrupted`] where the observer breaks.
+    pub fn reconstruct_observed(
+        &self,
+        points: &Buffer<T>,
+        given: Option<&Buffer<T>>,
+        held: &Held<T>,
+        observer: &mut Observer<'_>,
+    ) -> Result<Reconstruction<T>, Error> {
+        let mut begin = |stage| match observer(stage) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(Error::Interrupted(stage)),
+        };
+        begin(Stage::Normals)?;
+        let (device, grid, options) = (&self.device, &self.grid, &self.options);
+        let found = self.find_samples(points, given, held)?;
+        let samples = Samples {
+            points,
+            normals: &found.normals,
+            areas: &found.areas,
+        };
+        begin(Stage::Splat)?;
+        let (b, of_splat) = splat::forward(device, samples, grid, options.weights)?;
+        if let Some(Refused { count, first }) = of_splat.refused(device)? {
+            return Err(Error::Outside { count, first });
+        }
+        begin(Stage::Poisson)?;
+        let solved = self.solve(b, samples, found.width, &of_splat)?;
+        begin(Stage::Isosurface)?;
+        let (chi, level) = (&solved.chi, &solved.level);
+        let (surface, of_surface) = isosurface::forward(device, &self.surface, chi, level, grid)?;
+        let mesh = Mesh {
+            vertices: surface.vertices.clone(),
+            faces: surface.faces.clone(),
+        };
+        begin(Stage::Distance)?;
+        let (sdf, of_distance) =
+            distance::lattice::forward(device, &mesh, grid, chi, level, options.band)?;
+        Ok(Reconstruction {
+            sdf,
+            indicator: solved.chi,
+            iso_value: solved.level,
+            surface,
+            points: points.clone(),
+            normals: found.normals,
+            areas: found.areas,
+            residuals: Residuals {
+                normals: found.source,
+                areas: found.of_areas,
+                splat: of_splat,
+                smoothing: found.width,
+                iso_value: solved.of_level,
+                local_level: solved.of_local_level,
+                surface: of_surface,
+                distance: of_distance,
+            },
+        })
+    }
+
+    /// Outward normals and areas.
+    fn find_samples(
+        &self,
+        points: &Buffer<T>,
+        given: Option<&Buffer<T>>,
+        held: &Held<T>,
+    ) -> Result<Found<T>, Error> {
+        let device = &self.device;
+        let radii = match given {
+            Some(_) => &held.area_radii,
+            None => &held.radii,
+        };
+        let near = neighbors::forward(device, points, radii)?;
+        let (normals, source) = match given {
+            Some(given) => {
+                let normals = orient::given::forward(device, given)?;
+                (normals, Source::Given(given.clone()))
+            }
+            None => {
+                let (axes, residual) = normals::forward(device, &near)?;
+                let outward = held.outward.clone();
+                let normals = held::turn(device, &axes, &axes, &outward)?;
+                let source = Source::Axes {
+                    axes,
+                    outward,
+                    residual,
+                };
+                (normals, source)
+            }
+        };
+        let (areas, of_areas) = self.areas(&near, held)?;
+        let width = self.width(&areas, held)?;
+        Ok(Found {
+            normals,
+            areas,
+            source,
+            of_areas,
+            width,
+        })
+    }
+
+    /// The areas that samples count by.
+    fn areas(
+        &self,
+        near: &neighbors::Neighborhoods<T>,
+        held: &Held<T>,
+    ) -> Result<(Buffer<T>, Option<area::Residual<T>>), Error> {
+        let device = &self.device;
+        if !self.options.area_weights {
+            return Ok((device.upload(&vec![T::of(1.0); near.len()])?, None));
+        }
+        let near = neighbors::with_radii(device, near, &held.area_radii)?;
+        let (areas, residual) = area::forward(device, &near, held.common_radius)?;
+        Ok((areas, Some(residual)))
+    }
+
+    /// From the right-hand side, which is let go, to the indicator and its level.
+    fn solve(
+        &self,
+        b: Buffer<T>,
+        samples: Samples<'_, T>,
+        width: Width,
+        splat: &splat::Residual<T>,
+    ) -> Result<Solved<T>, Error> {
+        let (device, grid) = (&self.device, &self.grid);
+        let chi = self.solver.solve(device, &b, width.cells)?;
+        drop(b);
+        if self.options.screening > 0.0 {
+            let equation = self.screened_equation(samples, splat);
+            poisson::screened::forward(device, &equation, &chi)?;
+        }
+        let (level, of_level) =
+            iso_value::forward(device, &chi, grid, samples.points, samples.areas)?;
+        let (chi, of_local_level) = self.local_level(chi, samples, width, &of_level, splat)?;
+        Ok(Solved {
+            chi,
+            level,
+            of_level,
+            of_local_level,
+        })
+    }
+
+    pub(super) fn screened_equation<'a>(
+        &'a self,
+        samples: Samples<'a, T>,
+        splat: &'a splat::Residual<T>,
+    ) -> poisson::screened::Equation<'a, T> {
+        poisson::screened::Equation {
+            solver: &self.solver,
+            samples,
+            area_weights: self.options.area_weights,
+            splat,
+            screening: self.options.screening,
+        }
+    }
+
+    /// The indicator whose surface is at the mean everywhere.
+    fn local_level(
+        &self,
+        chi: Buffer<T>,
+        samples: Samples<'_, T>,
+        width: Width,
+        mean: &iso_value::Residual<T>,
+        splat: &splat::Residual<T>,
+    ) -> Result<(Buffer<T>, Option<local::Residual<T>>), Error> {
+        if self.options.level == Level::Mean {
+            return Ok((chi, None));
+        }
+        let choice = local::Choice {
+            area_weights: self.options.area_weights,
+            smoothing: width.cells,
+            thin: self.options.level == Level::Thin,
+        };
+        let (chi, residual) = local::forward(&self.device, &chi, samples, choice, mean, splat)?;
+        Ok((chi, Some(residual)))
+    }
+
+    /// How much the indicator is smoothed.
+    fn width(&self, areas: &Buffer<T>, held: &Held<T>) -> Result<Width, Error> {
+        let automatic = self.options.smoothing == Smoothing::Auto;
+        let areas = match automatic && self.options.area_weights {
+            true => area::mean(&self.device, areas)?,
+            false => (held.spacing.f64().powi(2), 0),
+        };
+        let apart = areas.0.sqrt() / self.grid.spacing().f64();
+        let cells = self.options.smoothing.cells(apart);
+        Ok(Width { cells, areas })
+    }
+}
