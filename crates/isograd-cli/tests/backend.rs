@@ -93,7 +93,8 @@ mod vulkan {
         let run = bench.done(&format!(
             "reconstruct cloud.ply -o gpu {METHOD} --backend vulkan"
         ));
-        assert!(run.stderr.is_empty(), "{run:?}");
+        // Mesa's layers may have something to say of the session.
+        assert!(!run.stderr.contains("warning"), "{run:?}");
         let files = bench.files();
         let of = |folder: &str| {
             let names = files.iter().filter_map(|f| f.strip_prefix(folder));
@@ -174,8 +175,8 @@ mod vulkan {
         let line = "reconstruct cloud.ply --mesh m.ply --resolution 24 --bounds 0 0 0 1 1 1";
         bench
             .run(line)
-            .says(1, &["cloud.ply: ", "outside the grid"]);
+            .says(1, &["cloud.ply: ", "use more padding"]);
         let run = bench.run(&format!("{line} --backend vulkan"));
-        run.says(1, &["cloud.ply: ", "outside the grid"]);
+        run.says(1, &["cloud.ply: ", "use more padding"]);
     }
 }
