@@ -147,7 +147,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
                 let source = Source::Axes {
                     axes,
                     outward,
-                    residual,
+                    residual: residual.into(),
                 };
                 (normals, source)
             }

@@ -178,7 +178,7 @@ enum Source<T> {
     Axes {
         axes: Buffer<T>,
         outward: Buffer<T>,
-        residual: normals::Residual<T>,
+        residual: Box<normals::Residual<T>>,
     },
     /// From vectors that were given.
     Given(Buffer<T>),
