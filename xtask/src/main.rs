@@ -44,6 +44,7 @@ Figures and pages
                    alone meanwhile
   gallery          docs/images/: pictures of the clouds in examples/clouds
   fit              docs/fit.md: a fish found from its signed distance field
+  gpu              docs/gpu.md: time and memory on a GPU; where there is none, memory alone
   bench [ARGS]     the benchmarks, every stage and the whole; --quick for a short run,
                    a stage's name for that stage; other arguments go to criterion
   peers [ARGS]     docs/peers.md: isograd beside other libraries, measured in one
@@ -86,6 +87,7 @@ fn run(command: &str, rest: &[String]) -> Option<Outcome> {
         ("accuracy", []) => Some(pages::accuracy()),
         ("gradients", []) => Some(pages::gradients()),
         ("orientation", []) => Some(pages::orientation()),
+        ("gpu", []) => Some(pages::gpu()),
         ("scaling", []) => Some(pages::scaling()),
         ("gallery", []) => Some(pages::gallery()),
         ("fit", []) => Some(fit::run()),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::process::{self, Outcome};
 
-/// Everything that a command makes, but for the comparison with peers, which needs Python.
+/// Everything that a command makes, but for the comparison with peers, which needs Python, and what needs a GPU.
 pub fn all() -> Outcome {
     accuracy()?;
     gradients()?;
@@ -33,6 +33,18 @@ pub fn orientation() -> Outcome {
 /// `docs/scaling.md`, with its numbers and picture.
 pub fn scaling() -> Outcome {
     program("isograd-scaling")
+}
+
+/// `docs/gpu.json`, and the part of `docs/gpu.md` about speed.
+pub fn gpu() -> Outcome {
+    process::run(&mut process::cargo([
+        "run",
+        "--release",
+        "--package",
+        "isograd-gpu-times",
+        "--features",
+        "cuda",
+    ]))
 }
 
 /// Runs the program of a package, which writes its page.

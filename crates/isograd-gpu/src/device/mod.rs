@@ -88,6 +88,15 @@ pub enum Error {
     },
 }
 
+/// Memory of a device that this program has, in bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Memory {
+    /// In arrays.
+    pub in_use: u64,
+    /// In arrays, and kept for others.
+    pub reserved: u64,
+}
+
 /// An open device: what kernels are launched on.
 ///
 /// Work is queued in the order of the calls, and a call returns before the device has done it;
@@ -188,6 +197,28 @@ impl<R: Runtime> Device<R> {
     /// [`Error::Failed`].
     pub fn wait(&self) -> Result<(), Error> {
         cubecl::future::block_on(self.client.sync()).map_err(|e| self.failed(&e))
+    }
+
+    /// What this program has of the device's memory.
+    ///
+    /// # Errors
+    /// [`Error::Failed`].
+    pub fn memory(&self) -> Result<Memory, Error> {
+        let usage = self.client.memory_usage().map_err(|e| self.failed(&e))?;
+        Ok(Memory {
+            in_use: usage.bytes_in_use,
+            reserved: usage.bytes_reserved,
+        })
+    }
+
+    /// Gives memory that no array uses back to the driver, as far as it takes it. Waits for all that was queued.
+    ///
+    /// # Errors
+    /// [`Error::Failed`].
+    pub fn release(&self) -> Result<(), Error> {
+        self.wait()?;
+        self.client.memory_cleanup();
+        self.wait()
     }
 
     /// Groups of `block` units for at least `count` units, as many along y as it takes to stay within the
