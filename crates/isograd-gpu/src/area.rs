@@ -17,7 +17,7 @@ use cubecl::prelude::*;
 
 use crate::device::check_length;
 use crate::element::plane;
-use crate::neighbors::{BLOCK, Neighborhoods, end_of_leaf, first_of_leaf, next_leaf};
+use crate::neighbors::{BLOCK, Neighborhoods, end_of_leaf, first_of_leaf, is_isolated, next_leaf};
 use crate::primitives::reduce::{self, sum_of_group};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
@@ -187,7 +187,7 @@ fn find_areas<F: Float + CubeElement>(
             crowd += of_leaf;
             node = next_leaf::<F>(nodes, links, centre, radius, node + 1, false);
         }
-        let isolated = radius > common_radius && 8u32 * mutual < max(count, 1u32);
+        let isolated = is_isolated::<F>(radius, common_radius, count, mutual);
         let area = plane::area::<F>(pi, radius, crowd);
         let place = places[ABSOLUTE_POS] as usize;
         areas[place] = select(isolated, F::new(0.0), area);

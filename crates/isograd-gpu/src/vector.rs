@@ -107,11 +107,15 @@ impl<F: Float> Vector3<F> {
         F::sqrt(self.dot(self))
     }
 
+    /// The absolute value of the largest component.
+    pub fn largest(self) -> F {
+        max(max(F::abs(self.x), F::abs(self.y)), F::abs(self.z))
+    }
+
     /// Of length 1; zero where there is no direction. Divided by the largest component first, so that short
     /// vectors keep theirs.
     pub fn direction(self) -> Self {
-        let largest = max(max(F::abs(self.x), F::abs(self.y)), F::abs(self.z));
-        let scaled = self.divide(largest);
+        let scaled = self.divide(self.largest());
         scaled.divide(scaled.norm())
     }
 

@@ -14,7 +14,6 @@
 
 mod backend;
 mod error;
-mod options;
 mod plan;
 mod result;
 mod work;

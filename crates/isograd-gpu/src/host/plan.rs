@@ -7,7 +7,6 @@ use std::time::Instant;
 use isograd::orient::Method;
 use isograd::{Backend, Grid, Options, Orienter, PointCloud, Report, Stage};
 
-use super::options::translate;
 use super::result::Samples;
 use super::work::Work;
 use super::{Error, Number, Reconstruction};
@@ -37,7 +36,7 @@ impl<T: Number> Plan<T> {
     /// # Errors
     /// A device that can't be had, with the reason and the remedy; options that are not for devices.
     pub fn new(backend: Backend, grid: Grid<T>, options: Options) -> Result<Self, Error> {
-        let device = T::open(backend, grid, translate(&options)?)?;
+        let device = T::open(backend, grid, (&options).into())?;
         let method = match options.orientation {
             Method::Previous => Method::Auto,
             method => method,

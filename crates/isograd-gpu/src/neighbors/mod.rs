@@ -30,7 +30,7 @@ mod walk;
 
 pub(crate) use nearest::{SURE_SHARE, about_nearest, any_within, reaches};
 pub(crate) use order::{gather, scatter};
-pub(crate) use walk::{end_of_leaf, first_of_leaf, next_leaf};
+pub(crate) use walk::{end_of_leaf, first_of_leaf, is_isolated, next_leaf};
 
 use cubecl::prelude::*;
 

@@ -17,8 +17,8 @@ use isograd::neighbors::{Error as Refused, Radius};
 use super::nearest::reaches;
 use super::order::gather;
 use super::{
-    BLOCK, Neighborhoods, choice, end_of_leaf, first_of_leaf, forward as sort_points, next_leaf,
-    with_radii,
+    BLOCK, Neighborhoods, choice, end_of_leaf, first_of_leaf, forward as sort_points, is_isolated,
+    next_leaf, with_radii,
 };
 use crate::device::check_length;
 use crate::primitives::ends::ends;
@@ -204,18 +204,10 @@ fn grow<R: Runtime, T: Scalar>(
     Ok(radii)
 }
 
-#[cube]
-pub(crate) fn is_finite<F: Float>(x: F) -> bool {
-    // Nothing that is compared with NaN is true.
-    x.abs() <= F::max_value()
-}
-
 #[cube(launch)]
 fn flag_not_finite<F: Float>(points: &Array<F>, bad: &mut Array<u32>) {
     if ABSOLUTE_POS < bad.len() {
-        let finite = is_finite::<F>(points[3 * ABSOLUTE_POS])
-            && is_finite::<F>(points[3 * ABSOLUTE_POS + 1])
-            && is_finite::<F>(points[3 * ABSOLUTE_POS + 2]);
+        let finite = Vector3::<F>::at(points, ABSOLUTE_POS).is_finite();
         bad[ABSOLUTE_POS] = select(finite, 0u32, 1u32);
     }
 }
@@ -297,8 +289,8 @@ fn count_neighbors<F: Float + CubeElement>(
             node = next_leaf::<F>(nodes, links, centre, radius, node + 1, false);
         }
         let place = places[ABSOLUTE_POS] as usize;
-        let few = radius > common && 8u32 * mutual < max(count, 2u32) - 1u32;
+        let alone = is_isolated::<F>(radius, common, max(count, 1u32) - 1u32, mutual);
         counts[place] = count;
-        isolated[place] = select(few, 1u32, 0u32);
+        isolated[place] = select(alone, 1u32, 0u32);
     }
 }

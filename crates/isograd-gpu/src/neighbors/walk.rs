@@ -57,3 +57,10 @@ pub(crate) fn first_of_leaf(links: &Array<u32>, node: usize) -> usize {
 pub(crate) fn end_of_leaf(first: usize, count: usize) -> usize {
     min(first + LEAF, count)
 }
+
+/// Whether a sample is an outlier: its radius has grown, and of the `others` within it fewer than 1 in 8 have it
+/// within theirs (`mutual`).
+#[cube]
+pub(crate) fn is_isolated<F: Float>(radius: F, common: F, others: u32, mutual: u32) -> bool {
+    radius > common && 8u32 * mutual < max(others, 1u32)
+}

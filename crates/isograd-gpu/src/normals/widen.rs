@@ -1,6 +1,7 @@
 //! Wider neighbourhoods for the axes of samples that scatter: `isograd`'s `normals/widen.rs`, which says why.
 
 use cubecl::prelude::*;
+use isograd::normals::widen::{GAIN, RIM, ROUGH, STEPS};
 
 use super::forward::{MOMENTS, fit, moments_within};
 use super::{Residual, VALUES};
@@ -9,22 +10,6 @@ use crate::neighbors::{BLOCK, scatter};
 use crate::primitives::flags;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
-
-/// Radii that are tried one after the other, in `R_i`; as on the CPU, and so are the numbers below.
-const STEPS: [f64; 3] = [
-    std::f64::consts::SQRT_2,
-    2.0,
-    2.0 * std::f64::consts::SQRT_2,
-];
-
-/// Hundredths of roughness up to which an axis is left alone.
-const ROUGH: f32 = 12.0;
-
-/// A wider neighbourhood is taken where its roughness is at most this share of the one at hand.
-const GAIN: f32 = 0.5;
-
-/// A neighbourhood is one-sided from here on: hundredths of the radius, squared.
-const RIM: f32 = 4.0;
 
 /// The radii `(N,)` within which axes are to be found, in input order: those of the residual, and wider ones where
 /// neighbourhoods are rough and wider ones far less so. For automatic radii; one that the user gave stays.
@@ -61,6 +46,7 @@ pub fn widen<R: Runtime, T: Scalar>(
             dim,
             roughness.arg(),
             rough.arg(),
+            <T as isograd::Real>::of(ROUGH),
         );
         let listed = flags::list(device, &rough)?;
         try_wider::launch::<T, R>(
@@ -76,6 +62,8 @@ pub fn widen<R: Runtime, T: Scalar>(
             roughness.arg(),
             widened.arg(),
             <T as isograd::Real>::of(step),
+            <T as isograd::Real>::of(GAIN),
+            <T as isograd::Real>::of(RIM * RIM),
         );
     }
     scatter(device, &widened, &near.places)
@@ -121,9 +109,9 @@ fn begin_widening<F: Float>(
 }
 
 #[cube(launch)]
-fn flag_rough<F: Float>(rough: &Array<F>, flags: &mut Array<u32>) {
+fn flag_rough<F: Float + CubeElement>(rough: &Array<F>, flags: &mut Array<u32>, most: F) {
     if ABSOLUTE_POS < flags.len() {
-        let is_rough = rough[ABSOLUTE_POS] > F::new(ROUGH) / F::new(100.0);
+        let is_rough = rough[ABSOLUTE_POS] > most;
         flags[ABSOLUTE_POS] = select(is_rough, 1u32, 0u32);
     }
 }
@@ -140,6 +128,8 @@ fn try_wider<F: Float + CubeElement>(
     rough: &mut Array<F>,
     widened: &mut Array<F>,
     step: F,
+    gain: F,
+    rim_squared: F,
 ) {
     let count = sums[sums.len() - 1];
     if ABSOLUTE_POS < count as usize {
@@ -151,9 +141,9 @@ fn try_wider<F: Float + CubeElement>(
         let fit = fit::<F>(&sums, 0usize, 1usize);
         let second = fit.eigen.second.dot(fit.centroid);
         let third = fit.eigen.third.dot(fit.centroid);
-        let is_at_rim = F::new(100.0) * (second * second + third * third) > F::new(RIM);
+        let is_at_rim = second * second + third * third > rim_squared;
         let found = roughness::<F>(fit.eigen.values);
-        if found <= F::new(GAIN) * rough[at] && !is_at_rim {
+        if found <= gain * rough[at] && !is_at_rim {
             rough[at] = found;
             widened[at] = radius;
         }

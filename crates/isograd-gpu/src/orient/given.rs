@@ -11,7 +11,6 @@ use cubecl::prelude::*;
 use super::{Error, Orientation};
 use crate::device::check_length;
 use crate::neighbors::BLOCK;
-use crate::neighbors::radius::is_finite;
 use crate::primitives::flags;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
@@ -104,18 +103,12 @@ pub(super) fn turn_to<R: Runtime, T: Scalar>(
     })
 }
 
-#[cube]
-fn largest<F: Float>(v: Vector3<F>) -> F {
-    max(max(F::abs(v.x), F::abs(v.y)), F::abs(v.z))
-}
-
 #[cube(launch)]
 fn normalize<F: Float>(given: &Array<F>, normals: &mut Array<F>, bad: &mut Array<u32>) {
     if ABSOLUTE_POS < bad.len() {
         let v = Vector3::<F>::at(given, ABSOLUTE_POS);
-        let finite = is_finite::<F>(v.x) && is_finite::<F>(v.y) && is_finite::<F>(v.z);
-        let known = v.choose(finite, Vector3::<F>::zero());
-        let has_direction = largest::<F>(known) > F::new(0.0);
+        let known = v.choose(v.is_finite(), Vector3::<F>::zero());
+        let has_direction = known.largest() > F::new(0.0);
         known.direction().write(normals, ABSOLUTE_POS);
         bad[ABSOLUTE_POS] = select(has_direction, 0u32, 1u32);
     }
@@ -133,7 +126,7 @@ fn pull_normalized<F: Float>(
         let bar = Vector3::<F>::at(normals_bar, ABSOLUTE_POS);
         let n = v.direction();
         // By the largest component first, whose square may be more or less than the number type holds.
-        let scale = largest::<F>(v);
+        let scale = v.largest();
         let length = v.divide(scale).norm();
         let tangential = bar.sub(n.scale(n.dot(bar))).divide(length).divide(scale);
         let most = F::max_value();

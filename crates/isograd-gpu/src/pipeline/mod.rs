@@ -123,6 +123,19 @@ impl Default for Options {
     }
 }
 
+impl From<&isograd::Options> for Options {
+    fn from(options: &isograd::Options) -> Self {
+        Self {
+            weights: options.weights,
+            area_weights: options.area_weights,
+            smoothing: options.smoothing,
+            screening: options.screening,
+            level: options.level,
+            band: options.band,
+        }
+    }
+}
+
 impl Options {
     /// Whether the smoothing follows the areas of the samples, and has a derivative: of a screened solution, what
     /// the smoothing was done to is not kept.

@@ -5,9 +5,9 @@ use isograd::isosurface::Level;
 use isograd::neighbors::Radius;
 use isograd::orient::{Method, ParityOptions};
 use isograd::poisson::Smoothing;
-use isograd::{Grid, PointCloud, Real, Reconstructor, Resolution};
+use isograd::{Grid, Options, PointCloud, Real, Reconstructor, Resolution};
 use isograd_gpu::distance::Band;
-use isograd_gpu::pipeline::{self, Error, Held, Options};
+use isograd_gpu::pipeline::{self, Error, Held};
 use isograd_gpu::splat::Weights;
 use isograd_gpu::{Device, Scalar, orient};
 use isograd_shapes::Sampling;
@@ -27,7 +27,7 @@ fn cloud<T: Scalar>(name: &str, count: usize) -> PointCloud<T> {
 }
 
 /// The plan that is compared on a cloud.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Case {
     shape: &'static str,
     samples: usize,
@@ -45,7 +45,7 @@ fn cases() -> [Case; 4] {
     let small = Case {
         samples: 2000,
         cells: 28,
-        ..torus
+        ..torus.clone()
     };
     [
         torus,
@@ -66,7 +66,7 @@ fn cases() -> [Case; 4] {
                 band: Band::Cells(3.0),
                 ..Options::default()
             },
-            ..small
+            ..small.clone()
         },
         Case {
             options: Options {
@@ -77,19 +77,6 @@ fn cases() -> [Case; 4] {
             ..small
         },
     ]
-}
-
-/// The CPU's, with the same choices.
-fn on_cpu(options: &Options) -> isograd::Options {
-    isograd::Options {
-        weights: options.weights,
-        area_weights: options.area_weights,
-        smoothing: options.smoothing,
-        screening: options.screening,
-        level: options.level,
-        band: options.band,
-        ..isograd::Options::default()
-    }
 }
 
 /// Cotangents of all results.
@@ -148,10 +135,10 @@ fn compare<R: Runtime, T: Scalar>(device: &Device<R>) {
     {
         let cloud = cloud::<T>(name, samples);
         let grid = Grid::fit(&cloud, Resolution::Cells(cells), real(0.1)).unwrap();
-        let mut plan = Reconstructor::new(grid, on_cpu(&options)).unwrap();
+        let mut plan = Reconstructor::new(grid, options.clone()).unwrap();
         let expected = plan.reconstruct(&cloud).unwrap();
 
-        let plan = pipeline::Reconstructor::new(device.clone(), grid, options).unwrap();
+        let plan = pipeline::Reconstructor::new(device.clone(), grid, (&options).into()).unwrap();
         let held = Held::find(device, &cloud, Radius::Auto, &Method::Auto).unwrap();
         let points = device.upload(cloud.points().as_flattened()).unwrap();
         let result = plan.reconstruct(&points, &held).unwrap();

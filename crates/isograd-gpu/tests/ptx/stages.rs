@@ -31,7 +31,6 @@ pub fn launch_all<T: Scalar>(device: &Device<Recorder>) {
     points::<T>(device);
     held::<T>(device);
     samples::<T>(device);
-    local_levels::<T>(device);
     solves::<T>(device);
     surfaces::<T>(device);
     distances::<T>(device);
@@ -117,12 +116,19 @@ fn samples<T: Scalar>(device: &Device<Recorder>) {
         normals: &points,
         areas: &areas,
     };
+    spreads(device, samples);
+    local_levels(device, samples);
+    screened(device, samples);
+}
+
+fn spreads<T: Scalar>(device: &Device<Recorder>, samples: Samples<'_, T>) {
+    let Samples { points, areas, .. } = samples;
     let bars = SampleCotangent::zeros(device, SAMPLES).unwrap();
     for weights in [Weights::BSpline, Weights::Paper] {
         let (b, of_splat) = splat::forward(device, samples, &grid(), weights).unwrap();
         splat::pullback(device, &of_splat, samples, &b, &bars).unwrap();
-        let (level, residual) = iso_value::forward(device, &b, &grid(), &points, &areas).unwrap();
-        for values in [None, Some(&areas)] {
+        let (level, residual) = iso_value::forward(device, &b, &grid(), points, areas).unwrap();
+        for values in [None, Some(areas)] {
             iso_value::pullback(
                 device, &residual, &of_splat, samples, &level, values, &b, &bars,
             )
@@ -132,44 +138,27 @@ fn samples<T: Scalar>(device: &Device<Recorder>) {
 }
 
 /// The step of χ, and then what is taken off in each of three passes.
-fn local_levels<T: Scalar>(device: &Device<Recorder>) {
-    let (points, areas) = (
-        numbers::<T>(device, 3 * SAMPLES),
-        numbers::<T>(device, SAMPLES),
-    );
-    let samples = Samples {
-        points: &points,
-        normals: &points,
-        areas: &areas,
-    };
+fn local_levels<T: Scalar>(device: &Device<Recorder>, samples: Samples<'_, T>) {
+    let Samples { points, areas, .. } = samples;
     let bars = SampleCotangent::zeros(device, SAMPLES).unwrap();
     let (chi, of_splat) = splat::forward(device, samples, &grid(), Weights::BSpline).unwrap();
-    let (_, mean) = iso_value::forward(device, &chi, &grid(), &points, &areas).unwrap();
+    let (_, mean) = iso_value::forward(device, &chi, &grid(), points, areas).unwrap();
     for thin in [false, true] {
         let choice = local::Choice {
             area_weights: thin,
             smoothing: 1.0,
             thin,
         };
-        let (step, pass) = (bits::<T>(&[1.0; 2]), bits::<T>(&[0.0, 1.0, 1.0, 1.0, 1.0]));
+        let (step, pass) = (
+            words::<T>(&[1.0; 2]),
+            words::<T>(&[0.0, 1.0, 1.0, 1.0, 1.0]),
+        );
         answer(&[&step, &pass, &pass, &pass]);
         let (chi, residual) =
             local::forward(device, &chi, samples, choice, &mean, &of_splat).unwrap();
         assert_eq!(residual.gains().count(), local::PASSES);
         local::pullback(device, &residual, &of_splat, samples, &chi, &chi, &bars).unwrap();
     }
-}
-
-/// Numbers as a device would give them.
-fn bits<T: Scalar>(values: &[f64]) -> Vec<u32> {
-    let values: Vec<T> = values
-        .iter()
-        .map(|&x| <T as isograd::Real>::of(x))
-        .collect();
-    let words = T::as_bytes(&values).chunks_exact(4);
-    words
-        .map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]]))
-        .collect()
 }
 
 /// Lines of factors 2, 3, 4, 5 and others, and products with matrices.
@@ -267,19 +256,13 @@ fn whole<T: Scalar>(device: &Device<Recorder>) {
         ..Default::default()
     };
     plan.pullback(&result, &cotangent).unwrap();
-    screened(device, &held.outward);
 }
 
-fn screened<T: Scalar>(device: &Device<Recorder>, points: &Buffer<T>) {
+fn screened<T: Scalar>(device: &Device<Recorder>, samples: Samples<'_, T>) {
+    let Samples { points, areas, .. } = samples;
     let solver = poisson::Solver::<T>::new(device, SHAPE).unwrap();
-    let areas = numbers::<T>(device, SAMPLES);
-    let samples = Samples {
-        points,
-        normals: points,
-        areas: &areas,
-    };
     let (chi, splat) = splat::forward(device, samples, &grid(), Weights::BSpline).unwrap();
-    let (_, level) = iso_value::forward(device, &chi, &grid(), points, &areas).unwrap();
+    let (_, level) = iso_value::forward(device, &chi, &grid(), points, areas).unwrap();
     let bars = SampleCotangent::zeros(device, SAMPLES).unwrap();
     let equation = poisson::screened::Equation {
         solver: &solver,

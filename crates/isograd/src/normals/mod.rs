@@ -61,7 +61,7 @@ mod forward;
 mod pullback;
 #[cfg(test)]
 mod tests;
-mod widen;
+pub mod widen;
 #[cfg(test)]
 mod widen_tests;
 

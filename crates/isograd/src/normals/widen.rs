@@ -20,20 +20,20 @@ use crate::neighbors::{Candidates, Census, Found as Sum, Neighborhoods, Radius, 
 use crate::{Real, simd, vector};
 
 /// Radii that are tried one after the other, in `R_i`.
-const STEPS: [f64; 3] = [
+pub const STEPS: [f64; 3] = [
     std::f64::consts::SQRT_2,
     2.0,
     2.0 * std::f64::consts::SQRT_2,
 ];
 
 /// Roughness up to which an axis is left alone: with 24 samples, it is off by 4 degrees.
-const ROUGH: f64 = 0.12;
+pub const ROUGH: f64 = 0.12;
 
 /// A wider neighbourhood is taken where its roughness is at most this share of the one at hand.
-const GAIN: f64 = 0.5;
+pub const GAIN: f64 = 0.5;
 
 /// A neighbourhood whose centroid is off its middle by this share of the radius is one-sided.
-const RIM: f64 = 0.2;
+pub const RIM: f64 = 0.2;
 
 /// Points of one task.
 const TASK: usize = 256;
