@@ -1,11 +1,13 @@
-//! The tests of the Python package, in a virtual environment below the target folder.
+//! The tests of the Python package, with a virtual environment below the target folder.
 
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use crate::process::{self, Outcome};
 use crate::tally::Tally;
+use crate::test;
 use crate::workspace::Workspace;
 
 /// The oldest Python that the pinned packages are made for; the package itself takes an older one.
@@ -25,10 +27,10 @@ impl From<String> for Obstacle {
     }
 }
 
-/// Builds the package, installs it and runs its tests, or returns a line that says why not.
+/// Builds the package and runs its tests, or returns a line that says why not.
 pub fn run(tally: &mut Tally) -> Outcome<Vec<String>> {
     let before = tally.skipped_lines().len();
-    match test(tally) {
+    match test_package(tally) {
         Ok(mut lines) => {
             lines.extend(tally.skipped_lines().split_off(before));
             Ok(lines)
@@ -43,14 +45,16 @@ pub fn run(tally: &mut Tally) -> Outcome<Vec<String>> {
 }
 
 /// Returns a line for what the environment lacks.
-fn test(tally: &mut Tally) -> Result<Vec<String>, Obstacle> {
+fn test_package(tally: &mut Tally) -> Result<Vec<String>, Obstacle> {
     let target = Workspace::load()?.target;
     let folder = target.join("xtask").join("python");
     let environment = Environment::make(folder.join("environment"))?;
     let lacking = environment.add_torch()?;
-    environment.install_package(&target, &folder.join("wheel"))?;
+    let packages = folder.join("packages");
+    environment.assemble_package(&target, &packages)?;
     let mut pytest = environment.module("pytest", &["-q", "-rs", "--color=no"]);
     pytest.args(["-p", "no:cacheprovider"]).arg(tests_folder());
+    pytest.env("PYTHONPATH", packages);
     // The packages that draw must not look for a screen.
     pytest.env("MPLBACKEND", "Agg").env_remove("DISPLAY");
     process::run_by_line(&mut pytest, |line| {
@@ -131,24 +135,32 @@ impl Environment {
         Ok(Vec::new())
     }
 
-    /// Builds the wheel in the profile of the tests, whose artefacts it shares, and installs it.
-    fn install_package(&self, target: &Path, wheels: &Path) -> Outcome {
-        remove_folder(wheels)?;
-        let mut build = self.module("maturin", &["build", "--quiet", "--profile", "dev"]);
-        // Vulkan, which needs no GPU, with the driver that the tests of the kernels use.
-        build.args(["--features", "pyo3/extension-module,vulkan"]);
-        // A wheel for this machine, now: neither checked for other machines nor compressed.
-        build.args(["--compatibility", "linux", "--compression-method", "stored"]);
-        build.arg("--interpreter").arg(&self.python);
-        build.arg("--out").arg(wheels);
+    /// Puts the package together in a folder, as a wheel has it.
+    ///
+    /// The library is built with the whole workspace, as the tests in Rust are: by itself it would have other features
+    /// of many dependencies, and Vulkan's would be built a second time, which takes longer than all tests.
+    fn assemble_package(&self, target: &Path, packages: &Path) -> Outcome {
+        // One test, so that cargo counts what tests depend on.
+        let mut build = process::cargo(["build", "--workspace", "--lib", "--test", "bad_input"]);
+        build.args(["--features", test::FEATURES]);
         process::run(build.env("CARGO_TARGET_DIR", target))?;
-        let wheel = only_file(wheels)?;
-        let mut pip = self.module(
-            "pip",
-            &["install", "--quiet", "--disable-pip-version-check"],
-        );
-        pip.args(["--no-deps", "--force-reinstall"]).arg(wheel);
-        process::run(&mut pip)
+        remove_folder(packages)?;
+        let mut metadata = self.module("maturin", &["pep517", "write-dist-info"]);
+        metadata.arg("--metadata-directory").arg(packages);
+        metadata.arg("--interpreter").arg(&self.python);
+        process::run(metadata.stdout(Stdio::null()))?;
+        let package = packages.join("isograd");
+        copy_folder(
+            &process::root().join("bindings/python/python/isograd"),
+            &package,
+        )?;
+        let built = format!("{DLL_PREFIX}_core{DLL_SUFFIX}");
+        let module = if cfg!(windows) {
+            "_core.pyd"
+        } else {
+            "_core.abi3.so"
+        };
+        copy(&target.join("debug").join(built), &package.join(module))
     }
 
     /// `python -m NAME ARGUMENTS` in the root of the repository.
@@ -248,14 +260,25 @@ pub fn remove_folder(folder: &Path) -> Outcome {
     fs::remove_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))
 }
 
-/// The one file of a folder.
-fn only_file(folder: &Path) -> Outcome<PathBuf> {
-    let entries = fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    let mut files = entries.filter_map(Result::ok).map(|entry| entry.path());
-    match (files.next(), files.next()) {
-        (Some(file), None) => Ok(file),
-        _ => Err(format!("{} should hold one wheel", folder.display())),
+/// Copies the files of a folder, and of those in it, but what Python has compiled.
+fn copy_folder(from: &Path, to: &Path) -> Outcome {
+    fs::create_dir_all(to).map_err(|e| format!("{}: {e}", to.display()))?;
+    let entries = fs::read_dir(from).map_err(|e| format!("{}: {e}", from.display()))?;
+    for path in entries.filter_map(Result::ok).map(|entry| entry.path()) {
+        let Some(name) = path.file_name().filter(|name| *name != "__pycache__") else {
+            continue;
+        };
+        match path.is_dir() {
+            true => copy_folder(&path, &to.join(name))?,
+            false => copy(&path, &to.join(name))?,
+        }
     }
+    Ok(())
+}
+
+fn copy(from: &Path, to: &Path) -> Outcome {
+    let copied = fs::copy(from, to).map_err(|e| format!("{}: {e}", from.display()));
+    copied.map(|_| ())
 }
 
 #[cfg(test)]

@@ -9,6 +9,9 @@ use crate::readme;
 use crate::steps::Steps;
 use crate::tally::Tally;
 
+/// Features of the tests: the kernels are built for their own tests in any case.
+pub const FEATURES: &str = "isograd-cli/vulkan,isograd-python/vulkan";
+
 /// All steps, a summary, and the count of tests as the last line.
 pub fn all() -> Outcome {
     let mut steps = Steps::default();
@@ -85,8 +88,7 @@ fn docs() -> Outcome<Vec<String>> {
 fn tests(tally: &mut Tally, targets: &[&str], nvrtc: Option<&Nvrtc>) -> Outcome<Vec<String>> {
     let before = tally.skipped_lines().len();
     let mut command = process::cargo(["test", "--workspace", "--no-fail-fast"]);
-    // The kernels are built for their own tests in any case.
-    command.args(["--features", "isograd-cli/vulkan,isograd-python/vulkan"]);
+    command.args(["--features", FEATURES]);
     command.args(targets).args(["--", "--show-output"]);
     if let Some(nvrtc) = nvrtc {
         nvrtc.tell(&mut command);
