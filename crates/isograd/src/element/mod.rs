@@ -6,11 +6,14 @@
 pub mod crossing;
 pub mod curvature;
 pub mod difference;
+pub mod evidence;
 pub mod hat;
 pub mod linear;
 pub mod plane;
 pub mod plate;
 pub mod spline;
+pub mod turned;
+pub mod winding;
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

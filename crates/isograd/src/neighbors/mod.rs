@@ -34,5 +34,5 @@ pub(crate) use candidates::{Candidates, LANES, Lanes, sum_lanes};
 pub use cell_index::CellIndex;
 pub(crate) use cells::Search;
 pub(crate) use census::Census;
-pub use radius::{Error, Neighborhoods, Radius, forward};
+pub use radius::{Error, Neighborhoods, Radii, Radius, forward, with_radii};
 pub(crate) use radius::{Found, forward_with, hold};

@@ -235,19 +235,59 @@ pub(crate) fn hold<T: Real>(
     held: &Neighborhoods<T>,
     out: &mut Neighborhoods<T>,
 ) -> Result<(), Error> {
+    let radii = Radii {
+        each: &held.radius,
+        common: held.common_radius,
+        spacing: held.spacing,
+    };
+    count_within(points, radii, out)?;
+    out.rule = held.rule;
+    out.isolated.clone_from(&held.isolated);
+    Ok(())
+}
+
+/// Radii that were found elsewhere, in the unit of the points.
+#[derive(Clone, Copy, Debug)]
+pub struct Radii<'a, T> {
+    /// `(N,)` the radius of each point; at least [`Self::common`].
+    pub each: &'a [T],
+    /// The radius of every point that has enough neighbours within it.
+    pub common: T,
+    /// See [`Neighborhoods::spacing`].
+    pub spacing: T,
+}
+
+/// The neighbourhoods of `(N, 3)` points with radii that were found elsewhere.
+///
+/// # Errors
+/// As [`forward`], and [`Error::TooFew`] where there are not as many points as radii.
+pub fn with_radii<T: Real>(
+    points: &[[T; 3]],
+    radii: Radii<'_, T>,
+    out: &mut Neighborhoods<T>,
+) -> Result<(), Error> {
+    count_within(points, radii, out)?;
+    find_isolated(out);
+    Ok(())
+}
+
+fn count_within<T: Real>(
+    points: &[[T; 3]],
+    radii: Radii<'_, T>,
+    out: &mut Neighborhoods<T>,
+) -> Result<(), Error> {
     check(points)?;
-    if points.len() != held.radius.len() {
+    if points.len() != radii.each.len() {
         return Err(Error::TooFew {
             points: points.len(),
         });
     }
     out.index.rebuild(points);
     check_extent(&out.index)?;
-    out.rule = held.rule;
-    out.common_radius = held.common_radius;
-    out.spacing = held.spacing;
-    out.radius.clone_from(&held.radius);
-    out.isolated.clone_from(&held.isolated);
+    out.common_radius = radii.common;
+    out.spacing = radii.spacing;
+    out.radius.clear();
+    out.radius.extend_from_slice(radii.each);
     find_positions(out);
     let mut sorted = std::mem::take(&mut out.sorted);
     sorted.resize(points.len(), Found::default());

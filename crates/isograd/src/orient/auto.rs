@@ -1,282 +1,214 @@
 //! The default method: evidence from fills at two scales, spread along the neighbour graph.
 
+use std::convert::Infallible;
+
 use rayon::prelude::*;
 
 use super::Axes;
-use super::fill::{Fill, Lattice};
+use super::decide::{Beliefs, Domains, Place, Reading, Signs, Verdict};
+use super::fill::Fill;
 use super::graph::{Graph, NEIGHBORS};
 use super::groups::Groups;
-use super::sensors;
-use super::settle::{Place, Settle};
+use super::winding;
 use crate::Real;
+use crate::element::evidence::{self, of_view};
 use crate::neighbors::Neighborhoods;
 use crate::parallel::CHUNK;
 use crate::vector;
 
-/// Cells of the two grids over the median reach of the samples, and what their evidence weighs.
-const SCALES: [(f64, f32); 2] = [(0.8, 1.0), (1.6, 0.5)];
-
-/// Most cells of a grid: for each sample, and in all; and what even a few samples may have.
-const CELLS_PER_SAMPLE: usize = 64;
-const FEWEST_CELLS: usize = 1 << 15;
-const MOST_CELLS: usize = 1 << 24;
-
-/// Discs grow with the cell, from this many median reaches on.
-const FINE: f64 = 1.1;
-
-/// What the evidence of a second sheet weighs.
-const SHEET: f32 = 4.0;
-
-/// What the side weighs on which a sample lies in a layer that scatters.
-const SLAB: f32 = 2.0;
-
-/// What a sample at which the winding number is wrong by 1 weighs, beside evidence of 1.
-const WINDING: f64 = 4.0;
-
-/// Evidence of a second sheet below this makes no difference.
-const SLIGHT: f32 = 0.05;
-
 /// Rounds in which every point takes the mean of its own evidence and what its neighbours say.
 const ROUNDS: usize = 60;
 
-/// What beliefs are worth, the other way round, where they were overruled as a whole.
-const OVERRULED: f32 = 0.5;
-
-/// Evidence from here on decides by itself.
-const CLEAR: f32 = 0.1;
-
-/// How sheets close to each other are read: as the two sides of a thin body, or of a narrow gap.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Reading {
-    /// A thin body, unless there seems to be matter on the far side of the sheet.
-    Careful,
-    /// A thin body.
-    Bold,
-}
-
-/// What decided the sign of an axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Decision {
-    Evidence,
-    Neighbors,
-    Rule,
-}
-
-/// The outcome for one axis.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Verdict {
-    pub flip: bool,
-    pub confidence: f32,
-    pub by: Decision,
-}
-
-/// One way of orienting the whole cloud, in sorted order.
-#[derive(Clone, Debug, Default)]
-struct Solution {
-    sign: Vec<f32>,
-    evidence: Vec<f32>,
-    belief: Vec<f32>,
-}
-
-/// Scratch of the automatic method.
+/// Scratch of the automatic method; all in sorted order.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Auto {
     graph: Graph,
     groups: Groups,
     fill: Fill,
-    settle: Settle,
-    /// In sorted order: what the fills say, the light on both sides of each axis, and what sheets say.
+    seen: Seen,
+    /// Beliefs of the next round.
+    next: Vec<f32>,
+    signs: Signs,
+    reaches: Vec<f32>,
+}
+
+/// What there is to see at each sample.
+#[derive(Clone, Debug, Default)]
+struct Seen {
+    /// What the fills say, the light on both sides of each axis, and what sheets say.
     filled: Vec<f32>,
     ends: Vec<[f32; 2]>,
     sheets: Vec<f32>,
     /// How much light there is on both sides of samples that scatter: 0..1.
     slabs: Vec<f32>,
     /// What sensors know; empty without them.
-    seen: Vec<f32>,
-    /// Own evidence, belief, and the belief of the next round.
-    evidence: Vec<f32>,
-    belief: Vec<f32>,
-    next: Vec<f32>,
-    best: Solution,
-    reaches: Vec<f32>,
+    views: Vec<f32>,
 }
 
-/// Where the points are, relative to one of them.
-struct Sorted<'a, T> {
-    neighborhoods: &'a Neighborhoods<T>,
-    origin: [f64; 3],
-    spacing: f64,
+/// The samples' own voices, and how they are spread.
+struct Voices<'a, P> {
+    graph: &'a Graph,
+    seen: &'a Seen,
+    next: &'a mut Vec<f32>,
+    place: &'a P,
 }
+
+/// Where the points are.
+struct Sorted<'a, T>(&'a Neighborhoods<T>);
 
 impl<T: Real> Place for Sorted<'_, T> {
     fn user(&self, p: usize) -> [f64; 3] {
-        vector::to_f64(self.neighborhoods.index.point(p))
+        vector::to_f64(self.0.index.point(p))
     }
 
-    fn in_spacings(&self, p: usize) -> [f32; 3] {
-        let offset = vector::sub(self.user(p), self.origin);
-        offset.map(|x| (x / self.spacing) as f32)
+    fn spacing(&self) -> f64 {
+        self.0.spacing().f64()
     }
 }
 
 impl Auto {
     /// Finds the sign of each axis. `views`, in input order, say from which side each point was seen, where
-    /// that is known; see [`sensors`].
-    ///
-    /// Two sheets close to each other are the two sides of a thin body or of a narrow gap, and nothing near
-    /// them says which. So where it matters both are tried, and the winding number of the whole decides;
-    /// where sensors know, they do.
+    /// that is known; see [`sensors`](super::sensors).
     pub(super) fn run<T: Real>(
         &mut self,
         axes: &Axes<'_, T>,
         neighborhoods: &Neighborhoods<T>,
         views: Option<&[f32]>,
     ) {
-        let place = Sorted {
-            neighborhoods,
-            origin: vector::to_f64(neighborhoods.index.point(0)),
-            spacing: neighborhoods.spacing().f64(),
-        };
+        let place = Sorted(neighborhoods);
         self.graph.build(axes, neighborhoods);
         self.groups.find(&self.graph, |p| place.user(p));
-        self.gather_evidence(place.spacing, |p| place.user(p));
-        self.seen.clear();
+        self.look(&place);
+        let known = &mut self.seen.views;
+        known.clear();
         if let Some(views) = views {
             let order = neighborhoods.index.order().iter();
-            self.seen
-                .extend(order.map(|&i| sensors::evidence(views[i as usize])));
+            known.extend(order.map(|&i| of_view(views[i as usize])));
         }
-        self.solve(Reading::Careful, &place);
-        if views.is_none() && (0..self.sheets.len()).any(|p| self.differs(p)) {
-            let careful = self.settle.misfit(&self.graph, &place);
-            self.keep();
-            self.solve(Reading::Bold, &place);
-            if self.settle.misfit(&self.graph, &place) < careful {
-                self.keep();
-            }
-        } else {
-            self.keep();
-        }
-    }
-
-    fn solve(&mut self, reading: Reading, place: &impl Place) {
-        let mut evidence = std::mem::take(&mut self.evidence);
-        evidence.clear();
-        evidence.extend((0..self.sheets.len()).map(|p| self.weighed(p, reading)));
-        self.evidence = evidence;
-        self.relax();
-        let winding = if self.seen.is_empty() { WINDING } else { 0.0 };
-        self.settle
-            .run(&self.graph, &self.evidence, &self.belief, winding, place);
-    }
-
-    fn keep(&mut self) {
-        self.best.sign.clone_from(&self.settle.sign);
-        self.best.evidence.clone_from(&self.evidence);
-        let overruled = self.settle.overruled.iter();
-        let heard =
-            |(&belief, &over): (&f32, &bool)| if over { -OVERRULED * belief } else { belief };
-        self.best.belief.clear();
-        self.best
-            .belief
-            .extend(self.belief.iter().zip(overruled).map(heard));
+        let mut voices = Voices {
+            graph: &self.graph,
+            seen: &self.seen,
+            next: &mut self.next,
+            place: &place,
+        };
+        let Ok(()) = self
+            .signs
+            .find(&self.graph, &mut voices, views.is_some(), &place);
     }
 
     /// What was found for the point at a sorted position.
     pub(super) fn verdict(&self, p: usize) -> Verdict {
-        let sign = self.best.sign[p];
-        let confidence = (sign * self.best.belief[p]).max(0.0);
-        let seen = sign * self.best.evidence[p] >= CLEAR;
-        let by = match (confidence > 0.0, seen) {
-            (true, true) => Decision::Evidence,
-            (true, false) => Decision::Neighbors,
-            (false, _) => Decision::Rule,
-        };
-        Verdict {
-            flip: sign < 0.0,
-            confidence,
-            by,
-        }
+        self.signs.verdict(p)
     }
 
-    fn gather_evidence(&mut self, spacing: f64, point: impl Fn(usize) -> [f64; 3] + Sync) {
+    /// Gathers what there is to see.
+    fn look(&mut self, place: &impl Place) {
         let n = self.graph.near.len();
-        self.filled.clear();
-        self.filled.resize(n, 0.0);
-        self.slabs.clear();
-        self.slabs.resize(n, 0.0);
-        self.ends.clear();
-        self.ends.resize(n, [1.0; 2]);
-        for (group, bounds) in self.groups.bounds.iter().enumerate() {
+        let Seen {
+            filled,
+            ends,
+            sheets,
+            slabs,
+            ..
+        } = &mut self.seen;
+        for values in [&mut *filled, &mut *slabs] {
+            values.clear();
+            values.resize(n, 0.0);
+        }
+        ends.clear();
+        ends.resize(n, [1.0; 2]);
+        for group in 0..self.groups.bounds.len() {
             let (graph, members) = (&self.graph, self.groups.members(group));
-            let reach = spacing * median_reach(graph, members, &mut self.reaches);
-            let budget = (CELLS_PER_SAMPLE * members.len()).clamp(FEWEST_CELLS, MOST_CELLS);
-            for (scale, weight) in SCALES {
-                let lattice = Lattice::new(bounds.low, bounds.high, scale * reach, budget);
-                let growth = spacing * (scale / FINE).max(1.0);
-                self.fill.run(&lattice, members.len(), |m| {
+            let scales = self.groups.scales(group, graph, place, &mut self.reaches);
+            for scale in scales {
+                self.fill.run(&scale.lattice, members.len(), |m| {
                     let p = members[m] as usize;
-                    (point(p), graph.axis[p], growth * f64::from(graph.reach[p]))
+                    let reach = scale.growth * f64::from(graph.reach[p]);
+                    (place.user(p), graph.axis[p], reach)
                 });
                 for (&p, sights) in members.iter().zip(&self.fill.sights) {
-                    let (filled, ends) = (&mut self.filled[p as usize], &mut self.ends[p as usize]);
-                    *filled += weight * sights.evidence;
-                    let slab = &mut self.slabs[p as usize];
-                    *slab = slab.max(sights.ends[0].min(sights.ends[1]));
-                    *ends = [0, 1].map(|side| ends[side].min(sights.ends[side]));
+                    let p = p as usize;
+                    filled[p] += scale.weight * sights.evidence;
+                    slabs[p] = slabs[p].max(sights.ends[0].min(sights.ends[1]));
+                    ends[p] = [0, 1].map(|side| ends[p][side].min(sights.ends[side]));
                 }
             }
         }
-        self.graph.part_slabs(&self.slabs);
+        self.graph.part_slabs(slabs);
         let (graph, all) = (&self.graph, (0..n).into_par_iter());
         all.map(|p| graph.sheet_evidence(p))
-            .collect_into_vec(&mut self.sheets);
+            .collect_into_vec(sheets);
     }
+}
 
+impl<P> Voices<'_, P> {
     fn weighed(&self, p: usize, reading: Reading) -> f32 {
+        let Seen {
+            filled,
+            sheets,
+            slabs,
+            views,
+            ..
+        } = self.seen;
         let open = match reading {
             Reading::Careful => self.open(p),
             Reading::Bold => 1.0,
         };
-        let found = self.filled[p] + SHEET * open * self.sheets[p] + self.slab_evidence(p);
-        let found = found.clamp(-1.0, 1.0);
-        let seen = self.seen.get(p).copied().unwrap_or(0.0);
-        seen + (1.0 - seen.abs()) * found
+        let seen = views.get(p).copied().unwrap_or(0.0);
+        evidence::weighed(
+            filled[p],
+            sheets[p],
+            open,
+            slabs[p],
+            self.graph.side[p],
+            seen,
+        )
     }
 
     /// In 0..1, how open the side is that a second sheet behind the point makes the outer one.
     fn open(&self, p: usize) -> f32 {
-        let side = usize::from(self.sheets[p] < 0.0);
-        (1.0 + self.ends[p][side]).clamp(0.0, 1.0)
+        let side = usize::from(self.seen.sheets[p] < 0.0);
+        evidence::openness(self.seen.ends[p][side])
     }
+}
 
-    /// Where noise has made one layer of the two sides of a thin body, which is seen by the open air on both
-    /// sides of it, a sample on one side of its middle belongs to that side.
-    fn slab_evidence(&self, p: usize) -> f32 {
-        SLAB * self.slabs[p] * self.graph.side[p]
-    }
-
-    fn differs(&self, p: usize) -> bool {
-        (1.0 - self.open(p)) * self.sheets[p].abs() > SLIGHT
-    }
+impl<P: Place> Beliefs for Voices<'_, P> {
+    type Error = Infallible;
 
     /// Spreads the evidence: repeated weighted means, each point's own evidence held with its strength.
-    fn relax(&mut self) {
-        self.belief.clone_from(&self.evidence);
-        self.next.resize(self.belief.len(), 0.0);
+    fn hear(
+        &mut self,
+        reading: Reading,
+        evidence: &mut Vec<f32>,
+        belief: &mut Vec<f32>,
+    ) -> Result<(), Infallible> {
+        let all = 0..self.seen.sheets.len();
+        evidence.clear();
+        evidence.extend(all.map(|p| self.weighed(p, reading)));
+        belief.clone_from(evidence);
+        self.next.resize(belief.len(), 0.0);
+        let (graph, evidence) = (self.graph, &*evidence);
         for _ in 0..ROUNDS {
-            let (graph, evidence, belief) = (&self.graph, &self.evidence, &self.belief);
-            self.next
-                .par_chunks_mut(CHUNK)
-                .enumerate()
-                .for_each(|(chunk, next)| {
-                    for (k, next) in next.iter_mut().enumerate() {
-                        let p = chunk * CHUNK + k;
-                        *next = spread(evidence[p], &graph.coupling[p], &graph.near[p], belief);
-                    }
-                });
-            std::mem::swap(&mut self.belief, &mut self.next);
+            let chunks = self.next.par_chunks_mut(CHUNK).enumerate();
+            chunks.for_each(|(chunk, next)| {
+                for (k, next) in next.iter_mut().enumerate() {
+                    let p = chunk * CHUNK + k;
+                    *next = spread(evidence[p], &graph.coupling[p], &graph.near[p], belief);
+                }
+            });
+            std::mem::swap(belief, self.next);
         }
+        Ok(())
+    }
+
+    fn differ(&mut self) -> Result<bool, Infallible> {
+        let sheets = self.seen.sheets.iter().enumerate();
+        let mut differing = sheets.filter(|&(p, &sheet)| evidence::differs(sheet, self.open(p)));
+        Ok(differing.next().is_some())
+    }
+
+    fn winding(&mut self, domains: &Domains<'_>, probes: &[u32]) -> Result<Vec<f64>, Infallible> {
+        Ok(winding::numbers(self.graph, self.place, domains, probes))
     }
 }
 
@@ -289,16 +221,4 @@ fn spread(own: f32, coupling: &[f32; NEIGHBORS], near: &[u32; NEIGHBORS], belief
         weight += coupling[slot].abs();
     }
     if weight > 0.0 { sum / weight } else { 0.0 }
-}
-
-/// The median reach of the members that have any, in spacings of the cloud.
-fn median_reach(graph: &Graph, members: &[u32], reaches: &mut Vec<f32>) -> f64 {
-    let reach = members.iter().map(|&p| graph.reach[p as usize]);
-    reaches.clear();
-    reaches.extend(reach.filter(|&r| r > 0.0));
-    if reaches.is_empty() {
-        return 1.0;
-    }
-    let middle = reaches.len() / 2;
-    f64::from(*reaches.select_nth_unstable_by(middle, f32::total_cmp).1)
 }

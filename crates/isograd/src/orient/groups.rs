@@ -1,8 +1,21 @@
 //! Parts of the cloud that get a grid of their own.
 
+use super::decide::Place;
+use super::fill::Lattice;
 use super::flood::root;
 use super::graph::Graph;
 use crate::vector;
+
+/// Cells of the two grids over the median reach of the samples, and what their evidence weighs.
+const SCALES: [(f64, f32); 2] = [(0.8, 1.0), (1.6, 0.5)];
+
+/// Most cells of a grid: for each sample, and in all; and what even a few samples may have.
+const CELLS_PER_SAMPLE: usize = 64;
+const FEWEST_CELLS: usize = 1 << 15;
+const MOST_CELLS: usize = 1 << 24;
+
+/// Discs grow with the cell, from this many median reaches on.
+const FINE: f64 = 1.1;
 
 /// Two neighbours belong together where they are at most this many reaches apart.
 const LINK: f32 = 8.0;
@@ -25,7 +38,7 @@ const NONE: u32 = u32::MAX;
 /// Parts of the cloud whose boxes are apart: so one that is far away doesn't make the grid of another
 /// coarse. Parts whose boxes meet, as a body inside the cavity of another, share one.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Groups {
+pub struct Groups {
     parent: Vec<u32>,
     size: Vec<u32>,
     /// The part of each point, or [`NONE`].
@@ -39,9 +52,22 @@ pub(super) struct Groups {
 
 /// A box, in user coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Bounds {
+pub struct Bounds {
+    /// Its low corner.
     pub low: [f64; 3],
+    /// Its high corner.
     pub high: [f64; 3],
+}
+
+/// One of the grids that the samples of a group are drawn on.
+#[derive(Clone, Copy, Debug)]
+pub struct Scale {
+    /// The grid.
+    pub lattice: Lattice,
+    /// What its evidence weighs.
+    pub weight: f32,
+    /// How wide a disc is there whose sample reaches one spacing, in user units.
+    pub growth: f64,
 }
 
 impl Bounds {
@@ -72,13 +98,38 @@ impl Bounds {
 }
 
 impl Groups {
-    pub(super) fn members(&self, group: usize) -> &[u32] {
+    /// The points of a group, in order.
+    ///
+    /// # Panics
+    /// There is no such group.
+    pub fn members(&self, group: usize) -> &[u32] {
         let start = if group == 0 { 0 } else { self.ends[group - 1] };
         &self.members[start..self.ends[group]]
     }
 
-    /// `point` returns the position of a point in user units.
-    pub(super) fn find(&mut self, graph: &Graph, point: impl Fn(usize) -> [f64; 3]) {
+    /// The grids of a group, finest first. `reaches` is scratch.
+    ///
+    /// # Panics
+    /// There is no such group.
+    pub fn scales(
+        &self,
+        group: usize,
+        graph: &Graph,
+        place: &impl Place,
+        reaches: &mut Vec<f32>,
+    ) -> [Scale; 2] {
+        let (bounds, members) = (self.bounds[group], self.members(group));
+        let reach = place.spacing() * median_reach(graph, members, reaches);
+        let budget = (CELLS_PER_SAMPLE * members.len()).clamp(FEWEST_CELLS, MOST_CELLS);
+        SCALES.map(|(scale, weight)| Scale {
+            lattice: Lattice::new(bounds.low, bounds.high, scale * reach, budget),
+            weight,
+            growth: place.spacing() * (scale / FINE).max(1.0),
+        })
+    }
+
+    /// Finds the parts of a graph; `point` returns the position of a point in user units.
+    pub fn find(&mut self, graph: &Graph, point: impl Fn(usize) -> [f64; 3]) {
         self.link(graph);
         let mut parts: Vec<Bounds> = Vec::new();
         self.part.clear();
@@ -143,6 +194,18 @@ impl Groups {
             self.ends[g] += 1;
         }
     }
+}
+
+/// The median reach of the members that have any, in spacings of the cloud.
+fn median_reach(graph: &Graph, members: &[u32], reaches: &mut Vec<f32>) -> f64 {
+    let reach = members.iter().map(|&p| graph.reach[p as usize]);
+    reaches.clear();
+    reaches.extend(reach.filter(|&r| r > 0.0));
+    if reaches.is_empty() {
+        return 1.0;
+    }
+    let middle = reaches.len() / 2;
+    f64::from(*reaches.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
 /// Merges boxes that are near each other, until none are, and returns the place of each former box.

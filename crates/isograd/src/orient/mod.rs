@@ -53,13 +53,14 @@
 //! The signs are discrete; nothing of how they are chosen has a derivative. The confidence has none.
 
 mod auto;
+pub mod decide;
 pub mod doubt;
 mod fill;
 mod flood;
 mod graph;
 #[cfg(test)]
 mod grid_tests;
-mod groups;
+pub mod groups;
 #[cfg(test)]
 mod known_tests;
 mod parity;
@@ -86,7 +87,7 @@ use crate::data::Sensors;
 use crate::neighbors::Neighborhoods;
 use crate::normals::{self, Plane};
 use crate::{PointCloud, Real, vector};
-use auto::{Decision, Verdict};
+use decide::{Decision, Verdict};
 
 /// Confidence below which a sign is [doubtful](Orientation::doubtful).
 const DOUBTFUL: f64 = 0.1;

@@ -6,17 +6,9 @@
 //! neighbours decide.
 
 use super::{MethodUsed, Orientation};
+use crate::element::turned::{self, MOST_FAR};
 use crate::neighbors::Neighborhoods;
 use crate::{Real, vector};
-
-/// An axis whose cosine with the normal of the step before is smaller than this has turned far.
-const FAR: f64 = 0.5;
-
-/// Where more than this share of the axes has turned far, the points are not those of the step before.
-const MOST_FAR: f64 = 0.03;
-
-/// Offsets shorter than this share of a neighbourhood's radius have no direction to speak of.
-const BLUNT: f64 = 0.1;
 
 /// What is kept of the step before, in input order.
 #[derive(Clone, Debug, Default)]
@@ -57,7 +49,7 @@ impl Previous {
             return false;
         }
         for (i, cosine) in self.cosines.iter().enumerate() {
-            if cosine.abs() >= FAR {
+            if is_near(*cosine) {
                 let confidence = f64::from(self.confidence[i]).min(cosine.abs());
                 out.set_sign(i, *cosine < 0.0, confidence);
             }
@@ -93,13 +85,12 @@ impl Previous {
         let far = (0u32..).zip(&self.cosines);
         self.turned.clear();
         self.turned
-            .extend(far.filter(|(_, c)| !(c.abs() >= FAR)).map(|(i, _)| i));
+            .extend(far.filter(|&(_, &c)| !is_near(c)).map(|(i, _)| i));
         self.turned.len() as f64 <= MOST_FAR * axes.len() as f64
     }
 
     /// What the neighbours that have not turned say of the axis of point `i`, from −1 to 1; `None` where there
-    /// is none. Each carries its normal over by reflection at the plane half-way between the two, so that it
-    /// turns with the surface round an edge, and changes sides across a thin body.
+    /// is none.
     fn side_among_neighbors<T: Real>(
         &self,
         i: usize,
@@ -109,20 +100,25 @@ impl Previous {
     ) -> Option<f64> {
         let axis = vector::to_f64(normals[i]);
         let radius = neighborhoods.radius[i];
-        let blunt = (BLUNT * radius.f64()).powi(2);
+        let blunt = turned::blunt(radius.f64());
         let (mut sum, mut weight) = (0.0, 0.0);
         let index = &neighborhoods.index;
         index.for_each_within(points[i], radius, |j, distance_squared| {
-            if self.cosines[j].abs() >= FAR {
+            if is_near(self.cosines[j]) {
                 let offset = vector::to_f64(vector::sub(points[j], points[i]));
                 let normal = vector::to_f64(normals[j]);
-                let near = 1.0 / (distance_squared.f64() + blunt);
-                let turned = 2.0 * vector::dot(normal, offset) * near;
-                let carried = vector::sub(normal, vector::scale(offset, turned));
-                sum += near * vector::dot(axis, carried);
+                let near = turned::weight(distance_squared.f64(), blunt);
+                let [axis_along, normal_along] = [axis, normal].map(|v| vector::dot(v, offset));
+                let parallel = vector::dot(axis, normal);
+                sum += near * turned::carried(parallel, axis_along, normal_along, near);
                 weight += near;
             }
         });
         (weight > 0.0).then(|| sum / weight)
     }
+}
+
+/// Whether an axis has not turned far since the step before, by their cosine.
+fn is_near(cosine: f64) -> bool {
+    cosine.abs() >= f64::from(turned::FAR)
 }

@@ -6,20 +6,12 @@
 
 use super::{Error, Known};
 use crate::data::Sensors;
+use crate::element::evidence::{self, CLEAR_VIEW};
 use crate::{Real, vector};
-
-/// A view with at least this cosine decides by itself. It is 14 degrees off the surface; the axes of noisy
-/// samples are 5 to 15 degrees off.
-const CLEAR_VIEW: f32 = 0.25;
 
 /// Whether a view decides alone.
 pub(super) fn is_clear(view: f32) -> bool {
     view.abs() >= CLEAR_VIEW
-}
-
-/// What a view adds to the evidence for the sign of an axis, in −1..1: all but all of it for a clear one.
-pub(super) fn evidence(view: f32) -> f32 {
-    (view / CLEAR_VIEW).clamp(-1.0, 1.0)
 }
 
 /// Cosine, from −1 to 1, between each axis and the direction from its point to its sensor. Where it is not
@@ -65,12 +57,7 @@ fn view_of_any<T: Real>(
     let mut agreed: Option<f32> = None;
     for &sensor in sensors {
         let cosine = view(i, point, axis, sensor)?;
-        agreed = Some(match agreed {
-            None => cosine,
-            Some(before) if before * cosine <= 0.0 => 0.0,
-            Some(before) if before.abs() <= cosine.abs() => before,
-            Some(_) => cosine,
-        });
+        agreed = Some(agreed.map_or(cosine, |before| evidence::agreed(before, cosine)));
     }
     agreed.ok_or(Error::NoSensors)
 }

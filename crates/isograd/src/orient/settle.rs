@@ -3,10 +3,9 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-use rayon::prelude::*;
-
+use super::decide::{self, Beliefs, Place};
 use super::graph::Graph;
-use super::winding::{Dipole, Misfit};
+use super::winding::Misfit;
 use crate::vector;
 
 /// Neighbours whose coupling is at least this strong belong to one domain if their beliefs agree.
@@ -25,15 +24,6 @@ const SWEEPS: usize = 20;
 
 /// A belief below this says nothing.
 const SILENT: f32 = 1e-2;
-
-/// Where points are.
-pub(super) trait Place: Sync {
-    /// Position of a point, in the unit of the user.
-    fn user(&self, p: usize) -> [f64; 3];
-
-    /// Position of a point relative to one of them, in sample spacings.
-    fn in_spacings(&self, p: usize) -> [f32; 3];
-}
 
 /// Turns beliefs into one sign for each point; all in sorted order.
 #[derive(Clone, Debug, Default)]
@@ -95,33 +85,35 @@ impl Domains {
 }
 
 impl Settle {
-    /// `winding` is what a sample at which the winding number is wrong by 1 weighs, beside evidence of 1.
+    /// `evidence` and `belief` are what the samples said; `winding` is what one at which the winding number is wrong by
+    /// 1 weighs, beside evidence of 1.
     ///
     /// Domains of neighbours that agree are first oriented as a whole, the strongest tie first: to the
     /// evidence, or to the domain next to them. So a part whose evidence is weak follows the neighbours
     /// on which it borders, however large it is. What is tied to no evidence at all turns its axes away
     /// from its centroid.
-    pub(super) fn run(
+    pub(super) fn run<B: Beliefs>(
         &mut self,
         graph: &Graph,
-        evidence: &[f32],
-        belief: &[f32],
+        (evidence, belief): (&[f32], &[f32]),
+        samples: &mut B,
         winding: f64,
         place: &impl Place,
-    ) {
+    ) -> Result<(), B::Error> {
         self.domains.reset(belief);
         self.join_agreeing(graph, belief);
         self.join_silent(graph, belief);
         let domains = self.number_domains();
         let mut ties = self.ties(graph, evidence, domains);
         if winding > 0.0 {
-            self.arbitrate(graph, winding, place, &mut ties);
+            self.arbitrate(samples, winding, &mut ties)?;
         }
         let mut outcome = contract(ties.clone());
         improve(&ties, &mut outcome);
         self.apply(&outcome);
         self.find_overruled(domains, belief);
         self.turn_from_centroids(graph, &outcome, |p| place.user(p));
+        Ok(())
     }
 
     fn join_agreeing(&mut self, graph: &Graph, belief: &[f32]) {
@@ -211,26 +203,20 @@ impl Settle {
     }
 
     /// Adds what the winding number says for and between the larger domains.
-    fn arbitrate(
+    fn arbitrate<B: Beliefs>(
         &self,
-        graph: &Graph,
+        samples: &mut B,
         winding: f64,
-        place: &impl Place,
         ties: &mut [BTreeMap<u32, f64>],
-    ) {
+    ) -> Result<(), B::Error> {
         let ground = ties.len() - 1;
         let large = self.large_domains(ground);
-        let mut row = vec![None; ground];
-        for (k, &domain) in large.iter().enumerate() {
-            row[domain] = Some(k);
+        let mut row = vec![decide::Domains::NONE; ground];
+        for (k, &domain) in (0..).zip(&large) {
+            row[domain] = k;
         }
-        let mut dipoles = vec![Vec::new(); large.len()];
-        for (p, &domain) in self.domain.iter().enumerate() {
-            if let Some(k) = row[domain as usize] {
-                dipoles[k].push(self.dipole(graph, place, p));
-            }
-        }
-        let misfit = Misfit::of(&dipoles);
+        let asked: Vec<u32> = self.domain.iter().map(|&d| row[d as usize]).collect();
+        let misfit = Misfit::of(samples, &self.asked(&asked, large.len()))?;
         let mut tie = |a: usize, b: usize, weight: f64| {
             *ties[a].entry(b as u32).or_insert(0.0) += weight;
             *ties[b].entry(a as u32).or_insert(0.0) += weight;
@@ -240,6 +226,15 @@ impl Settle {
             for (l, &b) in large[..k].iter().enumerate() {
                 tie(a, b, -2.0 * winding * misfit.gram[k * large.len() + l]);
             }
+        }
+        Ok(())
+    }
+
+    fn asked<'a>(&'a self, domain: &'a [u32], count: usize) -> decide::Domains<'a> {
+        decide::Domains {
+            domain,
+            sign: &self.sign,
+            count,
         }
     }
 
@@ -253,16 +248,10 @@ impl Settle {
         large
     }
 
-    fn dipole(&self, graph: &Graph, place: &impl Place, p: usize) -> Dipole {
-        let normal = vector::scale(graph.axis[p], self.sign[p]);
-        Dipole::new(place.in_spacings(p), normal, graph.area[p])
-    }
-
     /// How far the winding number of the whole is from that of a body.
-    pub(super) fn misfit(&self, graph: &Graph, place: &impl Place) -> f64 {
-        let all = 0..self.sign.len();
-        let dipoles = all.into_par_iter().map(|p| self.dipole(graph, place, p));
-        Misfit::of(&[dipoles.collect()]).total()
+    pub(super) fn misfit<B: Beliefs>(&self, samples: &mut B) -> Result<f64, B::Error> {
+        let whole = vec![0; self.sign.len()];
+        Ok(Misfit::of(samples, &self.asked(&whole, 1))?.total())
     }
 
     /// Marks the domains whose signs are against most of what their points believed: the winding number of all

@@ -13,29 +13,61 @@ use std::f32::consts::PI;
 
 use rayon::prelude::*;
 
+use super::decide::{Beliefs, Domains, Place};
+use super::graph::Graph;
+use crate::element::winding::{share, softened};
+use crate::vector;
+
 /// Samples at which the winding number is asked, and the fewest in one domain.
 const PROBES: usize = 2048;
 const FEWEST_PROBES: usize = 4;
 
-/// A sample nearer than this share of the spacing counts as if it were so far: it lies on the same sheet, and
-/// only its noise would speak.
-const SOFT: f32 = 0.3;
-
 /// A sample as a piece of surface; lengths in sample spacings.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Dipole {
+struct Dipole {
     position: [f32; 3],
     /// Area times normal over 4π.
     moment: [f32; 3],
 }
 
 impl Dipole {
-    pub(super) fn new(position: [f32; 3], normal: [f32; 3], area: f32) -> Self {
+    fn new(position: [f32; 3], normal: [f32; 3], area: f32) -> Self {
         Self {
             position,
             moment: normal.map(|n| n * area / (4.0 * PI)),
         }
     }
+}
+
+/// `(probes, domains)` the winding number that each domain gives at each of the `probes`.
+pub(super) fn numbers(
+    graph: &Graph,
+    place: &impl Place,
+    domains: &Domains<'_>,
+    probes: &[u32],
+) -> Vec<f64> {
+    let mut dipoles = vec![Vec::new(); domains.count];
+    for (p, &domain) in domains.domain.iter().enumerate() {
+        if let Some(dipoles) = dipoles.get_mut(domain as usize) {
+            let normal = vector::scale(graph.axis[p], domains.sign[p]);
+            dipoles.push(Dipole::new(place.in_spacings(p), normal, graph.area[p]));
+        }
+    }
+    let blocks: Vec<Vec<Block>> = dipoles.iter().map(|d| blocks(d)).collect();
+    let arch = pulp::Arch::new();
+    let ask = |&probe: &u32| -> Vec<f64> {
+        let at = place.in_spacings(probe as usize);
+        let winding = |blocks: &Vec<Block>| {
+            crate::simd::dispatch(
+                arch,
+                #[inline(always)]
+                || winding_number(blocks, at),
+            )
+        };
+        blocks.iter().map(winding).collect()
+    };
+    let asked: Vec<Vec<f64>> = probes.par_iter().map(ask).collect();
+    asked.concat()
 }
 
 /// What signs cost: the sum over all samples of the squared distance of the winding number from ½, which is
@@ -50,25 +82,13 @@ pub(super) struct Misfit {
 }
 
 impl Misfit {
-    /// `domains[a]` are the samples of a domain, with the signs that they have relative to each other.
-    pub(super) fn of(domains: &[Vec<Dipole>]) -> Self {
-        let (count, samples) = (domains.len(), domains.iter().map(Vec::len).sum());
-        let blocks: Vec<Vec<Block>> = domains.iter().map(|d| blocks(d)).collect();
-        let probes = probes(domains, samples);
-        let arch = pulp::Arch::new();
-        let ask = |&(at, _): &([f32; 3], f64)| -> Vec<f64> {
-            let winding = |blocks: &Vec<Block>| {
-                crate::simd::dispatch(
-                    arch,
-                    #[inline(always)]
-                    || winding_number(blocks, at),
-                )
-            };
-            blocks.iter().map(winding).collect()
-        };
-        let windings: Vec<Vec<f64>> = probes.par_iter().map(ask).collect();
+    /// Of domains with the signs that their samples have relative to each other.
+    pub(super) fn of<B: Beliefs>(samples: &mut B, domains: &Domains<'_>) -> Result<Self, B::Error> {
+        let (probes, weights) = probes(domains);
+        let windings = samples.winding(domains, &probes)?;
+        let count = domains.count;
         let (mut gram, mut pull) = (vec![0.0; count * count], vec![0.0; count]);
-        for (&(_, weight), winding) in probes.iter().zip(&windings) {
+        for (weight, winding) in weights.iter().zip(windings.chunks_exact(count.max(1))) {
             for a in 0..count {
                 pull[a] += weight * winding[a];
                 for b in 0..count {
@@ -76,11 +96,12 @@ impl Misfit {
                 }
             }
         }
-        Self {
+        let in_one = domains.domain.iter().filter(|&&d| (d as usize) < count);
+        Ok(Self {
             gram,
             pull,
-            samples,
-        }
+            samples: in_one.count(),
+        })
     }
 
     /// The cost with the signs as they are.
@@ -89,17 +110,23 @@ impl Misfit {
     }
 }
 
-/// Places to ask at, and how many samples each stands for: spread evenly over the samples of each domain.
-fn probes(domains: &[Vec<Dipole>], samples: usize) -> Vec<([f32; 3], f64)> {
-    let mut probes = Vec::new();
-    for dipoles in domains {
-        let n = dipoles.len();
-        let share = (PROBES * n / samples.max(1)).max(FEWEST_PROBES).min(n);
-        let place = |k: usize| dipoles[(2 * k + 1) * n / (2 * share)].position;
-        let weight = n as f64 / share as f64;
-        probes.extend((0..share).map(|k| (place(k), weight)));
+/// Samples to ask at, and how many each stands for: spread evenly over those of each domain.
+fn probes(domains: &Domains<'_>) -> (Vec<u32>, Vec<f64>) {
+    let mut members = vec![Vec::new(); domains.count];
+    for (p, &domain) in (0..).zip(domains.domain) {
+        if let Some(members) = members.get_mut(domain as usize) {
+            members.push(p);
+        }
     }
-    probes
+    let samples: usize = members.iter().map(Vec::len).sum();
+    let (mut probes, mut weights) = (Vec::new(), Vec::new());
+    for members in members {
+        let n = members.len();
+        let share = (PROBES * n / samples.max(1)).max(FEWEST_PROBES).min(n);
+        probes.extend((0..share).map(|k| members[(2 * k + 1) * n / (2 * share)]));
+        weights.extend((0..share).map(|_| n as f64 / share as f64));
+    }
+    (probes, weights)
 }
 
 /// Samples that are summed side by side, and blocks that are summed in single precision.
@@ -131,8 +158,8 @@ fn winding_number(blocks: &[Block], at: [f32; 3]) -> f64 {
         for [px, py, pz, mx, my, mz] in run {
             for l in 0..WIDTH {
                 let (x, y, z) = (px[l] - at[0], py[l] - at[1], pz[l] - at[2]);
-                let square = x * x + y * y + z * z + SOFT * SOFT;
-                sums[l] += (x * mx[l] + y * my[l] + z * mz[l]) / (square * square.sqrt());
+                let square = softened(x * x + y * y + z * z);
+                sums[l] += share(x * mx[l] + y * my[l] + z * mz[l], square, square.sqrt());
             }
         }
         total += sums.iter().map(|&s| f64::from(s)).sum::<f64>();
@@ -142,16 +169,78 @@ fn winding_number(blocks: &[Block], at: [f32; 3]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::shapes::{Sampled, inside_out, sphere};
-    use super::*;
-    use crate::vector;
+    use std::convert::Infallible;
 
-    /// Samples of a sphere in units of their spacing, which is then 1.
-    fn dipoles((points, normals): &Sampled) -> Vec<Dipole> {
-        let pairs = points.iter().zip(normals);
-        pairs
-            .map(|(&x, &n)| Dipole::new(vector::of_f64(x), vector::of_f64(n), 1.0))
-            .collect()
+    use super::super::decide::Reading;
+    use super::super::shapes::{Sampled, inside_out, join, sphere};
+    use super::*;
+
+    /// Samples in units of their spacing, each of which stands for an area of 1.
+    struct Body {
+        graph: Graph,
+        points: Vec<[f64; 3]>,
+    }
+
+    impl Place for Body {
+        fn user(&self, p: usize) -> [f64; 3] {
+            self.points[p]
+        }
+
+        fn spacing(&self) -> f64 {
+            1.0
+        }
+    }
+
+    impl Beliefs for Body {
+        type Error = Infallible;
+
+        fn hear(
+            &mut self,
+            _: Reading,
+            _: &mut Vec<f32>,
+            _: &mut Vec<f32>,
+        ) -> Result<(), Infallible> {
+            Ok(())
+        }
+
+        fn differ(&mut self) -> Result<bool, Infallible> {
+            Ok(false)
+        }
+
+        fn winding(
+            &mut self,
+            domains: &Domains<'_>,
+            probes: &[u32],
+        ) -> Result<Vec<f64>, Infallible> {
+            Ok(numbers(&self.graph, self, domains, probes))
+        }
+    }
+
+    impl Body {
+        fn of((points, normals): Sampled) -> Self {
+            let mut graph = Graph::default();
+            graph.axis = normals.iter().map(|&n| vector::of_f64(n)).collect();
+            graph.area = vec![1.0; points.len()];
+            Self { graph, points }
+        }
+
+        /// What it costs that the first samples are one domain, and the others another.
+        fn misfit(&mut self, first: usize) -> Misfit {
+            let n = self.points.len();
+            let domain: Vec<u32> = (0..n).map(|p| u32::from(p >= first)).collect();
+            let domains = Domains {
+                domain: &domain,
+                sign: &vec![1.0; n],
+                count: if first < n { 2 } else { 1 },
+            };
+            let Ok(misfit) = Misfit::of(self, &domains);
+            misfit
+        }
+
+        fn dipoles(&self) -> Vec<Dipole> {
+            let dipole = |p| Dipole::new(self.in_spacings(p), self.graph.axis[p], 1.0);
+            (0..self.points.len()).map(dipole).collect()
+        }
     }
 
     /// `n` samples, one for each unit of area.
@@ -162,23 +251,26 @@ mod tests {
     #[test]
     fn it_is_one_inside_nothing_outside_and_a_half_on_the_surface() {
         let r = radius(4000);
-        let ball = dipoles(&sphere(4000, [0.0; 3], r, 3));
-        let at = |x: f64| winding_number(&blocks(&ball), [x as f32, 0.0, 0.0]);
+        let mut ball = Body::of(sphere(4000, [0.0; 3], r, 3));
+        let blocks = blocks(&ball.dipoles());
+        let first = ball.points[0];
+        let at =
+            |x: f64| winding_number(&blocks, vector::of_f64(vector::sub([x, 0.0, 0.0], first)));
         // Random samples: a per cent or two.
         assert!((at(0.0) - 1.0).abs() < 1e-3, "{}", at(0.0));
         assert!((at(0.5 * r) - 1.0).abs() < 0.02, "{}", at(0.5 * r));
         assert!(at(1.5 * r).abs() < 0.02, "{}", at(1.5 * r));
-        let mean = Misfit::of(&[ball]).pull[0] / 4000.0;
+        let mean = ball.misfit(4000).pull[0] / 4000.0;
         assert!((mean - 0.5).abs() < 0.02, "{mean}");
     }
 
     #[test]
     fn the_sums_are_those_of_one_sample_after_the_other() {
-        let ball = dipoles(&sphere(1003, [1.0, 2.0, 3.0], 9.0, 5));
+        let ball = Body::of(sphere(1003, [1.0, 2.0, 3.0], 9.0, 5)).dipoles();
         let at = [3.0, -1.0, 4.0f32];
         let one = |d: &Dipole| {
             let r = vector::to_f64(vector::sub(d.position, at));
-            let square = vector::norm_squared(r) + f64::from(SOFT * SOFT);
+            let square = softened(vector::norm_squared(r));
             vector::dot(r, vector::to_f64(d.moment)) / square.powf(1.5)
         };
         let plain: f64 = ball.iter().map(one).sum();
@@ -190,15 +282,16 @@ mod tests {
     #[test]
     fn a_hollow_ball_fits_best_with_its_inner_wall_turned_inward() {
         let (r, inner) = (radius(4000), radius(2000));
-        let outer = dipoles(&sphere(4000, [0.0; 3], r, 3));
+        let outer = sphere(4000, [0.0; 3], r, 3);
         let wall = sphere(2000, [0.0; 3], inner, 4);
-        let cost = |wall: &Sampled| Misfit::of(&[outer.clone(), dipoles(wall)]).total();
-        let (right, wrong) = (cost(&inside_out(wall.clone())), cost(&wall));
+        let with = |wall: Sampled| Body::of(join(outer.clone(), wall));
+        let cost = |wall: Sampled| with(wall).misfit(4000).total();
+        let (right, wrong) = (cost(inside_out(wall.clone())), cost(wall.clone()));
         // Wrong, the winding number is 3/2 on the wall and right on the outside.
         assert!(right < 0.01 * 6000.0, "{right}");
         assert!((wrong - 2000.0).abs() < 0.1 * 2000.0, "{wrong}");
-        let both = Misfit::of(&[outer, dipoles(&wall)]);
+        let both = with(wall).misfit(4000);
         assert!(both.gram[1] > 0.0, "their signs should differ");
-        assert!((both.total() - wrong).abs() < 1e-9 * wrong);
+        assert_eq!(both.total(), wrong);
     }
 }

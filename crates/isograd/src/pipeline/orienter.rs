@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::stages::{check_samples, find_axes};
+use super::stages::find_axes;
 use super::{Error, Residuals};
 use crate::Real;
 use crate::data::PointCloud;
@@ -98,7 +98,7 @@ impl<T: Real> Orienter<T> {
         report.flipped = orientation.flipped;
         let start = done(report, Stage::Orient, start);
         if self.checks {
-            check_samples(cloud.points(), neighborhoods, orientation, report);
+            report.check_samples(cloud.points(), neighborhoods, orientation);
         }
         done(report, Stage::Checks, start);
         Ok(())

@@ -244,7 +244,7 @@ impl<T: Real> Reconstructor<T> {
         let (points, neighborhoods) = (cloud.points(), &residuals.neighborhoods);
         let scratch = &mut self.scratch.measure;
         report.check_field(points, &orientation.normals, sdf, mesh, scratch);
-        check_samples(points, neighborhoods, orientation, report);
+        report.check_samples(points, neighborhoods, orientation);
     }
 }
 
@@ -266,6 +266,24 @@ impl Report {
         warnings.extend(checks::sparse(self.sample_spacing, spacing.f64()));
         warnings.extend(checks::components(self.surface.components));
         warnings.extend(checks::rounded(points, spacing));
+    }
+
+    /// Measures the samples and their normals, and looks for reasons not to trust them. `neighborhoods` are those of
+    /// the points; [`Report::guarded`] is there already.
+    pub fn check_samples<T: Real>(
+        &mut self,
+        points: &[[T; 3]],
+        neighborhoods: &Neighborhoods<T>,
+        orientation: &Orientation<T>,
+    ) {
+        self.measure_samples(&neighborhoods.count, &orientation.confidence);
+        let rims = orient::rim::rims(points, &orientation.normals, neighborhoods);
+        let reasons = orient::doubt::reasons_beside(&rims, points, orientation, neighborhoods);
+        self.doubt = orient::doubt::Doubt::count(points.len(), &reasons);
+        let warnings = &mut self.warnings;
+        warnings.extend(checks::open(&rims));
+        warnings.extend(checks::doubtful_signs(self.doubt));
+        warnings.extend(checks::guarded(self.guarded, points.len()));
     }
 }
 
@@ -299,21 +317,4 @@ pub(super) fn find_axes<T: Real>(
         return Err(Error::NoPlane { points });
     }
     Ok(())
-}
-
-/// Measures the samples and their normals, and looks for reasons not to trust them.
-pub(super) fn check_samples<T: Real>(
-    points: &[[T; 3]],
-    neighborhoods: &Neighborhoods<T>,
-    orientation: &Orientation<T>,
-    report: &mut Report,
-) {
-    report.measure_samples(&neighborhoods.count, &orientation.confidence);
-    let rims = orient::rim::rims(points, &orientation.normals, neighborhoods);
-    let reasons = orient::doubt::reasons_beside(&rims, points, orientation, neighborhoods);
-    report.doubt = orient::doubt::Doubt::count(points.len(), &reasons);
-    let warnings = &mut report.warnings;
-    warnings.extend(checks::open(&rims));
-    warnings.extend(checks::doubtful_signs(report.doubt));
-    warnings.extend(checks::guarded(report.guarded, points.len()));
 }
