@@ -6,10 +6,12 @@
 pub mod crossing;
 pub mod curvature;
 pub mod difference;
+pub mod disc;
 pub mod hat;
 pub mod linear;
 pub mod plane;
 pub mod plate;
+pub mod sight;
 pub mod spline;
 
 use std::ops::{Add, Div, Mul, Neg, Sub};

@@ -218,7 +218,7 @@ impl Auto {
                     let p = members[m] as usize;
                     (point(p), graph.axis[p], growth * f64::from(graph.reach[p]))
                 });
-                for (&p, sights) in members.iter().zip(&self.fill.sights) {
+                for (&p, sights) in members.iter().zip(self.fill.sights()) {
                     let (filled, ends) = (&mut self.filled[p as usize], &mut self.ends[p as usize]);
                     *filled += weight * sights.evidence;
                     let slab = &mut self.slabs[p as usize];

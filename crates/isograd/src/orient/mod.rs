@@ -54,7 +54,7 @@
 
 mod auto;
 pub mod doubt;
-mod fill;
+pub mod fill;
 mod flood;
 mod graph;
 #[cfg(test)]
