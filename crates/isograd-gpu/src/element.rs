@@ -12,11 +12,15 @@ pub(crate) mod crossing;
 pub(crate) mod curvature;
 #[path = "../../isograd/src/element/difference.rs"]
 pub(crate) mod difference;
+#[path = "../../isograd/src/element/disc.rs"]
+pub(crate) mod disc;
 #[path = "../../isograd/src/element/hat.rs"]
 pub(crate) mod hat;
 #[path = "../../isograd/src/element/linear.rs"]
 pub(crate) mod linear;
 #[path = "../../isograd/src/element/plate.rs"]
 pub(crate) mod plate;
+#[path = "../../isograd/src/element/sight.rs"]
+pub(crate) mod sight;
 #[path = "../../isograd/src/element/spline.rs"]
 pub(crate) mod spline;

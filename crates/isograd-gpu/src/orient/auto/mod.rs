@@ -1,0 +1,3 @@
+//! The parts of the automatic method: see [`isograd::orient`].
+
+pub mod fill;
