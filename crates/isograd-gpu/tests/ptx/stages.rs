@@ -8,6 +8,7 @@ use isograd::splat::Weights;
 use isograd_gpu::differential::{self, Differential, LocalCotangent};
 use isograd_gpu::distance::{Band, Mesh, lattice, query};
 use isograd_gpu::iso_value::local;
+use isograd_gpu::orient::auto::fill::{Fill, Lattice, Members};
 use isograd_gpu::primitives::{reduce, scan, sort};
 use isograd_gpu::splat::{self, SampleCotangent, Samples};
 use isograd_gpu::{
@@ -35,6 +36,7 @@ pub fn launch_all<T: Scalar>(device: &Device<Recorder>) {
     surfaces::<T>(device);
     distances::<T>(device);
     derivatives::<T>(device);
+    fills::<T>(device);
     whole::<T>(device);
     forget_answers();
 }
@@ -226,6 +228,26 @@ fn derivatives<T: Scalar>(device: &Device<Recorder>) {
     known
         .pullback_at_points(device, &phi, &points, bar, &phi, &points)
         .unwrap();
+}
+
+/// A grid of three regions, which are asked for first.
+fn fills<T: Scalar>(device: &Device<Recorder>) {
+    let (rows, reach) = (device.empty(SAMPLES).unwrap(), numbers(device, SAMPLES));
+    let members = Members {
+        rows: &rows,
+        points: &numbers::<T>(device, 3 * SAMPLES),
+        axes: &numbers(device, 3 * SAMPLES),
+        reach: &reach,
+        growth: 0.1,
+    };
+    answer(&[&[3]]);
+    let lattice = Lattice::new([0.0; 3], [1.0; 3], 0.05, 1 << 20);
+    let fill = Fill::new(device, &lattice, &members).unwrap();
+    assert_eq!(fill.sides, [1, 0, 0]);
+    fill.look(device).unwrap();
+    fill.regions.of_cells(device, &fill.occupied).unwrap();
+    fill.sky.of_cells(device, &fill.occupied).unwrap();
+    forget_answers();
 }
 
 fn whole<T: Scalar>(device: &Device<Recorder>) {
