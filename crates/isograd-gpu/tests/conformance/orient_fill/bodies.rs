@@ -125,15 +125,17 @@ fn open<T: Scalar>() -> [Body<T>; 2] {
     ]
 }
 
-/// Both sides of a plate, a cell apart, which is flat in each direction in turn.
+/// Both sides of a plate, some cells apart, which is flat in each direction in turn. Not quite: no ray is to end where a
+/// cell does, and rounding to decide.
 fn plates<T: Scalar>() -> [Body<T>; 3] {
     let plate = |flat: usize| {
         let (n, spacing) = (90, 0.01);
+        let mut numbers = Numbers(17);
         let samples: Vec<_> = (0..2 * n * n)
             .map(|i| {
                 let (u, v, side) = (i / 2 / n, i / 2 % n, i % 2);
-                let flat_point = [u as f64 * spacing, v as f64 * spacing, 0.03 * side as f64];
-                let mut point = flat_point;
+                let mut point = [u as f64, v as f64, 3.1 * side as f64]
+                    .map(|x| spacing * (x + 0.1 * numbers.signed()));
                 point.rotate_right((flat + 1) % 3);
                 let mut axis = [0.0; 3];
                 axis[flat] = if u % 3 == 0 { 1.0 } else { -1.0 };

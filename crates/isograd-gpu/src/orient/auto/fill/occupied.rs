@@ -104,7 +104,7 @@ fn count_words<R: Runtime>(device: &Device<R>, shape: [usize; 3]) -> Result<usiz
     if words > MOST_WORDS {
         return Err(Error::TooLarge {
             device: device.name().to_owned(),
-            bytes: 4 * words as u64,
+            bytes: (words as u64).saturating_mul(4),
             limit: 4 * MOST_WORDS as u64,
         });
     }

@@ -123,7 +123,7 @@ fn shorten<R: Runtime>(
     let (mut parents, mut shorter) = (parents, None);
     for _ in 0..depth.next_power_of_two().ilog2() {
         let next = shorter.map_or_else(|| device.empty(parents.len()), Ok)?;
-        double::launch::<R>(
+        skip_parents::launch::<R>(
             device.client(),
             device.groups(parents.len(), BLOCK),
             CubeDim::new_1d(BLOCK),
@@ -235,7 +235,7 @@ fn link_runs(cells: &Cells, before: &Array<u32>, parents: &mut Array<u32>) {
 
 /// The parent of the parent of each run.
 #[cube(launch)]
-fn double(before: &Array<u32>, parents: &Array<u32>, next: &mut Array<u32>) {
+fn skip_parents(before: &Array<u32>, parents: &Array<u32>, next: &mut Array<u32>) {
     if (ABSOLUTE_POS as u32) < before[before.len() - 1] {
         next[ABSOLUTE_POS] = parents[parents[ABSOLUTE_POS] as usize];
     }
