@@ -3,6 +3,7 @@
 //! The files beside this one are compiled twice: here as plain Rust, and in `isograd-gpu`, where the cfg
 //! `cube` makes parts of kernels of the same lines.
 
+pub mod coupling;
 pub mod crossing;
 pub mod curvature;
 pub mod difference;
@@ -10,6 +11,7 @@ pub mod hat;
 pub mod linear;
 pub mod plane;
 pub mod plate;
+pub mod sheet;
 pub mod spline;
 
 use std::ops::{Add, Div, Mul, Neg, Sub};

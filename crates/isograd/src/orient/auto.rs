@@ -4,13 +4,12 @@ use rayon::prelude::*;
 
 use super::Axes;
 use super::fill::{Fill, Lattice};
-use super::graph::{Graph, NEIGHBORS};
+use super::graph::Graph;
 use super::groups::Groups;
 use super::sensors;
 use super::settle::{Place, Settle};
 use crate::Real;
 use crate::neighbors::Neighborhoods;
-use crate::parallel::CHUNK;
 use crate::vector;
 
 /// Cells of the two grids over the median reach of the samples, and what their evidence weighs.
@@ -35,9 +34,6 @@ const WINDING: f64 = 4.0;
 
 /// Evidence of a second sheet below this makes no difference.
 const SLIGHT: f32 = 0.05;
-
-/// Rounds in which every point takes the mean of its own evidence and what its neighbours say.
-const ROUNDS: usize = 60;
 
 /// What beliefs are worth, the other way round, where they were overruled as a whole.
 const OVERRULED: f32 = 0.5;
@@ -164,7 +160,8 @@ impl Auto {
         evidence.clear();
         evidence.extend((0..self.sheets.len()).map(|p| self.weighed(p, reading)));
         self.evidence = evidence;
-        self.relax();
+        self.graph
+            .relax(&self.evidence, &mut self.belief, &mut self.next);
         let winding = if self.seen.is_empty() { WINDING } else { 0.0 };
         self.settle
             .run(&self.graph, &self.evidence, &self.belief, winding, place);
@@ -259,36 +256,6 @@ impl Auto {
     fn differs(&self, p: usize) -> bool {
         (1.0 - self.open(p)) * self.sheets[p].abs() > SLIGHT
     }
-
-    /// Spreads the evidence: repeated weighted means, each point's own evidence held with its strength.
-    fn relax(&mut self) {
-        self.belief.clone_from(&self.evidence);
-        self.next.resize(self.belief.len(), 0.0);
-        for _ in 0..ROUNDS {
-            let (graph, evidence, belief) = (&self.graph, &self.evidence, &self.belief);
-            self.next
-                .par_chunks_mut(CHUNK)
-                .enumerate()
-                .for_each(|(chunk, next)| {
-                    for (k, next) in next.iter_mut().enumerate() {
-                        let p = chunk * CHUNK + k;
-                        *next = spread(evidence[p], &graph.coupling[p], &graph.near[p], belief);
-                    }
-                });
-            std::mem::swap(&mut self.belief, &mut self.next);
-        }
-    }
-}
-
-#[inline(always)]
-fn spread(own: f32, coupling: &[f32; NEIGHBORS], near: &[u32; NEIGHBORS], belief: &[f32]) -> f32 {
-    let mut sum = own * own.abs();
-    let mut weight = own.abs();
-    for slot in 0..NEIGHBORS {
-        sum += coupling[slot] * belief[near[slot] as usize];
-        weight += coupling[slot].abs();
-    }
-    if weight > 0.0 { sum / weight } else { 0.0 }
 }
 
 /// The median reach of the members that have any, in spacings of the cloud.

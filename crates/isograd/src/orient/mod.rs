@@ -56,7 +56,7 @@ mod auto;
 pub mod doubt;
 mod fill;
 mod flood;
-mod graph;
+pub mod graph;
 #[cfg(test)]
 mod grid_tests;
 mod groups;
