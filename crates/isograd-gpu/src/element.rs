@@ -6,6 +6,8 @@ pub(crate) use cubecl::prelude::Float as Element;
 #[path = "../../isograd/src/element/plane.rs"]
 pub(crate) mod plane;
 
+#[path = "../../isograd/src/element/coupling.rs"]
+pub(crate) mod coupling;
 #[path = "../../isograd/src/element/crossing.rs"]
 pub(crate) mod crossing;
 #[path = "../../isograd/src/element/curvature.rs"]
@@ -18,5 +20,7 @@ pub(crate) mod hat;
 pub(crate) mod linear;
 #[path = "../../isograd/src/element/plate.rs"]
 pub(crate) mod plate;
+#[path = "../../isograd/src/element/sheet.rs"]
+pub(crate) mod sheet;
 #[path = "../../isograd/src/element/spline.rs"]
 pub(crate) mod spline;

@@ -12,6 +12,10 @@ pub(crate) struct Vector3<F: Float> {
 
 #[cube]
 impl<F: Float> Vector3<F> {
+    pub fn new(x: F, y: F, z: F) -> Self {
+        Vector3::<F> { x, y, z }
+    }
+
     /// Row `i` of an `(N, 3)` array.
     pub fn at(array: &Array<F>, i: usize) -> Self {
         Vector3::<F>::load(array, 3 * i)

@@ -5,6 +5,7 @@ use cubecl::prelude::*;
 use super::tree::{IS_LEAF, NODE};
 use super::walk::{end_of_leaf, first_of_leaf};
 use super::{BLOCK, LEAF, Neighborhoods};
+use crate::primitives::smallest::insert;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
@@ -86,21 +87,21 @@ fn find_reaches<F: Float>(
 
 /// Squared distance from a place to a node's box.
 #[cube]
-fn box_square<F: Float>(nodes: &Array<F>, node: usize, x: Vector3<F>) -> F {
+pub(super) fn box_square<F: Float>(nodes: &Array<F>, node: usize, x: Vector3<F>) -> F {
     let low = Vector3::<F>::load(nodes, NODE * node);
     let high = Vector3::<F>::load(nodes, NODE * node + 3);
     x.to_box_squared(low, high)
 }
 
 #[cube]
-fn square_to<F: Float>(points: &Array<F>, j: usize, x: Vector3<F>) -> F {
+pub(super) fn square_to<F: Float>(points: &Array<F>, j: usize, x: Vector3<F>) -> F {
     let offset = Vector3::<F>::at(points, j).sub(x);
     offset.dot(offset)
 }
 
 /// The node to look at after this one: below it, if it is to be entered, else after its subtree.
 #[cube]
-fn next_node(links: &Array<u32>, node: usize, enter: bool) -> usize {
+pub(super) fn next_node(links: &Array<u32>, node: usize, enter: bool) -> usize {
     let link = links[node];
     let step = enter || link >= IS_LEAF;
     select(step, node + 1, link as usize)
@@ -126,21 +127,6 @@ fn leaf_towards<F: Float>(nodes: &Array<F>, links: &Array<u32>, x: Vector3<F>) -
         node = nearest;
     }
     node
-}
-
-/// Puts a number where it belongs among the `k` smallest so far.
-#[cube]
-fn insert<F: Float>(number: F, smallest: &mut Array<F>, #[comptime] k: usize) {
-    if number < smallest[k - 1] {
-        let mut moved = number;
-        #[unroll]
-        for i in 0..k {
-            let own = smallest[i];
-            let stays = own <= moved;
-            smallest[i] = select(stays, own, moved);
-            moved = select(stays, moved, own);
-        }
-    }
 }
 
 /// A point, and how far it is from a place, squared.

@@ -19,7 +19,7 @@
 //! The neighbourhoods, the radii, the sign. Where `λ₂ − λ₁` is at most `10⁻³ λ₃`, the pullback bounds
 //! `1/(λ₁ − λ_k)`: [`Residual::guarded`].
 
-mod eigen;
+pub(crate) mod eigen;
 mod forward;
 mod pullback;
 mod widen;
@@ -38,8 +38,8 @@ use crate::{Buffer, Device, Error, Scalar};
 /// normal, tangent, centroid, eigenvalues, weight.
 const PLANE: usize = 13;
 const TANGENT: usize = 3;
-const CENTROID: usize = 6;
-const VALUES: usize = 9;
+pub(crate) const CENTROID: usize = 6;
+pub(crate) const VALUES: usize = 9;
 const WEIGHT: usize = 12;
 
 /// Parts of 1000 of `λ₃` up to which the gap `λ₂ − λ₁` is too small for a normal to mean anything: as on the CPU.
@@ -48,8 +48,8 @@ const SMALLEST_GAP: f32 = 1.0;
 /// What the pullback needs of [`forward`].
 #[derive(Clone, Debug)]
 pub struct Residual<T> {
-    neighborhoods: Neighborhoods<T>,
-    planes: Buffer<T>,
+    pub(crate) neighborhoods: Neighborhoods<T>,
+    pub(crate) planes: Buffer<T>,
     /// `(N,)` number of samples within each radius, the point itself included, in input order.
     pub count: Buffer<u32>,
 }

@@ -12,6 +12,7 @@
 //! # Not differentiable
 //! The signs, and the confidence.
 
+pub mod auto;
 pub mod given;
 mod parity;
 

@@ -10,6 +10,7 @@ mod isosurface;
 mod local_level;
 mod normals;
 mod orient;
+mod orient_graph;
 mod pipeline;
 mod poisson;
 mod primitives;

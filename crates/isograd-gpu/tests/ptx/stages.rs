@@ -30,6 +30,7 @@ pub fn launch_all<T: Scalar>(device: &Device<Recorder>) {
     primitives::<T>(device);
     points::<T>(device);
     held::<T>(device);
+    graphs::<T>(device);
     samples::<T>(device);
     solves::<T>(device);
     surfaces::<T>(device);
@@ -95,6 +96,23 @@ fn held<T: Scalar>(device: &Device<Recorder>) {
     orient::forward(device, &near, &points, &orient::Method::Signs(&points)).unwrap();
     forget_answers();
     orient::given::pullback(device, &points, &points).unwrap();
+}
+
+/// The neighbour graph of the automatic orientation.
+fn graphs<T: Scalar>(device: &Device<Recorder>) {
+    use orient::auto::graph;
+    let (points, radii) = (
+        numbers::<T>(device, 3 * SAMPLES),
+        numbers::<T>(device, SAMPLES),
+    );
+    let near = neighbors::forward(device, &points, &radii).unwrap();
+    let (axes, planes) = normals::forward(device, &near).unwrap();
+    let spacing = <T as isograd::Real>::of(0.02);
+    let mut graph = graph::forward(device, &near, &axes, Some(&planes), spacing).unwrap();
+    let slab = device.empty(SAMPLES).unwrap();
+    graph::part_slabs(device, &mut graph, &slab).unwrap();
+    let evidence = graph::sheet_evidence(device, &near, &graph, spacing).unwrap();
+    graph::relax(device, &graph, &evidence).unwrap();
 }
 
 /// Numbers as they are in memory.
