@@ -6,6 +6,7 @@
 pub mod crossing;
 pub mod curvature;
 pub mod difference;
+pub mod fit;
 pub mod hat;
 pub mod linear;
 pub mod plane;
