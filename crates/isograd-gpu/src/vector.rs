@@ -37,6 +37,13 @@ impl<F: Float> Vector3<F> {
         array[start + 2] = self.z;
     }
 
+    /// Adds it to three numbers of an array, from `start` on.
+    pub fn add_to(self, array: &mut Array<F>, start: usize) {
+        array[start] += self.x;
+        array[start + 1] += self.y;
+        array[start + 2] += self.z;
+    }
+
     pub fn add(self, other: Self) -> Self {
         Vector3::<F> {
             x: self.x + other.x,

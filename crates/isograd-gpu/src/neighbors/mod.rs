@@ -28,7 +28,7 @@ pub mod radius;
 mod tree;
 mod walk;
 
-pub(crate) use nearest::{SURE_SHARE, about_nearest, any_within, reaches};
+pub(crate) use nearest::{SURE_SHARE, about_nearest, any_within, reach_squared, reaches};
 pub(crate) use order::{gather, scatter};
 pub(crate) use walk::{end_of_leaf, first_of_leaf, is_isolated, next_leaf};
 

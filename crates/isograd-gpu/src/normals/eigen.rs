@@ -11,7 +11,7 @@ use crate::vector::Vector3;
 
 /// A symmetric matrix.
 #[derive(CubeType, Clone, Copy)]
-pub(super) struct Symmetric<F: Float> {
+pub(crate) struct Symmetric<F: Float> {
     pub xx: F,
     pub xy: F,
     pub xz: F,
@@ -22,7 +22,7 @@ pub(super) struct Symmetric<F: Float> {
 
 /// Eigenvalues in ascending order, and a right-handed orthonormal basis of eigenvectors.
 #[derive(CubeType, Clone, Copy)]
-pub(super) struct Eigen<F: Float> {
+pub(crate) struct Eigen<F: Float> {
     pub values: Vector3<F>,
     pub first: Vector3<F>,
     pub second: Vector3<F>,

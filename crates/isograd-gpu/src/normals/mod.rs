@@ -24,13 +24,16 @@ mod forward;
 mod pullback;
 mod widen;
 
+pub(crate) use eigen::{Eigen, Symmetric};
 pub use forward::forward;
+pub(crate) use forward::{MOMENTS, add_moments, fit};
 pub use pullback::pullback;
 pub use widen::widen;
 
 use cubecl::prelude::*;
 
 use crate::neighbors::{BLOCK, Neighborhoods};
+use crate::primitives::flags;
 use crate::primitives::scan::exclusive_sum;
 use crate::{Buffer, Device, Error, Scalar};
 
@@ -70,17 +73,8 @@ impl<T: Scalar> Residual<T> {
         let flags: Buffer<u32> = device.empty(n)?;
         let (groups, dim) = (device.groups(n, BLOCK), CubeDim::new_1d(BLOCK));
         flag_guarded::launch::<T, R>(device.client(), groups, dim, self.planes.arg(), flags.arg());
-        let sums = exclusive_sum(device, &flags)?;
-        let total: Buffer<u32> = device.empty(1)?;
-        let one = CubeDim::new_1d(1);
-        take_last::launch::<R>(
-            device.client(),
-            device.groups(1, 1),
-            one,
-            sums.arg(),
-            total.arg(),
-        );
-        Ok(device.download(&total)?[0] as usize)
+        let [total] = flags::totals(device, [&exclusive_sum(device, &flags)?])?;
+        Ok(total)
     }
 
     /// A copy of the planes on the host.
@@ -124,12 +118,5 @@ fn flag_guarded<F: Float>(planes: &Array<F>, flags: &mut Array<u32>) {
         let third = planes[(VALUES + 2) * n + ABSOLUTE_POS];
         let clear = F::new(1000.0) * (second - first) > F::new(SMALLEST_GAP) * third;
         flags[ABSOLUTE_POS] = select(clear, 0u32, 1u32);
-    }
-}
-
-#[cube(launch)]
-fn take_last(values: &Array<u32>, last: &mut Array<u32>) {
-    if ABSOLUTE_POS == 0 {
-        last[0] = values[values.len() - 1];
     }
 }
