@@ -12,6 +12,8 @@ pub(crate) mod crossing;
 pub(crate) mod curvature;
 #[path = "../../isograd/src/element/difference.rs"]
 pub(crate) mod difference;
+#[path = "../../isograd/src/element/fit.rs"]
+pub(crate) mod fit;
 #[path = "../../isograd/src/element/hat.rs"]
 pub(crate) mod hat;
 #[path = "../../isograd/src/element/linear.rs"]

@@ -6,7 +6,7 @@ use isograd::isosurface::Level;
 use isograd::neighbors::Radius;
 use isograd::splat::Weights;
 use isograd_gpu::differential::{self, Differential, LocalCotangent};
-use isograd_gpu::distance::{Band, Mesh, lattice, query};
+use isograd_gpu::distance::{Band, Mesh, extend, lattice, query};
 use isograd_gpu::iso_value::local;
 use isograd_gpu::primitives::{reduce, scan, sort};
 use isograd_gpu::splat::{self, SampleCotangent, Samples};
@@ -34,6 +34,7 @@ pub fn launch_all<T: Scalar>(device: &Device<Recorder>) {
     solves::<T>(device);
     surfaces::<T>(device);
     distances::<T>(device);
+    extensions::<T>(device);
     derivatives::<T>(device);
     whole::<T>(device);
     forget_answers();
@@ -206,6 +207,54 @@ fn distances<T: Scalar>(device: &Device<Recorder>) {
     let hits = query::signed(device, &mesh, points, Some((&chi, &grid))).unwrap();
     let bars = (&hits.distances, Some(&hits.points));
     query::pullback(device, &mesh, points, &hits, bars.0, bars.1).unwrap();
+}
+
+/// An attribute of three components, one of five, and clouds too small for the usual numbers of samples. What is asked
+/// for is how many numbers are bad, how many cells are in the band, and how many faces are not there.
+fn extensions<T: Scalar>(device: &Device<Recorder>) {
+    let mesh = Mesh {
+        vertices: numbers::<T>(device, 3 * VERTICES),
+        faces: device.empty(3 * FACES).unwrap(),
+    };
+    let (grid, phi) = (grid(), numbers::<T>(device, cells()));
+    let closest = device.empty(cells()).unwrap();
+    let surface = extend::Surface {
+        mesh: &mesh,
+        grid: &grid,
+        phi: &phi,
+        closest: &closest,
+    };
+    for (count, components) in [(SAMPLES, 3), (SAMPLES, 5), (3, 1)] {
+        let areas = numbers::<T>(device, count);
+        let near = neighbors::forward(device, &numbers(device, 3 * count), &areas).unwrap();
+        let samples = extend::Samples {
+            neighborhoods: &near,
+            common_radius: <T as isograd::Real>::of(0.1),
+            areas: &areas,
+        };
+        let values = numbers::<T>(device, components * count);
+        let attribute = extend::Attribute {
+            values: &values,
+            components,
+        };
+        answer(&[&[0, 9000, 0]]);
+        let (extension, residual) =
+            extend::forward(device, samples, attribute, surface, 3.0).unwrap();
+        let (at_vertices, in_band) = (&extension.vertices, &extension.values);
+        answer(&[&[0, 0]]);
+        extend::pullback(
+            device,
+            samples,
+            attribute,
+            surface,
+            &residual,
+            &extension,
+            Some(at_vertices),
+            Some(in_band),
+        )
+        .unwrap();
+    }
+    forget_answers();
 }
 
 fn derivatives<T: Scalar>(device: &Device<Recorder>) {
