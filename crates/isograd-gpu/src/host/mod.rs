@@ -6,7 +6,6 @@
 //! compiled here, once for each number type.
 //!
 //! # What differs from the CPU
-//! - Options that devices do not have yet are an [`Error::Option`] that names them.
 //! - Radii and sides of normals are found on the CPU, as [`Held`](crate::pipeline::Held) says, at every call.
 //! - With [`Method::Previous`](isograd::orient::Method::Previous) they are found by the first call, and by one with
 //!   another number of points. Every other call keeps its radii, and takes sides from the normals of the call before,
@@ -14,6 +13,7 @@
 
 mod backend;
 mod error;
+mod extend;
 mod plan;
 mod result;
 mod work;

@@ -3,10 +3,11 @@
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
+use isograd::distance::extend::{self, Extension};
 use isograd::isosurface::measure;
 use isograd::{
-    CloudCotangent, Cotangent, Field, Grid, Mesh, Options, Orienter, PointCloud, PullbackError,
-    Report, Seconds, Stage, Warning,
+    Attribute, CloudCotangent, Cotangent, Field, Grid, Mesh, Options, Orienter, PointCloud,
+    PullbackError, Report, Seconds, Stage, Warning,
 };
 
 use super::work::{Work, vectors_of};
@@ -241,20 +242,45 @@ impl<T: Number> Reconstruction<T> {
         Ok(report)
     }
 
-    /// Pulls cotangents of any of the results back to the points and the grid, on the device, as
-    /// [`isograd::Reconstruction::pullback`] does. Of the samples whose axis is guarded all are counted, those without a
-    /// cotangent too.
+    /// The attribute `name` of the cloud at the vertices of the surface, and at every cell within `band_cells` cells of
+    /// the surface as it is at the closest surface point: [`isograd::Reconstruction::extend`], on the device.
     ///
     /// # Errors
-    /// Those of the device; a cotangent of another length, or that is not finite; [`Error::Option`] for extended
-    /// attributes.
+    /// What that says; those of the device.
+    pub fn extend(
+        &self,
+        cloud: &PointCloud<T>,
+        name: &str,
+        band_cells: f64,
+    ) -> Result<Extension<T>, Error> {
+        let attributes = cloud.attributes();
+        let attribute = attributes.iter().find(|a| a.name == name);
+        let attribute = attribute.ok_or_else(|| extend::Error::Missing {
+            name: name.into(),
+            known: attributes.iter().map(|a| a.name.clone()).collect(),
+        })?;
+        Ok(self.extend_with_residual(attribute, band_cells)?.0)
+    }
+
+    /// The same for one value per sample that was reconstructed, with what the pullback needs.
+    ///
+    /// # Errors
+    /// As [`Self::extend`].
+    pub fn extend_with_residual(
+        &self,
+        attribute: &Attribute<T>,
+        band_cells: f64,
+    ) -> Result<(Extension<T>, extend::Residual<T>), Error> {
+        self.device.extend(&self.result, attribute, band_cells)
+    }
+
+    /// Pulls cotangents of any of the results, and of what was extended, back to the points, the attributes and the
+    /// grid, on the device, as [`isograd::Reconstruction::pullback`] does. Of the samples whose axis is guarded all are
+    /// counted, those without a cotangent too.
+    ///
+    /// # Errors
+    /// Those of the device; a cotangent of another length, or that is not finite; an extension of another result.
     pub fn pullback(&self, cotangent: &Cotangent<'_, T>) -> Result<CloudCotangent<T>, Error> {
-        if !cotangent.extensions.is_empty() {
-            return Err(Error::Option {
-                option: "to extend attributes",
-                remedy: "leave them out",
-            });
-        }
         let vertices = self.result.surface.vertices.len() / 3;
         cotangent.check(self.grid.cells(), vertices, self.points())?;
         let mut found = self.device.pullback(&self.result, cotangent)?;

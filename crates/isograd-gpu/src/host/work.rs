@@ -4,9 +4,13 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use cubecl::prelude::{CubeElement, Runtime};
-use isograd::{Backend, CloudCotangent, Cotangent, Grid, GridCotangent, Orienter, Stage};
+use isograd::distance::extend::{Extension, Residual};
+use isograd::{
+    Attribute, Backend, CloudCotangent, Cotangent, Grid, GridCotangent, Orienter, Stage,
+};
 
 use super::Error;
+use super::extend::{self, Uploaded};
 use crate::pipeline::{self, Held, Options, Reconstruction, Reconstructor};
 use crate::{Buffer, Device, Scalar};
 
@@ -42,6 +46,17 @@ pub trait Work<T: Scalar>: Send + Sync {
         result: &Reconstruction<T>,
         cotangent: &Cotangent<'_, T>,
     ) -> Result<CloudCotangent<T>, Error>;
+
+    /// An attribute on the surface and round it.
+    ///
+    /// # Errors
+    /// Those of the pipeline.
+    fn extend(
+        &self,
+        result: &Reconstruction<T>,
+        attribute: &Attribute<T>,
+        band_cells: f64,
+    ) -> Result<(Extension<T>, Residual<T>), Error>;
 
     /// A copy of numbers.
     ///
@@ -167,6 +182,13 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
             upload(device, level.as_ref().map(|l| &l[..]))?,
         );
         let (vertices, normals) = (vectors(bars.vertices)?, vectors(bars.normals)?);
+        let shape = self.grid().shape();
+        let extended: Vec<Uploaded<T>> = (bars.extensions.iter())
+            .map(|of| Uploaded::new(device, shape, of))
+            .collect::<Result<_, _>>()?;
+        let extensions: Vec<_> = (extended.iter().zip(bars.extensions))
+            .map(|(uploaded, of)| uploaded.cotangent(of))
+            .collect();
         let cotangent = pipeline::Cotangent {
             sdf: sdf.as_ref(),
             indicator: indicator.as_ref(),
@@ -174,6 +196,7 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
             vertices: vertices.as_ref(),
             normals: normals.as_ref(),
             areas: areas.as_ref(),
+            extensions: &extensions,
         };
         let found = Reconstructor::pullback(self, result, &cotangent)?;
         let grid = device.download(&found.grid)?;
@@ -185,16 +208,26 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
             Some(normals) => vectors_of(&device.download(normals)?),
             None => Vec::new(),
         };
+        let attributes = found.attributes.iter().map(|of| device.download(of));
         Ok(CloudCotangent {
             points: vectors_of(&device.download(&found.points)?),
             normals,
+            attributes: attributes.collect::<Result<_, _>>()?,
             grid: GridCotangent {
                 lower: [grid[0], grid[1], grid[2]],
                 spacing: grid[3],
             },
             guarded,
-            ..CloudCotangent::default()
         })
+    }
+
+    fn extend(
+        &self,
+        result: &Reconstruction<T>,
+        attribute: &Attribute<T>,
+        band_cells: f64,
+    ) -> Result<(Extension<T>, Residual<T>), Error> {
+        extend::forward(self, result, attribute, band_cells)
     }
 
     fn numbers(&self, buffer: &Buffer<T>) -> Result<Vec<T>, Error> {
@@ -206,7 +239,11 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
     }
 }
 
-fn upload<R: Runtime, E: CubeElement>(
+/// A copy on the device of what is there.
+///
+/// # Errors
+/// Those of the device.
+pub fn upload<R: Runtime, E: CubeElement>(
     device: &Device<R>,
     given: Option<&[E]>,
 ) -> Result<Option<Buffer<E>>, crate::Error> {

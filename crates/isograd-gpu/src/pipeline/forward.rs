@@ -19,6 +19,7 @@ pub type Observer<'a> = dyn FnMut(Stage) -> ControlFlow<()> + 'a;
 
 /// What the first stages found of the samples.
 struct Found<T> {
+    near: neighbors::Neighborhoods<T>,
     normals: Buffer<T>,
     areas: Buffer<T>,
     source: Source<T>,
@@ -110,6 +111,8 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             normals: found.normals,
             areas: found.areas,
             residuals: Residuals {
+                near: found.near,
+                common_radius: held.common_radius,
                 normals: found.source,
                 areas: found.of_areas,
                 splat: of_splat,
@@ -155,6 +158,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         let (areas, of_areas) = self.areas(&near, held)?;
         let width = self.width(&areas, held)?;
         Ok(Found {
+            near,
             normals,
             areas,
             source,

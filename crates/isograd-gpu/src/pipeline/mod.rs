@@ -5,19 +5,23 @@
 //! cloud, radii and sides, is [`Held`]: found once, it does for the steps of a body that moves a little. After
 //! that nothing comes back to the host but a few counts, and the mean area where the smoothing follows it.
 //!
+//! [`Reconstructor::extend`] carries attributes of the samples to the surface and the cells round it.
+//!
 //! # Pullback
-//! As [`isograd::Reconstruction::pullback`], of any of the results: [`Reconstructor::pullback`].
+//! As [`isograd::Reconstruction::pullback`], of any of the results and of extended attributes:
+//! [`Reconstructor::pullback`].
 //!
 //! # Not differentiable
 //! What is held, and what the stages say of themselves.
 
+mod extend;
 mod forward;
 mod held;
 mod pullback;
 
 pub use forward::Observer;
 pub use held::Held;
-pub use pullback::{CloudCotangent, Cotangent};
+pub use pullback::{CloudCotangent, Cotangent, ExtensionCotangent};
 
 use cubecl::prelude::Runtime;
 use isograd::isosurface::Level;
@@ -73,6 +77,18 @@ pub enum Error {
     /// The distance.
     #[error(transparent)]
     Distance(#[from] distance::Error),
+    /// An attribute was not extended, or not pulled back.
+    #[error(transparent)]
+    Extension(#[from] isograd::distance::extend::Error),
+}
+
+impl From<distance::extend::Error> for Error {
+    fn from(error: distance::extend::Error) -> Self {
+        match error {
+            distance::extend::Error::Refused(error) => error.into(),
+            distance::extend::Error::Device(error) => error.into(),
+        }
+    }
 }
 
 impl From<neighbors::radius::Error> for Error {
@@ -173,6 +189,9 @@ pub struct Reconstruction<T: Scalar> {
 
 /// What the stages kept for their pullbacks.
 struct Residuals<T: Scalar> {
+    /// The points in their tree, and the radius that most neighbourhoods have.
+    near: neighbors::Neighborhoods<T>,
+    common_radius: T,
     normals: Source<T>,
     /// None where samples do not count by their areas.
     areas: Option<area::Residual<T>>,
@@ -243,5 +262,10 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
     /// Where it works.
     pub fn device(&self) -> &Device<R> {
         &self.device
+    }
+
+    /// The grid that all results are on.
+    pub fn grid(&self) -> &Grid<T> {
+        &self.grid
     }
 }

@@ -166,6 +166,7 @@ fn compare<R: Runtime, T: Scalar>(device: &Device<R>) {
                 vertices: given(3),
                 normals: given(4),
                 areas: given(5),
+                extensions: &[],
             };
             let bars = plan.pullback(result, &cotangent).unwrap();
             [&bars.points, &bars.grid].map(|bar| device.download(bar).unwrap())
