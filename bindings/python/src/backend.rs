@@ -2,8 +2,10 @@
 
 use std::ops::ControlFlow;
 
+use isograd::distance::extend;
 use isograd::{
-    Backend, CloudCotangent, Cotangent, PointCloud, Reconstruction, Reconstructor, Report, Stage,
+    Attribute, Backend, CloudCotangent, Cotangent, PointCloud, Reconstruction, Reconstructor,
+    Report, Stage,
 };
 use pyo3::PyErr;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
@@ -135,23 +137,11 @@ impl<T: Number> Made<T> {
     of_either!(/// Areas.
         areas -> &[T], of => of.areas(), of => of.areas()?);
 
-    /// How sure the sides are.
-    pub fn confidence(&self) -> &[T] {
-        match self {
-            Self::Cpu(of) => of.confidence(),
-            #[cfg(feature = "gpu")]
-            Self::Device(of, _) => of.confidence(),
-        }
-    }
+    of_either!(/// How sure the sides are.
+        confidence -> &[T], of => of.confidence(), of => of.confidence()?);
 
-    /// Samples in each neighbourhood.
-    pub fn neighbour_counts(&self) -> &[u32] {
-        match self {
-            Self::Cpu(of) => of.neighbour_counts(),
-            #[cfg(feature = "gpu")]
-            Self::Device(of, _) => of.neighbour_counts(),
-        }
-    }
+    of_either!(/// Samples in each neighbourhood.
+        neighbour_counts -> &[u32], of => of.neighbour_counts(), of => of.neighbour_counts()?);
 
     /// Cells of the grid along each axis.
     pub fn shape(&self) -> [usize; 3] {
@@ -171,20 +161,31 @@ impl<T: Number> Made<T> {
         }
     }
 
-    /// The result where it is on the CPU.
+    /// An attribute on the surface and round it, and what its pullback needs.
     ///
     /// # Errors
-    /// It is on a device, which can't do `what`.
-    pub fn on_cpu(
+    /// What the stage or the device says.
+    pub fn extend(
         &self,
-        #[cfg_attr(not(feature = "gpu"), allow(unused_variables))] what: &str,
-    ) -> Result<&Reconstruction<T>, String> {
+        attribute: &Attribute<T>,
+        band_cells: f64,
+    ) -> Result<(extend::Extension<T>, extend::Residual<T>), Failure> {
         match self {
-            Self::Cpu(of) => Ok(of),
+            Self::Cpu(of) => {
+                let (mut residual, mut extension) = Default::default();
+                let scratch = &mut extend::Scratch::default();
+                of.extend_into(
+                    attribute,
+                    band_cells,
+                    scratch,
+                    &mut residual,
+                    &mut extension,
+                )
+                .map_err(|error| Failure::Value(error.to_string()))?;
+                Ok((extension, residual))
+            }
             #[cfg(feature = "gpu")]
-            Self::Device(..) => Err(format!(
-                "{what} is not for devices yet; compute with backend=\"cpu\""
-            )),
+            Self::Device(of, _) => Ok(of.extend_with_residual(attribute, band_cells)?),
         }
     }
 

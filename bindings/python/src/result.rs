@@ -138,9 +138,9 @@ fn array<'py, T: Number>(
         "vertices" => Ok(arrays::of_vectors(py, result.mesh()?.vertices())),
         "faces" => Ok(arrays::of_vectors(py, result.mesh()?.faces())),
         "normals" => Ok(arrays::of_vectors(py, result.normals()?)),
-        "confidence" => arrays::shaped(py, result.confidence().to_vec(), [count]),
+        "confidence" => arrays::shaped(py, result.confidence()?.to_vec(), [count]),
         "areas" => arrays::shaped(py, result.areas()?.to_vec(), [count]),
-        "neighbours" => arrays::shaped(py, result.neighbour_counts().to_vec(), [count]),
+        "neighbours" => arrays::shaped(py, result.neighbour_counts()?.to_vec(), [count]),
         _ => Err(PyKeyError::new_err(name.to_owned())),
     }
 }
@@ -287,19 +287,14 @@ fn extended<T: Number>(
         let attribute = attributes.iter().find(|a| a.name == name).cloned();
         let attribute = attribute.ok_or_else(|| {
             let known = attributes.iter().map(|a| a.name.clone()).collect();
-            extend::Error::Missing { name, known }.to_string()
+            Failure::Value(extend::Error::Missing { name, known }.to_string())
         })?;
-        let (mut residual, mut extension) = (Default::default(), Default::default());
-        let scratch = &mut extend::Scratch::default();
-        let result = kept.result.on_cpu("to extend attributes")?;
-        result
-            .extend_into(&attribute, band, scratch, &mut residual, &mut extension)
-            .map_err(|error| error.to_string())?;
-        Ok::<_, String>(Extended {
+        let (extension, residual) = kept.result.extend(&attribute, band)?;
+        Ok::<_, Failure>(Extended {
             attribute,
             extension,
             residual,
         })
     })?;
-    Ok(Arc::new(out.map_err(value)?))
+    Ok(Arc::new(out?))
 }

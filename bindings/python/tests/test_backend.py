@@ -70,10 +70,33 @@ def test_given_normals_on_a_device_have_gradients():
     assert off(a.points, b.points) < 2e-3 and off(a.normals, b.normals) < 2e-3
 
 
-def test_what_devices_do_not_have_is_named():
-    result = plan("vulkan")(POINTS, attributes={"a": POINTS})
-    with pytest.raises(ValueError, match="not for devices yet"):
-        result.extend("a", band=3.0)
+def test_attributes_are_extended_on_a_device_and_have_gradients():
+    velocity = np.cross([0.4, -0.7, 1.1], POINTS) + [0.3, -0.2, 0.5]
+    attributes = {"velocity": velocity.astype(np.float32), "one": np.ones(len(POINTS), np.float32)}
+    found, expected = (plan(b)(POINTS, attributes=attributes) for b in ("vulkan", "cpu"))
+    a, b = found.extend("velocity", band=2.0), expected.extend("velocity", band=2.0)
+    assert off(a.vertices, b.vertices) < 2e-4
+    # Where φ is a rounding error from the end of the band, one may have a cell that the other has not.
+    both = np.intersect1d(a.cells, b.cells)
+    assert len(both) > 0.999 * max(len(a.cells), len(b.cells)) and np.all(np.diff(a.cells) > 0)
+    in_both = [e.values[np.isin(e.cells, both)] for e in (a, b)]
+    assert off(*in_both) < 2e-4
+    assert np.all(found.extend("one", band=2.0).values == 1)
+    bars = np.cos(5 * b.vertices)
+    pulled = [r.pullback(extensions=[(e, bars, None)]) for r, e in ((found, a), (expected, b))]
+    assert off(*(p.attributes["velocity"] for p in pulled)) < 2e-3
+    assert off(*(p.points for p in pulled)) < 2e-3
+    # The whole is linear in the attribute, at vertices and in the band.
+    through = found.pullback(extensions=[(a, bars, a.values)]).attributes["velocity"]
+    loss = np.sum(bars * a.vertices, dtype=float) + np.sum(a.values * a.values, dtype=float)
+    assert abs(np.sum(through * velocity, dtype=float) - loss) < 1e-4 * abs(loss)
+    with pytest.raises(ValueError, match="no attribute 'pressure'"):
+        found.extend("pressure", band=2.0)
+    with pytest.raises(ValueError, match="no width"):
+        found.extend("one", band=0.0)
+
+
+def test_what_can_not_be_is_said_as_on_the_cpu():
     with pytest.raises(ValueError, match="wall"):
         plan("vulkan")(POINTS + 10)
 

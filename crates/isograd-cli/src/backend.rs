@@ -143,7 +143,7 @@ impl<T: Number> Made<T> {
                         sdf: of.sdf()?,
                         mesh: of.mesh()?,
                         normals: of.normals()?,
-                        confidence: of.confidence(),
+                        confidence: of.confidence()?,
                         report: of.report(cloud)?,
                     })
                 };

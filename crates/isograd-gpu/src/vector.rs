@@ -12,6 +12,10 @@ pub(crate) struct Vector3<F: Float> {
 
 #[cube]
 impl<F: Float> Vector3<F> {
+    pub fn of(x: F, y: F, z: F) -> Self {
+        Vector3::<F> { x, y, z }
+    }
+
     /// Row `i` of an `(N, 3)` array.
     pub fn at(array: &Array<F>, i: usize) -> Self {
         Vector3::<F>::load(array, 3 * i)
@@ -35,6 +39,13 @@ impl<F: Float> Vector3<F> {
         array[start] = self.x;
         array[start + 1] = self.y;
         array[start + 2] = self.z;
+    }
+
+    /// Adds it to three numbers of an array, from `start` on.
+    pub fn add_to(self, array: &mut Array<F>, start: usize) {
+        array[start] += self.x;
+        array[start + 1] += self.y;
+        array[start + 2] += self.z;
     }
 
     pub fn add(self, other: Self) -> Self {

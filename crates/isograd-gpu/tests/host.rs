@@ -2,10 +2,11 @@
 
 #![cfg(feature = "wgpu")]
 
+use isograd::distance::extend;
 use isograd::orient::Method;
 use isograd::{
-    Backend, Cotangent, Grid, Options, PointCloud, PullbackError, Real, Reconstructor, Resolution,
-    Stage,
+    Attribute, Backend, Cotangent, ExtensionCotangent, Grid, Options, PointCloud, PullbackError,
+    Real, Reconstructor, Resolution, Stage,
 };
 use isograd_gpu::host::{Choice, Error, Number, Plan, choose};
 use isograd_shapes::Sampling;
@@ -78,8 +79,17 @@ fn all_that_is_asked_for_is_what_the_cpu_gives() {
         let normals = expected.normals().as_flattened();
         close("normals", found.normals().unwrap().as_flattened(), normals);
         close("areas", found.areas().unwrap(), expected.areas());
-        assert_eq!(found.confidence(), expected.confidence());
-        assert_eq!(found.neighbour_counts(), expected.neighbour_counts());
+        // In single precision, whatever the number type.
+        let (sure, wanted) = (found.confidence().unwrap(), expected.confidence());
+        assert!(relative(sure, wanted) < 1e-5);
+        let counts = found
+            .neighbour_counts()
+            .unwrap()
+            .iter()
+            .zip(expected.neighbour_counts());
+        // A sample at the very edge of a neighbourhood.
+        assert!(counts.clone().all(|(a, b)| a.abs_diff(*b) <= 1));
+        assert!(counts.filter(|(a, b)| a != b).count() <= 5);
         let same = found.closest().unwrap().iter().zip(expected.closest());
         let other = same.filter(|(a, b)| a != b).count();
         // Where two faces share the closest point, rounding chooses.
@@ -91,7 +101,7 @@ fn all_that_is_asked_for_is_what_the_cpu_gives() {
 
         let (report, wanted) = (found.report(&cloud).unwrap(), expected.report());
         assert_eq!(report.points, 2000);
-        assert_eq!(report.radius, wanted.radius);
+        assert!((report.radius / wanted.radius - 1.0).abs() < tolerance);
         assert_eq!(report.neighbours, wanted.neighbours);
         assert_eq!(report.doubt, wanted.doubt);
         assert_eq!(report.surface.euler, wanted.surface.euler);
@@ -200,6 +210,110 @@ fn any_cotangent_comes_back_as_on_the_cpu() {
 }
 
 #[test]
+fn attributes_are_extended_and_pulled_back_as_on_the_cpu() {
+    fn check<T: Number>(tolerance: f64) {
+        if !is_here::<T>() {
+            return;
+        }
+        let cloud = cloud::<T>(1500);
+        let turning = |p: &[T; 3]| [real::<T>(0.3) - p[1], p[0], p[0] * p[2]];
+        let attribute = Attribute {
+            name: "velocity".into(),
+            components: 3,
+            values: cloud.points().iter().flat_map(turning).collect(),
+        };
+        let cloud = cloud.with_attribute(attribute.clone()).unwrap();
+        let grid = grid(&cloud);
+        let mut plan = Reconstructor::new(grid, options()).unwrap();
+        let expected = plan.reconstruct(&cloud).unwrap();
+        let (mut residual, mut extension) = Default::default();
+        let scratch = &mut extend::Scratch::default();
+        expected
+            .extend_into(&attribute, 2.0, scratch, &mut residual, &mut extension)
+            .unwrap();
+        let mut plan = Plan::new(Backend::Vulkan, grid, options()).unwrap();
+        let found = plan.reconstruct(&cloud).unwrap();
+        let (made, kept) = found.extend_with_residual(&attribute, 2.0).unwrap();
+        assert_eq!(found.extend(&cloud, "velocity", 2.0).unwrap(), made);
+        let difference = relative(&made.vertices, &extension.vertices);
+        assert!(difference < tolerance, "{}: {difference:e}", T::NAME);
+        // φ is a rounding error off, and may end the band a cell later.
+        let cells = made.cells.len().abs_diff(extension.cells.len());
+        assert!(cells * 1000 < made.cells.len(), "{cells}");
+        assert_eq!(made.shape, grid.shape());
+
+        let wave = |i: usize| real::<T>((0.7 * i as f64).sin());
+        let vertices: Vec<T> = (0..made.vertices.len()).map(wave).collect();
+        let of_device = [ExtensionCotangent {
+            attribute: &attribute,
+            extension: &made,
+            residual: &kept,
+            vertices: Some(&vertices),
+            values: None,
+        }];
+        let of_cpu = [ExtensionCotangent {
+            extension: &extension,
+            residual: &residual,
+            ..of_device[0]
+        }];
+        let bar = |extensions| Cotangent {
+            areas: Some(expected.areas()),
+            extensions,
+            ..Cotangent::default()
+        };
+        let back = found.pullback(&bar(&of_device)).unwrap();
+        let wanted = expected.pullback(&cloud, &bar(&of_cpu)).unwrap();
+        assert_eq!(back.guarded, wanted.guarded);
+        assert_eq!(back.attributes.len(), 1);
+        for (what, a, b) in [
+            (
+                "attribute",
+                &back.attributes[0][..],
+                &wanted.attributes[0][..],
+            ),
+            (
+                "points",
+                back.points.as_flattened(),
+                wanted.points.as_flattened(),
+            ),
+        ] {
+            let difference = relative(a, b);
+            println!("{what} {}: {difference:.1e}", T::NAME);
+            assert!(difference < 10.0 * tolerance, "{what}: {difference:e}");
+        }
+        let missing = found.extend(&cloud, "pressure", 2.0).unwrap_err();
+        assert!(
+            missing.to_string().contains("it has: velocity"),
+            "{missing}"
+        );
+        let short = Attribute {
+            values: attribute.values[3..].to_vec(),
+            ..attribute.clone()
+        };
+        let refused = found.extend_with_residual(&short, 2.0);
+        assert!(matches!(
+            refused,
+            Err(Error::Extension(extend::Error::Samples { .. }))
+        ));
+        let other = extend::Extension {
+            shape: [1, 2, 3],
+            ..made.clone()
+        };
+        let of_other = [ExtensionCotangent {
+            extension: &other,
+            ..of_device[0]
+        }];
+        let refused = found.pullback(&bar(&of_other));
+        assert!(matches!(
+            refused,
+            Err(Error::Extension(extend::Error::Mismatch { .. }))
+        ));
+    }
+    check::<f32>(2e-4);
+    check::<f64>(1e-9);
+}
+
+#[test]
 fn previous_takes_the_sides_of_the_call_before() {
     if !is_here::<f32>() {
         return;
@@ -209,13 +323,21 @@ fn previous_takes_the_sides_of_the_call_before() {
         orientation: Method::Previous,
         ..options()
     };
-    let mut plan = Plan::new(Backend::Vulkan, grid(&cloud), options).unwrap();
+    // Room for it to turn.
+    let grid = Grid::new([-1.6; 3], 0.1, [32; 3]).unwrap();
+    let mut plan = Plan::new(Backend::Vulkan, grid, options).unwrap();
     let first = plan.reconstruct(&cloud).unwrap();
     let second = plan.reconstruct(&cloud).unwrap();
     let method =
         |of: &isograd_gpu::host::Reconstruction<f32>| of.report(&cloud).unwrap().orientation;
     assert_eq!([method(&first), method(&second)], ["auto", "previous"]);
     assert_eq!(first.sdf().unwrap(), second.sdf().unwrap());
+    // A body that has turned by more than 60 degrees is looked at anew.
+    let turned = |&[x, y, z]: &[f32; 3]| [x, -z, y];
+    let turned = PointCloud::new(cloud.points().iter().map(turned).collect()).unwrap();
+    let far = plan.reconstruct(&turned).unwrap();
+    assert_eq!(far.report(&turned).unwrap().orientation, "auto");
+    assert!(far.report(&turned).unwrap().surface.closed);
     // Another number of points is another cloud.
     let fewer = PointCloud::new(cloud.points()[..1400].to_vec()).unwrap();
     let third = plan.reconstruct(&fewer).unwrap();

@@ -5,6 +5,7 @@
 //! unit, negative inside; exact but for rounding. [`lattice::forward`] takes the sign from `χ − c` at the cell.
 //! [`query::forward`] gives the distance without a sign, its gradient, the closest point, its face and its weights;
 //! [`query::signed`] the same with the sign of the closest feature's pseudonormal, or of a field.
+//! [`mod@extend`] carries what is known at samples of the surface to the cells round it.
 //! Triangles are found in a hierarchy of boxes that is made on the device; of triangles equally far, to the
 //! last bit, the lowest face is named.
 //!
@@ -25,6 +26,7 @@
 //! All is computed in the number type of the mesh, squares of lengths too: in `f32` lengths, and cells, should
 //! be between about 1e-15 and 1e15 of the unit.
 
+pub mod extend;
 pub mod lattice;
 mod morton;
 mod pseudonormals;

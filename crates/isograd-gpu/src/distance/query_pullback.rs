@@ -4,7 +4,7 @@ use cubecl::prelude::*;
 
 use super::query::Hits;
 use super::shares::{by_face, gather_corners};
-use super::tangent::tangent;
+use super::tangent::{gains, tangent};
 use super::triangle::{closest, corners};
 use super::{Error, Mesh};
 use crate::device::check_length;
@@ -127,7 +127,8 @@ fn pull_closest_points<F: Float + CubeElement>(
         let t = corners::<F>(vertices, faces, triangles[i], Vector3::<F>::zero());
         let found = closest::<F>(t, Vector3::<F>::at(points, i));
         let own = Vector3::<F>::at(bar, i);
-        let moved = tangent::<F>(t, found, own, thinness * found.offset.norm());
+        let thinnest = thinness * found.offset.norm();
+        let moved = tangent::<F>(t, found, gains::<F>(t, own), thinnest);
         let (g, w) = (moved.gamma, found.weights);
         let still = own.sub(moved.query);
         Vector3::<F>::at(points_bar, i)

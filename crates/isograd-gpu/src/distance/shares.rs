@@ -2,12 +2,12 @@
 
 use cubecl::prelude::*;
 
+use super::Mesh;
 use super::triangle::Closest;
-use super::{Error, Mesh};
 use crate::primitives::segments::{Pieces, Rows, sum_rows};
 use crate::primitives::sort;
 use crate::vector::Vector3;
-use crate::{Buffer, Device, Scalar};
+use crate::{Buffer, Device, Error, Scalar};
 
 const BLOCK: u32 = 64;
 
@@ -40,29 +40,47 @@ pub(super) fn by_face<T: Scalar, R: Runtime>(
     Ok((order.places, pieces))
 }
 
+/// The corners of the faces, by vertex.
+pub(super) struct Corners {
+    places: Buffer<u32>,
+    starts: Buffer<u32>,
+}
+
+impl Corners {
+    pub fn of<T: Scalar, R: Runtime>(device: &Device<R>, mesh: &Mesh<T>) -> Result<Self, Error> {
+        let vertices = mesh.vertices.len() as u32 / 3;
+        let corners = sort::order(device, &mesh.faces, vertices)?;
+        let starts = sort::starts(device, &corners.keys, vertices)?;
+        let places = corners.places;
+        Ok(Self { places, starts })
+    }
+
+    /// The sum over the corners at each vertex, `(V, width)`; `of_faces` begins the row of each face with its three
+    /// corners.
+    pub fn sum<T: Scalar, R: Runtime>(
+        &self,
+        device: &Device<R>,
+        of_faces: &Buffer<T>,
+        width: usize,
+    ) -> Result<Buffer<T>, Error> {
+        let count = self.places.len();
+        let rows = Rows {
+            width,
+            group: 3,
+            pitch: of_faces.len() / (count / 3),
+        };
+        let places = Some(&self.places);
+        sum_rows(device, of_faces, rows, places, &self.starts, count)
+    }
+}
+
 /// The sum over the corners at each vertex, `(V, 3)`; `of_faces` begins the row of each face with its three corners.
 pub(super) fn gather_corners<T: Scalar, R: Runtime>(
     device: &Device<R>,
     mesh: &Mesh<T>,
     of_faces: &Buffer<T>,
 ) -> Result<Buffer<T>, Error> {
-    let vertices = mesh.vertices.len() as u32 / 3;
-    let corners = sort::order(device, &mesh.faces, vertices)?;
-    let starts = sort::starts(device, &corners.keys, vertices)?;
-    let rows = Rows {
-        width: 3,
-        group: 3,
-        pitch: of_faces.len() / (mesh.faces.len() / 3),
-    };
-    let (places, count) = (&corners.places, corners.places.len());
-    Ok(sum_rows(
-        device,
-        of_faces,
-        rows,
-        Some(places),
-        &starts,
-        count,
-    )?)
+    Corners::of(device, mesh)?.sum(device, of_faces, 3)
 }
 
 /// The closest face of each query whose cotangent counts; else one past the last.

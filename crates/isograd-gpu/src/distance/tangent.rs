@@ -16,15 +16,27 @@ pub(super) struct Tangent<F: Float> {
     pub query: Vector3<F>,
     /// `γ` of the three corners; their sum is 0.
     pub gamma: Vector3<F>,
+    /// Whether a bounded gradient was taken where the true one has no useful bound.
+    pub guarded: bool,
 }
 
-/// Gradient of `Σ β_k bar·y_k`, `β` the weights of the closest point `found`. A direction in which the feature is
-/// thinner than `thinnest` is left out.
+/// What `bar·y` gains along each edge.
+#[cube]
+pub(super) fn gains<F: Float>(corners: Corners<F>, bar: Vector3<F>) -> Vector3<F> {
+    Vector3::<F> {
+        x: bar.dot(corners.ab),
+        y: bar.dot(corners.bc),
+        z: bar.dot(corners.ca),
+    }
+}
+
+/// Gradient of `Σ β_k u_k`, `β` the weights of the closest point `found`, for corner values that gain `gains` along
+/// each edge (ab, bc, ca). A direction in which the feature is thinner than `thinnest` is left out.
 #[cube]
 pub(super) fn tangent<F: Float>(
     corners: Corners<F>,
     found: Closest<F>,
-    bar: Vector3<F>,
+    gains: Vector3<F>,
     thinnest: F,
 ) -> Tangent<F> {
     let (zero, one) = (F::new(0.0), F::new(1.0));
@@ -33,11 +45,12 @@ pub(super) fn tangent<F: Float>(
     // Of a face, its longest edge is the base; else its apex does not count.
     let first = select(of_face, first_corner::<F>(corners), found.feature % 3u32);
     let t = turned::<F>(corners, first);
+    let ahead = turned_ahead::<F>(gains, first);
     let base = t.ab.norm();
     let has_base = base > thinnest && !of_vertex;
     let length = select(has_base, base, one);
     let unit = t.ab.scale(one / length);
-    let slope = select(has_base, bar.dot(t.ab) / length, zero);
+    let slope = select(has_base, ahead.x / length, zero);
     let to_apex = t.ca.scale(F::new(-1.0));
     let foot = unit.dot(to_apex);
     let rest = to_apex.sub(unit.scale(foot));
@@ -46,7 +59,7 @@ pub(super) fn tangent<F: Float>(
     let rise = across.norm();
     let has_height = of_face && has_base && rise > thinnest;
     let height = select(has_height, rise, one);
-    let climb = (bar.dot(to_apex) - foot * slope) / height;
+    let climb = (-ahead.z - foot * slope) / height;
     let of_apex = select(has_height, climb / height, zero);
     let of_second = select(has_base, (slope - of_apex * foot) / length, zero);
     let gamma = Vector3::<F> {
@@ -57,5 +70,17 @@ pub(super) fn tangent<F: Float>(
     Tangent::<F> {
         query: unit.scale(slope).add(across.scale(of_apex)),
         gamma: turned_back::<F>(gamma, first),
+        guarded: (!has_base && !of_vertex && ahead.x != zero)
+            || (of_face && !has_height && ahead.z != zero),
+    }
+}
+
+/// Numbers of the edges from `first` on.
+#[cube]
+fn turned_ahead<F: Float>(of: Vector3<F>, first: u32) -> Vector3<F> {
+    Vector3::<F> {
+        x: select(first == 0u32, of.x, select(first == 1u32, of.y, of.z)),
+        y: select(first == 0u32, of.y, select(first == 1u32, of.z, of.x)),
+        z: select(first == 0u32, of.z, select(first == 1u32, of.x, of.y)),
     }
 }

@@ -1,5 +1,6 @@
 //! Why a host gets nothing.
 
+use isograd::distance::extend;
 use isograd::{Backend, PullbackError, Stage};
 
 use crate::pipeline;
@@ -14,26 +15,21 @@ pub enum Error {
     /// A choice that is no device.
     #[error("{0} is no device; give cuda or vulkan")]
     NoDevice(Backend),
-    /// Something that is not for devices yet.
-    #[error("{option} is not for devices yet; {remedy}, or compute on the CPU")]
-    Option {
-        /// What was asked for.
-        option: &'static str,
-        /// What to ask for instead.
-        remedy: &'static str,
-    },
     /// The device.
     #[error(transparent)]
     Device(#[from] crate::Error),
     /// The device's stages.
     #[error(transparent)]
     Pipeline(pipeline::Error),
-    /// The stages that run on the CPU.
+    /// What the CPU says of the same cloud.
     #[error(transparent)]
     Host(#[from] isograd::Error),
     /// Cotangents.
     #[error(transparent)]
     Pullback(#[from] PullbackError),
+    /// An attribute that was to be extended, or what was extended.
+    #[error(transparent)]
+    Extension(#[from] extend::Error),
     /// Stopped by the observer.
     #[error("stopped before the stage '{}'", .0.name())]
     Interrupted(Stage),
@@ -52,6 +48,9 @@ impl From<pipeline::Error> for Error {
         match error {
             pipeline::Error::Device(error) => Self::Device(error),
             pipeline::Error::Interrupted(stage) => Self::Interrupted(stage),
+            pipeline::Error::Neighbors(error) => Self::Host(error.into()),
+            pipeline::Error::Orient(error) => Self::Host(error.into()),
+            pipeline::Error::Extension(error) => Self::Extension(error),
             error => Self::Pipeline(error),
         }
     }

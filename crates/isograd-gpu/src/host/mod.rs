@@ -6,16 +6,15 @@
 //! compiled here, once for each number type.
 //!
 //! # What differs from the CPU
-//! - Options that devices do not have yet are an [`Error::Option`] that names them.
-//! - Radii and sides of normals are found on the CPU, as [`Held`](crate::pipeline::Held) says, at every call.
-//! - With [`Method::Previous`](isograd::orient::Method::Previous) they are found by the first call, and by one with
-//!   another number of points. Every other call keeps its radii, and takes sides from the normals of the call before,
-//!   all on the device; what its report says of the samples is what the first found.
+//! - With [`Method::Previous`](isograd::orient::Method::Previous) radii are found by the first call, by one with another
+//!   number of points, and where more than 3 % of the axes have turned far. Every other call keeps them.
 
 mod backend;
 mod error;
+mod extend;
 mod plan;
 mod result;
+mod sides;
 mod work;
 
 pub use backend::{Choice, choose};

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use isograd::orient::Method;
-use isograd::{Backend, Grid, Options, Orienter, PointCloud, Report, Stage};
+use isograd::{Backend, Grid, Options, PointCloud, Report, Seconds, Stage};
 
-use super::result::Samples;
 use super::work::Work;
 use super::{Error, Number, Reconstruction};
+use crate::element::turned::MOST_FAR;
 use crate::pipeline::Held;
 
 /// [`isograd::Reconstructor`] on a device: a plan for one grid and one set of options.
@@ -18,7 +18,6 @@ pub struct Plan<T: Number> {
     name: String,
     grid: Grid<T>,
     options: Options,
-    orienter: Orienter<T>,
     /// With [`Method::Previous`], what the next call starts from.
     before: Option<Before<T>>,
 }
@@ -26,7 +25,8 @@ pub struct Plan<T: Number> {
 /// What a call leaves to the next one.
 struct Before<T> {
     held: Held<T>,
-    samples: Arc<Samples<T>>,
+    /// What its report says of the samples.
+    report: Report,
 }
 
 impl<T: Number> Plan<T> {
@@ -37,15 +37,10 @@ impl<T: Number> Plan<T> {
     /// A device that can't be had, with the reason and the remedy; options that are not for devices.
     pub fn new(backend: Backend, grid: Grid<T>, options: Options) -> Result<Self, Error> {
         let device = T::open(backend, grid, (&options).into())?;
-        let method = match options.orientation {
-            Method::Previous => Method::Auto,
-            method => method,
-        };
         Ok(Self {
             name: format!("{backend}: {}", device.name()),
             device,
             grid,
-            orienter: Orienter::new(options.radius, method).with_checks(options.checks),
             options,
             before: None,
         })
@@ -84,15 +79,40 @@ impl<T: Number> Plan<T> {
         cloud: &PointCloud<T>,
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
     ) -> Result<Reconstruction<T>, Error> {
-        let Before { held, samples } = self.hold(cloud, observer)?;
-        let mut report = samples.report.clone();
+        if observer(Stage::Normals).is_break() {
+            return Err(Error::Interrupted(Stage::Normals));
+        }
+        let before = self.before.take();
+        if let Some(before) = before.filter(|before| before.report.points == cloud.len()) {
+            let (result, next) = self.run(cloud, before.next(), observer)?;
+            if result.turned()? as f64 <= MOST_FAR * cloud.len() as f64 {
+                self.before = next;
+                return Ok(result);
+            }
+        }
+        let found = self.find(cloud, observer)?;
+        let (result, next) = self.run(cloud, found, observer)?;
+        self.before = next;
+        Ok(result)
+    }
+
+    /// All stages but the orientation; and, with [`Method::Previous`], what the next call starts from.
+    fn run(
+        &mut self,
+        cloud: &PointCloud<T>,
+        found: Before<T>,
+        observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
+    ) -> Result<(Reconstruction<T>, Option<Before<T>>), Error> {
+        let Before { held, report } = found;
+        let of_samples = report.clone();
+        let mut report = report;
         let mut clock = Clock::new();
         let mut stage_before = Stage::Normals;
         let mut timed = |stage| {
             clock.note(&mut report, stage_before);
             stage_before = stage;
             match stage {
-                // Begun on the CPU.
+                // Begun before.
                 Stage::Normals => ControlFlow::Continue(()),
                 stage => observer(stage),
             }
@@ -103,43 +123,53 @@ impl<T: Number> Plan<T> {
             .device
             .reconstruct(cloud.points(), given, &held, &mut timed)?;
         clock.note(&mut report, stage_before);
-        if self.options.orientation == Method::Previous {
-            let held = held.facing(result.normals.clone())?;
-            let samples = samples.clone();
-            self.before = Some(Before { held, samples });
-        }
-        Ok(Reconstruction::new(
+        let next = match self.options.orientation {
+            Method::Previous => Some(Before {
+                held: held.clone().after(&result)?,
+                report: of_samples,
+            }),
+            _ => None,
+        };
+        let result = Reconstruction::new(
             self.device.clone(),
             result,
-            self.grid,
             &self.options,
+            self.grid,
+            held,
             report,
-            samples,
-        ))
+        );
+        Ok((result, next))
     }
 
-    /// Radii and sides: those of the call before where they are to be kept, else found on the CPU.
-    fn hold(
+    /// Radii and sides.
+    fn find(
         &mut self,
         cloud: &PointCloud<T>,
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
     ) -> Result<Before<T>, Error> {
-        if observer(Stage::Normals).is_break() {
-            return Err(Error::Interrupted(Stage::Normals));
-        }
-        if let Some(Before { held, samples }) = self.before.take()
-            && samples.len() == cloud.len()
-        {
-            let samples = Arc::new(samples.kept());
-            return Ok(Before { held, samples });
-        }
-        self.orienter.orient(cloud)?;
-        if observer(Stage::Orient).is_break() {
-            return Err(Error::Interrupted(Stage::Orient));
-        }
-        let samples = Arc::new(Samples::of(&self.orienter));
-        let held = self.device.hold(&self.orienter)?;
-        Ok(Before { held, samples })
+        let (mut clock, mut of_normals) = (Clock::new(), Report::default());
+        let mut begin = || {
+            clock.note(&mut of_normals, Stage::Normals);
+            observer(Stage::Orient)
+        };
+        let (radius, method) = (self.options.radius, self.options.orientation);
+        let (held, mut report) = self.device.find(cloud, radius, method, &mut begin)?;
+        report.seconds = of_normals.seconds;
+        clock.note(&mut report, Stage::Orient);
+        Ok(Before { held, report })
+    }
+}
+
+impl<T> Before<T> {
+    /// What a call starts from that follows this one.
+    fn next(self) -> Self {
+        let report = Report {
+            orientation: "previous",
+            flipped: 0,
+            seconds: Seconds::default(),
+            ..self.report
+        };
+        Self { report, ..self }
     }
 }
 

@@ -3,57 +3,19 @@
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
+use isograd::distance::extend::{self, Extension};
 use isograd::isosurface::measure;
+use isograd::neighbors::{Neighborhoods, Radii};
+use isograd::orient::Orientation;
 use isograd::{
-    CloudCotangent, Cotangent, Field, Grid, Mesh, Options, Orienter, PointCloud, PullbackError,
-    Report, Seconds, Stage, Warning,
+    Attribute, CloudCotangent, Cotangent, Field, Grid, Mesh, Options, PointCloud, PullbackError,
+    Report, Stage, Warning,
 };
 
 use super::work::{Work, vectors_of};
 use super::{Error, Number};
+use crate::pipeline::Held;
 use crate::{Buffer, pipeline};
-
-/// What was found on the CPU of the samples.
-pub struct Samples<T> {
-    /// The part of the report that is about them, without warnings.
-    pub report: Report,
-    warnings: Vec<Warning>,
-    confidence: Vec<T>,
-    counts: Vec<u32>,
-}
-
-impl<T: Number> Samples<T> {
-    /// What the orienter has found.
-    pub fn of(orienter: &Orienter<T>) -> Self {
-        let mut report = orienter.report().clone();
-        Self {
-            warnings: std::mem::take(&mut report.warnings),
-            report,
-            confidence: orienter.orientation().confidence.clone(),
-            counts: orienter.neighborhoods().count.clone(),
-        }
-    }
-
-    /// The same for the next step.
-    pub fn kept(&self) -> Self {
-        Self {
-            report: Report {
-                orientation: "previous",
-                flipped: 0,
-                seconds: Seconds::default(),
-                ..self.report.clone()
-            },
-            warnings: self.warnings.clone(),
-            confidence: self.confidence.clone(),
-            counts: self.counts.clone(),
-        }
-    }
-
-    /// Number of points.
-    pub fn len(&self) -> usize {
-        self.counts.len()
-    }
-}
 
 /// What a plan made of a cloud, on the device: [`isograd::Reconstruction`] there. What is asked for is copied, once.
 pub struct Reconstruction<T: Number> {
@@ -63,7 +25,8 @@ pub struct Reconstruction<T: Number> {
     checks: bool,
     /// As far as nothing has to be copied for it.
     begun: Report,
-    samples: Arc<Samples<T>>,
+    /// What the radii are.
+    held: Held<T>,
     copies: Copies<T>,
 }
 
@@ -75,7 +38,9 @@ struct Copies<T> {
     mesh: OnceLock<Mesh<T>>,
     closest: OnceLock<Vec<u32>>,
     normals: OnceLock<Vec<[T; 3]>>,
+    confidence: OnceLock<Vec<T>>,
     areas: OnceLock<Vec<T>>,
+    neighborhoods: OnceLock<Neighborhoods<T>>,
     report: OnceLock<Report>,
 }
 
@@ -88,7 +53,9 @@ impl<T> Default for Copies<T> {
             mesh: OnceLock::new(),
             closest: OnceLock::new(),
             normals: OnceLock::new(),
+            confidence: OnceLock::new(),
             areas: OnceLock::new(),
+            neighborhoods: OnceLock::new(),
             report: OnceLock::new(),
         }
     }
@@ -98,10 +65,10 @@ impl<T: Number> Reconstruction<T> {
     pub(super) fn new(
         device: Arc<dyn Work<T>>,
         result: pipeline::Reconstruction<T>,
-        grid: Grid<T>,
         options: &Options,
+        grid: Grid<T>,
+        held: Held<T>,
         begun: Report,
-        samples: Arc<Samples<T>>,
     ) -> Self {
         Self {
             device,
@@ -109,7 +76,7 @@ impl<T: Number> Reconstruction<T> {
             grid,
             checks: options.checks,
             begun,
-            samples,
+            held,
             copies: Copies::default(),
         }
     }
@@ -121,7 +88,7 @@ impl<T: Number> Reconstruction<T> {
 
     /// Number of points.
     pub fn points(&self) -> usize {
-        self.samples.len()
+        self.begun.points
     }
 
     /// The signed distance φ at every cell centre, in the cloud's unit, negative inside.
@@ -198,14 +165,44 @@ impl<T: Number> Reconstruction<T> {
         areas.map(Vec::as_slice)
     }
 
-    /// `(N,)` confidence in the sign of each normal, from 0 to 1, when it was found.
-    pub fn confidence(&self) -> &[T] {
-        &self.samples.confidence
+    /// `(N,)` confidence in the sign of each normal, from 0 to 1.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn confidence(&self) -> Result<&[T], Error> {
+        let confidence = once(&self.copies.confidence, || {
+            self.device.numbers(&self.result.confidence)
+        });
+        confidence.map(Vec::as_slice)
     }
 
-    /// `(N,)` number of samples in the neighbourhood of each, itself included, when its radius was found.
-    pub fn neighbour_counts(&self) -> &[u32] {
-        &self.samples.counts
+    /// Number of axes that have turned by more than 60° since the call before, and followed their neighbours.
+    pub(super) fn turned(&self) -> Result<usize, Error> {
+        Ok(self.device.indices(&self.result.turned)?[0] as usize)
+    }
+
+    /// `(N,)` number of samples in the neighbourhood of each, itself included.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn neighbour_counts(&self) -> Result<&[u32], Error> {
+        Ok(&self.neighborhoods()?.count)
+    }
+
+    /// The neighbourhoods, on the CPU.
+    fn neighborhoods(&self) -> Result<&Neighborhoods<T>, Error> {
+        once(&self.copies.neighborhoods, || {
+            let points = self.vectors(&self.result.points)?;
+            let radii = Radii {
+                each: &self.device.numbers(&self.held.area_radii)?,
+                common: self.held.common_radius,
+                spacing: self.held.spacing,
+            };
+            let mut found = Neighborhoods::default();
+            isograd::neighbors::with_radii(&points, radii, &mut found)
+                .map_err(isograd::Error::from)?;
+            Ok(found)
+        })
     }
 
     /// Numbers, times and warnings about the reconstruction of `cloud`, the one that it was made of. With
@@ -233,28 +230,58 @@ impl<T: Number> Reconstruction<T> {
             let scratch = &mut measure::Scratch::default();
             let (normals, mesh) = (self.normals()?, self.mesh()?);
             report.check_field(cloud.points(), normals, self.sdf()?, mesh, scratch);
+            let orientation = Orientation {
+                normals: normals.to_vec(),
+                confidence: self.confidence()?.to_vec(),
+                ..Orientation::default()
+            };
+            report.check_samples(cloud.points(), self.neighborhoods()?, &orientation);
         }
-        report.warnings.extend_from_slice(&self.samples.warnings);
         let before = report.seconds.of(Stage::Checks);
         let seconds = before + start.elapsed().as_secs_f64();
         report.seconds.set(Stage::Checks, seconds);
         Ok(report)
     }
 
-    /// Pulls cotangents of any of the results back to the points and the grid, on the device, as
-    /// [`isograd::Reconstruction::pullback`] does. Of the samples whose axis is guarded all are counted, those without a
-    /// cotangent too.
+    /// The attribute `name` of the cloud at the vertices of the surface, and at every cell within `band_cells` cells of
+    /// the surface as it is at the closest surface point: [`isograd::Reconstruction::extend`], on the device.
     ///
     /// # Errors
-    /// Those of the device; a cotangent of another length, or that is not finite; [`Error::Option`] for extended
-    /// attributes.
+    /// What that says; those of the device.
+    pub fn extend(
+        &self,
+        cloud: &PointCloud<T>,
+        name: &str,
+        band_cells: f64,
+    ) -> Result<Extension<T>, Error> {
+        let attributes = cloud.attributes();
+        let attribute = attributes.iter().find(|a| a.name == name);
+        let attribute = attribute.ok_or_else(|| extend::Error::Missing {
+            name: name.into(),
+            known: attributes.iter().map(|a| a.name.clone()).collect(),
+        })?;
+        Ok(self.extend_with_residual(attribute, band_cells)?.0)
+    }
+
+    /// The same for one value per sample that was reconstructed, with what the pullback needs.
+    ///
+    /// # Errors
+    /// As [`Self::extend`].
+    pub fn extend_with_residual(
+        &self,
+        attribute: &Attribute<T>,
+        band_cells: f64,
+    ) -> Result<(Extension<T>, extend::Residual<T>), Error> {
+        self.device.extend(&self.result, attribute, band_cells)
+    }
+
+    /// Pulls cotangents of any of the results, and of what was extended, back to the points, the attributes and the
+    /// grid, on the device, as [`isograd::Reconstruction::pullback`] does. Of the samples whose axis is guarded all are
+    /// counted, those without a cotangent too.
+    ///
+    /// # Errors
+    /// Those of the device; a cotangent of another length, or that is not finite; an extension of another result.
     pub fn pullback(&self, cotangent: &Cotangent<'_, T>) -> Result<CloudCotangent<T>, Error> {
-        if !cotangent.extensions.is_empty() {
-            return Err(Error::Option {
-                option: "to extend attributes",
-                remedy: "leave them out",
-            });
-        }
         let vertices = self.result.surface.vertices.len() / 3;
         cotangent.check(self.grid.cells(), vertices, self.points())?;
         let mut found = self.device.pullback(&self.result, cotangent)?;

@@ -4,10 +4,17 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use cubecl::prelude::{CubeElement, Runtime};
-use isograd::{Backend, CloudCotangent, Cotangent, Grid, GridCotangent, Orienter, Stage};
+use isograd::distance::extend::{Extension, Residual};
+use isograd::neighbors::Radius;
+use isograd::orient::Method;
+use isograd::{
+    Attribute, Backend, CloudCotangent, Cotangent, Grid, GridCotangent, PointCloud, Report, Stage,
+};
 
 use super::Error;
-use crate::pipeline::{self, Held, Options, Reconstruction, Reconstructor};
+use super::extend::{self, Uploaded};
+use super::sides::Sides;
+use crate::pipeline::{self, Held, Options, Reconstruction, Reconstructor, Summary};
 use crate::{Buffer, Device, Scalar};
 
 /// What is done on a device, whose runtime is not named.
@@ -15,11 +22,18 @@ pub trait Work<T: Scalar>: Send + Sync {
     /// The name that its driver gives the device.
     fn name(&self) -> &str;
 
-    /// What was found on the CPU, on the device.
+    /// The radii of a cloud and the sides of its axes, and what a report says of them; `begin` is called before the
+    /// sides are looked for, when the axes are there.
     ///
     /// # Errors
-    /// Those of the device.
-    fn hold(&self, found: &Orienter<T>) -> Result<Held<T>, Error>;
+    /// Those of the pipeline; [`Error::Interrupted`] where `begin` breaks.
+    fn find(
+        &self,
+        cloud: &PointCloud<T>,
+        radius: Radius,
+        method: Method,
+        begin: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<(Held<T>, Report), Error>;
 
     /// All stages, with given normals or without; `observer` is called before each, when those before it are done.
     ///
@@ -42,6 +56,17 @@ pub trait Work<T: Scalar>: Send + Sync {
         result: &Reconstruction<T>,
         cotangent: &Cotangent<'_, T>,
     ) -> Result<CloudCotangent<T>, Error>;
+
+    /// An attribute on the surface and round it.
+    ///
+    /// # Errors
+    /// Those of the pipeline.
+    fn extend(
+        &self,
+        result: &Reconstruction<T>,
+        attribute: &Attribute<T>,
+        band_cells: f64,
+    ) -> Result<(Extension<T>, Residual<T>), Error>;
 
     /// A copy of numbers.
     ///
@@ -116,13 +141,35 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
         self.device().name()
     }
 
-    fn hold(&self, found: &Orienter<T>) -> Result<Held<T>, Error> {
-        Ok(Held::of(
-            self.device(),
-            found.neighborhoods(),
-            found.axes(),
-            found.orientation(),
-        )?)
+    fn find(
+        &self,
+        cloud: &PointCloud<T>,
+        radius: Radius,
+        method: Method,
+        begin: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<(Held<T>, Report), Error> {
+        let device = self.device();
+        let points = device.upload(cloud.points().as_flattened())?;
+        let sides = Sides::upload(device, cloud, method)?;
+        let (held, summary) = match sides.method() {
+            Some(method) => Held::search(device, &points, radius, &method, begin)?,
+            None if begin().is_break() => return Err(Error::Interrupted(Stage::Orient)),
+            None => (Held::radii(device, &points, radius)?, Summary::default()),
+        };
+        if summary.guarded == cloud.len() {
+            let points = cloud.len();
+            return Err(isograd::Error::NoPlane { points }.into());
+        }
+        let report = Report {
+            points: cloud.len(),
+            orientation: sides.name(),
+            flipped: summary.flipped,
+            radius: isograd::Real::f64(held.common_radius),
+            sample_spacing: isograd::Real::f64(held.spacing),
+            guarded: summary.guarded,
+            ..Report::default()
+        };
+        Ok((held, report))
     }
 
     fn reconstruct(
@@ -167,6 +214,13 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
             upload(device, level.as_ref().map(|l| &l[..]))?,
         );
         let (vertices, normals) = (vectors(bars.vertices)?, vectors(bars.normals)?);
+        let shape = self.grid().shape();
+        let extended: Vec<Uploaded<T>> = (bars.extensions.iter())
+            .map(|of| Uploaded::new(device, shape, of))
+            .collect::<Result<_, _>>()?;
+        let extensions: Vec<_> = (extended.iter().zip(bars.extensions))
+            .map(|(uploaded, of)| uploaded.cotangent(of))
+            .collect();
         let cotangent = pipeline::Cotangent {
             sdf: sdf.as_ref(),
             indicator: indicator.as_ref(),
@@ -174,6 +228,7 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
             vertices: vertices.as_ref(),
             normals: normals.as_ref(),
             areas: areas.as_ref(),
+            extensions: &extensions,
         };
         let found = Reconstructor::pullback(self, result, &cotangent)?;
         let grid = device.download(&found.grid)?;
@@ -185,16 +240,26 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
             Some(normals) => vectors_of(&device.download(normals)?),
             None => Vec::new(),
         };
+        let attributes = found.attributes.iter().map(|of| device.download(of));
         Ok(CloudCotangent {
             points: vectors_of(&device.download(&found.points)?),
             normals,
+            attributes: attributes.collect::<Result<_, _>>()?,
             grid: GridCotangent {
                 lower: [grid[0], grid[1], grid[2]],
                 spacing: grid[3],
             },
             guarded,
-            ..CloudCotangent::default()
         })
+    }
+
+    fn extend(
+        &self,
+        result: &Reconstruction<T>,
+        attribute: &Attribute<T>,
+        band_cells: f64,
+    ) -> Result<(Extension<T>, Residual<T>), Error> {
+        extend::forward(self, result, attribute, band_cells)
     }
 
     fn numbers(&self, buffer: &Buffer<T>) -> Result<Vec<T>, Error> {
@@ -206,7 +271,11 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
     }
 }
 
-fn upload<R: Runtime, E: CubeElement>(
+/// A copy on the device of what is there.
+///
+/// # Errors
+/// Those of the device.
+pub fn upload<R: Runtime, E: CubeElement>(
     device: &Device<R>,
     given: Option<&[E]>,
 ) -> Result<Option<Buffer<E>>, crate::Error> {

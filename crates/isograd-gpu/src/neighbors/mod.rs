@@ -24,12 +24,14 @@
 mod choice;
 mod nearest;
 mod order;
+mod others;
 pub mod radius;
 mod tree;
 mod walk;
 
-pub(crate) use nearest::{SURE_SHARE, about_nearest, any_within, reaches};
+pub(crate) use nearest::{SURE_SHARE, about_nearest, any_within, reach_squared, reaches};
 pub(crate) use order::{gather, scatter};
+pub(crate) use others::nearest_others;
 pub(crate) use walk::{end_of_leaf, first_of_leaf, is_isolated, next_leaf};
 
 use cubecl::prelude::*;
@@ -68,6 +70,11 @@ impl<T> Neighborhoods<T> {
     /// Whether there are no points.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// `(N,)` sorted position → input index.
+    pub fn order(&self) -> &Buffer<u32> {
+        &self.places
     }
 }
 

@@ -5,24 +5,23 @@ use cubecl::prelude::*;
 use super::tree::{IS_LEAF, NODE};
 use super::walk::{end_of_leaf, first_of_leaf};
 use super::{BLOCK, LEAF, Neighborhoods};
+use crate::primitives::smallest::insert;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
-/// Points along the curve, round the leaf nearest to a place, that bound the distance to its nearest points.
+/// Points along the curve, round the leaf nearest to a place, that bound the distance to its nearest points; more
+/// where more are asked for.
 const WINDOW: usize = 32;
 
-/// Those of them before the leaf.
-const MARGIN: usize = (WINDOW - LEAF) / 2;
-
-/// The squared distance of each of the `(M, 3)` places to its `k`-th nearest point, `k` being at most [`WINDOW`] and
-/// the number of points. A point that is its own place is the first.
+/// The squared distance of each of the `(M, 3)` places to its `k`-th nearest point, `k` being at most the number of
+/// points. A point that is its own place is the first.
 pub(crate) fn reaches<R: Runtime, T: Scalar>(
     device: &Device<R>,
     neighborhoods: &Neighborhoods<T>,
     places: &Buffer<T>,
     k: usize,
 ) -> Result<Buffer<T>, Error> {
-    debug_assert!(k > 0 && k <= WINDOW.min(neighborhoods.len()));
+    debug_assert!(k > 0 && k <= neighborhoods.len());
     let squares = device.empty(places.len() / 3)?;
     find_reaches::launch::<T, R>(
         device.client(),
@@ -49,58 +48,72 @@ fn find_reaches<F: Float>(
 ) {
     if ABSOLUTE_POS < squares.len() {
         let x = Vector3::<F>::at(places, ABSOLUTE_POS);
-        let mut nearest = Array::<F>::new(k);
+        squares[ABSOLUTE_POS] = reach_squared::<F>(points, nodes, links, x, k);
+    }
+}
+
+/// The squared distance of `x` to its `k`-th nearest point; there must be as many.
+#[cube]
+pub(crate) fn reach_squared<F: Float>(
+    points: &Array<F>,
+    nodes: &Array<F>,
+    links: &Array<u32>,
+    x: Vector3<F>,
+    #[comptime] k: usize,
+) -> F {
+    let window = comptime!(if k > WINDOW { k } else { WINDOW });
+    let margin = comptime!((window - LEAF) / 2);
+    let mut nearest = Array::<F>::new(k);
+    #[unroll]
+    for i in 0..k {
+        nearest[i] = F::max_value();
+    }
+    // Any k points bound the distance; those round the nearest leaf bound it well.
+    let n = points.len() / 3;
+    let first = first_of_leaf(links, leaf_towards::<F>(nodes, links, x));
+    let begin = min(first - min(first, margin), n - min(n, window));
+    for j in begin..min(begin + window, n) {
+        insert::<F>(square_to::<F>(points, j, x), &mut nearest, k);
+    }
+    let bound = nearest[k - 1];
+    // However many points lie there, none is nearer.
+    if bound > F::new(0.0) {
         #[unroll]
         for i in 0..k {
-            nearest[i] = F::max_value();
+            nearest[i] = bound;
         }
-        // Any k points bound the distance; those round the nearest leaf bound it well.
-        let n = points.len() / 3;
-        let first = first_of_leaf(links, leaf_towards::<F>(nodes, links, x));
-        let begin = min(first - min(first, MARGIN), n - min(n, WINDOW));
-        for j in begin..min(begin + WINDOW, n) {
-            insert::<F>(square_to::<F>(points, j, x), &mut nearest, k);
-        }
-        let bound = nearest[k - 1];
-        // However many points lie there, none is nearer.
-        if bound > F::new(0.0) {
-            #[unroll]
-            for i in 0..k {
-                nearest[i] = bound;
-            }
-            let mut node = 0usize.runtime();
-            while node < links.len() {
-                let inside = box_square::<F>(nodes, node, x) < nearest[k - 1];
-                if inside && links[node] >= IS_LEAF {
-                    let first = first_of_leaf(links, node);
-                    for j in first..end_of_leaf(first, n) {
-                        insert::<F>(square_to::<F>(points, j, x), &mut nearest, k);
-                    }
+        let mut node = 0usize.runtime();
+        while node < links.len() {
+            let inside = box_square::<F>(nodes, node, x) < nearest[k - 1];
+            if inside && links[node] >= IS_LEAF {
+                let first = first_of_leaf(links, node);
+                for j in first..end_of_leaf(first, n) {
+                    insert::<F>(square_to::<F>(points, j, x), &mut nearest, k);
                 }
-                node = next_node(links, node, inside);
             }
+            node = next_node(links, node, inside);
         }
-        squares[ABSOLUTE_POS] = nearest[k - 1];
     }
+    nearest[k - 1]
 }
 
 /// Squared distance from a place to a node's box.
 #[cube]
-fn box_square<F: Float>(nodes: &Array<F>, node: usize, x: Vector3<F>) -> F {
+pub(super) fn box_square<F: Float>(nodes: &Array<F>, node: usize, x: Vector3<F>) -> F {
     let low = Vector3::<F>::load(nodes, NODE * node);
     let high = Vector3::<F>::load(nodes, NODE * node + 3);
     x.to_box_squared(low, high)
 }
 
 #[cube]
-fn square_to<F: Float>(points: &Array<F>, j: usize, x: Vector3<F>) -> F {
+pub(super) fn square_to<F: Float>(points: &Array<F>, j: usize, x: Vector3<F>) -> F {
     let offset = Vector3::<F>::at(points, j).sub(x);
     offset.dot(offset)
 }
 
 /// The node to look at after this one: below it, if it is to be entered, else after its subtree.
 #[cube]
-fn next_node(links: &Array<u32>, node: usize, enter: bool) -> usize {
+pub(super) fn next_node(links: &Array<u32>, node: usize, enter: bool) -> usize {
     let link = links[node];
     let step = enter || link >= IS_LEAF;
     select(step, node + 1, link as usize)
@@ -126,21 +139,6 @@ fn leaf_towards<F: Float>(nodes: &Array<F>, links: &Array<u32>, x: Vector3<F>) -
         node = nearest;
     }
     node
-}
-
-/// Puts a number where it belongs among the `k` smallest so far.
-#[cube]
-fn insert<F: Float>(number: F, smallest: &mut Array<F>, #[comptime] k: usize) {
-    if number < smallest[k - 1] {
-        let mut moved = number;
-        #[unroll]
-        for i in 0..k {
-            let own = smallest[i];
-            let stays = own <= moved;
-            smallest[i] = select(stays, own, moved);
-            moved = select(stays, moved, own);
-        }
-    }
 }
 
 /// A point, and how far it is from a place, squared.

@@ -112,7 +112,9 @@ fn fill_keys<F: Float>(points: &Array<F>, high: &mut Array<u32>, low: &mut Array
         #[unroll]
         for axis in 0..3usize {
             let offset = points[3 * ABSOLUTE_POS + axis] - middle::<F>(points, axis);
-            let bits = ordered_bits(f32::cast_from(offset)) >> 12u32;
+            let offset = f32::cast_from(offset);
+            // Both zeros are equal.
+            let bits = ordered_bits(select(offset == 0.0f32, 0.0f32, offset)) >> 12u32;
             upper |= spread_bits(bits >> 10u32) << (axis as u32);
             lower |= spread_bits(bits) << (axis as u32);
         }

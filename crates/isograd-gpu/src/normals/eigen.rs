@@ -11,7 +11,7 @@ use crate::vector::Vector3;
 
 /// A symmetric matrix.
 #[derive(CubeType, Clone, Copy)]
-pub(super) struct Symmetric<F: Float> {
+pub(crate) struct Symmetric<F: Float> {
     pub xx: F,
     pub xy: F,
     pub xz: F,
@@ -22,7 +22,7 @@ pub(super) struct Symmetric<F: Float> {
 
 /// Eigenvalues in ascending order, and a right-handed orthonormal basis of eigenvectors.
 #[derive(CubeType, Clone, Copy)]
-pub(super) struct Eigen<F: Float> {
+pub(crate) struct Eigen<F: Float> {
     pub values: Vector3<F>,
     pub first: Vector3<F>,
     pub second: Vector3<F>,
@@ -41,7 +41,7 @@ struct InPlane<F: Float> {
 /// Eigenvalues and eigenvectors, to a few units of rounding of the largest element. Where eigenvalues are equal
 /// the basis is some orthonormal one, the same every time.
 #[cube]
-pub(super) fn eigen<F: Float>(a: Symmetric<F>) -> Eigen<F> {
+pub(crate) fn eigen<F: Float>(a: Symmetric<F>) -> Eigen<F> {
     let on = larger::<F>(larger::<F>(a.xx.abs(), a.yy.abs()), a.zz.abs());
     let off = larger::<F>(larger::<F>(a.xy.abs(), a.xz.abs()), a.yz.abs());
     let largest = larger::<F>(on, off);

@@ -10,7 +10,7 @@ use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Sums over a neighbourhood: `Σ w`, `Σ w d` and `Σ w d dᵀ` (`xx, xy, xz, yy, yz, zz`), in units of the radius.
-pub(super) const MOMENTS: usize = 10;
+pub(crate) const MOMENTS: usize = 10;
 
 /// The axis `(N, 3)` of the surface at every point, in input order, and what the pullback needs; see the
 /// [module](super).
@@ -120,7 +120,9 @@ pub(super) fn moments_within<F: Float>(
         for j in first..end_of_leaf(first, n) {
             let offset = Vector3::<F>::at(points, j).sub(centre);
             if offset.dot(offset) <= radius * radius {
-                add_moments::<F>(offset.scale(F::new(1.0) / radius), &mut of_leaf);
+                let d = offset.scale(F::new(1.0) / radius);
+                let w = weight::<F>(F::sqrt(d.dot(d)), epsilon::<F>());
+                add_moments::<F>(d, w, &mut of_leaf);
                 count += 1u32;
             }
         }
@@ -133,10 +135,9 @@ pub(super) fn moments_within<F: Float>(
     count
 }
 
-/// Adds `w`, `w d` and `w d dᵀ` of an offset in units of the radius.
+/// Adds `w`, `w d` and `w d dᵀ` of an offset.
 #[cube]
-fn add_moments<F: Float>(d: Vector3<F>, sums: &mut Array<F>) {
-    let w = weight::<F>(F::sqrt(d.dot(d)), epsilon::<F>());
+pub(crate) fn add_moments<F: Float>(d: Vector3<F>, w: F, sums: &mut Array<F>) {
     let wd = d.scale(w);
     sums[0] += w;
     sums[1] += wd.x;
@@ -178,7 +179,7 @@ fn find_planes<F: Float>(
 
 /// `W`, `m` and the eigenvectors of `C`, whose eigenvalues are not negative; in units of the radius.
 #[derive(CubeType, Clone, Copy)]
-pub(super) struct Fit<F: Float> {
+pub(crate) struct Fit<F: Float> {
     pub weight: F,
     pub centroid: Vector3<F>,
     pub eigen: Eigen<F>,
@@ -186,7 +187,7 @@ pub(super) struct Fit<F: Float> {
 
 /// The plane of the moments at `at`, `at + pitch` and so on.
 #[cube]
-pub(super) fn fit<F: Float>(moments: &Array<F>, at: usize, pitch: usize) -> Fit<F> {
+pub(crate) fn fit<F: Float>(moments: &Array<F>, at: usize, pitch: usize) -> Fit<F> {
     let weight = moments[at];
     let mx = moments[pitch + at] / weight;
     let my = moments[2 * pitch + at] / weight;

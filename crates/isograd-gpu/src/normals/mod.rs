@@ -19,27 +19,29 @@
 //! The neighbourhoods, the radii, the sign. Where `λ₂ − λ₁` is at most `10⁻³ λ₃`, the pullback bounds
 //! `1/(λ₁ − λ_k)`: [`Residual::guarded`].
 
-mod eigen;
+pub(crate) mod eigen;
 mod forward;
 mod pullback;
 mod widen;
 
+pub(crate) use eigen::{Eigen, Symmetric};
 pub use forward::forward;
+pub(crate) use forward::{MOMENTS, add_moments, fit};
 pub use pullback::pullback;
 pub use widen::widen;
 
 use cubecl::prelude::*;
 
 use crate::neighbors::{BLOCK, Neighborhoods};
-use crate::primitives::scan::exclusive_sum;
+use crate::primitives::flags;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Numbers that the residual has of a point, each an array `(N,)` in sorted order, one after the other:
 /// normal, tangent, centroid, eigenvalues, weight.
 const PLANE: usize = 13;
 const TANGENT: usize = 3;
-const CENTROID: usize = 6;
-const VALUES: usize = 9;
+pub(crate) const CENTROID: usize = 6;
+pub(crate) const VALUES: usize = 9;
 const WEIGHT: usize = 12;
 
 /// Parts of 1000 of `λ₃` up to which the gap `λ₂ − λ₁` is too small for a normal to mean anything: as on the CPU.
@@ -48,8 +50,8 @@ const SMALLEST_GAP: f32 = 1.0;
 /// What the pullback needs of [`forward`].
 #[derive(Clone, Debug)]
 pub struct Residual<T> {
-    neighborhoods: Neighborhoods<T>,
-    planes: Buffer<T>,
+    pub(crate) neighborhoods: Neighborhoods<T>,
+    pub(crate) planes: Buffer<T>,
     /// `(N,)` number of samples within each radius, the point itself included, in input order.
     pub count: Buffer<u32>,
 }
@@ -67,19 +69,16 @@ impl<T: Scalar> Residual<T> {
         if n == 0 {
             return Ok(0);
         }
-        let flags: Buffer<u32> = device.empty(n)?;
+        let guarded: Buffer<u32> = device.empty(n)?;
         let (groups, dim) = (device.groups(n, BLOCK), CubeDim::new_1d(BLOCK));
-        flag_guarded::launch::<T, R>(device.client(), groups, dim, self.planes.arg(), flags.arg());
-        let sums = exclusive_sum(device, &flags)?;
-        let total: Buffer<u32> = device.empty(1)?;
-        let one = CubeDim::new_1d(1);
-        take_last::launch::<R>(
+        flag_guarded::launch::<T, R>(
             device.client(),
-            device.groups(1, 1),
-            one,
-            sums.arg(),
-            total.arg(),
+            groups,
+            dim,
+            self.planes.arg(),
+            guarded.arg(),
         );
+        let total = flags::count(device, &guarded)?;
         Ok(device.download(&total)?[0] as usize)
     }
 
@@ -124,12 +123,5 @@ fn flag_guarded<F: Float>(planes: &Array<F>, flags: &mut Array<u32>) {
         let third = planes[(VALUES + 2) * n + ABSOLUTE_POS];
         let clear = F::new(1000.0) * (second - first) > F::new(SMALLEST_GAP) * third;
         flags[ABSOLUTE_POS] = select(clear, 0u32, 1u32);
-    }
-}
-
-#[cube(launch)]
-fn take_last(values: &Array<u32>, last: &mut Array<u32>) {
-    if ABSOLUTE_POS == 0 {
-        last[0] = values[values.len() - 1];
     }
 }

@@ -8,7 +8,7 @@
 
 use cubecl::prelude::*;
 
-use super::{Error, Orientation};
+use super::{Decided, Error, Turned};
 use crate::device::check_length;
 use crate::neighbors::BLOCK;
 use crate::primitives::flags;
@@ -80,7 +80,7 @@ pub(super) fn turn_to<R: Runtime, T: Scalar>(
     device: &Device<R>,
     axes: &Buffer<T>,
     given: &Buffer<T>,
-) -> Result<Orientation<T>, Error> {
+) -> Result<Turned<T>, Error> {
     check_length("the given normals", given, axes.len())?;
     let units = forward(device, given)?;
     let n = axes.len() / 3;
@@ -96,9 +96,13 @@ pub(super) fn turn_to<R: Runtime, T: Scalar>(
             confidence.arg(),
         );
     }
-    Ok(Orientation {
+    Ok(Turned {
         normals,
         confidence,
+        decided: Decided {
+            given: n,
+            ..Decided::default()
+        },
         detection_radius: None,
     })
 }

@@ -9,7 +9,7 @@ use cubecl::prelude::*;
 use isograd::orient::ParityOptions;
 use isograd::vector;
 
-use super::{Error, Orientation};
+use super::{Decided, Error, Turned};
 use crate::neighbors::radius::bounds;
 use crate::neighbors::{BLOCK, Neighborhoods, SURE_SHARE, about_nearest, any_within, reaches};
 use crate::primitives::ends::ends;
@@ -32,14 +32,15 @@ pub(super) fn forward<R: Runtime, T: Scalar>(
     neighborhoods: &Neighborhoods<T>,
     axes: &Buffer<T>,
     options: &ParityOptions,
-) -> Result<Orientation<T>, Error> {
+) -> Result<Turned<T>, Error> {
     options.check()?;
     let n = neighborhoods.len();
     let (normals, confidence) = (device.empty(3 * n)?, device.empty(n)?);
     if n == 0 {
-        return Ok(Orientation {
+        return Ok(Turned {
             normals,
             confidence,
+            decided: Decided::default(),
             detection_radius: Some(0.0),
         });
     }
@@ -81,9 +82,13 @@ pub(super) fn forward<R: Runtime, T: Scalar>(
         confidence.arg(),
         u32::try_from(options.tolerance).unwrap_or(u32::MAX),
     );
-    Ok(Orientation {
+    Ok(Turned {
         normals,
         confidence,
+        decided: Decided {
+            parity: n,
+            ..Decided::default()
+        },
         detection_radius: Some(radius),
     })
 }

@@ -7,9 +7,10 @@ use isograd::Stage;
 use isograd::isosurface::Level;
 use isograd::poisson::Smoothing;
 
-use super::{Error, Held, Reconstruction, Reconstructor, Residuals, Source, Width, held};
+use super::{Error, Held, Reconstruction, Reconstructor, Residuals, Source, Width};
 use crate::distance::{self, Mesh};
 use crate::iso_value::local;
+use crate::orient::previous::Followed;
 use crate::splat::{self, Refused, Samples};
 use crate::{Buffer, Scalar, area, iso_value, isosurface, neighbors, normals, orient, poisson};
 
@@ -19,7 +20,8 @@ pub type Observer<'a> = dyn FnMut(Stage) -> ControlFlow<()> + 'a;
 
 /// What the first stages found of the samples.
 struct Found<T> {
-    normals: Buffer<T>,
+    sides: Followed<T>,
+    near: neighbors::Neighborhoods<T>,
     areas: Buffer<T>,
     source: Source<T>,
     of_areas: Option<area::Residual<T>>,
@@ -81,7 +83,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         let found = self.find_samples(points, given, held)?;
         let samples = Samples {
             points,
-            normals: &found.normals,
+            normals: &found.sides.normals,
             areas: &found.areas,
         };
         begin(Stage::Splat)?;
@@ -107,9 +109,14 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             iso_value: solved.level,
             surface,
             points: points.clone(),
-            normals: found.normals,
+            normals: found.sides.normals,
+            confidence: found.sides.confidence,
+            turned: found.sides.turned,
+            kept_confidence: found.sides.kept,
             areas: found.areas,
             residuals: Residuals {
+                near: found.near,
+                common_radius: held.common_radius,
                 normals: found.source,
                 areas: found.of_areas,
                 splat: of_splat,
@@ -135,31 +142,42 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             None => &held.radii,
         };
         let near = neighbors::forward(device, points, radii)?;
-        let (normals, source) = match given {
+        let (sides, source) = match given {
             Some(given) => {
-                let normals = orient::given::forward(device, given)?;
-                (normals, Source::Given(given.clone()))
+                let sides = self.take_given(given)?;
+                (sides, Source::Given(given.clone()))
             }
             None => {
                 let (axes, residual) = normals::forward(device, &near)?;
-                let outward = held.outward.clone();
-                let normals = held::turn(device, &axes, &axes, &outward)?;
+                let sides = held.turn(device, &near, &axes)?;
                 let source = Source::Axes {
                     axes,
-                    outward,
+                    outward: sides.normals.clone(),
                     residual: residual.into(),
                 };
-                (normals, source)
+                (sides, source)
             }
         };
         let (areas, of_areas) = self.areas(&near, held)?;
         let width = self.width(&areas, held)?;
         Ok(Found {
-            normals,
+            sides,
+            near,
             areas,
             source,
             of_areas,
             width,
+        })
+    }
+
+    /// Normals that are trusted as they are.
+    fn take_given(&self, given: &Buffer<T>) -> Result<Followed<T>, Error> {
+        let sure = self.device.upload(&vec![T::of(1.0); given.len() / 3])?;
+        Ok(Followed {
+            normals: orient::given::forward(&self.device, given)?,
+            confidence: sure.clone(),
+            kept: sure,
+            turned: self.device.upload(&[0])?,
         })
     }
 

@@ -1,17 +1,22 @@
 //! What is found in a cloud once, on the CPU or on the device, and then held: no derivative goes through it.
 
+use std::ops::ControlFlow;
+
 use cubecl::prelude::*;
 use isograd::neighbors::{Neighborhoods, Radius};
 use isograd::orient::{self, Method, Orientation};
-use isograd::{PointCloud, normals};
+use isograd::{PointCloud, Stage, normals};
 
-use super::Error;
+use super::{Error, Reconstruction};
 use crate::device::check_length;
 use crate::neighbors::radius;
+use crate::orient::Axes;
+use crate::orient::previous::{self, Before, Followed};
+use crate::primitives::fill::zeros;
 use crate::{Buffer, Device, Scalar};
 
 /// The radii of a cloud's neighbourhoods, and which way is out at each of its points. Of a body that moves a
-/// little, those of an earlier step will do: see [`Held::facing`].
+/// little, those of an earlier step will do: see [`Held::after`].
 #[derive(Clone, Debug)]
 pub struct Held<T> {
     /// `(N,)` within which normals are found, in the user's unit.
@@ -26,10 +31,22 @@ pub struct Held<T> {
     pub outward: Buffer<T>,
     /// `(N,)` from 0 to 1, how sure that is: see [`Orientation::confidence`].
     pub confidence: Buffer<T>,
+    /// Whether the sides are those of an earlier step, since which axes may have turned far: these then follow their
+    /// neighbours.
+    pub has_moved: bool,
+}
+
+/// What is found beside it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Summary {
+    /// Points whose axis is ill defined.
+    pub guarded: usize,
+    /// Axes whose sign was changed.
+    pub flipped: usize,
 }
 
 impl<T: Scalar> Held<T> {
-    /// Finds all of it on the CPU. `method` is any but [`Method::Previous`], which [`Self::facing`] takes the place
+    /// Finds all of it on the CPU. `method` is any but [`Method::Previous`], which [`Self::after`] takes the place
     /// of. With [`Method::Given`] there are no axes to turn: it is what
     /// [`reconstruct_given`](super::Reconstructor::reconstruct_given) holds.
     ///
@@ -83,11 +100,11 @@ impl<T: Scalar> Held<T> {
             spacing: near.spacing(),
             outward: device.upload(found.normals.as_flattened())?,
             confidence: device.upload(&found.confidence)?,
+            has_moved: false,
         })
     }
 
-    /// Finds all of it on the device, from `(N, 3)` points that are there: they never leave it. The automatic
-    /// orientation is on the CPU alone, in [`Self::find`].
+    /// Finds all of it on the device, from `(N, 3)` points that are there.
     ///
     /// # Errors
     /// What neighbours or orientation say of the cloud; [`Error::Device`].
@@ -97,33 +114,122 @@ impl<T: Scalar> Held<T> {
         radius: Radius,
         method: &crate::orient::Method<'_, T>,
     ) -> Result<Self, Error> {
+        let (held, _) = Self::search(device, points, radius, method, &mut || {
+            ControlFlow::Continue(())
+        })?;
+        Ok(held)
+    }
+
+    /// The same, and what else was found; `begin` is called before the sides are looked for.
+    pub(crate) fn search<R: Runtime>(
+        device: &Device<R>,
+        points: &Buffer<T>,
+        radius: Radius,
+        method: &crate::orient::Method<'_, T>,
+        begin: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<(Self, Summary), Error> {
         let found = radius::forward(device, points, radius)?;
-        let (mut axes, residual) = crate::normals::forward(device, &found.neighborhoods)?;
+        let (mut axes, mut residual) = crate::normals::forward(device, &found.neighborhoods)?;
         let mut radii = found.each.clone();
         if radius == Radius::Auto {
             radii = crate::normals::widen(device, &residual)?;
             let wider = crate::neighbors::with_radii(device, &found.neighborhoods, &radii)?;
-            (axes, _) = crate::normals::forward(device, &wider)?;
+            (axes, residual) = crate::normals::forward(device, &wider)?;
         }
+        let guarded = residual.guarded(device)?;
+        if begin().is_break() {
+            return Err(Error::Interrupted(Stage::Orient));
+        }
+        let axes = Axes {
+            normals: &axes,
+            residual: Some(&residual),
+            spacing: found.spacing,
+        };
         let oriented = crate::orient::forward(device, &found.neighborhoods, &axes, method)?;
-        Ok(Self {
+        let flipped = device.download(&oriented.flipped)?[0] as usize;
+        let held = Self {
             radii,
             area_radii: found.each,
             common_radius: found.common,
             spacing: found.spacing,
             outward: oriented.normals,
             confidence: oriented.confidence,
+            has_moved: false,
+        };
+        Ok((held, Summary { guarded, flipped }))
+    }
+
+    /// The radii alone, for normals that are given.
+    pub(crate) fn radii<R: Runtime>(
+        device: &Device<R>,
+        points: &Buffer<T>,
+        radius: Radius,
+    ) -> Result<Self, Error> {
+        let found = radius::forward(device, points, radius)?;
+        Ok(Self {
+            radii: found.each.clone(),
+            outward: zeros(device, points.len())?,
+            confidence: zeros(device, found.each.len())?,
+            area_radii: found.each,
+            common_radius: found.common,
+            spacing: found.spacing,
+            has_moved: false,
         })
     }
 
-    /// The same radii, with sides told by other vectors: for the next step of a body that moves, the outward
-    /// normals of this one.
+    /// The same radii, with sides told by other `(N, 3)` vectors of any length, roughly outward. Axes that are more
+    /// than 60° off follow their neighbours.
     ///
     /// # Errors
     /// [`crate::Error::Length`].
     pub fn facing(self, outward: Buffer<T>) -> Result<Self, crate::Error> {
         check_length("the outward vectors", &outward, self.outward.len())?;
-        Ok(Self { outward, ..self })
+        Ok(Self {
+            outward,
+            has_moved: true,
+            ..self
+        })
+    }
+
+    /// For the next step of a body that moves a little: the same radii, with the sides of this step. See
+    /// [`Reconstruction::turned`] for when that is no longer good enough.
+    ///
+    /// # Errors
+    /// [`crate::Error::Length`] where `result` is of other points.
+    pub fn after(self, result: &Reconstruction<T>) -> Result<Self, crate::Error> {
+        let held = self.facing(result.normals.clone())?;
+        Ok(Self {
+            confidence: result.kept_confidence.clone(),
+            ..held
+        })
+    }
+
+    /// Turns `(N, 3)` axes to the sides that are held.
+    pub(super) fn turn<R: Runtime>(
+        &self,
+        device: &Device<R>,
+        near: &crate::neighbors::Neighborhoods<T>,
+        axes: &Buffer<T>,
+    ) -> Result<Followed<T>, Error> {
+        if self.has_moved {
+            let before = Before {
+                outward: &self.outward,
+                confidence: &self.confidence,
+            };
+            return Ok(previous::forward(
+                device,
+                near,
+                &self.area_radii,
+                axes,
+                before,
+            )?);
+        }
+        Ok(Followed {
+            normals: turn(device, axes, axes, &self.outward)?,
+            confidence: self.confidence.clone(),
+            kept: self.confidence.clone(),
+            turned: device.upload(&[0])?,
+        })
     }
 }
 

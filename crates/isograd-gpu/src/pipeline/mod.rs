@@ -5,19 +5,24 @@
 //! cloud, radii and sides, is [`Held`]: found once, it does for the steps of a body that moves a little. After
 //! that nothing comes back to the host but a few counts, and the mean area where the smoothing follows it.
 //!
+//! [`Reconstructor::extend`] carries attributes of the samples to the surface and the cells round it.
+//!
 //! # Pullback
-//! As [`isograd::Reconstruction::pullback`], of any of the results: [`Reconstructor::pullback`].
+//! As [`isograd::Reconstruction::pullback`], of any of the results and of extended attributes:
+//! [`Reconstructor::pullback`].
 //!
 //! # Not differentiable
 //! What is held, and what the stages say of themselves.
 
+mod extend;
 mod forward;
 mod held;
 mod pullback;
 
 pub use forward::Observer;
 pub use held::Held;
-pub use pullback::{CloudCotangent, Cotangent};
+pub(crate) use held::Summary;
+pub use pullback::{CloudCotangent, Cotangent, ExtensionCotangent};
 
 use cubecl::prelude::Runtime;
 use isograd::isosurface::Level;
@@ -43,7 +48,7 @@ pub enum Error {
     #[error(transparent)]
     Orient(#[from] isograd::orient::Error),
     /// A way to orient that needs a step before.
-    #[error("there is no step before here: take its normals by Held::facing")]
+    #[error("there is no step before here: take its sides by Held::after")]
     Orientation,
     /// The smoothing makes no sense.
     #[error("the smoothing is {0:?}; it must be 0 or more cells, and finite")]
@@ -73,6 +78,18 @@ pub enum Error {
     /// The distance.
     #[error(transparent)]
     Distance(#[from] distance::Error),
+    /// An attribute was not extended, or not pulled back.
+    #[error(transparent)]
+    Extension(#[from] isograd::distance::extend::Error),
+}
+
+impl From<distance::extend::Error> for Error {
+    fn from(error: distance::extend::Error) -> Self {
+        match error {
+            distance::extend::Error::Refused(error) => error.into(),
+            distance::extend::Error::Device(error) => error.into(),
+        }
+    }
 }
 
 impl From<neighbors::radius::Error> for Error {
@@ -165,14 +182,24 @@ pub struct Reconstruction<T: Scalar> {
     pub surface: Surface<T>,
     /// `(N, 3)` outward unit normals.
     pub normals: Buffer<T>,
+    /// `(N,)` from 0 to 1, how sure their sides are; 1 for given normals.
+    pub confidence: Buffer<T>,
+    /// `(1,)` how many axes have turned by more than 60° since the step whose sides are [`Held`], and followed their
+    /// neighbours; 0 where these sides were found in this cloud. From 3 % of the points on, find them again.
+    pub turned: Buffer<u32>,
     /// `(N,)` areas, in that unit squared; 1 where samples do not count by them.
     pub areas: Buffer<T>,
-    points: Buffer<T>,
+    pub(crate) points: Buffer<T>,
+    /// The confidence that the next step starts from.
+    kept_confidence: Buffer<T>,
     residuals: Residuals<T>,
 }
 
 /// What the stages kept for their pullbacks.
 struct Residuals<T: Scalar> {
+    /// The points in their tree, and the radius that most neighbourhoods have.
+    near: neighbors::Neighborhoods<T>,
+    common_radius: T,
     normals: Source<T>,
     /// None where samples do not count by their areas.
     areas: Option<area::Residual<T>>,
@@ -243,5 +270,10 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
     /// Where it works.
     pub fn device(&self) -> &Device<R> {
         &self.device
+    }
+
+    /// The grid that all results are on.
+    pub fn grid(&self) -> &Grid<T> {
+        &self.grid
     }
 }

@@ -4,8 +4,10 @@ use cubecl::prelude::*;
 
 use super::{Error, Reconstruction, Reconstructor, Source, held};
 use crate::device::check_length;
+use crate::distance::extend;
 use crate::iso_value::local;
 use crate::primitives::fill::{add, zeros};
+use crate::primitives::flags;
 use crate::splat::{self, SampleCotangent, Samples};
 use crate::{Buffer, Scalar, area, distance, iso_value, isosurface, normals, orient, poisson};
 
@@ -28,6 +30,23 @@ pub struct Cotangent<'a, T> {
     pub normals: Option<&'a Buffer<T>>,
     /// `(N,)` of the areas of the samples.
     pub areas: Option<&'a Buffer<T>>,
+    /// Of attributes extended from the samples.
+    pub extensions: &'a [ExtensionCotangent<'a, T>],
+}
+
+/// Cotangents of one attribute that was [extended](Reconstructor::extend).
+#[derive(Clone, Copy, Debug)]
+pub struct ExtensionCotangent<'a, T> {
+    /// The attribute, as it was given.
+    pub attribute: extend::Attribute<'a, T>,
+    /// What came out.
+    pub extension: &'a extend::Extension<T>,
+    /// What was kept for this.
+    pub residual: &'a extend::Residual<T>,
+    /// `(V, components)` of the values at the vertices.
+    pub vertices: Option<&'a Buffer<T>>,
+    /// `(B, components)` of the values at the cells of the band.
+    pub values: Option<&'a Buffer<T>>,
 }
 
 impl<T> Default for Cotangent<'_, T> {
@@ -39,6 +58,7 @@ impl<T> Default for Cotangent<'_, T> {
             vertices: None,
             normals: None,
             areas: None,
+            extensions: &[],
         }
     }
 }
@@ -47,7 +67,7 @@ impl<T> Cotangent<'_, T> {
     /// Whether anything beyond the normals and areas of the samples has a cotangent.
     fn reaches_indicator(&self) -> bool {
         let fields = [self.sdf, self.indicator, self.iso_value, self.vertices];
-        fields.iter().any(Option::is_some)
+        fields.iter().any(Option::is_some) || !self.extensions.is_empty()
     }
 }
 
@@ -58,17 +78,28 @@ pub struct CloudCotangent<T> {
     pub points: Buffer<T>,
     /// `(N, 3)` of the given normals; none where the normals were found.
     pub normals: Option<Buffer<T>>,
+    /// Of each extended attribute, `(N, components)`, in the order of [`Cotangent::extensions`].
+    pub attributes: Vec<Buffer<T>>,
     /// `(4,)` of the low corner of the grid and of its cell size, at fixed points.
     pub grid: Buffer<T>,
-    /// `(1,)` vertices whose derivative has no bound, and a bounded one was taken; none where none was asked for.
+    /// `(1,)` vertices, and cells of extensions, whose derivative has no bound or does not exist, and a bounded one was
+    /// taken; none where none was asked for.
     pub guarded: Option<Buffer<u32>>,
 }
 
+/// What extensions have for others than the samples.
+struct Extended<T> {
+    attributes: Vec<Buffer<T>>,
+    /// None where nothing was extended.
+    vertices: Option<Buffer<T>>,
+    guarded: Vec<Buffer<u32>>,
+}
+
 impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
-    /// Pulls cotangents of any of the results of this plan back to the points and the grid.
+    /// Pulls cotangents of any of the results of this plan back to the points, the extended attributes and the grid.
     ///
     /// # Errors
-    /// A cotangent of another length than its result, or [`crate::Error::TooLarge`].
+    /// A cotangent of another length than its result, what [`Self::extend`] refuses, or [`crate::Error::TooLarge`].
     pub fn pullback(
         &self,
         result: &Reconstruction<T>,
@@ -84,9 +115,16 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
                 add(device, given, sum)?;
             }
         }
-        let guarded = match cotangent.reaches_indicator() {
-            true => Some(self.pull_indicator(result, cotangent, &bars)?),
-            false => None,
+        let mut extended = self.pull_extensions(result, cotangent, &bars)?;
+        if cotangent.reaches_indicator() {
+            let vertices_bar = self.pull_distance(result, cotangent, &extended, &bars)?;
+            let guarded = self.pull_indicator(result, cotangent, &vertices_bar, &bars)?;
+            extended.guarded.push(guarded);
+        }
+        let guarded = match &extended.guarded[..] {
+            [] => None,
+            [one] => Some(one.clone()),
+            all => Some(flags::sum_of_all(device, &all.iter().collect::<Vec<_>>())?),
         };
         let given = match &residuals.normals {
             Source::Axes {
@@ -108,16 +146,55 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         Ok(CloudCotangent {
             points: bars.points,
             normals: given,
+            attributes: extended.attributes,
             grid: bars.grid,
             guarded,
         })
     }
 
-    /// From φ, the surface, the indicator and the iso-value to samples and grid; how many vertices were guarded.
+    /// From extended attributes to the attributes themselves, and to vertices, points, areas and grid.
+    fn pull_extensions(
+        &self,
+        result: &Reconstruction<T>,
+        cotangent: &Cotangent<'_, T>,
+        bars: &SampleCotangent<T>,
+    ) -> Result<Extended<T>, Error> {
+        let device = &self.device;
+        let mut out = Extended {
+            attributes: Vec::new(),
+            vertices: None,
+            guarded: Vec::new(),
+        };
+        for of in cotangent.extensions {
+            let found = extend::pullback(
+                device,
+                result.extended_samples(),
+                of.attribute,
+                result.extended_surface(),
+                of.residual,
+                of.extension,
+                of.vertices,
+                of.values,
+            )?;
+            add(device, &found.points, &bars.points)?;
+            add(device, &found.areas, &bars.areas)?;
+            add(device, &found.grid, &bars.grid)?;
+            match &out.vertices {
+                Some(sum) => add(device, &found.vertices, sum)?,
+                None => out.vertices = Some(found.vertices),
+            }
+            out.attributes.push(found.attribute);
+            out.guarded.push(found.guarded);
+        }
+        Ok(out)
+    }
+
+    /// From the vertices, the indicator and the iso-value to samples and grid; how many vertices were guarded.
     fn pull_indicator(
         &self,
         result: &Reconstruction<T>,
         cotangent: &Cotangent<'_, T>,
+        vertices_bar: &Buffer<T>,
         bars: &SampleCotangent<T>,
     ) -> Result<Buffer<u32>, Error> {
         let (device, residuals) = (&self.device, &result.residuals);
@@ -126,13 +203,12 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             normals: &result.normals,
             areas: &result.areas,
         };
-        let vertices_bar = self.pull_distance(result, cotangent, bars)?;
         let isosurface::Cotangent {
             chi,
             level,
             grid,
             guarded,
-        } = isosurface::pullback(device, &residuals.surface, &vertices_bar)?;
+        } = isosurface::pullback(device, &residuals.surface, vertices_bar)?;
         add(device, &grid, &bars.grid)?;
         for (given, sum) in [(cotangent.indicator, &chi), (cotangent.iso_value, &level)] {
             if let Some(given) = given {
@@ -174,24 +250,26 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         &self,
         result: &Reconstruction<T>,
         cotangent: &Cotangent<'_, T>,
+        extended: &Extended<T>,
         bars: &SampleCotangent<T>,
     ) -> Result<Buffer<T>, Error> {
         let (device, count) = (&self.device, result.surface.vertices.len());
         if let Some(given) = cotangent.vertices {
             check_length("the cotangent of the vertices", given, count)?;
         }
-        let Some(sdf) = cotangent.sdf else {
-            return Ok(match cotangent.vertices {
-                Some(given) => given.clone(),
-                None => zeros(device, count)?,
-            });
+        let sum = match cotangent.sdf {
+            Some(sdf) => {
+                let found = distance::lattice::pullback(device, &result.residuals.distance, sdf)?;
+                add(device, &found.grid, &bars.grid)?;
+                found.vertices
+            }
+            None => zeros(device, count)?,
         };
-        let found = distance::lattice::pullback(device, &result.residuals.distance, sdf)?;
-        add(device, &found.grid, &bars.grid)?;
-        if let Some(given) = cotangent.vertices {
-            add(device, given, &found.vertices)?;
+        let parts = [cotangent.vertices, extended.vertices.as_ref()];
+        for part in parts.into_iter().flatten() {
+            add(device, part, &sum)?;
         }
-        Ok(found.vertices)
+        Ok(sum)
     }
 
     /// From the smoothing, which goes with the root of the mean area, to areas and cell size.

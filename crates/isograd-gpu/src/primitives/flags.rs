@@ -25,6 +25,18 @@ pub(crate) fn first<R: Runtime>(
     Ok((found[0] > 0).then_some(found[1] as usize))
 }
 
+/// How many flags are 1, the others being 0: `(1,)`. Nothing waits.
+pub(crate) fn count<R: Runtime>(
+    device: &Device<R>,
+    flags: &Buffer<u32>,
+) -> Result<Buffer<u32>, Error> {
+    let sums = exclusive_sum(device, flags)?;
+    let total = device.empty(1)?;
+    let (groups, dim) = (device.groups(1, 1), CubeDim::new_1d(1));
+    take_last::launch::<R>(device.client(), groups, dim, sums.arg(), total.arg(), 0);
+    Ok(total)
+}
+
 /// The indices of the flags that are 1, ascending; only as many numbers are written. The sums end with how many.
 pub(crate) struct Listed {
     pub indices: Buffer<u32>,
@@ -34,16 +46,83 @@ pub(crate) struct Listed {
 /// Lists the flags that are 1, the others being 0. Nothing waits.
 pub(crate) fn list<R: Runtime>(device: &Device<R>, flags: &Buffer<u32>) -> Result<Listed, Error> {
     let sums = exclusive_sum(device, flags)?;
-    let indices = device.empty(flags.len())?;
+    let indices = indices(device, &sums, flags.len())?;
+    Ok(Listed { indices, sums })
+}
+
+/// The indices of the flags that are 1, ascending, in an array of `len`: at least as many as there are. `sums` are
+/// the exclusive sums of the flags.
+pub(crate) fn indices<R: Runtime>(
+    device: &Device<R>,
+    sums: &Buffer<u32>,
+    len: usize,
+) -> Result<Buffer<u32>, Error> {
+    let (flags, indices) = (sums.len() - 1, device.empty(len)?);
     write_indices::launch::<R>(
         device.client(),
-        device.groups(flags.len(), BLOCK),
+        device.groups(flags, BLOCK),
         CubeDim::new_1d(BLOCK),
         sums.arg(),
         indices.arg(),
-        flags.len() as u32,
+        flags as u32,
     );
-    Ok(Listed { indices, sums })
+    Ok(indices)
+}
+
+/// How many flags of each of some arrays are 1, the others being 0, by the exclusive sums of the flags. Waits for the
+/// device, once.
+pub(crate) fn totals<R: Runtime, const N: usize>(
+    device: &Device<R>,
+    sums: [&Buffer<u32>; N],
+) -> Result<[usize; N], Error> {
+    let last: Buffer<u32> = device.empty(N)?;
+    for (k, sums) in sums.into_iter().enumerate() {
+        take_last::launch::<R>(
+            device.client(),
+            device.groups(1, 1),
+            CubeDim::new_1d(1),
+            sums.arg(),
+            last.arg(),
+            k as u32,
+        );
+    }
+    let last = device.download(&last)?;
+    Ok(std::array::from_fn(|k| last[k] as usize))
+}
+
+/// The sum of all numbers of some arrays, `(1,)`. Nothing waits.
+pub(crate) fn sum_of_all<R: Runtime>(
+    device: &Device<R>,
+    arrays: &[&Buffer<u32>],
+) -> Result<Buffer<u32>, Error> {
+    let ends: Buffer<u32> = device.empty(arrays.len())?;
+    for (k, array) in arrays.iter().enumerate() {
+        take_last::launch::<R>(
+            device.client(),
+            device.groups(1, 1),
+            CubeDim::new_1d(1),
+            exclusive_sum(device, array)?.arg(),
+            ends.arg(),
+            k as u32,
+        );
+    }
+    let sum = device.empty(1)?;
+    take_last::launch::<R>(
+        device.client(),
+        device.groups(1, 1),
+        CubeDim::new_1d(1),
+        exclusive_sum(device, &ends)?.arg(),
+        sum.arg(),
+        0,
+    );
+    Ok(sum)
+}
+
+#[cube(launch)]
+fn take_last(values: &Array<u32>, last: &mut Array<u32>, at: u32) {
+    if ABSOLUTE_POS == 0 {
+        last[at as usize] = values[values.len() - 1];
+    }
 }
 
 /// How many flags there are, and the first, where there is one: the only one with none before it.

@@ -1,4 +1,4 @@
-//! What several stages need: sums from the beginning, orders, totals, extremes, flags.
+//! What several stages need: sums from the beginning, orders, totals, extremes, flags, medians of a few numbers.
 
 pub(crate) mod ends;
 pub mod fill;
@@ -7,4 +7,5 @@ pub(crate) mod morton;
 pub mod reduce;
 pub mod scan;
 pub(crate) mod segments;
+pub(crate) mod smallest;
 pub mod sort;

@@ -19,7 +19,8 @@ pub(crate) const PIECE: usize = 64;
 /// Stands for the segment of a piece that is not there.
 pub(crate) const NO_SEGMENT: u32 = u32::MAX;
 
-/// The pieces that segments are cut into.
+/// The pieces that segments are cut into. Clones share the memory.
+#[derive(Clone)]
 pub(crate) struct Pieces {
     /// `(P, 3)`: segment, first element, and one past the last; [`NO_SEGMENT`] in those that are too many.
     pub table: Buffer<u32>,

@@ -166,6 +166,7 @@ fn compare<R: Runtime, T: Scalar>(device: &Device<R>) {
                 vertices: given(3),
                 normals: given(4),
                 areas: given(5),
+                extensions: &[],
             };
             let bars = plan.pullback(result, &cotangent).unwrap();
             [&bars.points, &bars.grid].map(|bar| device.download(bar).unwrap())
@@ -275,6 +276,7 @@ fn compare_held<R: Runtime, T: Scalar>(device: &Device<R>) {
         .unwrap();
     let parity = ParityOptions::default();
     let methods = [
+        (Method::Auto, orient::Method::Auto),
         (Method::Signs, orient::Method::Signs(&normals)),
         (Method::Parity(parity), orient::Method::Parity(parity)),
     ];
@@ -284,15 +286,16 @@ fn compare_held<R: Runtime, T: Scalar>(device: &Device<R>) {
             let found = Held::find_on_device(device, &points, radius, &on_device).unwrap();
             let common = Real::f64(found.common_radius) / Real::f64(expected.common_radius);
             assert!((common - 1.0).abs() < tight, "{common}");
-            for (found, expected) in [
-                (&found.radii, &expected.radii),
-                (&found.area_radii, &expected.area_radii),
-                (&found.outward, &expected.outward),
-                (&found.confidence, &expected.confidence),
+            for (found, expected, most) in [
+                (&found.radii, &expected.radii, loose),
+                (&found.area_radii, &expected.area_radii, loose),
+                (&found.outward, &expected.outward, loose),
+                // In single precision, whatever the number type.
+                (&found.confidence, &expected.confidence, loose.max(1e-5)),
             ] {
                 let [found, expected] = [found, expected].map(|b| device.download(b).unwrap());
                 let difference = relative(&found, &expected);
-                assert!(difference < loose, "{on_cpu:?}, {radius:?}: {difference:e}");
+                assert!(difference < most, "{on_cpu:?}, {radius:?}: {difference:e}");
             }
             if radius != Radius::Auto {
                 continue;

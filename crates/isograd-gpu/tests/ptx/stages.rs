@@ -4,10 +4,13 @@ use cubecl::prelude::CubeElement;
 use isograd::Grid;
 use isograd::isosurface::Level;
 use isograd::neighbors::Radius;
+use isograd::orient::decide::Domains;
 use isograd::splat::Weights;
 use isograd_gpu::differential::{self, Differential, LocalCotangent};
-use isograd_gpu::distance::{Band, Mesh, lattice, query};
+use isograd_gpu::distance::{Band, Mesh, extend, lattice, query};
 use isograd_gpu::iso_value::local;
+use isograd_gpu::orient::auto::fill::{Fill, Lattice, Members};
+use isograd_gpu::orient::previous::{self, Before};
 use isograd_gpu::primitives::{reduce, scan, sort};
 use isograd_gpu::splat::{self, SampleCotangent, Samples};
 use isograd_gpu::{
@@ -30,11 +33,14 @@ pub fn launch_all<T: Scalar>(device: &Device<Recorder>) {
     primitives::<T>(device);
     points::<T>(device);
     held::<T>(device);
+    graphs::<T>(device);
     samples::<T>(device);
     solves::<T>(device);
     surfaces::<T>(device);
     distances::<T>(device);
+    extensions::<T>(device);
     derivatives::<T>(device);
+    fills::<T>(device);
     whole::<T>(device);
     forget_answers();
 }
@@ -83,6 +89,7 @@ fn held<T: Scalar>(device: &Device<Recorder>) {
         &[0, 0],
         &unit_box,
         &median,
+        &[0],
         &words::<T>(&[0.0, 0.01]),
         &unit_box,
     ]);
@@ -91,10 +98,62 @@ fn held<T: Scalar>(device: &Device<Recorder>) {
     forget_answers();
     let near = neighbors::forward(device, &points, &numbers(device, SAMPLES)).unwrap();
     neighbors::radius::census(device, &near, <T as isograd::Real>::of(0.1)).unwrap();
-    answer(&[&[0, 0]]);
-    orient::forward(device, &near, &points, &orient::Method::Signs(&points)).unwrap();
-    forget_answers();
     orient::given::pullback(device, &points, &points).unwrap();
+    sides(device, &near, &points);
+}
+
+fn sides<T: Scalar>(
+    device: &Device<Recorder>,
+    near: &neighbors::Neighborhoods<T>,
+    points: &Buffer<T>,
+) {
+    let (normals, residual) = normals::forward(device, near).unwrap();
+    let axes = orient::Axes {
+        normals: &normals,
+        residual: Some(&residual),
+        spacing: <T as isograd::Real>::of(0.01),
+    };
+    for method in [
+        orient::Method::Signs(points),
+        orient::Method::Sensors(orient::Sensors::Each(points)),
+        orient::Method::Sensors(orient::Sensors::Any(points)),
+        orient::Method::Auto,
+    ] {
+        answer(&[&[0, 0]]);
+        orient::forward(device, near, &axes, &method).unwrap();
+        forget_answers();
+    }
+    let graph = orient::auto::graph::forward(device, near, &normals, None, axes.spacing).unwrap();
+    let domains = Domains {
+        domain: &[0; SAMPLES],
+        sign: &[1.0; SAMPLES],
+        count: 1,
+    };
+    let positions = numbers::<f32>(device, 3 * SAMPLES);
+    orient::auto::winding::numbers(device, &graph, &positions, &domains, &[0]).unwrap();
+    let radii = numbers(device, SAMPLES);
+    let before = Before {
+        outward: points,
+        confidence: &radii,
+    };
+    previous::forward(device, near, &radii, &normals, before).unwrap();
+}
+
+/// The neighbour graph of the automatic orientation.
+fn graphs<T: Scalar>(device: &Device<Recorder>) {
+    use orient::auto::graph;
+    let (points, radii) = (
+        numbers::<T>(device, 3 * SAMPLES),
+        numbers::<T>(device, SAMPLES),
+    );
+    let near = neighbors::forward(device, &points, &radii).unwrap();
+    let (axes, planes) = normals::forward(device, &near).unwrap();
+    let spacing = <T as isograd::Real>::of(0.02);
+    let mut graph = graph::forward(device, &near, &axes, Some(&planes), spacing).unwrap();
+    let slab = device.empty(SAMPLES).unwrap();
+    graph::part_slabs(device, &mut graph, &slab).unwrap();
+    let evidence = graph::sheet_evidence(device, &near, &graph, spacing).unwrap();
+    graph::relax(device, &graph, &evidence).unwrap();
 }
 
 /// Numbers as they are in memory.
@@ -208,6 +267,54 @@ fn distances<T: Scalar>(device: &Device<Recorder>) {
     query::pullback(device, &mesh, points, &hits, bars.0, bars.1).unwrap();
 }
 
+/// An attribute of three components, one of five, and clouds too small for the usual numbers of samples. What is asked
+/// for is how many numbers are bad, how many cells are in the band, and how many faces are not there.
+fn extensions<T: Scalar>(device: &Device<Recorder>) {
+    let mesh = Mesh {
+        vertices: numbers::<T>(device, 3 * VERTICES),
+        faces: device.empty(3 * FACES).unwrap(),
+    };
+    let (grid, phi) = (grid(), numbers::<T>(device, cells()));
+    let closest = device.empty(cells()).unwrap();
+    let surface = extend::Surface {
+        mesh: &mesh,
+        grid: &grid,
+        phi: &phi,
+        closest: &closest,
+    };
+    for (count, components) in [(SAMPLES, 3), (SAMPLES, 5), (3, 1)] {
+        let areas = numbers::<T>(device, count);
+        let near = neighbors::forward(device, &numbers(device, 3 * count), &areas).unwrap();
+        let samples = extend::Samples {
+            neighborhoods: &near,
+            common_radius: <T as isograd::Real>::of(0.1),
+            areas: &areas,
+        };
+        let values = numbers::<T>(device, components * count);
+        let attribute = extend::Attribute {
+            values: &values,
+            components,
+        };
+        answer(&[&[0, 9000, 0]]);
+        let (extension, residual) =
+            extend::forward(device, samples, attribute, surface, 3.0).unwrap();
+        let (at_vertices, in_band) = (&extension.vertices, &extension.values);
+        answer(&[&[0, 0]]);
+        extend::pullback(
+            device,
+            samples,
+            attribute,
+            surface,
+            &residual,
+            &extension,
+            Some(at_vertices),
+            Some(in_band),
+        )
+        .unwrap();
+    }
+    forget_answers();
+}
+
 fn derivatives<T: Scalar>(device: &Device<Recorder>) {
     let (phi, points) = (
         numbers::<T>(device, cells()),
@@ -228,6 +335,26 @@ fn derivatives<T: Scalar>(device: &Device<Recorder>) {
         .unwrap();
 }
 
+/// A grid of three regions, which are asked for first.
+fn fills<T: Scalar>(device: &Device<Recorder>) {
+    let (rows, reach) = (device.empty(SAMPLES).unwrap(), numbers(device, SAMPLES));
+    let members = Members {
+        rows: &rows,
+        points: &numbers::<T>(device, 3 * SAMPLES),
+        axes: &numbers(device, 3 * SAMPLES),
+        reach: &reach,
+        growth: 0.1,
+    };
+    answer(&[&[3]]);
+    let lattice = Lattice::new([0.0; 3], [1.0; 3], 0.05, 1 << 20);
+    let fill = Fill::new(device, &lattice, &members).unwrap();
+    assert_eq!(fill.sides, [1, 0, 0]);
+    fill.look(device).unwrap();
+    fill.regions.of_cells(device, &fill.occupied).unwrap();
+    fill.sky.of_cells(device, &fill.occupied).unwrap();
+    forget_answers();
+}
+
 fn whole<T: Scalar>(device: &Device<Recorder>) {
     let held = pipeline::Held {
         radii: numbers::<T>(device, SAMPLES),
@@ -236,6 +363,7 @@ fn whole<T: Scalar>(device: &Device<Recorder>) {
         spacing: <T as isograd::Real>::of(0.02),
         outward: numbers(device, 3 * SAMPLES),
         confidence: numbers(device, SAMPLES),
+        has_moved: true,
     };
     // The local level has its own call.
     let options = pipeline::Options {

@@ -3,14 +3,19 @@
 //! The files beside this one are compiled twice: here as plain Rust, and in `isograd-gpu`, where the cfg
 //! `cube` makes parts of kernels of the same lines.
 
+pub mod coupling;
 pub mod crossing;
 pub mod curvature;
 pub mod difference;
+pub mod disc;
 pub mod evidence;
+pub mod fit;
 pub mod hat;
 pub mod linear;
 pub mod plane;
 pub mod plate;
+pub mod sheet;
+pub mod sight;
 pub mod spline;
 pub mod turned;
 pub mod winding;

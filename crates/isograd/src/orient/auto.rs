@@ -7,17 +7,13 @@ use rayon::prelude::*;
 use super::Axes;
 use super::decide::{Beliefs, Domains, Place, Reading, Signs, Verdict};
 use super::fill::Fill;
-use super::graph::{Graph, NEIGHBORS};
+use super::graph::Graph;
 use super::groups::Groups;
 use super::winding;
 use crate::Real;
 use crate::element::evidence::{self, of_view};
 use crate::neighbors::Neighborhoods;
-use crate::parallel::CHUNK;
 use crate::vector;
-
-/// Rounds in which every point takes the mean of its own evidence and what its neighbours say.
-const ROUNDS: usize = 60;
 
 /// Scratch of the automatic method; all in sorted order.
 #[derive(Clone, Debug, Default)]
@@ -126,7 +122,7 @@ impl Auto {
                     let reach = scale.growth * f64::from(graph.reach[p]);
                     (place.user(p), graph.axis[p], reach)
                 });
-                for (&p, sights) in members.iter().zip(&self.fill.sights) {
+                for (&p, sights) in members.iter().zip(self.fill.sights()) {
                     let p = p as usize;
                     filled[p] += scale.weight * sights.evidence;
                     slabs[p] = slabs[p].max(sights.ends[0].min(sights.ends[1]));
@@ -175,7 +171,6 @@ impl<P> Voices<'_, P> {
 impl<P: Place> Beliefs for Voices<'_, P> {
     type Error = Infallible;
 
-    /// Spreads the evidence: repeated weighted means, each point's own evidence held with its strength.
     fn hear(
         &mut self,
         reading: Reading,
@@ -185,19 +180,7 @@ impl<P: Place> Beliefs for Voices<'_, P> {
         let all = 0..self.seen.sheets.len();
         evidence.clear();
         evidence.extend(all.map(|p| self.weighed(p, reading)));
-        belief.clone_from(evidence);
-        self.next.resize(belief.len(), 0.0);
-        let (graph, evidence) = (self.graph, &*evidence);
-        for _ in 0..ROUNDS {
-            let chunks = self.next.par_chunks_mut(CHUNK).enumerate();
-            chunks.for_each(|(chunk, next)| {
-                for (k, next) in next.iter_mut().enumerate() {
-                    let p = chunk * CHUNK + k;
-                    *next = spread(evidence[p], &graph.coupling[p], &graph.near[p], belief);
-                }
-            });
-            std::mem::swap(belief, self.next);
-        }
+        self.graph.relax(evidence, belief, self.next);
         Ok(())
     }
 
@@ -210,15 +193,4 @@ impl<P: Place> Beliefs for Voices<'_, P> {
     fn winding(&mut self, domains: &Domains<'_>, probes: &[u32]) -> Result<Vec<f64>, Infallible> {
         Ok(winding::numbers(self.graph, self.place, domains, probes))
     }
-}
-
-#[inline(always)]
-fn spread(own: f32, coupling: &[f32; NEIGHBORS], near: &[u32; NEIGHBORS], belief: &[f32]) -> f32 {
-    let mut sum = own * own.abs();
-    let mut weight = own.abs();
-    for slot in 0..NEIGHBORS {
-        sum += coupling[slot] * belief[near[slot] as usize];
-        weight += coupling[slot].abs();
-    }
-    if weight > 0.0 { sum / weight } else { 0.0 }
 }

@@ -5,48 +5,46 @@
 //! that the discs close off are matter; cells of the open region count as air by the share of the sky
 //! that they see. So a body with a hole in its sampling, which a flood alone would call all air, still
 //! has a darker and a brighter side.
+//!
+//! A part of [`Method::Auto`](super::Method::Auto), named for those who do the same elsewhere: `isograd-gpu` makes
+//! the same grid, and is compared with what is found here.
 
 use rayon::prelude::*;
 
+pub use super::flood::sides_of_walls;
+
 use super::flood::{self, Regions};
 use super::sky::Sky;
+use crate::element::disc as element;
+use crate::element::sight::{self, RAYS, STEPS};
 use crate::parallel::CHUNK;
 use crate::vector;
 
 /// Free cells on each side of a body.
 const MARGIN: f64 = 3.0;
 
-/// Planes of the grid drawn by one task, and the largest radius of a disc in cells: what one task draws
+/// The fewest cells that a grid can have: nothing but margins.
+const FEWEST: usize = 216;
+
+/// Planes of the grid drawn by one task, and more than the radius of any disc in cells: what one task draws
 /// comes from its own samples and those of the tasks beside it.
 const SLAB: usize = 8;
 
-/// Smallest radius of a disc in cells.
-const SMALLEST_DISC: f32 = 0.9;
-
-/// Radius of a disc over the reach of its sample.
-const DISC: f32 = 1.5;
-
-/// Air that sees nothing of the sky counts this much; air that sees all of it counts 1.
-const DARK_AIR: f32 = 0.2;
-
-/// Samples along a ray to the nearest free cell, [`STEP`] cells apart.
-const STEPS: usize = 8;
-const STEP: f32 = 0.5;
-const FIRST: f32 = 0.75;
-
 /// A cubic grid round a part of the cloud, in user coordinates.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Lattice {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lattice {
     lower: [f64; 3],
     cell: f64,
     shape: [usize; 3],
 }
 
 impl Lattice {
-    /// A grid over the box from `low` to `high` with cells of the given size; larger cells where there
-    /// would be more than `budget` of them.
-    pub(super) fn new(low: [f64; 3], high: [f64; 3], cell: f64, budget: usize) -> Self {
+    /// A grid over the box from `low` to `high`, which are finite, with cells of the given size, which is positive;
+    /// larger cells where there would be more than `budget` of them, or than 216. Three cells are free round the
+    /// box.
+    pub fn new(low: [f64; 3], high: [f64; 3], cell: f64, budget: usize) -> Self {
         let count = |cell: f64, a: usize| ((high[a] - low[a]) / cell).ceil() + 2.0 * MARGIN;
+        let budget = budget.max(FEWEST);
         let mut cell = cell;
         while count(cell, 0) * count(cell, 1) * count(cell, 2) > budget as f64 {
             cell *= 1.1;
@@ -58,11 +56,26 @@ impl Lattice {
         }
     }
 
+    /// The low corner of cell (0, 0, 0), in user coordinates.
+    pub fn lower(&self) -> [f64; 3] {
+        self.lower
+    }
+
+    /// The length of the edges of its cells, in user coordinates.
+    pub fn cell(&self) -> f64 {
+        self.cell
+    }
+
+    /// Numbers of cells along x, y and z; the last axis varies fastest in memory.
+    pub fn shape(&self) -> [usize; 3] {
+        self.shape
+    }
+
     /// Position in cells, kept inside the grid.
     fn place(&self, point: [f64; 3]) -> [f32; 3] {
         [0, 1, 2].map(|a| {
             let x = ((point[a] - self.lower[a]) / self.cell) as f32;
-            x.clamp(0.5, self.shape[a] as f32 - 0.5)
+            element::inside(x, self.shape[a] as f32)
         })
     }
 
@@ -91,8 +104,8 @@ struct Sight {
 }
 
 /// What a sample sees.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sights {
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sights {
     /// The evidence, in −1..1: positive where the axis points into the air.
     pub evidence: f32,
     /// The light in front, along the axis, and behind: −1 in matter, up to 1 in the open air.
@@ -101,7 +114,7 @@ pub(super) struct Sights {
 
 /// The grid of occupied cells, its regions and its sky: scratch that is used again.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Fill {
+pub struct Fill {
     discs: Vec<Disc>,
     by_slab: Vec<Vec<u32>>,
     occupied: Vec<u8>,
@@ -109,13 +122,13 @@ pub(super) struct Fill {
     sky: Sky,
     walls: Vec<(u32, u32)>,
     sides: Vec<i8>,
-    /// `(members,)`
-    pub sights: Vec<Sights>,
+    sights: Vec<Sights>,
 }
 
 impl Fill {
-    /// Evidence for each member: `sample(m)` returns its position, axis and reach in user units.
-    pub(super) fn run(
+    /// Evidence for each member: `sample(m)` returns its position, axis (of unit length, or zero) and reach in user
+    /// units, all finite.
+    pub fn run(
         &mut self,
         lattice: &Lattice,
         members: usize,
@@ -135,6 +148,22 @@ impl Fill {
         );
         self.tell_sides(lattice);
         self.look_both_ways(lattice);
+    }
+
+    /// `(members,)`: what each member of the last run sees.
+    pub fn sights(&self) -> &[Sights] {
+        &self.sights
+    }
+
+    /// Which cells of the last run samples cover: 1, else 0.
+    pub fn occupied(&self) -> &[u8] {
+        &self.occupied
+    }
+
+    /// Of each region of free cells that are joined through faces, in the order of their first cells: +1 for air, −1
+    /// for matter, 0 where no wall tells. Region 0 is the open air.
+    pub fn sides(&self) -> &[i8] {
+        &self.sides
     }
 
     /// Marks the cells that the discs cover.
@@ -194,33 +223,38 @@ impl Fill {
                 .map_or(0.0, |sight| self.light(&sight))
         };
         let pair = |direction: [f32; 3]| light(direction) - light(direction.map(|d| -d));
-        let [t, b] = tangents(disc.axis);
+        let tangents = vector::tangents(disc.axis).unwrap_or_default();
         let ends = [light(disc.axis), light(disc.axis.map(|a| -a))];
-        let mut sum = 2.0 * (ends[0] - ends[1]);
-        for tangent in [t, b] {
+        let mut sum = sight::along_axis(ends[0], ends[1]);
+        for tangent in tangents {
             sum += pair(vector::add(disc.axis, tangent));
             sum += pair(vector::sub(disc.axis, tangent));
         }
         Sights {
-            evidence: sum / 12.0,
+            evidence: sight::evidence(sum),
             ends,
         }
     }
 
     /// Light in the cell that a ray meets: −1 in matter, up to 1 in the open air, less for a longer way.
     fn light(&self, sight: &Sight) -> f32 {
-        let value = match self.sides[sight.region as usize] {
+        let light = match self.sides[sight.region as usize] {
             // Region 0 is the open air; other air is a cavity, which sees no sky.
-            1 if sight.region == 0 => DARK_AIR + (1.0 - DARK_AIR) * self.sky.seen(sight.cell),
+            1 if sight.region == 0 => {
+                sight::open_air(f32::from(self.sky.free(sight.cell)), RAYS as f32)
+            }
             side => f32::from(side),
         };
-        value * (1.0 - 0.5 * sight.steps as f32 / STEPS as f32)
+        sight::dimmed(light, sight.steps as f32, STEPS as f32)
     }
 
     fn first_free(&self, lattice: &Lattice, from: [f32; 3], direction: [f32; 3]) -> Option<Sight> {
         let [nx, ny, nz] = lattice.shape;
         for steps in 0..STEPS {
-            let at = vector::add(from, vector::scale(direction, FIRST + STEP * steps as f32));
+            let at = vector::add(
+                from,
+                vector::scale(direction, sight::distance(steps as f32)),
+            );
             let [x, y, z] = at.map(|x| x.max(0.0) as usize);
             let (x, y, z) = (x.min(nx - 1), y.min(ny - 1), z.min(nz - 1));
             let cell = (x * ny + y) * nz + z;
@@ -242,8 +276,8 @@ impl Disc {
         Self {
             center,
             axis,
-            radius: (DISC * reach).clamp(SMALLEST_DISC, SLAB as f32 - 0.5),
-            half: 0.5 * (axis[0].abs() + axis[1].abs() + axis[2].abs()),
+            radius: element::radius(reach),
+            half: element::half(axis[0], axis[1], axis[2]),
         }
     }
 
@@ -276,16 +310,6 @@ impl Disc {
     fn covers(&self, cell: [usize; 3]) -> bool {
         let d = [0, 1, 2].map(|a| cell[a] as f32 + 0.5 - self.center[a]);
         let height = vector::dot(d, self.axis);
-        height.abs() <= self.half
-            && vector::norm_squared(d) - height * height <= self.radius * self.radius
+        element::covers(vector::norm_squared(d), height, self.half, self.radius)
     }
-}
-
-/// Two unit vectors at right angles to a unit axis and to each other.
-fn tangents(axis: [f32; 3]) -> [[f32; 3]; 2] {
-    let least = (1..3).fold(0, |k, a| if axis[a].abs() < axis[k].abs() { a } else { k });
-    let mut unit = [0.0; 3];
-    unit[least] = 1.0;
-    let t = vector::normalized(vector::cross(axis, unit)).unwrap_or([0.0; 3]);
-    [t, vector::cross(axis, t)]
 }

@@ -104,15 +104,9 @@ fn push_runs(row: &[u8], runs: &mut Vec<(u32, u32)>) {
     }
 }
 
-/// Which regions are outside the body: `sides[r]` is +1 for air, −1 for matter, 0 where no wall tells.
-///
-/// `walls` holds, for each sample that has a region on either side, that pair; region 0 is air. From
-/// region to region across the wall with the most samples, air and matter alternate: so the cavity of a
-/// hollow body is air again, and a body inside the cavity is matter.
+/// Which regions are outside the body, from `walls`: for each sample that has a region on either side, that pair;
+/// see [`sides_of_walls`].
 pub(super) fn sides(regions: usize, walls: &mut [(u32, u32)], sides: &mut Vec<i8>) {
-    sides.clear();
-    sides.resize(regions, 0);
-    sides[0] = 1;
     walls
         .iter_mut()
         .for_each(|wall| *wall = (wall.0.min(wall.1), wall.0.max(wall.1)));
@@ -121,9 +115,27 @@ pub(super) fn sides(regions: usize, walls: &mut [(u32, u32)], sides: &mut Vec<i8
         .chunk_by(|a, b| a == b)
         .map(|same| (same.len(), same[0]))
         .collect();
-    counted.sort_by_key(|&(samples, wall)| (std::cmp::Reverse(samples), wall));
+    sides_of_walls(regions, &mut counted, sides);
+}
+
+/// Which of the `regions` are outside the body: `sides[r]` is +1 for air, −1 for matter, 0 where no wall tells.
+///
+/// `walls` are the pairs of regions, the lower first and no pair twice, with the number of samples that have one on
+/// either side, in any order. Region 0 is air. From region to region across the wall with the most samples, air and
+/// matter alternate: so the cavity of a hollow body is air again, and a body inside the cavity is matter.
+///
+/// # Panics
+/// A wall names a region that there is not.
+pub fn sides_of_walls(regions: usize, walls: &mut [(usize, (u32, u32))], sides: &mut Vec<i8>) {
+    sides.clear();
+    sides.resize(regions, 0);
+    let Some(open_air) = sides.first_mut() else {
+        return;
+    };
+    *open_air = 1;
+    walls.sort_by_key(|&(samples, wall)| (std::cmp::Reverse(samples), wall));
     let mut neighbors = vec![Vec::new(); regions];
-    for &(samples, (a, b)) in &counted {
+    for &(samples, (a, b)) in walls.iter() {
         neighbors[a as usize].push((samples, b));
         neighbors[b as usize].push((samples, a));
     }

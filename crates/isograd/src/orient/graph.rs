@@ -1,77 +1,59 @@
 //! The neighbour graph: who is next to whom, and how the signs of two neighbours hang together.
-
-use std::f32::consts::PI;
+//!
+//! # Map
+//! [`Axes`] and [`Neighborhoods`] → [`Graph`], on which the [automatic method](super::Method::Auto) spreads its
+//! evidence. Formulas of single neighbours are those of [`coupling`] and [`crate::element::sheet`].
+//!
+//! # Not differentiable
+//! Nothing here has a derivative: it decides about signs.
 
 use rayon::prelude::*;
 
 use super::{Axes, sheet};
+pub use crate::element::coupling::NEIGHBORS;
+use crate::element::coupling::{self, RING, ROUNDS};
 use crate::neighbors::Neighborhoods;
 use crate::normals::Plane;
 use crate::parallel::CHUNK;
 use crate::{Real, vector};
 
-/// Neighbours of a point in the graph.
-pub(super) const NEIGHBORS: usize = 16;
-
-/// The reach of a sample is its distance to this neighbour: the first ring round it.
-const RING: usize = 6;
-
-/// A sample reaches at most this many times as far as its neighbours do at the median: an outlier
-/// stands for no more surface than the samples that are nearest to it.
-const REACH_GROWTH: f32 = 1.5;
-
-/// Offsets shorter than this share of the reach have no direction to speak of.
-const BLUNT: f32 = 0.22;
-
-/// A sample lies off a sheet from this many times as far as the samples of the sheet scatter.
-const APART: f32 = 3.0;
-
-/// A neighbour of a coupling above this along the same direction lies on the same sheet; and the least share
-/// of the neighbours that do.
-const SAME_SHEET: f32 = 0.1;
-const LEAST_SHARE: f32 = 1.0 / 3.0;
-
-/// What the product of the spreads of two samples adds to the blur of their reflection.
-const NOISE: f32 = 4.0;
-
-/// How soon it is clear on which side of a plane a sample lies, by its height in spreads.
-const SIDE: f32 = 2.0;
-
-/// Couplings are raised to this odd power: a half-hearted one, as between a sample of one sheet and one
-/// slantwise across on the other, is mostly wrong, and must not count for half.
-const TRUST: i32 = 5;
-
-/// Neighbours, axes and couplings, all in the sorted order of the neighbour index; lengths are in
-/// sample spacings of the whole cloud, so that single precision serves any unit.
+/// Neighbours, axes and couplings, all in the sorted order of the neighbour index
+/// ([`CellIndex::order`](crate::neighbors::CellIndex::order)); lengths are in sample spacings
+/// ([`Neighborhoods::spacing`]) of the whole cloud, so that single precision serves any unit.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Graph {
-    /// The nearest other samples, nearest first; where there are too few, the point itself.
+pub struct Graph {
+    /// `(N, 16)` sorted positions of the nearest other samples, nearest first; where there are too few, the point
+    /// itself.
     pub near: Vec<[u32; NEIGHBORS]>,
-    /// Offset to each of them.
+    /// `(N, 16, 3)` offset to each of them, in spacings.
     pub offset: Vec<[[f32; 3]; NEIGHBORS]>,
-    /// How far the surface patch extends that this sample stands for.
+    /// `(N,)` how far the surface patch extends that each sample stands for, in spacings.
     pub reach: Vec<f32>,
-    /// The normal axis; its sign is arbitrary.
+    /// `(N, 3)` the normal axis, of unit length; its sign is arbitrary.
     pub axis: Vec<[f32; 3]>,
-    /// In −1..1: above 0 where the two axes should have the sign they have, relative to each other.
+    /// `(N, 16)` in −1..1: above 0 where the two axes should have the sign they have, relative to each other.
     pub coupling: Vec<[f32; NEIGHBORS]>,
-    /// How far the samples of its sheet lie off it, where that is known; else 0.
+    /// `(N,)` how far the samples of its sheet lie off it, in spacings, where that is known; else 0.
     pub scatter: Vec<f32>,
-    /// The area of surface that this sample stands for.
+    /// `(N,)` the area of surface that each sample stands for, in squares of the spacing.
     pub area: Vec<f32>,
-    /// How far samples lie off their common plane, where they scatter so much that the axis was sought in a
-    /// wider neighbourhood: root mean square; else 0.
+    /// `(N,)` how far samples lie off their common plane, where they scatter so much that the axis was sought in a
+    /// wider neighbourhood: root mean square, in spacings; else 0.
     pub spread: Vec<f32>,
-    /// In −1..1: how clearly such a sample lies on the side of that plane that its axis points to; else 0.
+    /// `(N,)` in −1..1: how clearly such a sample lies on the side of that plane that its axis points to; else 0.
     pub side: Vec<f32>,
-    /// Scratch: distance to the last sample of the ring.
-    ring: Vec<f32>,
-    /// Scratch: typical distance of the nearest samples from the tangent plane.
-    thickness: Vec<f32>,
+    /// `(N,)` distance to the last sample of the ring, the sixth, in spacings.
+    pub ring: Vec<f32>,
+    /// `(N,)` typical distance of the nearest samples from the tangent plane, in spacings.
+    pub thickness: Vec<f32>,
 }
 
 impl Graph {
-    pub(super) fn build<T: Real>(&mut self, axes: &Axes<'_, T>, neighborhoods: &Neighborhoods<T>) {
+    /// Finds all of it, in the memory of the graph before. The axes are those of the same points.
+    ///
+    /// # Panics
+    /// There are fewer axes than points.
+    pub fn build<T: Real>(&mut self, axes: &Axes<'_, T>, neighborhoods: &Neighborhoods<T>) {
         let n = neighborhoods.index.len();
         self.take_axes(axes, neighborhoods);
         self.near.resize(n, [0; NEIGHBORS]);
@@ -187,7 +169,7 @@ impl Graph {
                 for (around, &q) in around.iter_mut().zip(&near[p]) {
                     *around = ring[q as usize];
                 }
-                *reach = ring[p].min(REACH_GROWTH * median(&mut around));
+                *reach = coupling::reach(ring[p], median(&mut around));
             });
     }
 
@@ -207,20 +189,22 @@ impl Graph {
     }
 
     fn tie(&self, p: usize, q: usize, slot: usize) -> f32 {
-        let blunt = (BLUNT * self.reach[p]).powi(2);
+        let (a, b, d) = (self.axis[p], self.axis[q], self.offset[p][slot]);
         let gap = self.least_gap(p, q);
-        // Where sheets are told apart, it is not noise.
-        let noise = match gap.is_finite() {
-            true => 0.0,
-            false => NOISE * self.spread[p] * self.spread[q],
-        };
-        let blur = blunt + noise.max(self.thickness[p] * self.thickness[q]);
-        coupled(self.axis[p], self.axis[q], self.offset[p][slot], blur, gap).powi(TRUST)
+        let spreads = self.spread[p] * self.spread[q];
+        let thicknesses = self.thickness[p] * self.thickness[q];
+        let blur = coupling::blur(self.reach[p], spreads, thicknesses, gap);
+        let heights = vector::dot(a, d) * vector::dot(b, d);
+        let square = vector::norm_squared(d) + blur;
+        coupling::trusted(coupling::coupled(vector::dot(a, b), heights, square, gap))
     }
 
-    /// In layers with air on both sides, as far as they are that (`slab`, in 0..1), two samples hang together as
-    /// they lie: on one side of the middle, or on both.
-    pub(super) fn part_slabs(&mut self, slab: &[f32]) {
+    /// In layers with air on both sides, as far as they are that (`slab`, `(N,)` in 0..1), two samples hang together
+    /// as they lie: on one side of the middle, or on both.
+    ///
+    /// # Panics
+    /// There are fewer slabs than points.
+    pub fn part_slabs(&mut self, slab: &[f32]) {
         let (near, axis, side) = (&self.near, &self.axis, &self.side);
         let all = self.coupling.par_iter_mut().enumerate();
         all.for_each(|(p, coupling)| {
@@ -228,65 +212,83 @@ impl Graph {
                 let q = q as usize;
                 let both = slab[p].min(slab[q]);
                 if both > 0.0 && side[p] != 0.0 && side[q] != 0.0 {
-                    let tie = vector::dot(axis[p], axis[q]) * side[p] * side[q];
-                    *coupling += both * (tie.powi(TRUST) - *coupling);
+                    let parallel = vector::dot(axis[p], axis[q]);
+                    *coupling = coupling::parted(*coupling, both, parallel, side[p], side[q]);
                 }
             }
         });
     }
 
-    /// The square of the height from which on one of two samples lies off the sheet of the other; infinite
-    /// where a sheet is not known.
     fn least_gap(&self, p: usize, q: usize) -> f32 {
-        let (a, b) = (self.scatter[p], self.scatter[q]);
-        if a > 0.0 && b > 0.0 {
-            (APART * a.max(b)).powi(2)
-        } else {
-            f32::INFINITY
-        }
+        coupling::least_gap(self.scatter[p], self.scatter[q])
     }
 
-    /// The area of surface that each sample stands for, in squares of the sample spacing.
     fn measure_areas(&mut self) {
         let (near, coupling, axis, reach) = (&self.near, &self.coupling, &self.axis, &self.reach);
         self.area.par_iter_mut().enumerate().for_each(|(p, area)| {
-            // Neighbours on another sheet take nothing away from this one.
-            let parallel = |&(slot, &q): &(usize, &u32)| {
-                coupling[p][slot] * vector::dot(axis[p], axis[q as usize]) > SAME_SHEET
+            let same = |&(slot, &q): &(usize, &u32)| {
+                let parallel = vector::dot(axis[p], axis[q as usize]);
+                coupling::on_same_sheet(coupling[p][slot], parallel)
             };
-            let own = 1 + near[p].iter().enumerate().filter(parallel).count();
-            let share = (own as f32 / (NEIGHBORS + 1) as f32).max(LEAST_SHARE);
-            *area = PI * reach[p] * reach[p] / ((RING as f32 + 0.5) * share);
+            let same = near[p].iter().enumerate().filter(same).count();
+            *area = coupling::area(reach[p], same as f32);
         });
     }
 
-    /// Evidence for the sign of each axis from a second sheet close by: the samples of the other side of
-    /// a thin body lie behind this one. Positive where the axis points away from them.
-    pub(super) fn sheet_evidence(&self, p: usize) -> f32 {
+    /// Evidence in −1..1 for the sign of the axis at a sorted position from a second sheet close by: the samples of
+    /// the other side of a thin body lie behind this one. Positive where the axis points away from them.
+    ///
+    /// # Panics
+    /// There is no such point.
+    pub fn sheet_evidence(&self, p: usize) -> f32 {
         let (mut signed, mut total) = (0.0, 0.0);
         for (slot, &d) in self.offset[p].iter().enumerate() {
             let square = vector::norm_squared(d);
             if square > 0.0 {
                 let q = self.near[p][slot] as usize;
-                let parallel = vector::dot(self.axis[p], self.axis[q]).powi(4);
+                let parallel = vector::dot(self.axis[p], self.axis[q]);
                 let height = vector::dot(d, self.axis[p]);
-                let gap = self.least_gap(p, q);
-                let off = if gap.is_finite() {
-                    height * height / (height * height + gap)
-                } else {
-                    (height.abs() / square.sqrt()).powi(3)
-                };
-                let across = off.copysign(height) * parallel;
+                let across = coupling::across(height, square, parallel, self.least_gap(p, q));
                 signed += across;
                 total += across.abs();
             }
         }
-        if total > 0.0 {
-            -signed * signed.abs() / (total * NEIGHBORS as f32)
-        } else {
-            0.0
+        coupling::sheet_evidence(signed, total)
+    }
+
+    /// Spreads the evidence `(N,)`, in −1..1: repeated weighted means of what a point's neighbours believe and its
+    /// own evidence, held with its strength. `next` is scratch.
+    ///
+    /// # Panics
+    /// There is evidence of fewer or of more than the points of the graph.
+    pub fn relax(&self, evidence: &[f32], belief: &mut Vec<f32>, next: &mut Vec<f32>) {
+        belief.clear();
+        belief.extend_from_slice(evidence);
+        next.resize(belief.len(), 0.0);
+        for _ in 0..ROUNDS {
+            let before = &*belief;
+            next.par_chunks_mut(CHUNK)
+                .enumerate()
+                .for_each(|(chunk, next)| {
+                    for (k, next) in next.iter_mut().enumerate() {
+                        let p = chunk * CHUNK + k;
+                        *next = spread(evidence[p], &self.coupling[p], &self.near[p], before);
+                    }
+                });
+            std::mem::swap(belief, next);
         }
     }
+}
+
+#[inline(always)]
+fn spread(own: f32, coupling: &[f32; NEIGHBORS], near: &[u32; NEIGHBORS], belief: &[f32]) -> f32 {
+    let mut sum = coupling::held(own);
+    let mut weight = own.abs();
+    for slot in 0..NEIGHBORS {
+        sum += coupling[slot] * belief[near[slot] as usize];
+        weight += coupling[slot].abs();
+    }
+    coupling::belief(sum, weight)
 }
 
 /// Spread of the samples about the plane round one of them, in spacings, and the side of it on which that one lies.
@@ -296,37 +298,10 @@ fn scatter<T: Real>(plane: &Plane<T>, axis: [T; 3], spacing: f64) -> (f32, f32) 
     match spread > 0.0 {
         true => (
             (spread / spacing) as f32,
-            (SIDE * (height / spread) as f32).tanh(),
+            coupling::side((height / spread) as f32),
         ),
         false => (0.0, 0.0),
     }
-}
-
-/// How the signs of two neighbouring axes `a` and `b` hang together, `d` apart: `a` is reflected at the
-/// plane half-way between the two samples and compared with `b`. Along a sheet that is `a·b`; round an
-/// edge it turns with the surface; and two sheets that face each other, whether matter or air is
-/// between them, have opposite outward normals. `blur` (a squared length) takes the reflection back
-/// where `d` is too short to tell. Two parallel sheets much closer to each other than their samples are
-/// face each other although `d` runs along them: there the reflection is full from the height whose square
-/// is `gap` on.
-///
-/// Source: the reflected transfer of H. Xie, K. McDonnell, H. Qin, "Surface reconstruction of noisy
-/// and defective data sets" (2004).
-#[inline(always)]
-fn coupled(a: [f32; 3], b: [f32; 3], d: [f32; 3], blur: f32, gap: f32) -> f32 {
-    let parallel = vector::dot(a, b);
-    let heights = vector::dot(a, d) * vector::dot(b, d);
-    let mut square = vector::norm_squared(d) + blur;
-    if gap < square && heights * parallel > 0.0 {
-        let share = parallel.powi(8);
-        square = square.min(share * (heights.abs() + gap) + (1.0 - share) * square);
-    }
-    let turned = if square > 0.0 {
-        2.0 * heights / square
-    } else {
-        0.0
-    };
-    (parallel - turned).clamp(-1.0, 1.0)
 }
 
 /// The upper median.

@@ -51,8 +51,8 @@ fn the_sky_is_what_rays_see() {
             let steps = (0..27).map(|k| [k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1]);
             let seen = steps.filter(|&s| s != [0; 3] && escapes(s)).count();
             assert_eq!(
-                sky.seen(at(cell)),
-                seen as f32 / 26.0,
+                usize::from(sky.free(at(cell))),
+                seen,
                 "{cell:?} of {shape:?}"
             );
         }
@@ -116,6 +116,15 @@ fn air_and_matter_alternate_across_the_stronger_walls() {
     let mut found = Vec::new();
     sides(5, &mut walls, &mut found);
     assert_eq!(found, [1, -1, 1, -1, 0]);
+}
+
+#[test]
+fn a_grid_without_a_free_cell_has_no_sides() {
+    let mut regions = Regions::default();
+    regions.find(&[1; 24], [2, 3, 4]);
+    let mut found = vec![1];
+    sides(regions.len, &mut [], &mut found);
+    assert_eq!((regions.len, found.len()), (0, 0));
 }
 
 #[test]

@@ -55,9 +55,9 @@
 mod auto;
 pub mod decide;
 pub mod doubt;
-mod fill;
+pub mod fill;
 mod flood;
-mod graph;
+pub mod graph;
 #[cfg(test)]
 mod grid_tests;
 pub mod groups;

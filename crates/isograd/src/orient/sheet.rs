@@ -10,30 +10,10 @@
 //! point clouds with sharp features" (2012), but over all pairs of near neighbours instead of random
 //! ones.
 
-use super::graph::NEIGHBORS;
+use crate::element::coupling::NEIGHBORS;
+use crate::element::sheet::{self, QUORUM, REST, SPANNING};
 use crate::normals::{Symmetric, eigen};
 use crate::vector;
-
-/// Nearest neighbours whose pairs span the planes that are tried.
-const SPANNING: usize = 9;
-
-/// Neighbours that a plane has to fit.
-const QUORUM: usize = 6;
-
-/// Rank of the neighbour that stands for those off the plane.
-const REST: usize = (NEIGHBORS + QUORUM) / 2;
-
-/// A plane is taken for a sheet where it fits its quorum this much better than the rest. Noise does not: of
-/// all planes the best fits its quorum about 7 times better than the rest, seldom 20 times.
-const RESOLVED: f32 = 0.05;
-
-/// Neighbours within this many times the fit of the quorum lie on the sheet, and so do those within this
-/// share of the distance of the rest.
-const ON: f32 = 3.0;
-const ROUNDED: f32 = 0.02;
-
-/// Two neighbours seen under a smaller sine span no plane.
-const SLIVER: f32 = 0.3;
 
 /// A local sheet.
 #[derive(Clone, Copy, Debug)]
@@ -53,10 +33,10 @@ pub(super) fn find(offset: &Offsets, axis: [f32; 3]) -> Option<Sheet> {
     let (normal, fit) = best_plane(offset, axis, quantile(together, QUORUM));
     let apart = residuals(offset, normal);
     let rest = quantile(apart, REST).max(quantile(together, REST));
-    if !(rest > 0.0) || fit > RESOLVED * rest {
+    if !sheet::stands_out(fit, rest) {
         return None;
     }
-    let limit = (ON * fit).max(ROUNDED * rest);
+    let limit = sheet::limit(fit, rest);
     let on = offset.iter().zip(apart).filter(|&(_, r)| r <= limit);
     let (found, scatter) = plane(on.map(|(d, _)| *d));
     Some(Sheet {
@@ -65,7 +45,7 @@ pub(super) fn find(offset: &Offsets, axis: [f32; 3]) -> Option<Sheet> {
         } else {
             found
         },
-        scatter: scatter.max(limit / ON),
+        scatter: sheet::scatter(scatter, limit),
     })
 }
 
@@ -76,8 +56,8 @@ fn best_plane(offset: &Offsets, axis: [f32; 3], fit: f32) -> ([f32; 3], f32) {
         for k in j + 1..SPANNING {
             let normal = vector::cross(offset[j], offset[k]);
             let square = vector::norm_squared(normal);
-            let largest = vector::norm_squared(offset[j]) * vector::norm_squared(offset[k]);
-            if square <= SLIVER * SLIVER * largest {
+            let squares = vector::norm_squared(offset[j]) * vector::norm_squared(offset[k]);
+            if !sheet::spans(square, squares) {
                 continue;
             }
             let normal = vector::scale(normal, 1.0 / square.sqrt());

@@ -1,10 +1,11 @@
 //! How much of the sky every free cell sees.
 
+use crate::element::sight;
+
 /// Directions of one sweep: the neighbours of a cell that come before it in C order.
 const DIRECTIONS: u32 = 13;
 
-/// All directions of both sweeps.
-pub(super) const SKY: f32 = 2.0 * DIRECTIONS as f32;
+const _: () = assert!(2 * DIRECTIONS as usize == sight::RAYS);
 
 /// Scratch of the two sweeps, and their counts for each cell.
 #[derive(Clone, Debug, Default)]
@@ -33,11 +34,11 @@ impl Sky {
         );
     }
 
-    /// The share of rays that are free.
+    /// How many of the [`sight::RAYS`] are free.
     #[inline(always)]
-    pub(super) fn seen(&self, cell: usize) -> f32 {
+    pub(super) fn free(&self, cell: usize) -> u8 {
         let [forward, backward] = &self.sweeps;
-        f32::from(forward.count[cell] + backward.count[cell]) / SKY
+        forward.count[cell] + backward.count[cell]
     }
 }
 

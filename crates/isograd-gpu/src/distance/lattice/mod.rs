@@ -25,6 +25,16 @@ impl<T> Residual<T> {
     pub fn closest(&self) -> &Buffer<u32> {
         &self.closest
     }
+
+    /// The surface that distances are to.
+    pub(crate) fn mesh(&self) -> &Mesh<T> {
+        &self.mesh
+    }
+
+    /// The grid that they are on.
+    pub(crate) fn grid(&self) -> &Grid<T> {
+        &self.grid
+    }
 }
 
 /// What cotangents of the distances mean for the mesh and the grid.

@@ -1,5 +1,6 @@
 //! The distance, beside the CPU's stage and all triangles tried.
 
+mod extension;
 mod lattice;
 mod meshes;
 mod pullback;

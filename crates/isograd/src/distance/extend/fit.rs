@@ -1,13 +1,7 @@
 //! The linear fit at one vertex: small pure functions in double precision.
 
+use crate::element::fit;
 use crate::vector::{add, dot, norm_squared, scale, sub};
-
-/// Share of the trace of `C` below which a direction counts as noise.
-pub(super) const NOISE: f64 = 1e-5;
-
-/// How soon the slope fades with the distance of a vertex from its samples: half of it is gone, in the
-/// mean direction, where `|m|² = 16 tr C · √(1/3)`.
-pub(super) const FADING: f64 = 1.0 / 256.0;
 
 /// The fit at one vertex; see the head of [`extend`](super).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -33,13 +27,6 @@ pub(super) struct Neighbor {
     pub weight: f64,
     /// `p_j t_j − p_j`, once the fit is made.
     pub correction: f64,
-}
-
-/// `(1 − r²)²` inside the unit ball, else 0.
-#[inline(always)]
-pub(super) fn kernel(squared: f64) -> f64 {
-    let s = (1.0 - squared).max(0.0);
-    s * s
 }
 
 /// Fits a linear function to the samples round a vertex, and writes the weight of each.
@@ -82,8 +69,7 @@ pub(super) fn covariance(neighbors: &[Neighbor]) -> [f64; 6] {
 /// `(C + ε I)⁻¹ b`, with the `ε` of `C` and `m`; none where all samples coincide.
 pub(super) fn regularized(mut c: [f64; 6], m: [f64; 3], b: [f64; 3]) -> Option<[f64; 3]> {
     let trace = c[0] + c[1] + c[2];
-    let distance = norm_squared(m) / trace;
-    let ridge = trace * (NOISE + FADING * distance * distance);
+    let ridge = fit::ridge(trace, norm_squared(m) / trace);
     if !(ridge > 0.0) || !ridge.is_finite() {
         return None;
     }
@@ -93,15 +79,10 @@ pub(super) fn regularized(mut c: [f64; 6], m: [f64; 3], b: [f64; 3]) -> Option<[
     Some(solve(c, b))
 }
 
-/// Solves `A x = b` for a symmetric positive definite `A`, by its Cholesky factors.
+/// Solves `A x = b` for a symmetric positive definite `A`.
 fn solve([xx, yy, zz, yz, xz, xy]: [f64; 6], b: [f64; 3]) -> [f64; 3] {
-    let (l10, l20) = (xy / xx, xz / xx);
-    let d1 = yy - l10 * xy;
-    let l21 = (yz - l20 * xy) / d1;
-    let d2 = zz - l20 * xz - l21 * l21 * d1;
-    let b1 = b[1] - l10 * b[0];
-    let b2 = b[2] - l20 * b[0] - l21 * b1;
-    let z = b2 / d2;
-    let y = b1 / d1 - l21 * z;
-    [b[0] / xx - l10 * y - l20 * z, y, z]
+    let factors = fit::factors(xx, yy, zz, yz, xz, xy);
+    let z = fit::solved_z(factors, b[0], b[1], b[2]);
+    let y = fit::solved_y(factors, b[0], b[1], z);
+    [fit::solved_x(factors, b[0], y, z), y, z]
 }

@@ -3,7 +3,8 @@
 //! All lengths are in units of `R_v`, as in [`fit`]: the formulas at the head of [`extend`](super) hold in any
 //! unit.
 
-use super::fit::{self, FADING, NOISE, Neighbor};
+use super::fit::{self, Neighbor};
+use crate::element::fit as element;
 use crate::vector::{add, dot, norm_squared, scale};
 
 /// What one sample gets from the fit at one vertex.
@@ -56,8 +57,8 @@ impl Adjoint {
         let along = slope.map_or(0.0, |g| dot(g, tilt));
         let ridge = match slope {
             Some(_) => [
-                4.0 * FADING * tau * along,
-                (NOISE - FADING * tau * tau) * along,
+                element::ridge_of_mean(tau, along),
+                element::ridge_of_offset(tau, along),
             ],
             None => [0.0; 2],
         };
@@ -79,7 +80,15 @@ impl Adjoint {
     fn pull(&self, n: &Neighbor, q: f64) -> f64 {
         let e = n.offset;
         let (t, rho) = (1.0 - dot(self.tilt, e), q - dot(self.slope, e));
-        rho * t + self.ridge[1] * norm_squared(e) + self.ridge[0] * dot(self.mean, e)
+        let [of_mean, of_offset] = self.ridge;
+        element::pull(
+            rho,
+            t,
+            norm_squared(e),
+            dot(self.mean, e),
+            of_offset,
+            of_mean,
+        )
     }
 
     /// What a neighbour gets: `q` is its `q_j`, `area` is `a_j + a₀`.
@@ -88,18 +97,18 @@ impl Adjoint {
         let e = n.offset;
         let (t, rho) = (1.0 - dot(self.tilt, e), q - dot(self.slope, e));
         let w_bar = (self.pull(n, q) - self.mean_pull) / self.weight;
-        let ridge = add(
-            scale(self.mean, self.ridge[0]),
-            scale(e, 2.0 * self.ridge[1]),
-        );
-        let through_fit = add(add(scale(self.slope, -t), scale(self.tilt, -rho)), ridge);
+        let [of_mean, of_offset] = self.ridge;
+        let through_fit: [f64; 3] = std::array::from_fn(|k| {
+            let of_ridge = element::ridge_bar(self.mean[k], of_mean, e[k], of_offset);
+            element::fit_bar(self.slope[k], t, self.tilt[k], rho, of_ridge)
+        });
         let d = add(e, self.mean);
-        let rest = (1.0 - norm_squared(d)).max(0.0);
+        let rest = element::rest(norm_squared(d));
         Share {
             value: n.weight + n.correction,
             offset: add(
                 scale(through_fit, n.weight),
-                scale(d, -4.0 * w_bar * area * rest),
+                scale(d, element::radial(w_bar, area, rest)),
             ),
             area: w_bar * rest * rest,
         }

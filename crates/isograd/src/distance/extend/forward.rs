@@ -3,29 +3,15 @@
 use rayon::prelude::*;
 
 use super::fit::{self, Fit, Neighbor};
+use super::rule::{ENOUGH, MARGIN, MOST, REACH, SMALLEST_AREA};
 use super::{Error, Extension, NO_TRIANGLE, Residual, Samples, Surface};
 use crate::data::Attribute;
 use crate::distance::triangle;
+use crate::element::fit as element;
 use crate::neighbors::CellIndex;
 use crate::parallel::{self, CHUNK};
 use crate::vector::{scale, sub, to_f64};
 use crate::{Grid, Mesh, Real};
-
-/// Samples that have to be well within the radius of a vertex, so that a plane of values fits them.
-const ENOUGH: usize = 6;
-
-/// A radius reaches this many times beyond the last of them.
-const REACH: f64 = 1.5;
-
-/// A radius that has grown holds no more samples than this, so that the time does not grow with the square
-/// of a hole.
-const MOST: usize = 64;
-
-/// By how much it passes the last of these, so that the weights are not all 0 where all are equally far.
-const MARGIN: f64 = 1.05;
-
-/// `a₀` over the mean area.
-const SMALLEST_AREA: f64 = 1e-6;
 
 /// Cells in one chunk of a loop over the grid.
 const CELLS: usize = 1 << 16;
@@ -236,7 +222,7 @@ pub(super) fn collect<T: Real>(
         neighbors.push(Neighbor {
             sample: j as u32,
             offset,
-            weight: (areas[j].f64() + smallest_area) * fit::kernel(squared),
+            weight: (areas[j].f64() + smallest_area) * element::kernel(squared),
             correction: 0.0,
         });
     });

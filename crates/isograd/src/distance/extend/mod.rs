@@ -62,6 +62,7 @@ mod fit;
 mod fit_pullback;
 mod forward;
 mod pullback;
+pub mod rule;
 mod shares;
 #[cfg(test)]
 mod tests;

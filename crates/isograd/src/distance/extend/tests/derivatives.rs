@@ -1,10 +1,11 @@
 //! The formulas of the pullback that the head of the stage promises, against finite differences.
 
-use super::super::fit::{self, FADING, NOISE, Neighbor};
+use super::super::fit::{self, Neighbor};
 use super::super::fit_pullback::Adjoint;
 use super::*;
 use crate::distance::tangent::tangent;
 use crate::distance::triangle::{Feature, closest_point};
+use crate::element::fit::kernel;
 use crate::vector::{add, dot, norm_squared, scale, sub};
 
 /// A vertex at `vertex`, samples round it with areas and one value each, and a radius held constant.
@@ -17,6 +18,10 @@ struct Patch {
 }
 
 const RADIUS: f64 = 1.3;
+
+/// `ε₀` and `ε₁`.
+const NOISE: f64 = 1e-5;
+const FADING: f64 = 1.0 / 256.0;
 
 impl Patch {
     /// A curved patch; far from the vertex where `away` is large.
@@ -42,7 +47,7 @@ impl Patch {
         let samples = self.points.iter().zip(&self.areas).enumerate();
         let neighbor = |(j, (&x, area)): (usize, (&[f64; 3], &f64))| {
             let offset = scale(sub(x, self.vertex), 1.0 / RADIUS);
-            let weight = area * fit::kernel(norm_squared(offset));
+            let weight = area * kernel(norm_squared(offset));
             Neighbor {
                 sample: j as u32,
                 offset,

@@ -1,0 +1,367 @@
+//! The pullback of the fits: to the vertices, and what the samples need of each.
+
+use cubecl::prelude::*;
+
+use super::checks::Given;
+use super::fits::{covariance, in_frame, ridge, solve};
+use super::neighbor::{Fitted, Neighbor, Sorted, contract, neighbor, sum_moments};
+use super::{BLOCK, FIT, Samples};
+use crate::element::fit;
+use crate::neighbors::{self, Neighborhoods, end_of_leaf, first_of_leaf, next_leaf};
+use crate::normals::{MOMENTS, fit as plane_of};
+use crate::vector::{Vector3, is_finite};
+use crate::{Buffer, Device, Error, Scalar};
+
+/// Numbers of an [`Adjoint`] in memory.
+const ADJOINT: usize = 15;
+
+/// The fits, as the samples see them.
+pub(super) struct Adjoints<T> {
+    /// The vertices, with `R_v` where `ū_v` is not zero, and else 0: no sample is that near.
+    pub near: Neighborhoods<T>,
+    /// `(V, 15)` in their order.
+    pub records: Buffer<T>,
+    /// `(V, 2, components)` `ū_v` and `u_v` in their order.
+    pub bars: Buffer<T>,
+    /// `(V,)` how often something was bounded.
+    pub guarded: Buffer<u32>,
+}
+
+/// Pulls `bars` `(V, components)` of the values at the vertices back to the vertices themselves: adds to
+/// `vertices_bar` `(V, 3)`, and bounds that. There is at least one vertex.
+pub(super) fn pullback<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    samples: Samples<'_, T>,
+    sorted: &Sorted<T>,
+    vertices: &Buffer<T>,
+    given: &Given<'_, T>,
+    bars: &Buffer<T>,
+    vertices_bar: &Buffer<T>,
+) -> Result<Adjoints<T>, Error> {
+    let (fits, values) = (&given.residual.fits, &given.extension.vertices);
+    let count = vertices.len() / 3;
+    let components = bars.len() / count;
+    let radii = device.empty(count)?;
+    let (groups, dim) = (device.groups(count, BLOCK), CubeDim::new_1d(BLOCK));
+    mask_radii::launch::<T, R>(
+        device.client(),
+        groups.clone(),
+        dim,
+        fits.arg(),
+        bars.arg(),
+        radii.arg(),
+        components as u32,
+    );
+    let near = neighbors::forward(device, vertices, &radii)?;
+    let found = Adjoints {
+        records: device.empty(ADJOINT * count)?,
+        bars: device.empty(2 * bars.len())?,
+        guarded: device.empty(count)?,
+        near,
+    };
+    pair_values::launch::<T, R>(
+        device.client(),
+        device.groups(bars.len(), BLOCK),
+        dim,
+        bars.arg(),
+        values.arg(),
+        found.near.places.arg(),
+        found.bars.arg(),
+        components as u32,
+    );
+    let of_samples = samples.neighborhoods;
+    pull_fits::launch::<T, R>(
+        device.client(),
+        groups,
+        dim,
+        of_samples.points.arg(),
+        sorted.areas.arg(),
+        sorted.values.arg(),
+        of_samples.nodes.arg(),
+        of_samples.links.arg(),
+        found.near.points.arg(),
+        found.near.radii.arg(),
+        found.near.places.arg(),
+        fits.arg(),
+        found.bars.arg(),
+        found.records.arg(),
+        vertices_bar.arg(),
+        found.guarded.arg(),
+        components as u32,
+    );
+    Ok(found)
+}
+
+/// `R_v` where any component of `ū_v` is not zero, else 0.
+#[cube(launch)]
+fn mask_radii<F: Float>(fits: &Array<F>, bars: &Array<F>, radii: &mut Array<F>, components: u32) {
+    if ABSOLUTE_POS < radii.len() {
+        let mut radius = F::new(0.0);
+        for c in 0..components as usize {
+            if bars[ABSOLUTE_POS * components as usize + c] != F::new(0.0) {
+                radius = fits[FIT * ABSOLUTE_POS];
+            }
+        }
+        radii[ABSOLUTE_POS] = radius;
+    }
+}
+
+/// `ū` and `u` of each vertex, in the order of the vertices' tree.
+#[cube(launch)]
+fn pair_values<F: Float>(
+    bars: &Array<F>,
+    values: &Array<F>,
+    places: &Array<u32>,
+    pairs: &mut Array<F>,
+    components: u32,
+) {
+    if ABSOLUTE_POS < bars.len() {
+        let components = components as usize;
+        let (k, c) = (ABSOLUTE_POS / components, ABSOLUTE_POS % components);
+        let from = places[k] as usize * components + c;
+        pairs[2 * k * components + c] = bars[from];
+        pairs[(2 * k + 1) * components + c] = values[from];
+    }
+}
+
+/// The pullback of one fit; its letters are those of the head of the stage, in units of `R_v`.
+#[derive(CubeType, Clone, Copy)]
+pub(super) struct Adjoint<F: Float> {
+    /// `W`, `m` and `s`.
+    pub weight: F,
+    pub mean: Vector3<F>,
+    pub tilt: Vector3<F>,
+    /// `g`.
+    pub slope: Vector3<F>,
+    /// Factors of `m` and of `e_j` in the pullback of `ε`.
+    pub of_mean: F,
+    pub of_offset: F,
+    /// `t_j + s·e_j`: 1 but for what rounding has left of `Σ_k p_k e_k`, so that `Σ_k p_k t_k = 1`.
+    pub level: F,
+    /// `ρ_j + g·e_j` is `ū·(v_j − u)` less this, so that `Σ_k p_k ρ_k = 0`.
+    pub middle: F,
+    /// `Σ_k p_k D_k`.
+    pub mean_pull: F,
+}
+
+/// A sample as an adjoint sees it.
+#[derive(CubeType, Clone, Copy)]
+pub(super) struct Seen<F: Float> {
+    /// `d_j` and `e_j`.
+    d: Vector3<F>,
+    e: Vector3<F>,
+    /// `p_j`, `t_j`, `ρ_j` and `D_j`.
+    pub p: F,
+    pub t: F,
+    rho: F,
+    pub pull: F,
+}
+
+#[cube]
+impl<F: Float> Adjoint<F> {
+    pub fn at(records: &Array<F>, k: usize) -> Self {
+        let at = ADJOINT * k;
+        Adjoint::<F> {
+            weight: records[at],
+            mean: Vector3::<F>::load(records, at + 1),
+            tilt: Vector3::<F>::load(records, at + 4),
+            slope: Vector3::<F>::load(records, at + 7),
+            of_mean: records[at + 10],
+            of_offset: records[at + 11],
+            middle: records[at + 12],
+            mean_pull: records[at + 13],
+            level: records[at + 14],
+        }
+    }
+
+    fn write(self, records: &mut Array<F>, k: usize) {
+        let at = ADJOINT * k;
+        records[at] = self.weight;
+        self.mean.store(records, at + 1);
+        self.tilt.store(records, at + 4);
+        self.slope.store(records, at + 7);
+        records[at + 10] = self.of_mean;
+        records[at + 11] = self.of_offset;
+        records[at + 12] = self.middle;
+        records[at + 13] = self.mean_pull;
+        records[at + 14] = self.level;
+    }
+
+    /// A neighbour with `ū·(v_j − u)`.
+    pub fn see(self, n: Neighbor<F>, contracted: F) -> Seen<F> {
+        let e = n.offset.sub(self.mean);
+        let t = self.level - self.tilt.dot(e);
+        let rho = contracted - self.middle - self.slope.dot(e);
+        let (ee, me) = (e.dot(e), self.mean.dot(e));
+        Seen::<F> {
+            d: n.offset,
+            e,
+            p: n.weight / self.weight,
+            t,
+            rho,
+            pull: fit::pull::<F>(rho, t, ee, me, self.of_offset, self.of_mean),
+        }
+    }
+
+    /// What `d̄_j` has through the fit.
+    fn through_fit(self, s: Seen<F>) -> Vector3<F> {
+        let (m, e) = (self.mean, s.e);
+        let (a, b) = (self.of_mean, self.of_offset);
+        let x = fit::ridge_bar::<F>(m.x, a, e.x, b);
+        let y = fit::ridge_bar::<F>(m.y, a, e.y, b);
+        let z = fit::ridge_bar::<F>(m.z, a, e.z, b);
+        let bar = Vector3::<F> {
+            x: fit::fit_bar::<F>(self.slope.x, s.t, self.tilt.x, s.rho, x),
+            y: fit::fit_bar::<F>(self.slope.y, s.t, self.tilt.y, s.rho, y),
+            z: fit::fit_bar::<F>(self.slope.z, s.t, self.tilt.z, s.rho, z),
+        };
+        bar.scale(s.p)
+    }
+
+    /// `w̄_j`.
+    pub fn weight_bar(self, s: Seen<F>) -> F {
+        (s.pull - self.mean_pull) / self.weight
+    }
+
+    /// `d̄_j`, times `R_v`.
+    pub fn offset_bar(self, s: Seen<F>, rest: F, area: F) -> Vector3<F> {
+        let radial = fit::radial::<F>(self.weight_bar(s), area, rest);
+        self.through_fit(s).add(s.d.scale(radial))
+    }
+}
+
+/// One unit takes one vertex, in the order of the vertices' tree: its adjoint, and `−Σ_j d̄_j` for itself.
+#[cube(launch)]
+fn pull_fits<F: Float>(
+    points: &Array<F>,
+    areas: &Array<F>,
+    values: &Array<F>,
+    nodes: &Array<F>,
+    links: &Array<u32>,
+    vertices: &Array<F>,
+    radii: &Array<F>,
+    places: &Array<u32>,
+    fits: &Array<F>,
+    bars: &Array<F>,
+    records: &mut Array<F>,
+    vertices_bar: &mut Array<F>,
+    guarded: &mut Array<u32>,
+    components: u32,
+) {
+    let k = ABSOLUTE_POS;
+    if k < radii.len() {
+        let vertex = places[k] as usize;
+        let through_surface = Vector3::<F>::at(vertices_bar, vertex);
+        let mut sums = Array::<F>::new(3usize);
+        through_surface.store(&mut sums, 0usize);
+        let mut bounded = 0u32.runtime();
+        if radii[k] > F::new(0.0) {
+            let y = Vector3::<F>::at(vertices, k);
+            let of = Fitted::<F>::at(fits, vertex);
+            let mut moments = Array::<F>::new(MOMENTS);
+            sum_moments::<F>(points, areas, nodes, links, y, of.radius, &mut moments);
+            let axes = plane_of::<F>(&moments, 0usize, 1usize).eigen;
+            let c = covariance::<F>(points, areas, nodes, links, y, of, axes);
+            let ridge = ridge::<F>(c, of.mean);
+
+            // Σ p, Σ p q, Σ p e, Σ p e q and Σ p s·e, with q = ū·(v − u).
+            let mut found = Array::<F>::new(9usize);
+            #[unroll]
+            for i in 0..9usize {
+                found[i] = F::new(0.0);
+            }
+            let mut node = next_leaf::<F>(nodes, links, y, of.radius, 0usize, false);
+            while node < links.len() {
+                let first = first_of_leaf(links, node);
+                for j in first..end_of_leaf(first, areas.len()) {
+                    let d = Vector3::<F>::at(points, j).sub(y);
+                    let n = neighbor::<F>(d, of.unit, areas[j]);
+                    if n.weight > F::new(0.0) {
+                        let p = n.weight / of.weight;
+                        let q = p * contract::<F>(bars, k, values, j, components as usize);
+                        let offset = n.offset.sub(of.mean);
+                        let e = in_frame::<F>(axes, offset);
+                        found[8] += p * of.tilt.dot(offset);
+                        found[0] += p;
+                        found[1] += q;
+                        e.scale(p).add_to(&mut found, 2usize);
+                        e.scale(q).add_to(&mut found, 5usize);
+                    }
+                }
+                node = next_leaf::<F>(nodes, links, y, of.radius, node + 1, false);
+            }
+            let middle = found[1] / found[0];
+            let drift = Vector3::<F>::load(&found, 2usize).scale(middle);
+            let moment = Vector3::<F>::load(&found, 5usize).sub(drift);
+            let slope = solve::<F>(ridge, axes, moment);
+            let along = slope.dot(of.tilt);
+            let rest = Vector3::<F>::load(&found, 2usize).scale(F::new(1.0) / found[0]);
+            let level = (F::new(1.0) + found[8]) / found[0];
+            let middle = middle - in_frame::<F>(axes, slope).dot(rest);
+            let without_mean = Adjoint::<F> {
+                weight: of.weight,
+                mean: of.mean,
+                tilt: of.tilt,
+                slope,
+                of_mean: fit::ridge_of_mean::<F>(ridge.tau, along),
+                of_offset: fit::ridge_of_offset::<F>(ridge.tau, along),
+                level,
+                middle,
+                mean_pull: F::new(0.0),
+            };
+
+            // Σ p D; Σ d̄ through the weights without that in w̄; and what that is multiplied by.
+            let mut shares = Array::<F>::new(7usize);
+            #[unroll]
+            for i in 0..7usize {
+                shares[i] = F::new(0.0);
+            }
+            let mut node = next_leaf::<F>(nodes, links, y, of.radius, 0usize, false);
+            while node < links.len() {
+                let first = first_of_leaf(links, node);
+                for j in first..end_of_leaf(first, areas.len()) {
+                    let d = Vector3::<F>::at(points, j).sub(y);
+                    let n = neighbor::<F>(d, of.unit, areas[j]);
+                    if n.weight > F::new(0.0) {
+                        let q = contract::<F>(bars, k, values, j, components as usize);
+                        let seen = without_mean.see(n, q);
+                        let radial = fit::radial::<F>(F::new(1.0) / of.weight, areas[j], n.rest);
+                        shares[0] += seen.p * seen.pull;
+                        n.offset
+                            .scale(radial * seen.pull)
+                            .add_to(&mut shares, 1usize);
+                        n.offset.scale(radial).add_to(&mut shares, 4usize);
+                    }
+                }
+                node = next_leaf::<F>(nodes, links, y, of.radius, node + 1, false);
+            }
+            let with_mean = Adjoint::<F> {
+                weight: of.weight,
+                mean: of.mean,
+                tilt: of.tilt,
+                slope,
+                of_mean: without_mean.of_mean,
+                of_offset: without_mean.of_offset,
+                level,
+                middle,
+                mean_pull: shares[0],
+            };
+            with_mean.write(records, k);
+            let of_mean = Vector3::<F>::load(&shares, 4usize).scale(shares[0]);
+            let through_weights = Vector3::<F>::load(&shares, 1usize).sub(of_mean);
+            // Σ p t = 1, Σ p ρ = 0 and Σ p e = 0: s may be so large that their rounding would count.
+            let through_fit = of.mean.scale(with_mean.of_mean).sub(slope);
+            let total = through_weights.add(through_fit);
+            total.scale(-of.unit).add_to(&mut sums, 0usize);
+            bounded += select(ridge.coincide, 1u32, 0u32);
+        }
+        let zero = F::new(0.0);
+        #[unroll]
+        for axis in 0..3usize {
+            let finite = is_finite::<F>(sums[axis]);
+            vertices_bar[3 * vertex + axis] = select(finite, sums[axis], zero);
+            bounded += select(finite, 0u32, 1u32);
+        }
+        guarded[k] = bounded;
+    }
+}

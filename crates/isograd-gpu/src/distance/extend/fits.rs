@@ -1,0 +1,353 @@
+//! The fits at the vertices, and what they say of the attribute.
+
+use cubecl::prelude::*;
+use isograd::distance::extend::rule::{ENOUGH, MARGIN, MOST, REACH, SMALLEST_AREA};
+
+use super::neighbor::{Fitted, Sorted, neighbor, sum_moments};
+use super::{BLOCK, FIT, Samples, columns};
+use crate::element::fit;
+use crate::neighbors::{end_of_leaf, first_of_leaf, next_leaf, reach_squared};
+use crate::normals::{Eigen, MOMENTS, Symmetric, fit as plane_of};
+use crate::primitives::reduce;
+use crate::vector::Vector3;
+use crate::{Buffer, Device, Error, Scalar};
+
+/// `a₀`, `(1,)`: a millionth of the mean area, or 1 where all are 0.
+pub(super) fn smallest_area<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    areas: &Buffer<T>,
+) -> Result<Buffer<T>, Error> {
+    let sum = reduce::sum(device, areas)?;
+    let smallest = device.empty(1)?;
+    share_area::launch::<T, R>(
+        device.client(),
+        device.groups(1, 1),
+        CubeDim::new_1d(1),
+        sum.arg(),
+        smallest.arg(),
+        T::of(SMALLEST_AREA / areas.len() as f64),
+    );
+    Ok(smallest)
+}
+
+/// The fit at each of the `(V, 3)` vertices: `(V, 8)`.
+pub(super) fn forward<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    samples: Samples<'_, T>,
+    sorted: &Sorted<T>,
+    vertices: &Buffer<T>,
+) -> Result<Buffer<T>, Error> {
+    let near = samples.neighborhoods;
+    let count = vertices.len() / 3;
+    let fits = device.empty(FIT * count)?;
+    let (groups, dim) = (device.groups(count, BLOCK), CubeDim::new_1d(BLOCK));
+    find_radii::launch::<T, R>(
+        device.client(),
+        groups.clone(),
+        dim,
+        near.points.arg(),
+        near.nodes.arg(),
+        near.links.arg(),
+        vertices.arg(),
+        fits.arg(),
+        samples.common_radius,
+        T::of(REACH),
+        T::of(MARGIN),
+        count as u32,
+        ENOUGH.min(near.len()),
+        MOST.min(near.len()),
+    );
+    fit_vertices::launch::<T, R>(
+        device.client(),
+        groups,
+        dim,
+        near.points.arg(),
+        sorted.areas.arg(),
+        near.nodes.arg(),
+        near.links.arg(),
+        vertices.arg(),
+        fits.arg(),
+        count as u32,
+    );
+    Ok(fits)
+}
+
+/// `u_v` at each vertex, `(V, components)`.
+pub(super) fn evaluate<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    samples: Samples<'_, T>,
+    sorted: &Sorted<T>,
+    vertices: &Buffer<T>,
+    fits: &Buffer<T>,
+) -> Result<Buffer<T>, Error> {
+    let near = samples.neighborhoods;
+    let (count, components) = (vertices.len() / 3, sorted.values.len() / near.len());
+    let values = device.empty(count * components)?;
+    for (first, width) in columns(components) {
+        evaluate_columns::launch::<T, R>(
+            device.client(),
+            device.groups(count, BLOCK),
+            CubeDim::new_1d(BLOCK),
+            near.points.arg(),
+            sorted.areas.arg(),
+            near.nodes.arg(),
+            near.links.arg(),
+            sorted.values.arg(),
+            vertices.arg(),
+            fits.arg(),
+            values.arg(),
+            count as u32,
+            components as u32,
+            first as u32,
+            width,
+        );
+    }
+    Ok(values)
+}
+
+#[cube(launch)]
+fn share_area<F: Float + CubeElement>(sum: &Array<F>, smallest: &mut Array<F>, share: F) {
+    if ABSOLUTE_POS == 0 {
+        smallest[0] = select(sum[0] > F::new(0.0), share * sum[0], F::new(1.0));
+    }
+}
+
+/// `max(R, min(1.5 r₆, 1.05 r₆₄))`. That is `R` just where six samples are well within it.
+#[cube(launch)]
+fn find_radii<F: Float + CubeElement>(
+    points: &Array<F>,
+    nodes: &Array<F>,
+    links: &Array<u32>,
+    vertices: &Array<F>,
+    fits: &mut Array<F>,
+    common: F,
+    reach: F,
+    margin: F,
+    count: u32,
+    #[comptime] enough: usize,
+    #[comptime] most: usize,
+) {
+    if ABSOLUTE_POS < count as usize {
+        let y = Vector3::<F>::at(vertices, ABSOLUTE_POS);
+        let grown = reach * F::sqrt(reach_squared::<F>(points, nodes, links, y, enough));
+        let mut radius = common;
+        if grown > common {
+            let last = margin * F::sqrt(reach_squared::<F>(points, nodes, links, y, most));
+            radius = max(common, min(grown, last));
+        }
+        fits[FIT * ABSOLUTE_POS] = radius;
+    }
+}
+
+/// `C` in the frame of the axes, of offsets from the mean that is given.
+#[cube]
+pub(super) fn covariance<F: Float>(
+    points: &Array<F>,
+    areas: &Array<F>,
+    nodes: &Array<F>,
+    links: &Array<u32>,
+    y: Vector3<F>,
+    of: Fitted<F>,
+    axes: Eigen<F>,
+) -> Symmetric<F> {
+    let zero = F::new(0.0);
+    let mut xx = zero;
+    let mut xy = zero;
+    let mut xz = zero;
+    let mut yy = zero;
+    let mut yz = zero;
+    let mut zz = zero;
+    let mut node = next_leaf::<F>(nodes, links, y, of.radius, 0usize, false);
+    while node < links.len() {
+        let first = first_of_leaf(links, node);
+        for j in first..end_of_leaf(first, areas.len()) {
+            let d = Vector3::<F>::at(points, j).sub(y);
+            let n = neighbor::<F>(d, of.unit, areas[j]);
+            let e = in_frame::<F>(axes, n.offset.sub(of.mean));
+            let p = n.weight / of.weight;
+            xx += p * e.x * e.x;
+            xy += p * e.x * e.y;
+            xz += p * e.x * e.z;
+            yy += p * e.y * e.y;
+            yz += p * e.y * e.z;
+            zz += p * e.z * e.z;
+        }
+        node = next_leaf::<F>(nodes, links, y, of.radius, node + 1, false);
+    }
+    Symmetric::<F> {
+        xx,
+        xy,
+        xz,
+        yy,
+        yz,
+        zz,
+    }
+}
+
+/// A vector along the axes.
+#[cube]
+pub(super) fn in_frame<F: Float>(axes: Eigen<F>, v: Vector3<F>) -> Vector3<F> {
+    Vector3::<F> {
+        x: axes.first.dot(v),
+        y: axes.second.dot(v),
+        z: axes.third.dot(v),
+    }
+}
+
+/// `C + ε I` in a frame, and what its pullback needs.
+#[derive(CubeType, Clone, Copy)]
+pub(super) struct Ridge<F: Float> {
+    /// Whether there is one: samples that coincide have no slope.
+    pub exists: bool,
+    /// Whether they do to the last bit.
+    pub coincide: bool,
+    /// `τ`.
+    pub tau: F,
+    factors: fit::Factors<F>,
+}
+
+/// So far from samples so close together nothing is left of a slope, and squares would leave the range of numbers.
+const FARTHEST: f32 = 1e15;
+
+#[cube]
+pub(super) fn ridge<F: Float>(c: Symmetric<F>, mean: Vector3<F>) -> Ridge<F> {
+    let (zero, one) = (F::new(0.0), F::new(1.0));
+    let trace = c.xx + c.yy + c.zz;
+    let spreads = trace > zero;
+    let square = mean.dot(mean);
+    let near = square < F::new(FARTHEST) * trace;
+    let exists = spreads && near;
+    let tau = select(exists, square / select(exists, trace, one), zero);
+    let size = fit::ridge::<F>(trace, tau);
+    Ridge::<F> {
+        exists,
+        coincide: !spreads,
+        tau,
+        factors: fit::factors::<F>(
+            select(exists, c.xx + size, one),
+            select(exists, c.yy + size, one),
+            select(exists, c.zz + size, one),
+            select(exists, c.yz, zero),
+            select(exists, c.xz, zero),
+            select(exists, c.xy, zero),
+        ),
+    }
+}
+
+/// `(C + ε I)⁻¹ b` for a vector along the axes, turned back; zero where there is no slope.
+#[cube]
+pub(super) fn solve<F: Float>(of: Ridge<F>, axes: Eigen<F>, b: Vector3<F>) -> Vector3<F> {
+    let z = fit::solved_z::<F>(of.factors, b.x, b.y, b.z);
+    let y = fit::solved_y::<F>(of.factors, b.x, b.y, z);
+    let x = fit::solved_x::<F>(of.factors, b.x, y, z);
+    let found = axes
+        .first
+        .scale(x)
+        .add(axes.second.scale(y).add(axes.third.scale(z)));
+    found.choose(of.exists, Vector3::<F>::zero())
+}
+
+/// The radii are there already.
+#[cube(launch)]
+fn fit_vertices<F: Float>(
+    points: &Array<F>,
+    areas: &Array<F>,
+    nodes: &Array<F>,
+    links: &Array<u32>,
+    vertices: &Array<F>,
+    fits: &mut Array<F>,
+    count: u32,
+) {
+    if ABSOLUTE_POS < count as usize {
+        let at = FIT * ABSOLUTE_POS;
+        let y = Vector3::<F>::at(vertices, ABSOLUTE_POS);
+        let radius = fits[at];
+        let mut sums = Array::<F>::new(MOMENTS);
+        sum_moments::<F>(points, areas, nodes, links, y, radius, &mut sums);
+        let plane = plane_of::<F>(&sums, 0usize, 1usize);
+        let mean = plane.centroid;
+        let of = Fitted::<F> {
+            unit: F::new(1.0) / radius,
+            radius,
+            weight: plane.weight,
+            mean,
+            tilt: Vector3::<F>::zero(),
+        };
+        let axes = plane.eigen;
+        let c = covariance::<F>(points, areas, nodes, links, y, of, axes);
+        let ridge = ridge::<F>(c, mean);
+        let tilt = solve::<F>(ridge, axes, in_frame::<F>(axes, mean));
+        fits[at + 1] = plane.weight;
+        mean.scale(radius).store(fits, at + 2);
+        tilt.scale(of.unit).store(fits, at + 5);
+    }
+}
+
+/// `Σ_j p_j t_j v_j` of some columns, as the mean and a correction to it, so that neither what is left of
+/// `Σ_j p_j e_j` nor what `Σ_j p_j` lacks to 1 counts.
+#[cube(launch)]
+fn evaluate_columns<F: Float>(
+    points: &Array<F>,
+    areas: &Array<F>,
+    nodes: &Array<F>,
+    links: &Array<u32>,
+    values: &Array<F>,
+    vertices: &Array<F>,
+    fits: &Array<F>,
+    out: &mut Array<F>,
+    count: u32,
+    components: u32,
+    column: u32,
+    #[comptime] width: usize,
+) {
+    if ABSOLUTE_POS < count as usize {
+        let y = Vector3::<F>::at(vertices, ABSOLUTE_POS);
+        let of = Fitted::<F>::at(fits, ABSOLUTE_POS);
+        let (components, column) = (components as usize, column as usize);
+        // Seen from one of the samples.
+        let mut from = Array::<F>::new(width);
+        let mut means = Array::<F>::new(width);
+        let mut rises = Array::<F>::new(width);
+        #[unroll]
+        for c in 0..width {
+            from[c] = F::new(0.0);
+            means[c] = F::new(0.0);
+            rises[c] = F::new(0.0);
+        }
+        let mut total = F::new(0.0);
+        let mut drift = F::new(0.0);
+        let mut node = next_leaf::<F>(nodes, links, y, of.radius, 0usize, false);
+        while node < links.len() {
+            let first = first_of_leaf(links, node);
+            for j in first..end_of_leaf(first, areas.len()) {
+                let d = Vector3::<F>::at(points, j).sub(y);
+                let n = neighbor::<F>(d, of.unit, areas[j]);
+                if n.weight > F::new(0.0) {
+                    let p = n.weight / of.weight;
+                    let slope = p * of.tilt.dot(n.offset.sub(of.mean));
+                    if total == F::new(0.0) {
+                        #[unroll]
+                        for c in 0..width {
+                            from[c] = values[j * components + column + c];
+                        }
+                    }
+                    total += p;
+                    drift += slope;
+                    #[unroll]
+                    for c in 0..width {
+                        let value = values[j * components + column + c] - from[c];
+                        means[c] += p * value;
+                        rises[c] += slope * value;
+                    }
+                }
+            }
+            node = next_leaf::<F>(nodes, links, y, of.radius, node + 1, false);
+        }
+        #[unroll]
+        for c in 0..width {
+            let mean = means[c] / total;
+            let rise = drift * mean - rises[c];
+            out[ABSOLUTE_POS * components + column + c] = from[c] + (mean + rise);
+        }
+    }
+}

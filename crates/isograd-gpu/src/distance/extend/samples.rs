@@ -1,0 +1,199 @@
+//! What the samples get from the fits: each gathers over the vertices whose radius reaches it.
+
+use cubecl::prelude::*;
+
+use super::adjoint::{Adjoint, Adjoints};
+use super::neighbor::{Sorted, contract, neighbor};
+use super::{BLOCK, Samples, columns};
+use crate::neighbors::{end_of_leaf, first_of_leaf, next_leaf};
+use crate::vector::{Vector3, is_finite};
+use crate::{Buffer, Device, Error, Scalar};
+
+/// Cotangents of the samples, in the order in which they were given.
+pub(super) struct OfSamples<T> {
+    /// `(N, components)`.
+    pub attribute: Buffer<T>,
+    /// `(N, 3)`.
+    pub points: Buffer<T>,
+    /// `(N,)`.
+    pub areas: Buffer<T>,
+    /// `(N,)` numbers that were not finite.
+    pub guarded: Buffer<u32>,
+}
+
+pub(super) fn gather<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    samples: Samples<'_, T>,
+    sorted: &Sorted<T>,
+    adjoints: &Adjoints<T>,
+) -> Result<OfSamples<T>, Error> {
+    let (own, near) = (samples.neighborhoods, &adjoints.near);
+    let count = own.len();
+    let components = sorted.values.len() / count;
+    let out = OfSamples {
+        attribute: device.empty(count * components)?,
+        points: device.empty(3 * count)?,
+        areas: device.empty(count)?,
+        guarded: device.empty(count)?,
+    };
+    let (groups, dim) = (device.groups(count, BLOCK), CubeDim::new_1d(BLOCK));
+    gather_points::launch::<T, R>(
+        device.client(),
+        groups.clone(),
+        dim,
+        own.points.arg(),
+        own.places.arg(),
+        sorted.areas.arg(),
+        sorted.values.arg(),
+        near.points.arg(),
+        near.radii.arg(),
+        near.nodes.arg(),
+        near.links.arg(),
+        adjoints.records.arg(),
+        adjoints.bars.arg(),
+        out.points.arg(),
+        out.areas.arg(),
+        out.guarded.arg(),
+        components as u32,
+    );
+    for (first, width) in columns(components) {
+        gather_columns::launch::<T, R>(
+            device.client(),
+            groups.clone(),
+            dim,
+            own.points.arg(),
+            own.places.arg(),
+            sorted.areas.arg(),
+            near.points.arg(),
+            near.radii.arg(),
+            near.nodes.arg(),
+            near.links.arg(),
+            adjoints.records.arg(),
+            adjoints.bars.arg(),
+            out.attribute.arg(),
+            out.guarded.arg(),
+            components as u32,
+            first as u32,
+            width,
+        );
+    }
+    Ok(out)
+}
+
+/// Writes a number, or 0 where it is not finite; returns 1 then.
+#[cube]
+fn write_bounded<F: Float>(out: &mut Array<F>, at: usize, number: F) -> u32 {
+    let finite = is_finite::<F>(number);
+    out[at] = select(finite, number, F::new(0.0));
+    select(finite, 0u32, 1u32)
+}
+
+/// `Σ_v d̄_j` and `Σ_v w̄_j K`. A vertex that counts for nothing has the radius 0.
+#[cube(launch)]
+fn gather_points<F: Float>(
+    points: &Array<F>,
+    places: &Array<u32>,
+    areas: &Array<F>,
+    values: &Array<F>,
+    vertices: &Array<F>,
+    radii: &Array<F>,
+    nodes: &Array<F>,
+    links: &Array<u32>,
+    records: &Array<F>,
+    bars: &Array<F>,
+    points_bar: &mut Array<F>,
+    areas_bar: &mut Array<F>,
+    guarded: &mut Array<u32>,
+    components: u32,
+) {
+    let j = ABSOLUTE_POS;
+    if j < areas.len() {
+        let x = Vector3::<F>::at(points, j);
+        let zero = F::new(0.0);
+        let mut sum_x = zero;
+        let mut sum_y = zero;
+        let mut sum_z = zero;
+        let mut of_area = zero;
+        let mut node = next_leaf::<F>(nodes, links, x, zero, 0usize, true);
+        while node < links.len() {
+            let first = first_of_leaf(links, node);
+            for k in first..end_of_leaf(first, radii.len()) {
+                if radii[k] > zero {
+                    let unit = F::new(1.0) / radii[k];
+                    let n = neighbor::<F>(x.sub(Vector3::<F>::at(vertices, k)), unit, areas[j]);
+                    if n.weight > zero {
+                        let q = contract::<F>(bars, k, values, j, components as usize);
+                        let adjoint = Adjoint::<F>::at(records, k);
+                        let seen = adjoint.see(n, q);
+                        let share = adjoint.offset_bar(seen, n.rest, areas[j]);
+                        sum_x += share.x * unit;
+                        sum_y += share.y * unit;
+                        sum_z += share.z * unit;
+                        of_area += adjoint.weight_bar(seen) * n.rest * n.rest;
+                    }
+                }
+            }
+            node = next_leaf::<F>(nodes, links, x, zero, node + 1, true);
+        }
+        let place = places[j] as usize;
+        let mut count = write_bounded::<F>(points_bar, 3 * place, sum_x);
+        count += write_bounded::<F>(points_bar, 3 * place + 1, sum_y);
+        count += write_bounded::<F>(points_bar, 3 * place + 2, sum_z);
+        count += write_bounded::<F>(areas_bar, place, of_area);
+        guarded[j] = count;
+    }
+}
+
+/// `Σ_v p_j t_j ū_v` of some columns.
+#[cube(launch)]
+fn gather_columns<F: Float>(
+    points: &Array<F>,
+    places: &Array<u32>,
+    areas: &Array<F>,
+    vertices: &Array<F>,
+    radii: &Array<F>,
+    nodes: &Array<F>,
+    links: &Array<u32>,
+    records: &Array<F>,
+    bars: &Array<F>,
+    attribute_bar: &mut Array<F>,
+    guarded: &mut Array<u32>,
+    components: u32,
+    column: u32,
+    #[comptime] width: usize,
+) {
+    let j = ABSOLUTE_POS;
+    if j < areas.len() {
+        let x = Vector3::<F>::at(points, j);
+        let zero = F::new(0.0);
+        let (components, column) = (components as usize, column as usize);
+        let mut sums = Array::<F>::new(width);
+        #[unroll]
+        for c in 0..width {
+            sums[c] = F::new(0.0);
+        }
+        let mut node = next_leaf::<F>(nodes, links, x, zero, 0usize, true);
+        while node < links.len() {
+            let first = first_of_leaf(links, node);
+            for k in first..end_of_leaf(first, radii.len()) {
+                if radii[k] > zero {
+                    let unit = F::new(1.0) / radii[k];
+                    let n = neighbor::<F>(x.sub(Vector3::<F>::at(vertices, k)), unit, areas[j]);
+                    if n.weight > zero {
+                        let seen = Adjoint::<F>::at(records, k).see(n, zero);
+                        #[unroll]
+                        for c in 0..width {
+                            sums[c] += seen.p * seen.t * bars[2 * k * components + column + c];
+                        }
+                    }
+                }
+            }
+            node = next_leaf::<F>(nodes, links, x, zero, node + 1, true);
+        }
+        let row = places[j] as usize * components + column;
+        #[unroll]
+        for c in 0..width {
+            guarded[j] += write_bounded::<F>(attribute_bar, row + c, sums[c]);
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! Attributes of the samples on the reconstructed surface and round it.
+
+use cubecl::prelude::Runtime;
+
+use super::{Error, Reconstruction, Reconstructor};
+use crate::Scalar;
+use crate::distance::extend::{self, Attribute, Extension, Residual, Samples, Surface};
+
+impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
+    /// An attribute of the samples of `result`, which this plan made, at the vertices of the surface, and at every cell
+    /// within `band_cells` cells of the surface as it is at the closest surface point; and what the pullback needs. See
+    /// [`distance::extend`](crate::distance::extend). Cells outside the band that φ was computed in are left out.
+    ///
+    /// # Errors
+    /// An attribute of another number of samples, values that are not finite, a band without width; those of the
+    /// device.
+    pub fn extend(
+        &self,
+        result: &Reconstruction<T>,
+        attribute: Attribute<'_, T>,
+        band_cells: f64,
+    ) -> Result<(Extension<T>, Residual<T>), Error> {
+        let (samples, surface) = (result.extended_samples(), result.extended_surface());
+        let device = self.device();
+        Ok(extend::forward(
+            device, samples, attribute, surface, band_cells,
+        )?)
+    }
+}
+
+impl<T: Scalar> Reconstruction<T> {
+    pub(super) fn extended_samples(&self) -> Samples<'_, T> {
+        Samples {
+            neighborhoods: &self.residuals.near,
+            common_radius: self.residuals.common_radius,
+            areas: &self.areas,
+        }
+    }
+
+    pub(super) fn extended_surface(&self) -> Surface<'_, T> {
+        let of_distance = &self.residuals.distance;
+        Surface {
+            mesh: of_distance.mesh(),
+            grid: of_distance.grid(),
+            phi: &self.sdf,
+            closest: of_distance.closest(),
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! The pullback, beside the CPU's for the same extension.
+
+use super::*;
+use crate::samples::report;
+
+/// Cotangents of an extension.
+struct Bars<T> {
+    vertices: Option<Vec<T>>,
+    cells: Option<Vec<T>>,
+}
+
+fn noise<T: Scalar>(count: usize, seed: u64) -> Vec<T> {
+    let mut numbers = Numbers(seed);
+    (0..count).map(|_| T::of(numbers.signed())).collect()
+}
+
+impl<T: Scalar> Bars<T> {
+    /// Of both, or one, or of a few vertices alone.
+    fn all(extension: &cpu::Extension<T>) -> [Self; 4] {
+        let vertices = noise(extension.vertices.len(), 21);
+        let cells = noise(extension.values.len(), 22);
+        let mut few = vec![T::of(0.0); vertices.len()];
+        few[..10].copy_from_slice(&vertices[..10]);
+        let of = |vertices: Option<&Vec<T>>, cells: Option<&Vec<T>>| Self {
+            vertices: vertices.cloned(),
+            cells: cells.cloned(),
+        };
+        [
+            of(Some(&vertices), Some(&cells)),
+            of(Some(&vertices), None),
+            of(None, Some(&cells)),
+            of(Some(&few), None),
+        ]
+    }
+}
+
+/// Cotangents in the host's memory: of attribute, points, areas, vertices, low corner and spacing of the grid.
+type Pulled<T> = [Vec<T>; 6];
+
+const NAMES: [&str; 6] = [
+    "attribute",
+    "points",
+    "areas",
+    "vertices",
+    "lower",
+    "spacing",
+];
+
+fn pull<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    scene: &OnDevice<T>,
+    (extension, residual): &(extend::Extension<T>, extend::Residual<T>),
+    bars: &Bars<T>,
+) -> (Pulled<T>, usize) {
+    let [vertices, cells] = [&bars.vertices, &bars.cells]
+        .map(|bar| bar.as_ref().map(|bar| device.upload(bar).unwrap()));
+    let found = extend::pullback(
+        device,
+        scene.samples(),
+        scene.attribute(),
+        scene.surface(),
+        residual,
+        extension,
+        vertices.as_ref(),
+        cells.as_ref(),
+    )
+    .unwrap();
+    let numbers = |buffer: &Buffer<T>| device.download(buffer).unwrap();
+    let grid = numbers(&found.grid);
+    let pulled = [
+        numbers(&found.attribute),
+        numbers(&found.points),
+        numbers(&found.areas),
+        numbers(&found.vertices),
+        grid[..3].to_vec(),
+        grid[3..].to_vec(),
+    ];
+    (pulled, device.download(&found.guarded).unwrap()[0] as usize)
+}
+
+fn pull_on_cpu<T: Scalar>(
+    scene: &Scene<T>,
+    attribute: &Attribute<T>,
+    (extension, residual): &(cpu::Extension<T>, cpu::Residual<T>),
+    bars: &Bars<T>,
+) -> (Pulled<T>, usize) {
+    let mut out = cpu::Cotangent::default();
+    cpu::pullback(
+        scene.samples(),
+        attribute,
+        scene.surface(),
+        residual,
+        extension,
+        bars.vertices.as_deref(),
+        bars.cells.as_deref(),
+        &mut out,
+    )
+    .unwrap();
+    let pulled = [
+        out.attribute,
+        out.points.into_flattened(),
+        out.areas,
+        out.vertices.into_flattened(),
+        out.grid.lower.to_vec(),
+        vec![out.grid.spacing],
+    ];
+    (pulled, out.guarded)
+}
+
+fn largest<T: Scalar>(numbers: &[T]) -> f64 {
+    let sizes = numbers.iter().map(|x| Real::f64(*x).abs());
+    sizes.fold(0.0, |a, b| if b > a || b.is_nan() { b } else { a })
+}
+
+#[test]
+fn cotangents_are_those_of_the_cpu() {
+    on_each_device!(check_cotangents);
+}
+
+fn check_cotangents<R: Runtime>(device: &Device<R>) {
+    in_both_numbers!(device, check_cotangents_in);
+}
+
+fn check_cotangents_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
+    for scene in Scene::<T>::all() {
+        // Across a line or a plane of samples, slopes are bounded by the ridge alone: 1e-5 of their spread, by which the
+        // rounding of both sides is divided, and that of `g·s` twice.
+        let tolerance = match (scene.name, T::NAME) {
+            ("four places", _) => 10.0 * tolerance,
+            ("a flat square", "f64") => 100.0 * tolerance,
+            _ => tolerance,
+        };
+        for components in [1, 3, 6] {
+            let attribute = scene.attribute(components);
+            let on_device = scene.upload(device, &attribute);
+            let made = on_device.extend(device, 3.0).unwrap();
+            let of_cpu = downloaded(device, scene.grid().shape(), &made);
+            for bars in Bars::all(&of_cpu.0) {
+                let (found, guarded) = pull(device, &on_device, &made, &bars);
+                let (expected, wanted) = pull_on_cpu(&scene, &attribute, &of_cpu, &bars);
+                println!("{}, {components} in {}:", scene.name, T::NAME);
+                for (k, name) in NAMES.into_iter().enumerate() {
+                    if largest(&expected[k]) > 1e-12 {
+                        assert_near(name, &found[k], &expected[k], tolerance);
+                    } else {
+                        // Of samples that coincide, but for what rounding says.
+                        assert!(largest(&found[k]) < 1e-6, "{name}");
+                    }
+                }
+                if scene.name != "four places" {
+                    // Whether samples in one place coincide to the last bit, rounding says.
+                    assert_eq!(guarded, wanted);
+                }
+                let again = pull(device, &on_device, &made, &bars);
+                assert!(again == (found, guarded), "other bits the second time");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_attribute_gets_the_transpose_of_the_map() {
+    on_each_device!(check_transpose);
+}
+
+fn check_transpose<R: Runtime>(device: &Device<R>) {
+    in_both_numbers!(device, check_transpose_in);
+}
+
+/// `⟨v̄, v⟩ = ⟨ū, u⟩`, for noise.
+fn check_transpose_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
+    for scene in Scene::<T>::all() {
+        let components = 5;
+        let attribute = Attribute {
+            name: "noise".into(),
+            components,
+            values: noise(components * scene.points.len(), 55),
+        };
+        let on_device = scene.upload(device, &attribute);
+        let made = on_device.extend(device, 3.0).unwrap();
+        let (extension, _) = downloaded(device, scene.grid().shape(), &made);
+        let [bars, ..] = Bars::all(&extension);
+        let ([attribute_bar, ..], _) = pull(device, &on_device, &made, &bars);
+        let dot = |a: &[T], b: &[T]| -> [f64; 2] {
+            let products = a.iter().zip(b).map(|(a, b)| Real::f64(*a) * Real::f64(*b));
+            products.fold([0.0; 2], |[sum, size], x| [sum + x, size + x.abs()])
+        };
+        let [at_vertices, size] = dot(bars.vertices.as_ref().unwrap(), &extension.vertices);
+        let [in_band, more] = dot(bars.cells.as_ref().unwrap(), &extension.values);
+        let [found, _] = dot(&attribute_bar, &attribute.values);
+        let error = (found - at_vertices - in_band).abs() / (size + more);
+        report(scene.name, error);
+        assert!(error <= 0.1 * tolerance, "{}: {error:e}", scene.name);
+    }
+}

@@ -1,0 +1,254 @@
+//! Sides that something is known of, from sensors or from the step before, beside those of the CPU.
+
+use cubecl::prelude::Runtime;
+use isograd::neighbors::Radius;
+use isograd::orient::{self as cpu, Known, MethodUsed, Orientation, Scratch};
+use isograd::vector::{add, scale};
+use isograd::{PointCloud, Real, vector};
+use isograd_gpu::orient::previous::{self, Before};
+use isograd_gpu::orient::{self, Axes, Error, Method, Sensors};
+use isograd_gpu::pipeline::{Held, Reconstructor};
+use isograd_gpu::{Device, Scalar, neighbors};
+use isograd_shapes::Sampling;
+
+use crate::clouds::{Cloud, clouds, real, relative};
+use crate::devices::{in_each_number, on_each_device, tolerance};
+
+/// The body as it is, and with one in fifty of its points swapped with points elsewhere.
+fn moved<T: Scalar>(cloud: &Cloud<T>) -> Cloud<T> {
+    let mut points = cloud.points.clone();
+    let n = points.len();
+    for i in (0..n).step_by(100) {
+        points.swap(i, (i + n / 2 + 1) % n);
+    }
+    Cloud::of(cloud.name, points)
+}
+
+#[test]
+fn sides_of_the_step_before_are_those_of_the_cpu() {
+    in_each_number!(check_previous);
+}
+
+fn check_previous<R: Runtime, T: Scalar>(device: &Device<R>) {
+    let mut all_turned = 0;
+    for cloud in &clouds::<T>()[..3] {
+        let name = cloud.name;
+        let mut scratch = Scratch::default();
+        let mut step = |cloud: &Cloud<T>| {
+            let mut found = Orientation::default();
+            let (points, axes, near) = (&cloud.points, &cloud.axes, &cloud.near);
+            let method = &cpu::Method::Previous;
+            cpu::forward(points, axes, near, None, method, &mut scratch, &mut found).unwrap();
+            found
+        };
+        let first = step(cloud);
+        let now = moved(cloud);
+        let wanted = step(&now);
+        let MethodUsed::Previous { turned } = wanted.method else {
+            panic!("{name}: {:?}", wanted.method);
+        };
+        all_turned += turned;
+        // The CPU keeps single precision.
+        let single = |x: &T| real::<T>(f64::from(Real::f64(*x) as f32));
+        let outward: Vec<T> = first.normals.as_flattened().iter().map(single).collect();
+        let before: Vec<T> = first.confidence.iter().map(single).collect();
+        let radii = device.upload(&now.near.radius).unwrap();
+        let near = neighbors::forward(device, &now.upload(device), &radii).unwrap();
+        let axes = device.upload(now.axes.normals.as_flattened()).unwrap();
+        let run = || {
+            let before = Before {
+                outward: &device.upload(&outward).unwrap(),
+                confidence: &device.upload(&before).unwrap(),
+            };
+            let found = previous::forward(device, &near, &radii, &axes, before).unwrap();
+            let normals = device.download(&found.normals).unwrap();
+            let confidence = device.download(&found.confidence).unwrap();
+            let kept = device.download(&found.kept).unwrap();
+            (
+                normals,
+                confidence,
+                kept,
+                device.download(&found.turned).unwrap(),
+            )
+        };
+        let (normals, confidence, kept, count) = run();
+        assert_eq!(count, [turned as u32], "{name}");
+        let expected = wanted.normals.as_flattened();
+        let others = normals.iter().zip(expected).filter(|(a, b)| a != b);
+        assert_eq!(others.count(), 0, "{name}");
+        let difference = relative(&confidence, &wanted.confidence);
+        println!(
+            "{name}, {}: {turned} turned, confidence within {difference:.1e}",
+            T::NAME
+        );
+        assert!(
+            difference < 0.1 * tolerance::<f32>(),
+            "{name}: {difference:e}"
+        );
+        let is_far = |&i: &usize| kept[i] != before[i];
+        let far: Vec<usize> = (0..kept.len()).filter(is_far).collect();
+        assert!(far.len() <= turned && far.iter().all(|&i| kept[i] == confidence[i]));
+        assert_eq!(run(), (normals, confidence, kept, count));
+    }
+    assert!(all_turned > 20, "{all_turned}");
+}
+
+#[test]
+fn a_body_that_turns_keeps_its_sides_on_the_device() {
+    on_each_device!(check_turning);
+}
+
+fn check_turning<R: Runtime>(device: &Device<R>) {
+    let shape = isograd_shapes::by_name("torus").unwrap();
+    let samples = shape.sample::<f32>(2000, &Sampling::default(), 3).unwrap();
+    let turned = |angle: f32, vectors: &[[f32; 3]]| -> Vec<[f32; 3]> {
+        let (sine, cosine) = angle.sin_cos();
+        let turn = |&[x, y, z]: &[f32; 3]| [x, cosine * y - sine * z, sine * y + cosine * z];
+        vectors.iter().map(turn).collect()
+    };
+    let cloud = samples.cloud;
+    let truth = cloud.normals().unwrap();
+    let start = PointCloud::new(cloud.points().to_vec()).unwrap();
+    let grid = isograd::Grid::new([-1.6; 3], 0.1, [32; 3]).unwrap();
+    let plan = Reconstructor::new(device.clone(), grid, Default::default()).unwrap();
+    let mut held = Held::find(device, &start, Radius::Auto, &cpu::Method::Auto).unwrap();
+    for step in 0..8 {
+        let angle = 0.5 * step as f32;
+        let points = turned(angle, cloud.points());
+        let points = device.upload(points.as_flattened()).unwrap();
+        let result = plan.reconstruct(&points, &held).unwrap();
+        assert_eq!(device.download(&result.turned).unwrap(), [0], "step {step}");
+        let normals = device.download(&result.normals).unwrap();
+        let inward = normals.as_chunks::<3>().0.iter().zip(turned(angle, truth));
+        let inward = inward.filter(|&(&n, t)| vector::dot(n, t) < 0.0).count();
+        assert_eq!(inward, 0, "step {step}");
+        held = held.after(&result).unwrap();
+    }
+    // All sides at once by more than 60 degrees: these are found to have turned, and not to be trusted.
+    let points = device
+        .upload(turned(5.0, cloud.points()).as_flattened())
+        .unwrap();
+    let result = plan.reconstruct(&points, &held).unwrap();
+    let count = device.download(&result.turned).unwrap()[0];
+    assert!(count > 400, "{count}");
+}
+
+#[test]
+fn views_from_sensors_are_those_of_the_cpu() {
+    in_each_number!(check_sensors);
+}
+
+fn check_sensors<R: Runtime, T: Scalar>(device: &Device<R>) {
+    let cloud = &clouds::<T>()[0];
+    let n = cloud.points.len();
+    let place = |p: [f64; 3]| p.map(real::<T>);
+    let slant = |i: usize| [(0.3 * i as f64).sin(), (0.7 * i as f64).cos(), 0.4];
+    let each: Vec<[T; 3]> = (0..n)
+        .map(|i| {
+            let axis = vector::to_f64(cloud.axes.normals[i]);
+            let sight = add(axis, scale(slant(i), 0.8));
+            place(add(vector::to_f64(cloud.points[i]), scale(sight, 2.0)))
+        })
+        .collect();
+    let round = vec![
+        place([4.0, 0.0, 0.5]),
+        place([-2.0, 3.4, 0.5]),
+        place([-2.0, -3.4, -0.5]),
+    ];
+    let (near, axes) = upload(device, cloud);
+    let axes = Axes {
+        normals: &axes,
+        residual: None,
+        spacing: cloud.near.spacing(),
+    };
+    for sensors in [
+        isograd::Sensors::Each(each),
+        isograd::Sensors::Any(vec![place([0.0, 0.0, 6.0])]),
+        isograd::Sensors::Any(round),
+    ] {
+        let scratch = &mut Scratch::default();
+        // Bare axes here and there: no planes.
+        let bare = cpu::Axes::from(&cloud.axes.normals);
+        let mut wanted = Orientation::default();
+        let known = Known {
+            normals: None,
+            sensors: Some(&sensors),
+        };
+        let method = cpu::Method::Sensors;
+        let (points, near_cpu) = (&cloud.points, &cloud.near);
+        cpu::forward(points, bare, near_cpu, known, &method, scratch, &mut wanted).unwrap();
+        let positions = match &sensors {
+            isograd::Sensors::Each(p) | isograd::Sensors::Any(p) => p.as_flattened(),
+        };
+        let positions = device.upload(positions).unwrap();
+        let on_device = match sensors {
+            isograd::Sensors::Each(_) => Sensors::Each(&positions),
+            isograd::Sensors::Any(_) => Sensors::Any(&positions),
+        };
+        let found = orient::forward(device, &near, &axes, &Method::Sensors(on_device)).unwrap();
+        let normals = device.download(&found.normals).unwrap();
+        let confidence = device.download(&found.confidence).unwrap();
+        let differs = |&i: &usize| {
+            normals.as_chunks::<3>().0[i] != wanted.normals[i]
+                || (Real::f64(confidence[i]) - Real::f64(wanted.confidence[i])).abs() > 1e-3
+        };
+        let others = (0..n).filter(differs).count();
+        println!(
+            "{}: {others} of {n} differ; {:?}, on the CPU {:?}",
+            T::NAME,
+            found.decided,
+            wanted.decided
+        );
+        assert!(200 * others <= n, "{others} of {n}");
+        // Three sensors round a ring disagree of every point.
+        let decided = wanted.decided;
+        assert!(
+            decided.given > n / 10 || decided.evidence > n / 2,
+            "{decided:?}"
+        );
+        assert!(found.decided.given.abs_diff(wanted.decided.given) <= n.div_ceil(1000));
+    }
+}
+
+/// The cloud on the device, sorted, with the CPU's radii and axes.
+fn upload<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    cloud: &Cloud<T>,
+) -> (neighbors::Neighborhoods<T>, isograd_gpu::Buffer<T>) {
+    let radii = device.upload(&cloud.near.radius).unwrap();
+    let near = neighbors::forward(device, &cloud.upload(device), &radii).unwrap();
+    let axes = device.upload(cloud.axes.normals.as_flattened()).unwrap();
+    (near, axes)
+}
+
+#[test]
+fn sensors_that_cannot_be_used_are_refused() {
+    on_each_device!(check_refused);
+}
+
+fn check_refused<R: Runtime>(device: &Device<R>) {
+    let cloud = &clouds::<f32>()[0];
+    let (near, axes) = upload(device, cloud);
+    let axes = Axes {
+        normals: &axes,
+        residual: None,
+        spacing: cloud.near.spacing(),
+    };
+    let refused = |sensors: Sensors<'_, f32>| {
+        orient::forward(device, &near, &axes, &Method::Sensors(sensors)).unwrap_err()
+    };
+    let none = device.upload::<f32>(&[]).unwrap();
+    let cpu = |error: Error| match error {
+        Error::Cloud(error) => error,
+        other => panic!("{other}"),
+    };
+    assert_eq!(cpu(refused(Sensors::Any(&none))), cpu::Error::NoSensors);
+    assert!(matches!(refused(Sensors::Each(&none)), Error::Device(_)));
+    for index in [0, 517] {
+        let mut on_point = vec![[9.0; 3]; 2];
+        on_point[1] = cloud.points[index];
+        let sensors = device.upload(on_point.as_flattened()).unwrap();
+        let wanted = cpu::Error::SensorOnPoint { index };
+        assert_eq!(cpu(refused(Sensors::Any(&sensors))), wanted);
+    }
+}

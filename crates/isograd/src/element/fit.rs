@@ -1,0 +1,149 @@
+//! The linear fit of samples at a vertex, and its pullback: see [`crate::distance::extend`], whose letters these are.
+//! Vectors go in and out by component.
+
+#[cfg(cube)]
+use cubecl::prelude::*;
+
+use super::Element;
+
+/// `ε₀ = 1e-5`: share of the trace of `C` below which a direction counts as noise.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn noise<F: Element>() -> F {
+    F::new(1.0) / F::new(100_000.0)
+}
+
+/// `ε₁ = 1/256`: how soon the slope fades with the distance of a vertex from its samples. Half of it is gone, in the
+/// mean direction, where `|m|² = 16 tr C · √(1/3)`.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn fading<F: Element>() -> F {
+    F::new(1.0) / F::new(256.0)
+}
+
+/// `1 − q` inside the radius, else 0, where `q = r²/R²`.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn rest<F: Element>(q: F) -> F {
+    let mut rest = F::new(1.0) - q;
+    if rest < F::new(0.0) {
+        rest = F::new(0.0);
+    }
+    rest
+}
+
+/// `K`: `(1 − q)²` inside the radius, else 0.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn kernel<F: Element>(q: F) -> F {
+    let rest = rest::<F>(q);
+    rest * rest
+}
+
+/// `ε`, of `tr C` and `τ`.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn ridge<F: Element>(trace: F, tau: F) -> F {
+    trace * (noise::<F>() + fading::<F>() * tau * tau)
+}
+
+/// `(g·s) 4 ε₁ τ`: factor of `m` in the pullback of `ε`.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn ridge_of_mean<F: Element>(tau: F, along: F) -> F {
+    F::new(4.0) * fading::<F>() * tau * along
+}
+
+/// `(g·s) (ε₀ − ε₁ τ²)`: factor of `e_j` in it.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn ridge_of_offset<F: Element>(tau: F, along: F) -> F {
+    (noise::<F>() - fading::<F>() * tau * tau) * along
+}
+
+/// `L D Lᵀ`, a symmetric positive definite matrix.
+#[cfg_attr(cube, derive(CubeType))]
+#[derive(Clone, Copy, Debug)]
+pub struct Factors<F: Element> {
+    /// Below the diagonal of `L`.
+    pub yx: F,
+    /// The same.
+    pub zx: F,
+    /// The same.
+    pub zy: F,
+    /// Of `D`.
+    pub x: F,
+    /// Of `D`.
+    pub y: F,
+    /// Of `D`.
+    pub z: F,
+}
+
+/// The factors of a matrix.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn factors<F: Element>(xx: F, yy: F, zz: F, yz: F, xz: F, xy: F) -> Factors<F> {
+    let yx = xy / xx;
+    let zx = xz / xx;
+    let y = yy - yx * xy;
+    let zy = (yz - zx * xy) / y;
+    let z = zz - zx * xz - zy * zy * y;
+    Factors::<F> {
+        yx,
+        zx,
+        zy,
+        x: xx,
+        y,
+        z,
+    }
+}
+
+/// `z` of the solution of `L D Lᵀ (x, y, z) = (a, b, c)`.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn solved_z<F: Element>(of: Factors<F>, a: F, b: F, c: F) -> F {
+    let lower = b - of.yx * a;
+    (c - of.zx * a - of.zy * lower) / of.z
+}
+
+/// `y` of it, given `z`.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn solved_y<F: Element>(of: Factors<F>, a: F, b: F, z: F) -> F {
+    (b - of.yx * a) / of.y - of.zy * z
+}
+
+/// `x` of it, given the others.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn solved_x<F: Element>(of: Factors<F>, a: F, y: F, z: F) -> F {
+    a / of.x - of.yx * y - of.zx * z
+}
+
+/// `D_j`, of `ρ_j`, `t_j`, `|e_j|²`, `m·e_j` and the factors of the ridge.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn pull<F: Element>(rho: F, t: F, ee: F, me: F, of_offset: F, of_mean: F) -> F {
+    rho * t + of_offset * ee + of_mean * me
+}
+
+/// What `d̄_j` has through the ridge, over `p_j`.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn ridge_bar<F: Element>(m: F, of_mean: F, e: F, of_offset: F) -> F {
+    m * of_mean + e * (F::new(2.0) * of_offset)
+}
+
+/// What it has through the fit, over `p_j`, that of the ridge included.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn fit_bar<F: Element>(g: F, t: F, s: F, rho: F, of_ridge: F) -> F {
+    g * -t + s * -rho + of_ridge
+}
+
+/// `−4 w̄_j (a_j + a₀)(1 − q)`: factor of `d_j` in what `d̄_j` has through the weight.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn radial<F: Element>(weight_bar: F, area: F, rest: F) -> F {
+    F::new(-4.0) * weight_bar * area * rest
+}
