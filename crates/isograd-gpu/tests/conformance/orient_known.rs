@@ -245,7 +245,7 @@ fn check_refused<R: Runtime>(device: &Device<R>) {
     assert_eq!(cpu(refused(Sensors::Any(&none))), cpu::Error::NoSensors);
     assert!(matches!(refused(Sensors::Each(&none)), Error::Device(_)));
     for index in [0, 517] {
-        let mut on_point = vec![[9.0; 3]; 2];
+        let mut on_point = [[9.0; 3]; 2];
         on_point[1] = cloud.points[index];
         let sensors = device.upload(on_point.as_flattened()).unwrap();
         let wanted = cpu::Error::SensorOnPoint { index };

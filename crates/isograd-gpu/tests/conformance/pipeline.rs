@@ -258,7 +258,7 @@ fn what_the_device_finds_and_holds_is_what_the_cpu_finds() {
 
 /// Points go to the device, and nothing else does.
 fn compare_held<R: Runtime, T: Scalar>(device: &Device<R>) {
-    let (tight, loose) = if T::NAME == "f32" {
+    let (tight, loose): (f64, f64) = if T::NAME == "f32" {
         (1e-5, 2e-4)
     } else {
         (1e-12, 1e-9)

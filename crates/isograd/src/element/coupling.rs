@@ -114,6 +114,7 @@ pub fn blur(reach: f32, spreads: f32, thicknesses: f32, gap: f32) -> f32 {
 ///
 /// Source: the reflected transfer of H. Xie, K. McDonnell, H. Qin, "Surface reconstruction of noisy
 /// and defective data sets" (2004).
+#[allow(clippy::manual_clamp)] // a kernel has no such method
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn coupled(parallel: f32, heights: f32, square: f32, gap: f32) -> f32 {

@@ -11,7 +11,7 @@
 
 use rayon::prelude::*;
 
-pub use super::flood::sides_of_walls;
+pub use super::flood::{Wall, sides_of_walls};
 
 use super::flood::{self, Regions};
 use super::sky::Sky;

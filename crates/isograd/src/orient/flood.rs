@@ -111,12 +111,15 @@ pub(super) fn sides(regions: usize, walls: &mut [(u32, u32)], sides: &mut Vec<i8
         .iter_mut()
         .for_each(|wall| *wall = (wall.0.min(wall.1), wall.0.max(wall.1)));
     walls.sort_unstable();
-    let mut counted: Vec<(usize, (u32, u32))> = walls
+    let mut counted: Vec<Wall> = walls
         .chunk_by(|a, b| a == b)
         .map(|same| (same.len(), same[0]))
         .collect();
     sides_of_walls(regions, &mut counted, sides);
 }
+
+/// A wall: how many samples it has, and the regions on its two sides.
+pub type Wall = (usize, (u32, u32));
 
 /// Which of the `regions` are outside the body: `sides[r]` is +1 for air, −1 for matter, 0 where no wall tells.
 ///
@@ -126,7 +129,7 @@ pub(super) fn sides(regions: usize, walls: &mut [(u32, u32)], sides: &mut Vec<i8
 ///
 /// # Panics
 /// A wall names a region that there is not.
-pub fn sides_of_walls(regions: usize, walls: &mut [(usize, (u32, u32))], sides: &mut Vec<i8>) {
+pub fn sides_of_walls(regions: usize, walls: &mut [Wall], sides: &mut Vec<i8>) {
     sides.clear();
     sides.resize(regions, 0);
     let Some(open_air) = sides.first_mut() else {

@@ -218,9 +218,11 @@ mod tests {
 
     impl Body {
         fn of((points, normals): Sampled) -> Self {
-            let mut graph = Graph::default();
-            graph.axis = normals.iter().map(|&n| vector::of_f64(n)).collect();
-            graph.area = vec![1.0; points.len()];
+            let graph = Graph {
+                axis: normals.iter().map(|&n| vector::of_f64(n)).collect(),
+                area: vec![1.0; points.len()],
+                ..Graph::default()
+            };
             Self { graph, points }
         }
 

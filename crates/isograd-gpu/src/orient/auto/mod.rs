@@ -107,11 +107,7 @@ fn copy<R: Runtime, T: Scalar>(
     graph: &Graph,
     place: &Samples<T>,
 ) -> Result<cpu::Graph, Error> {
-    let mut whole = cpu::Graph::default();
-    whole.near = device.download(&graph.near)?.as_chunks().0.to_vec();
-    whole.axis = device.download(&graph.axis)?.as_chunks().0.to_vec();
-    whole.reach = device.download(&graph.reach)?;
-    whole.area = device.download(&graph.area)?;
+    let near = device.download(&graph.near)?.as_chunks().0.to_vec();
     let unit = 1.0 / place.spacing;
     let offsets = |(p, near): (usize, &[u32; cpu::NEIGHBORS])| {
         near.map(|q| {
@@ -119,8 +115,14 @@ fn copy<R: Runtime, T: Scalar>(
             offset.map(|x| (x.f64() * unit) as f32)
         })
     };
-    whole.offset = whole.near.iter().enumerate().map(offsets).collect();
-    Ok(whole)
+    Ok(cpu::Graph {
+        offset: near.iter().enumerate().map(offsets).collect(),
+        near,
+        axis: device.download(&graph.axis)?.as_chunks().0.to_vec(),
+        reach: device.download(&graph.reach)?,
+        area: device.download(&graph.area)?,
+        ..cpu::Graph::default()
+    })
 }
 
 /// Draws the parts of the cloud on their grids.

@@ -112,7 +112,7 @@ fn serpentine(shape: [usize; 3], order: [usize; 3]) -> Cells {
         let [u, v, w] = order.map(|a| at[a]);
         let [nu, nv, _] = order.map(|a| shape[a]);
         let lanes = nv - (nv + 1) % 2;
-        let end = |k: usize, last: usize| if k / 2 % 2 == 0 { last } else { 0 };
+        let end = |k: usize, last: usize| if (k / 2).is_multiple_of(2) { last } else { 0 };
         match (v % 2, w % 2) {
             (0, 0) => v >= lanes,
             (1, 0) => v >= lanes || u != (if v / 2 % 2 == 0 { nu - 1 } else { 0 }),

@@ -181,7 +181,8 @@ fn beside(cells: &Cells, row: u32, w: u32) -> Beside {
     if w > 0u32 {
         z = free_in(cells, row, w - 1u32);
     }
-    if row % cells.ny > 0u32 {
+    let in_plane = row % cells.ny;
+    if in_plane > 0u32 {
         y = free_in(cells, row - 1u32, w);
     }
     if row >= cells.ny {

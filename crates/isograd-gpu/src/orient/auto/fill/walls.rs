@@ -1,7 +1,7 @@
 //! Which regions are air and which are matter, by the walls between them.
 
 use cubecl::prelude::*;
-use isograd::orient::fill::sides_of_walls;
+use isograd::orient::fill::{Wall, sides_of_walls};
 
 use super::BLOCK;
 use super::discs::Discs;
@@ -81,11 +81,7 @@ impl Pairs {
     }
 
     /// Each pair once, with the number of times that it is there.
-    fn counted<R: Runtime>(
-        &self,
-        device: &Device<R>,
-        regions: usize,
-    ) -> Result<Vec<(usize, (u32, u32))>, Error> {
+    fn counted<R: Runtime>(&self, device: &Device<R>, regions: usize) -> Result<Vec<Wall>, Error> {
         let samples = self.lower.len();
         let flags = device.empty(samples)?;
         let (client, dim) = (device.client(), CubeDim::new_1d(BLOCK));
