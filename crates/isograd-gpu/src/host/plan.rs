@@ -9,7 +9,7 @@ use isograd::{Backend, Grid, Options, PointCloud, Report, Seconds, Stage};
 
 use super::work::Work;
 use super::{Error, Number, Reconstruction};
-use crate::element::turned::MOST_FAR;
+use crate::element::turned;
 use crate::pipeline::Held;
 
 /// [`isograd::Reconstructor`] on a device: a plan for one grid and one set of options.
@@ -85,7 +85,7 @@ impl<T: Number> Plan<T> {
         let before = self.before.take();
         if let Some(before) = before.filter(|before| before.report.points == cloud.len()) {
             let (result, next) = self.run(cloud, before.next(), observer)?;
-            if result.turned()? as f64 <= MOST_FAR * cloud.len() as f64 {
+            if turned::are_few(result.turned()?, cloud.len()) {
                 self.before = next;
                 return Ok(result);
             }

@@ -25,7 +25,7 @@ pub(crate) fn first<R: Runtime>(
     Ok((found[0] > 0).then_some(found[1] as usize))
 }
 
-/// How many flags are 1, the others being 0: `(1,)`. Nothing waits.
+/// The sum of some numbers, `(1,)`: of flags that are 1 or 0, how many are 1. Nothing waits.
 pub(crate) fn count<R: Runtime>(
     device: &Device<R>,
     flags: &Buffer<u32>,
@@ -106,16 +106,7 @@ pub(crate) fn sum_of_all<R: Runtime>(
             k as u32,
         );
     }
-    let sum = device.empty(1)?;
-    take_last::launch::<R>(
-        device.client(),
-        device.groups(1, 1),
-        CubeDim::new_1d(1),
-        exclusive_sum(device, &ends)?.arg(),
-        sum.arg(),
-        0,
-    );
-    Ok(sum)
+    count(device, &ends)
 }
 
 #[cube(launch)]

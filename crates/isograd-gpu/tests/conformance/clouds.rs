@@ -2,6 +2,7 @@
 
 use isograd::neighbors::{self, Radius};
 use isograd::{Real, normals};
+use isograd_gpu::neighbors::Neighborhoods;
 use isograd_gpu::{Buffer, Device, Scalar};
 use isograd_shapes::{Layout, Sampling};
 
@@ -36,6 +37,14 @@ impl<T: Scalar> Cloud<T> {
     /// The points on the device.
     pub fn upload<R: Runtime>(&self, device: &Device<R>) -> Buffer<T> {
         device.upload(self.points.as_flattened()).unwrap()
+    }
+
+    /// The points on the device, sorted, with the CPU's radii and axes.
+    pub fn upload_sorted<R: Runtime>(&self, device: &Device<R>) -> (Neighborhoods<T>, Buffer<T>) {
+        let radii = device.upload(&self.near.radius).unwrap();
+        let near = isograd_gpu::neighbors::forward(device, &self.upload(device), &radii).unwrap();
+        let axes = device.upload(self.axes.normals.as_flattened()).unwrap();
+        (near, axes)
     }
 }
 

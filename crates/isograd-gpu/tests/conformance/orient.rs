@@ -24,17 +24,6 @@ fn expected<T: Scalar>(
     Ok(found)
 }
 
-/// The cloud on the device, sorted, with the CPU's radii and axes.
-fn upload<R: Runtime, T: Scalar>(
-    device: &Device<R>,
-    cloud: &Cloud<T>,
-) -> (neighbors::Neighborhoods<T>, Buffer<T>) {
-    let radii = device.upload(&cloud.near.radius).unwrap();
-    let near = neighbors::forward(device, &cloud.upload(device), &radii).unwrap();
-    let axes = device.upload(cloud.axes.normals.as_flattened()).unwrap();
-    (near, axes)
-}
-
 /// Axes of which nothing else is known: parity and given sides need no more.
 fn bare<T: Scalar>(normals: &Buffer<T>) -> Axes<'_, T> {
     Axes {
@@ -59,7 +48,7 @@ fn check_parity<R: Runtime, T: Scalar>(device: &Device<R>) {
     };
     let (mut points, mut turned, mut open) = (0, 0, 0);
     for cloud in clouds::<T>() {
-        let (near, axes) = upload(device, &cloud);
+        let (near, axes) = cloud.upload_sorted(device);
         let (name, n) = (cloud.name, cloud.points.len());
         for options in [ParityOptions::default(), fine] {
             let expected = expected(&cloud, None, cpu::Method::Parity(options)).unwrap();
@@ -147,7 +136,7 @@ fn check_refused<R: Runtime>(device: &Device<R>) {
     let cloud = &clouds::<f32>()[2];
     let refusal = |cloud: &Cloud<f32>, options| {
         let expected = expected(cloud, None, cpu::Method::Parity(options)).unwrap_err();
-        let (near, axes) = upload(device, cloud);
+        let (near, axes) = cloud.upload_sorted(device);
         match orient::forward(device, &near, &bare(&axes), &Method::Parity(options)) {
             // NaN is not equal to itself.
             Err(Error::Cloud(found)) => assert_eq!(found.to_string(), expected.to_string()),
@@ -169,7 +158,7 @@ fn check_refused<R: Runtime>(device: &Device<R>) {
     }
     let twice = Cloud::of("all twice", cloud.points.repeat(2));
     refusal(&twice, options(2.5, 1.0));
-    let (near, axes) = upload(device, cloud);
+    let (near, axes) = cloud.upload_sorted(device);
     let few = device.upload(&[1f32; 9]).unwrap();
     let parity = Method::Parity(ParityOptions::default());
     assert!(orient::forward(device, &near, &bare(&few), &parity).is_err());
@@ -195,7 +184,7 @@ fn check_signs<R: Runtime, T: Scalar>(device: &Device<R>) {
     let cloud = &clouds::<T>()[1];
     let vectors = vectors::<T>(cloud.points.len());
     let expected = expected(cloud, Some(&vectors), cpu::Method::Signs).unwrap();
-    let (near, axes) = upload(device, cloud);
+    let (near, axes) = cloud.upload_sorted(device);
     let given = device.upload(vectors.as_flattened()).unwrap();
     let found = orient::forward(device, &near, &bare(&axes), &Method::Signs(&given)).unwrap();
     let normals = device.download(&found.normals).unwrap();

@@ -155,7 +155,7 @@ fn check_sensors<R: Runtime, T: Scalar>(device: &Device<R>) {
         place([-2.0, 3.4, 0.5]),
         place([-2.0, -3.4, -0.5]),
     ];
-    let (near, axes) = upload(device, cloud);
+    let (near, axes) = cloud.upload_sorted(device);
     let axes = Axes {
         normals: &axes,
         residual: None,
@@ -210,17 +210,6 @@ fn check_sensors<R: Runtime, T: Scalar>(device: &Device<R>) {
     }
 }
 
-/// The cloud on the device, sorted, with the CPU's radii and axes.
-fn upload<R: Runtime, T: Scalar>(
-    device: &Device<R>,
-    cloud: &Cloud<T>,
-) -> (neighbors::Neighborhoods<T>, isograd_gpu::Buffer<T>) {
-    let radii = device.upload(&cloud.near.radius).unwrap();
-    let near = neighbors::forward(device, &cloud.upload(device), &radii).unwrap();
-    let axes = device.upload(cloud.axes.normals.as_flattened()).unwrap();
-    (near, axes)
-}
-
 #[test]
 fn sensors_that_cannot_be_used_are_refused() {
     on_each_device!(check_refused);
@@ -228,7 +217,7 @@ fn sensors_that_cannot_be_used_are_refused() {
 
 fn check_refused<R: Runtime>(device: &Device<R>) {
     let cloud = &clouds::<f32>()[0];
-    let (near, axes) = upload(device, cloud);
+    let (near, axes) = cloud.upload_sorted(device);
     let axes = Axes {
         normals: &axes,
         residual: None,

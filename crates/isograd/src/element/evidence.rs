@@ -16,7 +16,7 @@ const SLIGHT: f32 = 0.05;
 
 /// A view with at least this cosine decides by itself. It is 14 degrees off the surface; the axes of noisy
 /// samples are 5 to 15 degrees off.
-pub const CLEAR_VIEW: f32 = 0.25;
+const CLEAR_VIEW: f32 = 0.25;
 
 /// Within −1..1.
 #[cfg_attr(cube, cube)]
@@ -69,6 +69,13 @@ pub fn weighed<F: Element>(filled: F, sheet: F, open: F, slab: F, side: F, seen:
 #[inline(always)]
 pub fn differs<F: Element>(sheet: F, open: F) -> bool {
     (F::new(1.0) - open) * size::<F>(sheet) > F::new(SLIGHT)
+}
+
+/// Whether a view decides alone.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn is_clear<F: Element>(view: F) -> bool {
+    size::<F>(view) >= F::new(CLEAR_VIEW)
 }
 
 /// What a view adds to the evidence for the sign of an axis: all but all of it for a clear one.

@@ -9,7 +9,12 @@ use super::Element;
 pub const FAR: f32 = 0.5;
 
 /// Where more than this share of the axes has turned far, the points are not those of the step before.
-pub const MOST_FAR: f64 = 0.03;
+const MOST_FAR: f64 = 0.03;
+
+/// Whether so few of the axes have turned far that these may be the points of the step before.
+pub fn are_few(turned: usize, points: usize) -> bool {
+    turned as f64 <= MOST_FAR * points as f64
+}
 
 /// Offsets shorter than this share of a neighbourhood's radius have no direction to speak of.
 #[cfg_attr(cube, cube)]

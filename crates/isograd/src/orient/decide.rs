@@ -84,6 +84,17 @@ pub struct Domains<'a> {
 impl Domains<'_> {
     /// The mark of a sample of no domain.
     pub const NONE: u32 = u32::MAX;
+
+    /// The samples of each domain, in order.
+    pub fn members(&self) -> Vec<Vec<u32>> {
+        let mut members = vec![Vec::new(); self.count];
+        for (p, &domain) in (0..).zip(self.domain) {
+            if let Some(members) = members.get_mut(domain as usize) {
+                members.push(p);
+            }
+        }
+        members
+    }
 }
 
 /// What decided the sign of an axis.

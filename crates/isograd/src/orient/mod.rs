@@ -84,6 +84,7 @@ pub(crate) use pullback::hold;
 pub use pullback::{axes_pullback, given_pullback};
 
 use crate::data::Sensors;
+use crate::element::evidence;
 use crate::neighbors::Neighborhoods;
 use crate::normals::{self, Plane};
 use crate::{PointCloud, Real, vector};
@@ -483,7 +484,7 @@ fn automatically<T: Real>(
         let i = i as usize;
         match views
             .map(|views| views[i])
-            .filter(|&view| sensors::is_clear(view))
+            .filter(|&view| evidence::is_clear(view))
         {
             Some(view) => {
                 out.set_sign(i, view < 0.0, 1.0);

@@ -6,7 +6,7 @@
 //! neighbours decide.
 
 use super::{MethodUsed, Orientation};
-use crate::element::turned::{self, MOST_FAR};
+use crate::element::turned;
 use crate::neighbors::Neighborhoods;
 use crate::{Real, vector};
 
@@ -86,7 +86,7 @@ impl Previous {
         self.turned.clear();
         self.turned
             .extend(far.filter(|&(_, &c)| !is_near(c)).map(|(i, _)| i));
-        self.turned.len() as f64 <= MOST_FAR * axes.len() as f64
+        turned::are_few(self.turned.len(), axes.len())
     }
 
     /// What the neighbours that have not turned say of the axis of point `i`, from −1 to 1; `None` where there

@@ -6,13 +6,8 @@
 
 use super::{Error, Known};
 use crate::data::Sensors;
-use crate::element::evidence::{self, CLEAR_VIEW};
+use crate::element::evidence;
 use crate::{Real, vector};
-
-/// Whether a view decides alone.
-pub(super) fn is_clear(view: f32) -> bool {
-    view.abs() >= CLEAR_VIEW
-}
 
 /// Cosine, from −1 to 1, between each axis and the direction from its point to its sensor. Where it is not
 /// known which of several sensors saw the point: that of the most grazing one where they are all on one side,

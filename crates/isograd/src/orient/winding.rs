@@ -46,14 +46,16 @@ pub(super) fn numbers(
     domains: &Domains<'_>,
     probes: &[u32],
 ) -> Vec<f64> {
-    let mut dipoles = vec![Vec::new(); domains.count];
-    for (p, &domain) in domains.domain.iter().enumerate() {
-        if let Some(dipoles) = dipoles.get_mut(domain as usize) {
-            let normal = vector::scale(graph.axis[p], domains.sign[p]);
-            dipoles.push(Dipole::new(place.in_spacings(p), normal, graph.area[p]));
-        }
-    }
-    let blocks: Vec<Vec<Block>> = dipoles.iter().map(|d| blocks(d)).collect();
+    let dipole = |&p: &u32| {
+        let p = p as usize;
+        let normal = vector::scale(graph.axis[p], domains.sign[p]);
+        Dipole::new(place.in_spacings(p), normal, graph.area[p])
+    };
+    let of_domain = |members: Vec<u32>| {
+        let dipoles: Vec<Dipole> = members.iter().map(dipole).collect();
+        blocks(&dipoles)
+    };
+    let blocks: Vec<Vec<Block>> = domains.members().into_iter().map(of_domain).collect();
     let arch = pulp::Arch::new();
     let ask = |&probe: &u32| -> Vec<f64> {
         let at = place.in_spacings(probe as usize);
@@ -84,7 +86,9 @@ pub(super) struct Misfit {
 impl Misfit {
     /// Of domains with the signs that their samples have relative to each other.
     pub(super) fn of<B: Beliefs>(samples: &mut B, domains: &Domains<'_>) -> Result<Self, B::Error> {
-        let (probes, weights) = probes(domains);
+        let members = domains.members();
+        let in_one = members.iter().map(Vec::len).sum();
+        let (probes, weights) = probes(&members, in_one);
         let windings = samples.winding(domains, &probes)?;
         let count = domains.count;
         let (mut gram, mut pull) = (vec![0.0; count * count], vec![0.0; count]);
@@ -96,11 +100,10 @@ impl Misfit {
                 }
             }
         }
-        let in_one = domains.domain.iter().filter(|&&d| (d as usize) < count);
         Ok(Self {
             gram,
             pull,
-            samples: in_one.count(),
+            samples: in_one,
         })
     }
 
@@ -111,14 +114,7 @@ impl Misfit {
 }
 
 /// Samples to ask at, and how many each stands for: spread evenly over those of each domain.
-fn probes(domains: &Domains<'_>) -> (Vec<u32>, Vec<f64>) {
-    let mut members = vec![Vec::new(); domains.count];
-    for (p, &domain) in (0..).zip(domains.domain) {
-        if let Some(members) = members.get_mut(domain as usize) {
-            members.push(p);
-        }
-    }
-    let samples: usize = members.iter().map(Vec::len).sum();
+fn probes(members: &[Vec<u32>], samples: usize) -> (Vec<u32>, Vec<f64>) {
     let (mut probes, mut weights) = (Vec::new(), Vec::new());
     for members in members {
         let n = members.len();

@@ -174,7 +174,8 @@ impl<F: Float> Adjoint<F> {
         }
     }
 
-    fn write(self, records: &mut Array<F>, k: usize) {
+    /// With `Σ_k p_k D_k`, which takes the rest of it to find.
+    fn write(self, records: &mut Array<F>, k: usize, mean_pull: F) {
         let at = ADJOINT * k;
         records[at] = self.weight;
         self.mean.store(records, at + 1);
@@ -183,7 +184,7 @@ impl<F: Float> Adjoint<F> {
         records[at + 10] = self.of_mean;
         records[at + 11] = self.of_offset;
         records[at + 12] = self.middle;
-        records[at + 13] = self.mean_pull;
+        records[at + 13] = mean_pull;
         records[at + 14] = self.level;
     }
 
@@ -335,22 +336,11 @@ fn pull_fits<F: Float>(
                 }
                 node = next_leaf::<F>(nodes, links, y, of.radius, node + 1, false);
             }
-            let with_mean = Adjoint::<F> {
-                weight: of.weight,
-                mean: of.mean,
-                tilt: of.tilt,
-                slope,
-                of_mean: without_mean.of_mean,
-                of_offset: without_mean.of_offset,
-                level,
-                middle,
-                mean_pull: shares[0],
-            };
-            with_mean.write(records, k);
+            without_mean.write(records, k, shares[0]);
             let of_mean = Vector3::<F>::load(&shares, 4usize).scale(shares[0]);
             let through_weights = Vector3::<F>::load(&shares, 1usize).sub(of_mean);
             // Σ p t = 1, Σ p ρ = 0 and Σ p e = 0: s may be so large that their rounding would count.
-            let through_fit = of.mean.scale(with_mean.of_mean).sub(slope);
+            let through_fit = of.mean.scale(without_mean.of_mean).sub(slope);
             let total = through_weights.add(through_fit);
             total.scale(-of.unit).add_to(&mut sums, 0usize);
             bounded += select(ridge.coincide, 1u32, 0u32);

@@ -11,6 +11,7 @@ mod voices;
 pub mod winding;
 
 use cubecl::prelude::*;
+use isograd::element::evidence::is_clear;
 use isograd::orient::decide::{Decision, Place, Signs};
 use isograd::orient::graph as cpu;
 use isograd::orient::groups::Groups;
@@ -170,7 +171,7 @@ fn turn<R: Runtime, T: Scalar>(
     for (p, &i) in places.iter().enumerate() {
         let verdict = signs.verdict(p);
         match verdict.by {
-            _ if seen[i as usize].abs() >= evidence::CLEAR_VIEW => decided.given += 1,
+            _ if is_clear(seen[i as usize]) => decided.given += 1,
             Decision::Evidence => decided.evidence += 1,
             Decision::Neighbors => decided.neighbors += 1,
             Decision::Rule => decided.rule += 1,
@@ -212,9 +213,9 @@ fn turn_axes<F: Float>(
     if ABSOLUTE_POS < places.len() {
         let i = places[ABSOLUTE_POS] as usize;
         let view = views[i];
-        let is_clear = f32::abs(view) >= f32::new(evidence::CLEAR_VIEW);
-        let side = select(is_clear, view, known[2 * ABSOLUTE_POS]);
-        let sure = select(is_clear, f32::new(1.0), known[2 * ABSOLUTE_POS + 1]);
+        let clear = evidence::is_clear::<f32>(view);
+        let side = select(clear, view, known[2 * ABSOLUTE_POS]);
+        let sure = select(clear, f32::new(1.0), known[2 * ABSOLUTE_POS + 1]);
         let sign = select(side < f32::new(0.0), F::new(-1.0), F::new(1.0));
         Vector3::<F>::at(axes, i).scale(sign).write(normals, i);
         confidence[i] = F::cast_from(sure);

@@ -67,14 +67,8 @@ struct Runs {
 
 impl Runs {
     fn of(domains: &Domains<'_>) -> Self {
-        let mut members = vec![Vec::new(); domains.count];
-        for (p, &domain) in (0..).zip(domains.domain) {
-            if let Some(members) = members.get_mut(domain as usize) {
-                members.push(p);
-            }
-        }
         let mut runs = Self::default();
-        for (domain, members) in (0..).zip(&members) {
+        for (domain, members) in (0..).zip(domains.members()) {
             for run in members.chunks(RUN) {
                 runs.members.extend_from_slice(run);
                 runs.ends.push(runs.members.len() as u32);
