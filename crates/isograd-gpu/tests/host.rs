@@ -6,7 +6,7 @@ use isograd::distance::extend;
 use isograd::orient::Method;
 use isograd::{
     Attribute, Backend, Cotangent, ExtensionCotangent, Grid, Options, PointCloud, PullbackError,
-    Real, Reconstructor, Resolution, Stage,
+    Real, Reconstructor, Resolution, Saved, Stage,
 };
 use isograd_gpu::host::{Choice, Error, Number, Plan, choose};
 use isograd_shapes::Sampling;
@@ -399,6 +399,54 @@ fn given_normals_are_taken_and_have_cotangents() {
     ] {
         let difference = relative(found.as_flattened(), expected.as_flattened());
         assert!(difference < 2e-3, "{difference:e}");
+    }
+}
+
+#[test]
+fn a_result_is_found_again_from_its_normals() {
+    if !is_here::<f32>() {
+        return;
+    }
+    let shape = isograd_shapes::by_name("torus").unwrap();
+    let samples = shape.sample::<f32>(1500, &Sampling::default(), 3).unwrap();
+    let given = samples.cloud.normals().unwrap().to_vec();
+    let bare = cloud::<f32>(1500);
+    let with_normals = bare.clone().with_normals(given).unwrap();
+    for (cloud, orientation) in [
+        (&bare, Method::Auto),
+        (&with_normals, Method::Signs),
+        (&with_normals, Method::Given),
+    ] {
+        let options = Options {
+            orientation,
+            ..options()
+        };
+        let grid = grid(cloud);
+        let mut plan = Plan::new(Backend::Vulkan, grid, options.clone()).unwrap();
+        let first = plan.reconstruct(cloud).unwrap();
+        let (sdf, closest) = (first.sdf().unwrap().values(), first.closest().unwrap());
+        let saved = Saved {
+            sdf,
+            closest,
+            normals: first.normals().unwrap(),
+        };
+        // A plan that has never seen the cloud.
+        let other = Plan::new(Backend::Vulkan, grid, options).unwrap();
+        let again = other.restore(cloud, &saved).unwrap();
+        assert_eq!(again.sdf().unwrap().values(), sdf, "{orientation:?}");
+        assert_eq!(again.mesh().unwrap(), first.mesh().unwrap());
+        let bar = Cotangent {
+            sdf: Some(sdf),
+            ..Cotangent::default()
+        };
+        let (a, b) = (again.pullback(&bar).unwrap(), first.pullback(&bar).unwrap());
+        assert_eq!((&a.points, &a.normals), (&b.points, &b.normals));
+        let short = Saved {
+            normals: &saved.normals[1..],
+            ..saved
+        };
+        let refused = other.restore(cloud, &short);
+        assert!(matches!(refused, Err(Error::Restore(_))));
     }
 }
 

@@ -1,7 +1,7 @@
 //! Why a host gets nothing.
 
 use isograd::distance::extend;
-use isograd::{Backend, PullbackError, Stage};
+use isograd::{Backend, PointCloudError, PullbackError, RestoreError, Stage};
 
 use crate::pipeline;
 
@@ -27,6 +27,12 @@ pub enum Error {
     /// Cotangents.
     #[error(transparent)]
     Pullback(#[from] PullbackError),
+    /// What was saved makes no result.
+    #[error(transparent)]
+    Restore(#[from] RestoreError),
+    /// What was saved makes no cloud.
+    #[error(transparent)]
+    Cloud(#[from] PointCloudError),
     /// An attribute that was to be extended, or what was extended.
     #[error(transparent)]
     Extension(#[from] extend::Error),

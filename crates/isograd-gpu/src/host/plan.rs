@@ -5,10 +5,11 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use isograd::orient::Method;
-use isograd::{Backend, Grid, Options, PointCloud, Report, Seconds, Stage};
+use isograd::{Backend, Grid, Options, PointCloud, Report, Saved, Seconds, Stage};
 
-use super::work::Work;
+use super::work::{Begun, Work};
 use super::{Error, Number, Reconstruction};
+use crate::Buffer;
 use crate::element::turned;
 use crate::pipeline::Held;
 
@@ -19,14 +20,7 @@ pub struct Plan<T: Number> {
     grid: Grid<T>,
     options: Options,
     /// With [`Method::Previous`], what the next call starts from.
-    before: Option<Before<T>>,
-}
-
-/// What a call leaves to the next one.
-struct Before<T> {
-    held: Held<T>,
-    /// What its report says of the samples.
-    report: Report,
+    before: Option<Begun<T>>,
 }
 
 impl<T: Number> Plan<T> {
@@ -82,30 +76,58 @@ impl<T: Number> Plan<T> {
         if observer(Stage::Normals).is_break() {
             return Err(Error::Interrupted(Stage::Normals));
         }
+        let points = self.device.upload(cloud.points())?;
         let before = self.before.take();
         if let Some(before) = before.filter(|before| before.report.points == cloud.len()) {
-            let (result, next) = self.run(cloud, before.next(), observer)?;
+            let (result, held) = self.run(&points, None, before, observer)?;
             if turned::are_few(result.turned()?, cloud.len()) {
-                self.before = next;
+                self.before = Some(next(held, &result)?);
                 return Ok(result);
             }
         }
-        let found = self.find(cloud, observer)?;
-        let (result, next) = self.run(cloud, found, observer)?;
-        self.before = next;
+        let method = self.options.orientation;
+        let begun = self.find(cloud, &points, method, observer)?;
+        let given = cloud.normals().filter(|_| method == Method::Given);
+        let (result, held) = self.run(&points, given, begun, observer)?;
+        if method == Method::Previous {
+            self.before = Some(next(held, &result)?);
+        }
         Ok(result)
     }
 
-    /// All stages but the orientation; and, with [`Method::Previous`], what the next call starts from.
-    fn run(
-        &mut self,
+    /// The result again that a plan with the same grid and options made of `cloud`: [`isograd::Reconstructor::restore`].
+    /// Of what was saved only the normals are used, which tell the sides: to compute φ anew takes no longer than to
+    /// bring it back.
+    ///
+    /// # Errors
+    /// As [`Self::reconstruct`]; what was saved of another result.
+    pub fn restore(
+        &self,
         cloud: &PointCloud<T>,
-        found: Before<T>,
+        saved: &Saved<'_, T>,
+    ) -> Result<Reconstruction<T>, Error> {
+        saved.check(self.grid.cells(), cloud.len())?;
+        let mut observer = |_| ControlFlow::Continue(());
+        let points = self.device.upload(cloud.points())?;
+        if self.options.orientation == Method::Given {
+            let begun = self.find(cloud, &points, Method::Given, &mut observer)?;
+            return Ok(self.run(&points, cloud.normals(), begun, &mut observer)?.0);
+        }
+        let sided = PointCloud::new(cloud.points().to_vec())
+            .and_then(|cloud| cloud.with_normals(saved.normals.to_vec()))?;
+        let begun = self.find(&sided, &points, Method::Signs, &mut observer)?;
+        Ok(self.run(&points, None, begun, &mut observer)?.0)
+    }
+
+    /// All stages but the orientation; and what was held.
+    fn run(
+        &self,
+        points: &Buffer<T>,
+        given: Option<&[[T; 3]]>,
+        begun: Begun<T>,
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
-    ) -> Result<(Reconstruction<T>, Option<Before<T>>), Error> {
-        let Before { held, report } = found;
-        let of_samples = report.clone();
-        let mut report = report;
+    ) -> Result<(Reconstruction<T>, Held<T>), Error> {
+        let (held, mut report) = (begun.held.clone(), begun.report.clone());
         let mut clock = Clock::new();
         let mut stage_before = Stage::Normals;
         let mut timed = |stage| {
@@ -117,60 +139,55 @@ impl<T: Number> Plan<T> {
                 stage => observer(stage),
             }
         };
-        let is_given = self.options.orientation == Method::Given;
-        let given = cloud.normals().filter(|_| is_given);
-        let result = self
-            .device
-            .reconstruct(cloud.points(), given, &held, &mut timed)?;
+        let result = self.device.reconstruct(points, given, begun, &mut timed)?;
         clock.note(&mut report, stage_before);
-        let next = match self.options.orientation {
-            Method::Previous => Some(Before {
-                held: held.clone().after(&result)?,
-                report: of_samples,
-            }),
-            _ => None,
-        };
         let result = Reconstruction::new(
             self.device.clone(),
             result,
             &self.options,
             self.grid,
-            held,
+            held.clone(),
             report,
         );
-        Ok((result, next))
+        Ok((result, held))
     }
 
     /// Radii and sides.
     fn find(
-        &mut self,
+        &self,
         cloud: &PointCloud<T>,
+        points: &Buffer<T>,
+        method: Method,
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
-    ) -> Result<Before<T>, Error> {
+    ) -> Result<Begun<T>, Error> {
         let (mut clock, mut of_normals) = (Clock::new(), Report::default());
         let mut begin = || {
             clock.note(&mut of_normals, Stage::Normals);
             observer(Stage::Orient)
         };
-        let (radius, method) = (self.options.radius, self.options.orientation);
-        let (held, mut report) = self.device.find(cloud, radius, method, &mut begin)?;
-        report.seconds = of_normals.seconds;
-        clock.note(&mut report, Stage::Orient);
-        Ok(Before { held, report })
+        let radius = self.options.radius;
+        let mut begun = self
+            .device
+            .find(cloud, points, radius, method, &mut begin)?;
+        begun.report.seconds = of_normals.seconds;
+        clock.note(&mut begun.report, Stage::Orient);
+        Ok(begun)
     }
 }
 
-impl<T> Before<T> {
-    /// What a call starts from that follows this one.
-    fn next(self) -> Self {
-        let report = Report {
-            orientation: "previous",
-            flipped: 0,
-            seconds: Seconds::default(),
-            ..self.report
-        };
-        Self { report, ..self }
-    }
+/// What a call starts from that follows the one that made `result`.
+fn next<T: Number>(held: Held<T>, result: &Reconstruction<T>) -> Result<Begun<T>, Error> {
+    let report = Report {
+        orientation: "previous",
+        flipped: 0,
+        seconds: Seconds::default(),
+        ..result.begun().clone()
+    };
+    Ok(Begun {
+        held: result.hold_after(held)?,
+        axes: None,
+        report,
+    })
 }
 
 /// Adds the time since it was looked at last to that of a stage.

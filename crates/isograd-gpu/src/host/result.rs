@@ -176,6 +176,16 @@ impl<T: Number> Reconstruction<T> {
         confidence.map(Vec::as_slice)
     }
 
+    /// What was known of the samples, and the time that it took.
+    pub(super) fn begun(&self) -> &Report {
+        &self.begun
+    }
+
+    /// What the next step of a body that moves holds.
+    pub(super) fn hold_after(&self, held: Held<T>) -> Result<Held<T>, Error> {
+        Ok(held.after(&self.result)?)
+    }
+
     /// Number of axes that have turned by more than 60° since the call before, and followed their neighbours.
     pub(super) fn turned(&self) -> Result<usize, Error> {
         Ok(self.device.indices(&self.result.turned)?[0] as usize)

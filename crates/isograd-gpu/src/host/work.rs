@@ -14,7 +14,7 @@ use isograd::{
 use super::Error;
 use super::extend::{self, Uploaded};
 use super::sides::Sides;
-use crate::pipeline::{self, Held, Options, Reconstruction, Reconstructor, Summary};
+use crate::pipeline::{self, FoundAxes, Held, Options, Reconstruction, Reconstructor, Start};
 use crate::{Buffer, Device, Scalar};
 
 /// What is done on a device, whose runtime is not named.
@@ -22,18 +22,25 @@ pub trait Work<T: Scalar>: Send + Sync {
     /// The name that its driver gives the device.
     fn name(&self) -> &str;
 
-    /// The radii of a cloud and the sides of its axes, and what a report says of them; `begin` is called before the
-    /// sides are looked for, when the axes are there.
+    /// `(N, 3)` vectors, there.
+    ///
+    /// # Errors
+    /// Those of the device.
+    fn upload(&self, vectors: &[[T; 3]]) -> Result<Buffer<T>, Error>;
+
+    /// The radii of a cloud, whose `points` are there, and the sides of its axes; `begin` is called before the sides are
+    /// looked for, when the axes are there.
     ///
     /// # Errors
     /// Those of the pipeline; [`Error::Interrupted`] where `begin` breaks.
     fn find(
         &self,
         cloud: &PointCloud<T>,
+        points: &Buffer<T>,
         radius: Radius,
         method: Method,
         begin: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Result<(Held<T>, Report), Error>;
+    ) -> Result<Begun<T>, Error>;
 
     /// All stages, with given normals or without; `observer` is called before each, when those before it are done.
     ///
@@ -41,9 +48,9 @@ pub trait Work<T: Scalar>: Send + Sync {
     /// Those of the pipeline.
     fn reconstruct(
         &self,
-        points: &[[T; 3]],
+        points: &Buffer<T>,
         given: Option<&[[T; 3]]>,
-        held: &Held<T>,
+        begun: Begun<T>,
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
     ) -> Result<Reconstruction<T>, Error>;
 
@@ -79,6 +86,16 @@ pub trait Work<T: Scalar>: Send + Sync {
     /// # Errors
     /// Those of the device.
     fn indices(&self, buffer: &Buffer<u32>) -> Result<Vec<u32>, Error>;
+}
+
+/// What a reconstruction starts from.
+pub struct Begun<T: Scalar> {
+    /// Radii and sides.
+    pub held: Held<T>,
+    /// The axes that the sides were looked for with, where they were.
+    pub axes: Option<FoundAxes<T>>,
+    /// What a report says of the samples.
+    pub report: Report,
 }
 
 /// `f32` and `f64`, compiled here.
@@ -141,47 +158,63 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
         self.device().name()
     }
 
+    fn upload(&self, vectors: &[[T; 3]]) -> Result<Buffer<T>, Error> {
+        Ok(self.device().upload(vectors.as_flattened())?)
+    }
+
     fn find(
         &self,
         cloud: &PointCloud<T>,
+        points: &Buffer<T>,
         radius: Radius,
         method: Method,
         begin: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Result<(Held<T>, Report), Error> {
+    ) -> Result<Begun<T>, Error> {
         let device = self.device();
-        let points = device.upload(cloud.points().as_flattened())?;
         let sides = Sides::upload(device, cloud, method)?;
-        let (held, summary) = match sides.method() {
-            Some(method) => Held::search(device, &points, radius, &method, begin)?,
+        let (held, search) = match sides.method() {
+            Some(method) => {
+                let (held, search) = Held::search(device, points, radius, &method, begin)?;
+                (held, Some(search))
+            }
             None if begin().is_break() => return Err(Error::Interrupted(Stage::Orient)),
-            None => (Held::radii(device, &points, radius)?, Summary::default()),
+            None => (Held::radii(device, points, radius)?, None),
         };
-        if summary.guarded == cloud.len() {
+        let guarded = search.as_ref().map_or(0, |search| search.guarded);
+        if guarded == cloud.len() {
             let points = cloud.len();
             return Err(isograd::Error::NoPlane { points }.into());
         }
         let report = Report {
             points: cloud.len(),
             orientation: sides.name(),
-            flipped: summary.flipped,
+            flipped: search.as_ref().map_or(0, |search| search.flipped),
             radius: isograd::Real::f64(held.common_radius),
             sample_spacing: isograd::Real::f64(held.spacing),
-            guarded: summary.guarded,
+            guarded,
             ..Report::default()
         };
-        Ok((held, report))
+        Ok(Begun {
+            held,
+            axes: search.map(|search| search.axes),
+            report,
+        })
     }
 
     fn reconstruct(
         &self,
-        points: &[[T; 3]],
+        points: &Buffer<T>,
         given: Option<&[[T; 3]]>,
-        held: &Held<T>,
+        begun: Begun<T>,
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
     ) -> Result<Reconstruction<T>, Error> {
         let device = self.device();
-        let points = device.upload(points.as_flattened())?;
         let given = upload(device, given.map(<[_]>::as_flattened))?;
+        let start = match (&given, begun.axes) {
+            (Some(given), _) => Start::Given(given),
+            (None, Some(axes)) => Start::Axes(axes),
+            (None, None) => Start::Points,
+        };
         let mut failed = None;
         let mut waiting = |stage| match device.wait() {
             Ok(()) => observer(stage),
@@ -190,7 +223,7 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
                 ControlFlow::Break(())
             }
         };
-        let result = self.reconstruct_observed(&points, given.as_ref(), held, &mut waiting);
+        let result = self.reconstruct_from(points, start, &begun.held, &mut waiting);
         match failed {
             Some(error) => Err(error.into()),
             None => {

@@ -7,7 +7,7 @@ use isograd::Stage;
 use isograd::isosurface::Level;
 use isograd::poisson::Smoothing;
 
-use super::{Error, Held, Reconstruction, Reconstructor, Residuals, Source, Width};
+use super::{Error, FoundAxes, Held, Reconstruction, Reconstructor, Residuals, Source, Width};
 use crate::distance::{self, Mesh};
 use crate::iso_value::local;
 use crate::orient::previous::Followed;
@@ -18,12 +18,27 @@ use crate::{Buffer, Scalar, area, iso_value, isosurface, neighbors, normals, ori
 /// takes must [wait](crate::Device::wait).
 pub type Observer<'a> = dyn FnMut(Stage) -> ControlFlow<()> + 'a;
 
-/// What the first stages found of the samples.
-struct Found<T> {
+/// What is known of the normals before the stages begin.
+pub(crate) enum Start<'a, T: Scalar> {
+    /// Nothing.
+    Points,
+    /// They are given.
+    Given(&'a Buffer<T>),
+    /// Their axes, which the sides were looked for with.
+    Axes(FoundAxes<T>),
+}
+
+/// Outward normals, the neighbourhoods, and where the normals come from.
+struct Normals<T> {
     sides: Followed<T>,
     near: neighbors::Neighborhoods<T>,
-    areas: Buffer<T>,
     source: Source<T>,
+}
+
+/// What the first stages found of the samples.
+struct Found<T> {
+    normals: Normals<T>,
+    areas: Buffer<T>,
     of_areas: Option<area::Residual<T>>,
     width: Width,
 }
@@ -74,16 +89,28 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         held: &Held<T>,
         observer: &mut Observer<'_>,
     ) -> Result<Reconstruction<T>, Error> {
+        let start = given.map_or(Start::Points, Start::Given);
+        self.reconstruct_from(points, start, held, observer)
+    }
+
+    /// The same, with what is known of the normals.
+    pub(crate) fn reconstruct_from(
+        &self,
+        points: &Buffer<T>,
+        start: Start<'_, T>,
+        held: &Held<T>,
+        observer: &mut Observer<'_>,
+    ) -> Result<Reconstruction<T>, Error> {
         let mut begin = |stage| match observer(stage) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Error::Interrupted(stage)),
         };
         begin(Stage::Normals)?;
         let (device, grid, options) = (&self.device, &self.grid, &self.options);
-        let found = self.find_samples(points, given, held)?;
+        let found = self.find_samples(points, start, held)?;
         let samples = Samples {
             points,
-            normals: &found.sides.normals,
+            normals: &found.normals.sides.normals,
             areas: &found.areas,
         };
         begin(Stage::Splat)?;
@@ -103,21 +130,26 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         begin(Stage::Distance)?;
         let (sdf, of_distance) =
             distance::lattice::forward(device, &mesh, grid, chi, level, options.band)?;
+        let Normals {
+            sides,
+            near,
+            source,
+        } = found.normals;
         Ok(Reconstruction {
             sdf,
             indicator: solved.chi,
             iso_value: solved.level,
             surface,
             points: points.clone(),
-            normals: found.sides.normals,
-            confidence: found.sides.confidence,
-            turned: found.sides.turned,
-            kept_confidence: found.sides.kept,
+            normals: sides.normals,
+            confidence: sides.confidence,
+            turned: sides.turned,
+            kept_confidence: sides.kept,
             areas: found.areas,
             residuals: Residuals {
-                near: found.near,
+                near,
                 common_radius: held.common_radius,
-                normals: found.source,
+                normals: source,
                 areas: found.of_areas,
                 splat: of_splat,
                 smoothing: found.width,
@@ -133,40 +165,51 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
     fn find_samples(
         &self,
         points: &Buffer<T>,
-        given: Option<&Buffer<T>>,
+        start: Start<'_, T>,
         held: &Held<T>,
     ) -> Result<Found<T>, Error> {
         let device = &self.device;
-        let radii = match given {
-            Some(_) => &held.area_radii,
-            None => &held.radii,
-        };
-        let near = neighbors::forward(device, points, radii)?;
-        let (sides, source) = match given {
-            Some(given) => {
-                let sides = self.take_given(given)?;
-                (sides, Source::Given(given.clone()))
-            }
-            None => {
+        let normals = match start {
+            Start::Given(given) => Normals {
+                sides: self.take_given(given)?,
+                near: neighbors::forward(device, points, &held.area_radii)?,
+                source: Source::Given(given.clone()),
+            },
+            Start::Points => {
+                let near = neighbors::forward(device, points, &held.radii)?;
                 let (axes, residual) = normals::forward(device, &near)?;
-                let sides = held.turn(device, &near, &axes)?;
-                let source = Source::Axes {
-                    axes,
-                    outward: sides.normals.clone(),
-                    residual: residual.into(),
-                };
-                (sides, source)
+                let residual = residual.into();
+                self.turn(FoundAxes { axes, residual }, held)?
             }
+            Start::Axes(found) => self.turn(found, held)?,
         };
-        let (areas, of_areas) = self.areas(&near, held)?;
+        let (areas, of_areas) = self.areas(&normals.near, held)?;
         let width = self.width(&areas, held)?;
         Ok(Found {
-            sides,
-            near,
+            normals,
             areas,
-            source,
             of_areas,
             width,
+        })
+    }
+
+    /// Axes, turned to the sides that are held.
+    fn turn(
+        &self,
+        FoundAxes { axes, residual }: FoundAxes<T>,
+        held: &Held<T>,
+    ) -> Result<Normals<T>, Error> {
+        let near = residual.neighborhoods.clone();
+        let sides = held.turn(&self.device, &near, &axes)?;
+        let source = Source::Axes {
+            axes,
+            outward: sides.normals.clone(),
+            residual,
+        };
+        Ok(Normals {
+            sides,
+            near,
+            source,
         })
     }
 

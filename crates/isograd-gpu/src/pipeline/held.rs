@@ -37,12 +37,19 @@ pub struct Held<T> {
 }
 
 /// What is found beside it.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Summary {
+pub(crate) struct Search<T: Scalar> {
+    /// The axes that the sides were looked for with.
+    pub axes: FoundAxes<T>,
     /// Points whose axis is ill defined.
     pub guarded: usize,
     /// Axes whose sign was changed.
     pub flipped: usize,
+}
+
+/// The axes of a cloud's samples, and the neighbourhoods that they were found in.
+pub struct FoundAxes<T: Scalar> {
+    pub(crate) axes: Buffer<T>,
+    pub(crate) residual: Box<crate::normals::Residual<T>>,
 }
 
 impl<T: Scalar> Held<T> {
@@ -127,7 +134,7 @@ impl<T: Scalar> Held<T> {
         radius: Radius,
         method: &crate::orient::Method<'_, T>,
         begin: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Result<(Self, Summary), Error> {
+    ) -> Result<(Self, Search<T>), Error> {
         let found = radius::forward(device, points, radius)?;
         let (mut axes, mut residual) = crate::normals::forward(device, &found.neighborhoods)?;
         let mut radii = found.each.clone();
@@ -140,12 +147,12 @@ impl<T: Scalar> Held<T> {
         if begin().is_break() {
             return Err(Error::Interrupted(Stage::Orient));
         }
-        let axes = Axes {
+        let to_turn = Axes {
             normals: &axes,
             residual: Some(&residual),
             spacing: found.spacing,
         };
-        let oriented = crate::orient::forward(device, &found.neighborhoods, &axes, method)?;
+        let oriented = crate::orient::forward(device, &found.neighborhoods, &to_turn, method)?;
         let flipped = device.download(&oriented.flipped)?[0] as usize;
         let held = Self {
             radii,
@@ -156,7 +163,15 @@ impl<T: Scalar> Held<T> {
             confidence: oriented.confidence,
             has_moved: false,
         };
-        Ok((held, Summary { guarded, flipped }))
+        let search = Search {
+            axes: FoundAxes {
+                axes,
+                residual: residual.into(),
+            },
+            guarded,
+            flipped,
+        };
+        Ok((held, search))
     }
 
     /// The radii alone, for normals that are given.

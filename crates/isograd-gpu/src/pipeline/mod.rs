@@ -20,8 +20,9 @@ mod held;
 mod pullback;
 
 pub use forward::Observer;
+pub(crate) use forward::Start;
+pub(crate) use held::FoundAxes;
 pub use held::Held;
-pub(crate) use held::Summary;
 pub use pullback::{CloudCotangent, Cotangent, ExtensionCotangent};
 
 use cubecl::prelude::Runtime;

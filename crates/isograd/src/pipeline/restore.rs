@@ -68,10 +68,7 @@ impl<T: Real> Reconstructor<T> {
         cloud: &PointCloud<T>,
         saved: &Saved<'_, T>,
     ) -> Result<(), RestoreError> {
-        let cells = self.grid().cells();
-        check("φ", saved.sdf.len(), cells)?;
-        check("list of closest faces", saved.closest.len(), cells)?;
-        check("list of normals", saved.normals.len(), cloud.len())?;
+        saved.check(self.grid().cells(), cloud.len())?;
         self.result.report = Report {
             points: cloud.len(),
             ..Report::default()
@@ -110,13 +107,27 @@ impl<T: Real> Reconstructor<T> {
     }
 }
 
-fn check(what: &'static str, found: usize, expected: usize) -> Result<(), RestoreError> {
-    match found == expected {
-        true => Ok(()),
-        false => Err(RestoreError::Length {
-            what,
-            found,
-            expected,
-        }),
+impl<T> Saved<'_, T> {
+    /// Whether these may be of a result with so many cells and points.
+    ///
+    /// # Errors
+    /// [`RestoreError::Length`].
+    pub fn check(&self, cells: usize, points: usize) -> Result<(), RestoreError> {
+        let lengths = [
+            ("φ", self.sdf.len(), cells),
+            ("list of closest faces", self.closest.len(), cells),
+            ("list of normals", self.normals.len(), points),
+        ];
+        match lengths
+            .into_iter()
+            .find(|(_, found, expected)| found != expected)
+        {
+            None => Ok(()),
+            Some((what, found, expected)) => Err(RestoreError::Length {
+                what,
+                found,
+                expected,
+            }),
+        }
     }
 }
