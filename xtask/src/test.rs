@@ -45,7 +45,7 @@ fn run(steps: &mut Steps, tally: &mut Tally) -> Outcome {
         let nvrtc = Nvrtc::fetch()
             .inspect_err(|reason| println!("PTX tests are left out: {reason}"))
             .ok();
-        tests(tally, &["--lib", "--bins", "--tests"], nvrtc.as_ref())
+        tests(tally, &["--tests"], nvrtc.as_ref())
     })?;
     steps.step("doc tests", || tests(tally, &["--doc"], None))?;
     steps.step("Python", || python::run(tally))?;

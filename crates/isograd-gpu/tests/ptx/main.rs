@@ -28,17 +28,28 @@ fn every_kernel_becomes_ptx() {
         println!("SKIPPED PTX: ISOGRAD_CUDA_INCLUDE is not set; `cargo xtask test` sets it");
         return;
     };
-    for (name, source) in &sources {
-        let options = CompileOptions {
-            arch: Some("sm_90"),
-            include_paths: vec![include.clone(), format!("{include}/cccl")],
-            ..Default::default()
-        };
-        if let Err(error) = compile_ptx_with_opts(source, options) {
-            panic!("{name}: {error:?}\n{source}");
+    let sources: Vec<_> = sources.iter().collect();
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for part in sources.chunks(sources.len().div_ceil(threads)) {
+            scope.spawn(|| {
+                part.iter()
+                    .for_each(|(name, text)| compile(name, text, &include))
+            });
         }
-    }
+    });
     println!("{} kernels became PTX", sources.len());
+}
+
+fn compile(name: &str, source: &str, include: &str) {
+    let options = CompileOptions {
+        arch: Some("sm_90"),
+        include_paths: vec![include.into(), format!("{include}/cccl")],
+        ..Default::default()
+    };
+    if let Err(error) = compile_ptx_with_opts(source, options) {
+        panic!("{name}: {error:?}\n{source}");
+    }
 }
 
 /// The names of all `#[cube(launch)]` functions below `src`.
