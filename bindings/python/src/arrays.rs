@@ -9,11 +9,10 @@ use numpy::{
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::backend::Scalar;
 use crate::errors::value;
 
 /// A number type on both sides.
-pub trait Number: Real + Scalar + Element {}
+pub trait Number: Real + isograd_backend::Number + Element {}
 impl Number for f32 {}
 impl Number for f64 {}
 

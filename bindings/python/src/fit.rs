@@ -11,6 +11,7 @@ use pyo3::prelude::*;
 use serde::Deserialize;
 
 use crate::arrays;
+use crate::backend::Failure;
 use crate::background::{self, Stop};
 use crate::errors::value;
 use crate::settings::Settings;
@@ -47,9 +48,12 @@ enum Wanted {
     Cloud(Vec<[f64; 3]>),
 }
 
-/// Outcome, history as JSON, names and values of the shape, points, φ, vertices, faces.
+/// Outcome, who computed, why the CPU where that was left to the package, history as JSON, names and values of the
+/// shape, points, φ, vertices, faces.
 type Fitted<'py> = (
     &'static str,
+    String,
+    Option<String>,
     String,
     Vec<(&'static str, f64)>,
     Bound<'py, PyAny>,
@@ -76,6 +80,7 @@ pub fn run_fit<'py>(
     let how: FitSettings =
         serde_json::from_str(how).map_err(|error| value(format!("fit: {error}")))?;
     let grid = settings.grid::<f64>().map_err(value)?;
+    let backend = settings.backend()?;
     let wanted = match (kind, target.as_slice()) {
         ("sdf", [sdf]) => Wanted::Sdf(arrays::values(sdf, "the target")?),
         ("mesh", [vertices, faces]) => Wanted::Mesh(arrays::mesh(vertices, faces)?),
@@ -94,10 +99,13 @@ pub fn run_fit<'py>(
     };
     let done = background::run(py, move |stop| {
         let target = wanted.target(grid, &settings.options())?;
-        let options = how.options(settings.options());
-        let mut fit = Fit::new(&target, variables, options).map_err(value)?;
+        let options = Options {
+            backend,
+            ..how.options(settings.options())
+        };
+        let mut fit = Fit::new(&target, variables, options).map_err(Failure::from)?;
         let outcome = descend(&mut fit, callback.as_ref(), stop)?;
-        Done::new(&mut fit, outcome).map_err(value)
+        Ok::<_, PyErr>(Done::new(&mut fit, outcome).map_err(Failure::from)?)
     })??;
     done.arrays(py)
 }
@@ -185,7 +193,7 @@ fn descend(fit: &mut Fit, callback: Option<&Py<PyAny>>, stop: &Stop) -> PyResult
     });
     match raised {
         Some(error) => Err(error),
-        None => outcome.map_err(value),
+        None => Ok(outcome.map_err(Failure::from)?),
     }
 }
 
@@ -198,6 +206,8 @@ fn goes_on(py: Python<'_>, callback: &Py<PyAny>, fit: &Fit) -> PyResult<bool> {
 /// All that is left of a fit.
 struct Done {
     outcome: Outcome,
+    backend: String,
+    note: Option<String>,
     history: String,
     values: Vec<(&'static str, f64)>,
     points: Vec<[f64; 3]>,
@@ -214,14 +224,18 @@ impl Done {
         let values = values.collect();
         let points = fit.cloud()?.points().to_vec();
         let history = serde_json::to_string(fit.history()).unwrap_or_default();
+        let backend = fit.backend().to_string();
+        let note = fit.backend_note().map(String::from);
         let result = fit.reconstruction()?;
         Ok(Self {
             outcome,
+            backend,
+            note,
             history,
             values,
             points,
-            sdf: result.sdf().clone(),
-            mesh: result.mesh().clone(),
+            sdf: result.sdf()?.clone(),
+            mesh: result.mesh()?.clone(),
         })
     }
 
@@ -235,6 +249,8 @@ impl Done {
         };
         Ok((
             outcome,
+            self.backend,
+            self.note,
             self.history,
             self.values,
             arrays::of_vectors(py, &self.points),

@@ -36,7 +36,7 @@ mod _core {
     #[pymodule_export]
     use plan::Plan;
     #[pymodule_export]
-    use pure::{forward_saved, pullback_saved};
+    use pure::{forward_saved, open_backend, pullback_saved};
     #[pymodule_export]
     use query::{query_mesh, query_mesh_pullback};
     #[pymodule_export]

@@ -18,8 +18,8 @@ use crate::settings::Settings;
 #[pyclass(frozen)]
 pub struct Plan {
     settings: Settings,
-    single: Mutex<Option<backend::Plan<f32>>>,
-    double: Mutex<Option<backend::Plan<f64>>>,
+    single: Mutex<Option<isograd_backend::Plan<f32>>>,
+    double: Mutex<Option<isograd_backend::Plan<f64>>>,
     /// Why the CPU computes, where that was left to the package.
     note: Mutex<Option<String>>,
 }
@@ -42,7 +42,7 @@ impl Plan {
         if plan.settings.backend()? != Backend::Cpu {
             // A device that can't be had is said now.
             let settings = plan.settings.clone();
-            let single = background::run(py, move |_| backend::Plan::new(&settings))??;
+            let single = background::run(py, move |_| backend::plan(&settings))??;
             plan.keep(&plan.single, single);
         }
         Ok(plan)
@@ -82,7 +82,7 @@ impl Plan {
     /// interrupt leaves none behind.
     fn run<T: Number>(
         &self,
-        place: &Mutex<Option<backend::Plan<T>>>,
+        place: &Mutex<Option<isograd_backend::Plan<T>>>,
         py: Python<'_>,
         cloud: PointCloud<T>,
     ) -> PyResult<Kept<T>> {
@@ -91,20 +91,24 @@ impl Plan {
         let (plan, result) = background::run(py, move |stop| {
             let mut plan = match waiting {
                 Some(plan) => plan,
-                None => backend::Plan::new(&settings)?,
+                None => backend::plan(&settings)?,
             };
             let mut observer = |_| match stop.asked() {
                 true => ControlFlow::Break(()),
                 false => ControlFlow::Continue(()),
             };
-            let result = plan.run(&cloud, &mut observer);
+            let result = plan.make(&cloud, &mut observer);
             Ok::<_, Failure>((plan, result.map(|result| Kept { cloud, result })))
         })??;
         self.keep(place, plan);
-        Ok(result?)
+        Ok(result.map_err(Failure::from)?)
     }
 
-    fn keep<T: Number>(&self, place: &Mutex<Option<backend::Plan<T>>>, mut plan: backend::Plan<T>) {
+    fn keep<T: Number>(
+        &self,
+        place: &Mutex<Option<isograd_backend::Plan<T>>>,
+        mut plan: isograd_backend::Plan<T>,
+    ) {
         if let Some(note) = plan.take_note() {
             *lock(&self.note) = Some(note);
         }

@@ -4,18 +4,20 @@
 use std::any::Any;
 use std::sync::{Mutex, PoisonError};
 
-use isograd::{CloudCotangent, PullbackScratch, Real, Reconstructor};
+use isograd::{CloudCotangent, PullbackScratch};
 
+use crate::arrays::Number;
+use crate::backend::{self, Failure};
 use crate::settings::Settings;
 
 /// Plans that are kept at most; the one that has waited longest goes first.
 const KEPT: usize = 4;
 
 /// A plan and the memory of its pullbacks.
-pub struct Plan<T: Real> {
+pub struct Plan<T: Number> {
     /// The plan.
-    pub reconstructor: Reconstructor<T>,
-    /// For [`isograd::Reconstruction::pullback_into`].
+    pub plan: isograd_backend::Plan<T>,
+    /// For [`isograd_backend::View::pullback_into`].
     pub scratch: PullbackScratch<T>,
     /// What that writes.
     pub bar: CloudCotangent<T>,
@@ -34,11 +36,11 @@ static POOL: Mutex<Vec<Waiting>> = Mutex::new(Vec::new());
 /// lock is held meanwhile. A panic drops the plan.
 ///
 /// # Errors
-/// Settings that make no plan.
-pub fn with_plan<T: Real, R>(
+/// Settings that make no plan, and devices that can't be had.
+pub fn with_plan<T: Number, R>(
     settings: &str,
     work: impl FnOnce(&mut Plan<T>) -> R,
-) -> Result<R, String> {
+) -> Result<R, Failure> {
     let mut plan = match take::<T>(settings) {
         Some(plan) => plan,
         None => Box::new(create::<T>(settings)?),
@@ -48,22 +50,22 @@ pub fn with_plan<T: Real, R>(
     Ok(result)
 }
 
-fn create<T: Real>(settings: &str) -> Result<Plan<T>, String> {
+fn create<T: Number>(settings: &str) -> Result<Plan<T>, Failure> {
     Ok(Plan {
-        reconstructor: Settings::parse(settings)?.plan()?,
+        plan: backend::plan(&Settings::parse(settings)?)?,
         scratch: PullbackScratch::default(),
         bar: CloudCotangent::default(),
     })
 }
 
-fn take<T: Real>(settings: &str) -> Option<Box<Plan<T>>> {
+fn take<T: Number>(settings: &str) -> Option<Box<Plan<T>>> {
     let mut pool = POOL.lock().unwrap_or_else(PoisonError::into_inner);
     let fits = |waiting: &Waiting| waiting.settings == settings && waiting.type_name == T::NAME;
     let place = pool.iter().rposition(fits)?;
     pool.remove(place).plan.downcast().ok()
 }
 
-fn put_back<T: Real>(settings: &str, plan: Box<Plan<T>>) {
+fn put_back<T: Number>(settings: &str, plan: Box<Plan<T>>) {
     let waiting = Waiting {
         settings: settings.into(),
         type_name: T::NAME,

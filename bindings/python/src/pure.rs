@@ -4,10 +4,26 @@ use isograd::Saved;
 use pyo3::prelude::*;
 
 use crate::arrays::{self, Dtype, Number};
+use crate::backend::Failure;
 use crate::background;
 use crate::errors::value;
+use crate::pool;
 use crate::saved::{self, Inputs, Outputs};
 use crate::settings::Settings;
+
+/// Makes the plan of these settings, which then waits for its first call: a device that can't be had is said now.
+/// Returns why the CPU computes, where that was left to the package.
+#[pyfunction]
+pub fn open_backend(py: Python<'_>, settings: String, double: bool) -> PyResult<Option<String>> {
+    fn open<T: Number>(settings: &str) -> Result<Option<String>, Failure> {
+        pool::with_plan::<T, _>(settings, |plan| plan.plan.take_note())
+    }
+    let opened = background::run(py, move |_| match double {
+        true => open::<f64>(&settings),
+        false => open::<f32>(&settings),
+    })?;
+    Ok(opened?)
+}
 
 type Arrays<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
 
@@ -46,9 +62,9 @@ fn forward<'py, T: Number>(
             normals: &mut normals,
         };
         saved::forward(&settings, &points, given.as_deref(), out)?;
-        Ok::<_, String>((sdf, closest, normals))
+        Ok::<_, Failure>((sdf, closest, normals))
     })?;
-    let (sdf, closest, normals) = result.map_err(value)?;
+    let (sdf, closest, normals) = result?;
     let shape = grid.shape();
     Ok((
         arrays::shaped(py, sdf, shape)?,
@@ -113,9 +129,9 @@ fn pullback<'py, T: Number>(
             &mut points_bar,
             given_bar.as_deref_mut(),
         )?;
-        Ok::<_, String>((points_bar, given_bar))
+        Ok::<_, Failure>((points_bar, given_bar))
     })?;
-    let (points_bar, given_bar) = result.map_err(value)?;
+    let (points_bar, given_bar) = result?;
     let given_bar = given_bar.map(|bar| arrays::of_vectors(py, &bar));
     Ok((arrays::of_vectors(py, &points_bar), given_bar))
 }

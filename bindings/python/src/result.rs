@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use isograd::distance::extend;
 use isograd::{CloudCotangent, Cotangent, ExtensionCotangent, PointCloud, Real};
+use isograd_backend::Made;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{self, Either, Number};
-use crate::backend::{Failure, Made};
+use crate::backend::Failure;
 use crate::background;
 use crate::errors::value;
 use crate::report;
@@ -56,21 +57,22 @@ impl Outcome {
 
     /// The level of the surface.
     fn iso_value(&self) -> PyResult<f64> {
-        Ok(each!(&self.0, kept => Real::f64(kept.result.iso_value()?)))
+        Ok(each!(&self.0, kept => Real::f64(there(kept.result.view().iso_value())?)))
     }
 
     /// Who computed: `cpu`, or a backend and its device.
     fn backend(&self) -> &str {
-        each!(&self.0, kept => kept.result.backend())
+        each!(&self.0, kept => kept.result.view().backend())
     }
 
     /// The numbers of the report.
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         each!(&self.0, kept => {
             let of = kept.clone();
-            let made = background::run(py, move |_| of.result.report(&of.cloud).map(|_| ()))?;
-            made?;
-            report::dict(py, kept.result.backend(), kept.result.report(&kept.cloud)?)
+            let made = background::run(py, move |_| of.result.view().report(&of.cloud).map(|_| ()))?;
+            there(made)?;
+            let view = kept.result.view();
+            report::dict(py, view.backend(), there(view.report(&kept.cloud))?)
         })
     }
 
@@ -124,23 +126,28 @@ impl<T: Number> Extended<T> {
     }
 }
 
+/// One of the results, or why there is none.
+fn there<V>(result: Result<V, isograd_backend::Error>) -> Result<V, Failure> {
+    Ok(result?)
+}
+
 fn array<'py, T: Number>(
     py: Python<'py>,
     kept: &Arc<Kept<T>>,
     name: &str,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let result = &kept.result;
+    let result = kept.result.view();
     let (shape, count) = (result.shape(), kept.cloud.len());
     match name {
-        "sdf" => arrays::shaped(py, result.sdf()?.to_vec(), shape),
-        "indicator" => arrays::shaped(py, result.indicator()?.to_vec(), shape),
-        "closest" => arrays::shaped(py, result.closest()?.to_vec(), shape),
-        "vertices" => Ok(arrays::of_vectors(py, result.mesh()?.vertices())),
-        "faces" => Ok(arrays::of_vectors(py, result.mesh()?.faces())),
-        "normals" => Ok(arrays::of_vectors(py, result.normals()?)),
-        "confidence" => arrays::shaped(py, result.confidence()?.to_vec(), [count]),
-        "areas" => arrays::shaped(py, result.areas()?.to_vec(), [count]),
-        "neighbours" => arrays::shaped(py, result.neighbour_counts()?.to_vec(), [count]),
+        "sdf" => arrays::shaped(py, there(result.sdf())?.values().to_vec(), shape),
+        "indicator" => arrays::shaped(py, there(result.indicator())?.values().to_vec(), shape),
+        "closest" => arrays::shaped(py, there(result.closest())?.to_vec(), shape),
+        "vertices" => Ok(arrays::of_vectors(py, there(result.mesh())?.vertices())),
+        "faces" => Ok(arrays::of_vectors(py, there(result.mesh())?.faces())),
+        "normals" => Ok(arrays::of_vectors(py, there(result.normals())?)),
+        "confidence" => arrays::shaped(py, there(result.confidence())?.to_vec(), [count]),
+        "areas" => arrays::shaped(py, there(result.areas())?.to_vec(), [count]),
+        "neighbours" => arrays::shaped(py, there(result.neighbour_counts())?.to_vec(), [count]),
         _ => Err(PyKeyError::new_err(name.to_owned())),
     }
 }
@@ -250,7 +257,7 @@ impl<T: Number> Bars<T> {
             areas: self.areas.as_deref(),
             extensions: &extensions,
         };
-        kept.result.pullback(&kept.cloud, &cotangent)
+        Ok(kept.result.view().pullback(&kept.cloud, &cotangent)?)
     }
 }
 
@@ -289,7 +296,7 @@ fn extended<T: Number>(
             let known = attributes.iter().map(|a| a.name.clone()).collect();
             Failure::Value(extend::Error::Missing { name, known }.to_string())
         })?;
-        let (extension, residual) = kept.result.extend(&attribute, band)?;
+        let (extension, residual) = kept.result.view().extend(&attribute, band)?;
         Ok::<_, Failure>(Extended {
             attribute,
             extension,

@@ -3,6 +3,8 @@
 
 use isograd::{Cotangent, PointCloud, Real, Saved};
 
+use crate::arrays::Number;
+use crate::backend::Failure;
 use crate::pool;
 
 /// Where the forward map writes.
@@ -27,23 +29,22 @@ pub struct Inputs<'a, T> {
     pub sdf_bar: &'a [T],
 }
 
-/// Reconstructs `points` with the grid and options of `settings`.
+/// Reconstructs `points` with the grid and options of `settings`, where these say.
 ///
 /// # Errors
 /// What the settings, the cloud or a stage say; an output of another length.
-pub fn forward<T: Real>(
+pub fn forward<T: Number>(
     settings: &str,
     points: &[[T; 3]],
     given: Option<&[[T; 3]]>,
     out: Outputs<'_, T>,
-) -> Result<(), String> {
+) -> Result<(), Failure> {
     let cloud = cloud(points, given)?;
     pool::with_plan::<T, _>(settings, |plan| {
-        let result = plan.reconstructor.reconstruct(&cloud);
-        let result = result.map_err(|e| e.to_string())?;
-        copy("φ", result.sdf().values(), out.sdf)?;
-        copy("the closest faces", result.closest(), out.closest)?;
-        copy("the normals", result.normals(), out.normals)
+        let result = plan.plan.reconstruct(&cloud)?;
+        copy("φ", result.sdf()?.values(), out.sdf)?;
+        copy("the closest faces", result.closest()?, out.closest)?;
+        copy("the normals", result.normals()?, out.normals)
     })?
 }
 
@@ -51,23 +52,21 @@ pub fn forward<T: Real>(
 ///
 /// # Errors
 /// As [`forward`], and cotangents that are not finite.
-pub fn pullback<T: Real>(
+pub fn pullback<T: Number>(
     settings: &str,
     inputs: &Inputs<'_, T>,
     points_bar: &mut [[T; 3]],
     given_bar: Option<&mut [[T; 3]]>,
-) -> Result<(), String> {
+) -> Result<(), Failure> {
     let cloud = cloud(inputs.points, inputs.given)?;
     pool::with_plan::<T, _>(settings, |plan| {
-        let restored = plan.reconstructor.restore(&cloud, &inputs.saved);
-        let restored = restored.map_err(|e| e.to_string())?;
+        let restored = plan.plan.restore(&cloud, &inputs.saved)?;
         let cotangent = Cotangent {
             sdf: Some(inputs.sdf_bar),
             ..Cotangent::default()
         };
         let (scratch, bar) = (&mut plan.scratch, &mut plan.bar);
-        let pulled = restored.pullback_into(&cloud, &cotangent, scratch, bar);
-        pulled.map_err(|e| e.to_string())?;
+        restored.pullback_into(&cloud, &cotangent, scratch, bar)?;
         copy("the points' cotangent", &bar.points, points_bar)?;
         copy_given(&bar.normals, given_bar)
     })?
@@ -80,13 +79,13 @@ pub fn pullback<T: Real>(
 pub fn cloud<T: Real>(
     points: &[[T; 3]],
     given: Option<&[[T; 3]]>,
-) -> Result<PointCloud<T>, String> {
+) -> Result<PointCloud<T>, Failure> {
     let cloud = PointCloud::new(points.to_vec()).map_err(|e| e.to_string())?;
     match given {
         None => Ok(cloud),
         Some(normals) => {
             let cloud = cloud.with_normals(normals.to_vec());
-            cloud.map_err(|e| e.to_string())
+            Ok(cloud.map_err(|e| e.to_string())?)
         }
     }
 }
@@ -95,7 +94,7 @@ pub fn cloud<T: Real>(
 ///
 /// # Errors
 /// An array of another length.
-pub fn copy_given<T: Real>(bar: &[[T; 3]], out: Option<&mut [[T; 3]]>) -> Result<(), String> {
+pub fn copy_given<T: Real>(bar: &[[T; 3]], out: Option<&mut [[T; 3]]>) -> Result<(), Failure> {
     match out {
         None => Ok(()),
         Some(out) if bar.is_empty() => {
@@ -110,12 +109,12 @@ pub fn copy_given<T: Real>(bar: &[[T; 3]], out: Option<&mut [[T; 3]]>) -> Result
 ///
 /// # Errors
 /// An array of another length.
-pub fn copy<E: Copy>(what: &str, from: &[E], to: &mut [E]) -> Result<(), String> {
+pub fn copy<E: Copy>(what: &str, from: &[E], to: &mut [E]) -> Result<(), Failure> {
     if from.len() != to.len() {
         let (found, expected) = (to.len(), from.len());
-        return Err(format!(
+        return Err(Failure::Value(format!(
             "the array for {what} has {found} entries and must have {expected}"
-        ));
+        )));
     }
     to.copy_from_slice(from);
     Ok(())

@@ -5,8 +5,7 @@ use isograd::distance::Band;
 use isograd::neighbors::Radius;
 use isograd::poisson::Smoothing;
 use isograd::{
-    Backend, Grid, GridError, Options, Real, Reconstructor, UnknownBackend, isosurface, orient,
-    splat, vector,
+    Backend, Grid, GridError, Options, Real, UnknownBackend, isosurface, orient, splat, vector,
 };
 use serde::Deserialize;
 
@@ -28,7 +27,7 @@ pub struct Settings {
     level: Level,
     band: Option<f64>,
     checks: bool,
-    /// Of plans alone: pure functions are computed on the CPU.
+    /// The CPU where there is none.
     backend: Option<String>,
 }
 
@@ -113,15 +112,6 @@ impl Settings {
         let text = self.backend.as_deref().unwrap_or("cpu");
         text.parse()
             .map_err(|error: UnknownBackend| Failure::Value(error.to_string()))
-    }
-
-    /// A plan for grid and options, on the CPU.
-    ///
-    /// # Errors
-    /// What the grid or the options say.
-    pub fn plan<T: Real>(&self) -> Result<Reconstructor<T>, String> {
-        let grid = self.grid::<T>().map_err(|e| e.to_string())?;
-        Reconstructor::new(grid, self.options()).map_err(|e| e.to_string())
     }
 
     /// The options.

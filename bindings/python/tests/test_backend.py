@@ -97,6 +97,92 @@ def test_attributes_are_extended_on_a_device_and_have_gradients():
         found.extend("one", band=0.0)
 
 
+def gradient_on(backend, **changes):
+    """What a plan gives: φ, and the gradient of Σ φ² near the surface."""
+    result = plan(backend, **changes)(POINTS)
+    return result.sdf, result.pullback(2 * near(result.sdf)).points
+
+
+def near(sdf):
+    return sdf * (abs(sdf) < 1.5 * GRID.spacing)
+
+
+def test_jax_computes_on_a_device_inside_jit():
+    sdf, gradient = gradient_on("vulkan")
+    jax = pytest.importorskip("jax")
+    import isograd.jax
+
+    def loss(points):
+        return (near(isograd.jax.signed_distance(points, GRID, options=OPTIONS, backend="vulkan")) ** 2).sum()
+
+    def distance(points):
+        return isograd.jax.signed_distance(points, GRID, options=OPTIONS, backend="vulkan")
+
+    found = jax.jit(distance)(POINTS)
+    assert np.array_equal(found, sdf)
+    assert np.array_equal(jax.jit(jax.grad(loss))(POINTS), gradient)
+    # The other targets, which look at the surface and at the fits of attributes.
+    on_device, on_cpu = (
+        jax.value_and_grad(lambda points: scene(jax, isograd.jax, points, backend))(POINTS)
+        for backend in ("vulkan", "cpu")
+    )
+    assert off(on_device[0], on_cpu[0]) < 2e-4
+    apart = np.abs(on_device[1] - on_cpu[1]).max(axis=1) / np.abs(on_cpu[1]).max()
+    # A cell may have its closest point so near a corner that rounding takes the other side of a kink, which concerns
+    # the samples round it.
+    assert np.quantile(apart, 0.98) < 2e-3 and apart.max() < 0.1
+    with pytest.raises(RuntimeError, match="no CUDA device|build it with"):
+        isograd.jax.signed_distance(POINTS, GRID, backend="cuda:77")
+
+
+def scene(jax, functions, points, backend):
+    """A number that mesh, query and extension have a part in."""
+    how = {"options": OPTIONS, "backend": backend}
+    mesh = functions.mesh(points, GRID, max_vertices=20_000, max_faces=40_000, **how)
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    volume = (a * jax.numpy.cross(b, c)).sum() / 6
+    far = functions.query(points, GRID, 1.3 * POINTS[:50], **how).sum()
+    extended = functions.extend(points, points[:, 0] ** 2, GRID, band=2.0, **how)
+    # Smooth, and 0 before the band ends: no cell comes or goes by rounding.
+    window = jax.numpy.maximum(0, 1 - (extended.sdf / (1.5 * GRID.spacing)) ** 2) ** 2
+    return volume + far + (extended.values * window).sum()
+
+
+def test_torch_computes_on_a_device():
+    sdf, gradient = gradient_on("vulkan")
+    torch = pytest.importorskip("torch")
+    import isograd.torch
+
+    points = torch.tensor(POINTS, requires_grad=True)
+    found = isograd.torch.signed_distance(points, GRID, options=OPTIONS, backend="vulkan")
+    assert np.array_equal(found.detach().numpy(), sdf)
+    (near(found) ** 2).sum().backward()
+    assert off(points.grad.numpy(), gradient) < 1e-6
+    with pytest.raises(RuntimeError, match="no CUDA device|build it with"):
+        isograd.torch.signed_distance(points, GRID, backend="cuda:77")
+
+
+def test_a_fit_is_made_on_a_device():
+    plan("vulkan")
+    grid = isograd.Grid.fit(isograd.sample("sphere", 500).points, 20, padding=0.3)
+    fits = [
+        isograd.fit(
+            isograd.sample("sphere", 1000).points,
+            grid,
+            shape=isograd.Shape("sphere", radius=0.45),
+            samples=800,
+            epochs=2,
+            backend=backend,
+        )
+        for backend in ("vulkan", "cpu")
+    ]
+    assert fits[0].backend.startswith("vulkan: ") and fits[1].backend == "cpu"
+    losses = [[epoch["loss"] for epoch in fit.history] for fit in fits]
+    assert len(losses[0]) == 3 and off(*map(np.array, losses)) < 1e-6
+    with pytest.raises(RuntimeError, match="no CUDA device|build it with"):
+        isograd.fit(POINTS, GRID, points=POINTS, backend="cuda:77")
+
+
 def test_what_can_not_be_is_said_as_on_the_cpu():
     with pytest.raises(ValueError, match="wall"):
         plan("vulkan")(POINTS + 10)

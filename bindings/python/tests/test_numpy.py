@@ -442,7 +442,7 @@ def test_a_plan_follows_the_step_before():
 @pytest.mark.parametrize("orient", ["previous", "sensors"])
 def test_pure_functions_refuse_what_is_no_function_of_their_arguments(orient):
     with pytest.raises(ValueError, match='with orient="signs"'):
-        _settings.encode_pure(GRID, isograd.Options(orient=orient), False)
+        _settings.encode_pure(GRID, isograd.Options(orient=orient), False, "cpu", False)
     with pytest.raises(ValueError, match='with orient="signs"'):
         isograd.fit(SPHERE, GRID, points=SPHERE, options=isograd.Options(orient=orient))
 

@@ -118,22 +118,20 @@ pub enum Error {
         feature: &'static str,
     },
     /// A backend that can't be had, or not with these options.
-    #[cfg(feature = "gpu")]
     #[error("--backend {backend}: {error}")]
     Backend {
         /// What was asked for.
         backend: isograd::Backend,
         /// What is wrong.
-        error: isograd_gpu::host::Error,
+        error: isograd_backend::Error,
     },
     /// A device failed.
-    #[cfg(feature = "gpu")]
     #[error("{file}: {source}")]
     Device {
         /// The file.
         file: String,
         /// What is wrong.
-        source: isograd_gpu::host::Error,
+        source: isograd_backend::Error,
     },
     /// The threads could not be started.
     #[error("the threads could not be started: {0}; use fewer")]

@@ -4,11 +4,12 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
-use isograd::{Grid, PointCloud, Real, Stage};
+use isograd::{Field, Grid, Mesh, PointCloud, Real, Stage};
+use isograd_backend::{Number, Plan, View};
 use isograd_io::Geometry;
 
 use crate::args::{self, Precision};
-use crate::backend::{Number, Plan, Results};
+use crate::backend;
 use crate::error::Error;
 use crate::outputs::{Outputs, write_report};
 use crate::plot;
@@ -65,6 +66,31 @@ fn read(args: &args::Reconstruct) -> Result<Geometry, Error> {
             problem: "its faces have no area; --sample can't be used".into(),
         })
     })
+}
+
+/// What the command writes and says, wherever it was made.
+struct Results<'a, T> {
+    sdf: &'a Field<T>,
+    mesh: &'a Mesh<T>,
+    normals: &'a [[T; 3]],
+    confidence: &'a [T],
+    report: &'a isograd::Report,
+    /// Who computed.
+    backend: &'a str,
+}
+
+impl<'a, T: Number> Results<'a, T> {
+    /// Copied from a device, where one computed.
+    fn of(view: View<'a, T>, cloud: &PointCloud<T>) -> Result<Self, isograd_backend::Error> {
+        Ok(Self {
+            sdf: view.sdf()?,
+            mesh: view.mesh()?,
+            normals: view.normals()?,
+            confidence: view.confidence()?,
+            report: view.report(cloud)?,
+            backend: view.backend(),
+        })
+    }
 }
 
 /// One reconstruction, apart from its number type.
@@ -132,9 +158,9 @@ impl Job<'_> {
             grid.spacing()
         ));
         let options = self.args.method.options(grid.spacing().f64());
-        let plan = Plan::new(self.args.backend, grid, options, &self.file())?;
-        let backend = plan.name().to_string();
-        progress.detail(&format!("on {backend}"));
+        let plan = Plan::new(self.args.backend, grid, options);
+        let mut plan = plan.map_err(|e| backend::plan_error(self.args.backend, e, &self.file()))?;
+        progress.detail(&format!("on {}", plan.name()));
         if let Some(note) = plan.note() {
             progress.warn(note);
         }
@@ -142,8 +168,17 @@ impl Job<'_> {
             progress.step(stage.name());
             ControlFlow::Continue(())
         };
-        let made = plan.run(&cloud, &mut observer, &self.file())?;
-        let result = made.results(&cloud, &self.file())?;
+        let result = plan
+            .reconstruct_observed(&cloud, &mut observer)
+            .and_then(|view| {
+                if view.backend() != "cpu" {
+                    // There they are made with the report.
+                    progress.step(Stage::Checks.name());
+                }
+                Results::of(view, &cloud)
+            })
+            .map_err(|e| backend::run_error(e, &self.file()))?;
+        let backend = result.backend.to_string();
         let mut report = Report::new(&self.args.cloud, backend, &grid, result.report);
         for warning in &report.warnings {
             progress.warn(warning);
@@ -156,7 +191,7 @@ impl Job<'_> {
         Ok(())
     }
 
-    fn write<T: Real>(
+    fn write<T: Number>(
         &self,
         cloud: &PointCloud<T>,
         result: &Results<'_, T>,

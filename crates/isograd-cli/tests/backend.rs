@@ -32,6 +32,8 @@ fn a_backend_that_was_left_out_says_how_to_build_with_it() {
     for (backend, part) in lines {
         let line = format!("reconstruct cloud.ply --mesh m.ply --backend {backend}");
         bench.run(&line).says(1, &[part, "--backend cpu"]);
+        let line = format!("fit --target cloud.ply --shape sphere -o fit --backend {backend}");
+        bench.run(&line).says(1, &[part, "--backend cpu"]);
     }
     assert_eq!(bench.files(), ["cloud.ply"]);
 }
@@ -47,6 +49,22 @@ fn the_report_says_that_the_cpu_did_it() {
     let bench = sphere();
     bench.done("reconstruct cloud.ply --report r.json --resolution 24 -q");
     assert_eq!(report(&bench, "r.json")["backend"], "cpu");
+}
+
+#[test]
+fn a_fit_says_who_computed() {
+    let bench = sphere();
+    let line = "fit --target cloud.ply --shape sphere --param radius=0.9 -n 1000 --resolution 20 --epochs 1 -o";
+    bench.done(&format!("{line} cpu --pictures-at 0"));
+    assert_eq!(report(&bench, "cpu/fit.json")["backend"], "cpu");
+    let run = bench.done(&format!("{line} auto --pictures-at 0 --backend auto"));
+    match report(&bench, "auto/fit.json")["backend"]
+        .as_str()
+        .expect("a text")
+    {
+        "cpu" => run.says(0, &["computed on the CPU: "]),
+        device => println!("there is a GPU: {device}"),
+    }
 }
 
 #[test]
@@ -69,7 +87,9 @@ mod vulkan {
 
     /// Whether there is a device.
     fn is_here() -> bool {
-        match isograd_gpu::Device::vulkan() {
+        let grid = isograd::Grid::<f32>::new([0.0; 3], 1.0, [8; 3]).expect("a grid");
+        let options = isograd::Options::default();
+        match isograd_backend::Plan::new(isograd::Backend::Vulkan, grid, options) {
             Ok(_) => true,
             Err(error) => {
                 println!("SKIPPED: {error}");

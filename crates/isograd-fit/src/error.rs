@@ -27,6 +27,9 @@ pub enum Error {
     /// The pullback.
     #[error(transparent)]
     Pullback(#[from] PullbackError),
+    /// The backend.
+    #[error(transparent)]
+    Backend(isograd_backend::Error),
     /// Nothing may change.
     #[error("no parameter is left to fit; name at least one that is not a whole number")]
     NoParameters,
@@ -77,4 +80,14 @@ pub enum Error {
         /// What differs.
         what: &'static str,
     },
+}
+
+impl From<isograd_backend::Error> for Error {
+    fn from(error: isograd_backend::Error) -> Self {
+        match error {
+            isograd_backend::Error::Reconstruct(error) => Self::Reconstruct(error),
+            isograd_backend::Error::Pullback(error) => Self::Pullback(error),
+            error => Self::Backend(error),
+        }
+    }
 }

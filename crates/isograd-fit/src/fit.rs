@@ -2,7 +2,8 @@
 
 use std::ops::ControlFlow;
 
-use isograd::{PointCloud, Reconstruction};
+use isograd::PointCloud;
+use isograd_backend::View;
 use isograd_shapes::Shape;
 use serde::{Deserialize, Serialize};
 
@@ -36,6 +37,9 @@ pub struct Options {
     /// orientation becomes [`orient::Method::Signs`](isograd::orient::Method::Signs). Sensors are not passed on; and
     /// with the signs of the call before the loss is no function of the variables alone.
     pub reconstruction: isograd::Options,
+    /// Where reconstructions and pullbacks are computed, in `f64`. The shape, the loss and the descent stay on the CPU:
+    /// φ and its cotangent are copied for every evaluation.
+    pub backend: isograd::Backend,
 }
 
 impl Default for Options {
@@ -47,6 +51,7 @@ impl Default for Options {
             tolerance: 1e-6,
             patience: 25,
             reconstruction: isograd::Options::default(),
+            backend: isograd::Backend::Cpu,
         }
     }
 }
@@ -329,9 +334,19 @@ impl Fit {
     /// The field and the surface as they are now.
     ///
     /// # Errors
-    /// None, once a step was taken there.
-    pub fn reconstruction(&mut self) -> Result<&Reconstruction<f64>, Error> {
+    /// Those of a device; on the CPU none, once a step was taken there.
+    pub fn reconstruction(&mut self) -> Result<View<'_, f64>, Error> {
         self.problem.reconstruction(&self.state.x)
+    }
+
+    /// Who computes: `cpu`, or a backend and its device, such as `cuda: NVIDIA H100`.
+    pub fn backend(&self) -> &str {
+        self.problem.plan.name()
+    }
+
+    /// Why it is the CPU, where that was left to the program.
+    pub fn backend_note(&self) -> Option<&str> {
+        self.problem.plan.note()
     }
 }
 
@@ -347,8 +362,13 @@ fn prepare(
             range: "a number of cells, 0 for none",
         });
     }
-    let problem = Problem::new(target, variables, options.region, &options.reconstruction)?;
-    let others = format!("{:?} {:?}", options.region, options.optimizer);
+    let problem = Problem::new(target, variables, options)?;
+    let mut others = format!("{:?} {:?}", options.region, options.optimizer);
+    // Every device rounds in its own way.
+    others += match problem.plan.name() {
+        "cpu" => "",
+        device => device,
+    };
     let reconstruction = &options.reconstruction;
     let fingerprints = Fingerprints::new(target, &problem.degrees, reconstruction, &others);
     Ok((problem, fingerprints))

@@ -32,7 +32,8 @@
 //!
 //! - [`Target`]: a field, a closed mesh, or a cloud.
 //! - [`Variables`]: the parameters of a shape ([`ShapeParameters`]), or raw points ([`Points`]).
-//! - [`Options`]: where the fields are compared ([`Region`]), the method ([`Optimizer`]), when to end.
+//! - [`Options`]: where the fields are compared ([`Region`]), the method ([`Optimizer`]), when to end, and who computes
+//!   (a device needs the features of [`isograd_backend`]).
 //! - [`Fit`]: a step, a run with an observer, the state to go on from ([`Checkpoint`]).
 //!
 //! What it guarantees: the same bits for any number of threads; a run that was stopped and resumed ends in the

@@ -1,11 +1,13 @@
 //! The chain: variables → points → φ → loss, and its gradient back.
 
-use isograd::{CloudCotangent, Cotangent, PullbackScratch, Reconstruction, Reconstructor};
+use isograd::{CloudCotangent, Cotangent, PullbackScratch};
+use isograd_backend::{Plan, View};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 use crate::fingerprint::Fingerprint;
-use crate::loss::{Matching, Region};
+use crate::fit::Options;
+use crate::loss::Matching;
 use crate::optimize::Evaluation;
 use crate::target::Target;
 use crate::variables::{Degrees, Variables};
@@ -26,7 +28,7 @@ pub struct Parts {
 /// One plan for all evaluations of a fit.
 pub(crate) struct Problem {
     pub degrees: Degrees,
-    plan: Reconstructor<f64>,
+    pub plan: Plan<f64>,
     matching: Matching,
     phi_bar: Vec<f64>,
     scratch: PullbackScratch<f64>,
@@ -34,23 +36,19 @@ pub(crate) struct Problem {
 }
 
 impl Problem {
-    pub fn new(
-        target: &Target,
-        variables: Variables,
-        region: Region,
-        options: &isograd::Options,
-    ) -> Result<Self, Error> {
-        // Nobody reads the report of a reconstruction among hundreds.
+    pub fn new(target: &Target, variables: Variables, options: &Options) -> Result<Self, Error> {
         let degrees = Degrees::new(variables, target.grid().spacing())?;
-        let options = isograd::Options {
+        let of_plan = &options.reconstruction;
+        let of_plan = isograd::Options {
+            // Nobody reads the report of a reconstruction among hundreds.
             checks: false,
-            orientation: degrees.orientation(options.orientation),
-            ..options.clone()
+            orientation: degrees.orientation(of_plan.orientation),
+            ..of_plan.clone()
         };
         Ok(Self {
             degrees,
-            plan: Reconstructor::new(*target.grid(), options)?,
-            matching: Matching::new(target.sdf(), region)?,
+            plan: Plan::new(options.backend, *target.grid(), of_plan)?,
+            matching: Matching::new(target.sdf(), options.region)?,
             phi_bar: vec![0.0; target.grid().cells()],
             scratch: PullbackScratch::default(),
             bar: CloudCotangent::default(),
@@ -63,7 +61,7 @@ impl Problem {
         let result = self.plan.reconstruct(&cloud)?;
         let mismatch = self
             .matching
-            .evaluate(result.sdf().values(), &mut self.phi_bar);
+            .evaluate(result.sdf()?.values(), &mut self.phi_bar);
         let cotangent = Cotangent {
             sdf: Some(&self.phi_bar),
             ..Cotangent::default()
@@ -84,7 +82,7 @@ impl Problem {
     }
 
     /// The reconstruction at `x`.
-    pub fn reconstruction(&mut self, x: &[f64]) -> Result<&Reconstruction<f64>, Error> {
+    pub fn reconstruction(&mut self, x: &[f64]) -> Result<View<'_, f64>, Error> {
         let cloud = self.degrees.cloud(x)?;
         Ok(self.plan.reconstruct(&cloud)?)
     }

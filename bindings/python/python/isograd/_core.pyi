@@ -26,6 +26,7 @@ __all__ = [
     "check_grid",
     "fit_grid",
     "forward_saved",
+    "open_backend",
     "orient",
     "pullback_saved",
     "query_mesh",
@@ -122,6 +123,10 @@ def orient(
 ) -> tuple[_Floats, _Floats, dict[str, Any]]:
     """Outward normals, confidence and report of a cloud: ``points``, ``normals`` and ``sensors`` of one type."""
 
+def open_backend(settings: str, double: bool) -> str | None:
+    """Makes the plan of these settings, in either number type; why the CPU computes, where that was left to the
+    package."""
+
 def forward_saved(
     settings: str, points: _Floats, normals: _Floats | None = None
 ) -> tuple[_Floats, _Indices, _Floats]:
@@ -190,8 +195,11 @@ def run_fit(
     shape: Shape | None,
     points: _Floats | None,
     callback: Callable[[str], bool | None] | None,
-) -> tuple[str, str, list[tuple[str, float]], _Floats, _Floats, _Floats, _Indices]:
-    """Outcome, history as JSON, names and values of the shape, points, φ, vertices, faces.
+) -> tuple[
+    str, str, str | None, str, list[tuple[str, float]], _Floats, _Floats, _Floats, _Indices
+]:
+    """Outcome, who computed, why the CPU where that was left to the package, history as JSON, names and values of the
+    shape, points, φ, vertices, faces.
 
     ``target`` is φ, ``(vertices, faces)`` or points, as ``kind`` says."""
 

@@ -15,7 +15,7 @@ from ._grid import Grid
 from ._mesh import Mesh
 from ._numbers import number, whole
 from ._options import Options
-from ._settings import check_pure, encode
+from ._settings import check_backend, check_pure, encode, say_note
 from ._shapes import Shape
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ class Fit:
     Attributes:
         outcome: ``"met"`` (the tolerance), ``"minimum"`` (nothing lower was found), ``"epochs"`` (all are done) or
             ``"stopped"`` (by the callback).
+        backend: who computed: ``"cpu"``, or a backend and its device.
         shape: the shape as it is at the end; ``None`` for points.
         points: ``(N, 3)`` points at the end.
         sdf: ``(nx, ny, nz)`` field at the end, negative inside.
@@ -38,6 +39,7 @@ class Fit:
     """
 
     outcome: str
+    backend: str
     shape: Shape | None
     points: np.ndarray
     sdf: np.ndarray
@@ -64,6 +66,7 @@ def fit(
     tolerance: float = 1e-6,
     band: float | None = 8.0,
     options: Options | None = None,
+    backend: str = "cpu",
     callback: Callable[[dict[str, Any]], bool | None] | None = None,
 ) -> Fit:
     """Changes the parameters of ``shape``, or every one of ``points``, until the field is that of ``target``.
@@ -83,10 +86,12 @@ def fit(
         rate: length of the first steps, as a share of the parameters, or in cells for points.
         tolerance: mean difference of φ, in cells, below which the fit is done.
         band: compares within so many cells of the target's surface; ``None`` for everywhere.
+        backend: where to reconstruct, as for :func:`reconstruct`; the device must have float64.
         callback: called with each epoch; the fit stops where it returns ``False``.
 
     Raises:
         TypeError, ValueError: a target or a start that makes no field, with the reason and the remedy.
+        RuntimeError: a backend that can't be had, with the reason and the remedy.
     """
     if (shape is None) == (points is None):
         raise ValueError("give a shape or points to fit, and not both")
@@ -110,8 +115,8 @@ def fit(
     check_pure(options or Options())
     found_kind, arrays = _target(target, grid, kind)
     start = None if points is None else floats(points, "points", (None, 3), np.float64)
-    outcome, history, values, found, sdf, vertices, faces = _core.run_fit(
-        encode(grid, options),
+    outcome, who, note, history, values, found, sdf, vertices, faces = _core.run_fit(
+        encode(grid, options, check_backend(backend)),
         json.dumps(how, allow_nan=False),
         found_kind,
         arrays,
@@ -119,8 +124,9 @@ def fit(
         start,
         None if callback is None else (lambda epoch: callback(json.loads(epoch))),
     )
+    say_note(note)
     fitted = None if shape is None else Shape(shape.name, **dict(values))
-    return Fit(outcome, fitted, found, sdf, Mesh(vertices, faces), json.loads(history))
+    return Fit(outcome, who, fitted, found, sdf, Mesh(vertices, faces), json.loads(history))
 
 
 def _target(target: object, grid: Grid, kind: str | None) -> tuple[str, list[np.ndarray]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,7 +15,7 @@ from ._grid import Grid
 from ._mesh import Mesh
 from ._numbers import number
 from ._options import Options, check_known, resolve
-from ._settings import encode
+from ._settings import check_backend, encode, say_note
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -248,10 +247,10 @@ class Reconstructor:
         """What to compute, and how."""
         self.grid = grid
         """The grid of all results."""
-        self.backend = _backend(backend)
+        self.backend = check_backend(backend)
         """Where to compute, as it was asked for."""
         self._plan = _core.Plan(encode(grid, self.options, self.backend))
-        self._say_note()
+        say_note(self._plan.take_note())
 
     def __call__(
         self,
@@ -266,15 +265,10 @@ class Reconstructor:
         normals, sensors = known(cloud, normals, sensors)
         check_known(self.options.orient, normals is not None, sensors is not None)
         core = self._plan.reconstruct(cloud, normals, sensors, _attributes(attributes, cloud))
-        self._say_note()
+        say_note(self._plan.take_note())
         return Reconstruction(core, self.grid, self.options, len(cloud), cloud.dtype)
 
     reconstruct = __call__
-
-    def _say_note(self) -> None:
-        note = self._plan.take_note()
-        if note is not None:
-            warnings.warn(note, RuntimeWarning, stacklevel=3)
 
 
 def reconstruct(
@@ -313,12 +307,6 @@ def reconstruct(
     grid = Grid.fit(cloud) if grid is None else grid
     plan = Reconstructor(grid, options, backend=backend, **changes)
     return plan(cloud, normals=normals, sensors=sensors, attributes=attributes)
-
-
-def _backend(backend: object) -> str:
-    if not isinstance(backend, str):
-        raise TypeError(f"backend is a {type(backend).__name__}; give a text such as \"cpu\" or \"cuda\"")
-    return str(backend)
 
 
 def _attributes(

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import warnings
 
+from . import _core
 from ._grid import Grid
 from ._options import Level, Options, Orient, Splat, check_known, resolve
 
@@ -38,18 +40,43 @@ def encode(grid: Grid, options: Options | None = None, backend: str | None = Non
     )
 
 
-def encode_pure(grid: Grid, options: Options | None, normals_are_given: bool) -> str:
-    """The text for a function that returns arrays alone: nobody sees a report, so nothing is checked for one.
+def encode_pure(
+    grid: Grid, options: Options | None, normals_are_given: bool, backend: str, double: bool
+) -> str:
+    """The text for a function that returns arrays alone, in double precision or single: nobody sees a report, so
+    nothing is checked for one.
 
     Raises:
-        TypeError: for what is no grid or no options.
+        TypeError: for what is no grid, no options or no text.
         ValueError: for normals that are missing or not used, and for ways to orient that are no function of the
             points and normals alone.
+        RuntimeError: for a backend that can't be had.
     """
     options = resolve(options, {"checks": False})
     check_pure(options)
     check_known(options.orient, normals_are_given)
-    return encode(grid, options)
+    if check_backend(backend) == "cpu":
+        return encode(grid, options)
+    settings = encode(grid, options, backend)
+    say_note(_core.open_backend(settings, double))
+    return settings
+
+
+def check_backend(backend: object) -> str:
+    """The text.
+
+    Raises:
+        TypeError: for what is none.
+    """
+    if not isinstance(backend, str):
+        raise TypeError(f"backend is a {type(backend).__name__}; give a text such as \"cpu\" or \"cuda\"")
+    return str(backend)
+
+
+def say_note(note: str | None) -> None:
+    """Warns that the CPU computes, where that was left to the package."""
+    if note is not None:
+        warnings.warn(note, RuntimeWarning, stacklevel=4)
 
 
 def check_pure(options: Options) -> None:

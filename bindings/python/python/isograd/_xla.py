@@ -52,6 +52,7 @@ def prepare(
     grid: Grid,
     normals: ArrayLike | None,
     options: Options | None,
+    backend: str,
     band: float | None = None,
 ) -> tuple[Plan, jax.Array, jax.Array | None]:
     """Checks what can be checked while tracing.
@@ -59,11 +60,13 @@ def prepare(
     Raises:
         TypeError: for what is no array of numbers, no grid, no options.
         ValueError: for another shape, and for normals that are missing or not used.
+        RuntimeError: for a backend that can't be had.
     """
     points = floats(points, "points", (None, 3))
     if normals is not None:
         normals = floats(normals, "normals", points.shape, points.dtype)
-    settings = _settings.encode_pure(grid, options, normals is not None)
+    double = points.dtype == jnp.float64
+    settings = _settings.encode_pure(grid, options, normals is not None, backend, double)
     return Plan(settings, grid.shape, band), points, normals
 
 
@@ -131,7 +134,7 @@ def refuse(*_arrays: ArrayLike) -> tuple[np.ndarray, ...]:
         ValueError: always.
     """
     raise ValueError(
-        "isograd.jax computes on the CPU, and these arrays are on another device: put them on "
+        "isograd.jax takes arrays of the CPU, whatever the backend, and these are on another device: put them on "
         'jax.devices("cpu")[0], or set ISOGRAD_JAX_CALLBACK=1 in the environment, and they are copied to the CPU '
         "and back at every call"
     )

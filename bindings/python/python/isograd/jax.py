@@ -6,9 +6,10 @@
 
 Points and normals are arrays that are traced; grid and options are static. float32 and float64 stay what they are
 (float64 needs ``jax_enable_x64``), half precision becomes float32, whole numbers JAX's default float. The work is
-done on the CPU, by handlers that XLA calls without Python. Arrays on other devices are refused, unless the environment
-has ``ISOGRAD_JAX_CALLBACK=1``: then they are copied, and the work is done through ``jax.pure_callback``, with the same
-bits.
+done by handlers that XLA calls without Python, on arrays of the CPU. Arrays on other devices are refused, unless the
+environment has ``ISOGRAD_JAX_CALLBACK=1``: then they are copied, and the work is done through ``jax.pure_callback``,
+with the same bits. With ``backend="cuda"`` or ``"vulkan"`` the handlers compute on that device: points and φ, and
+their cotangents, are copied there and back at every call, and the pullback reconstructs once more.
 
 What can be seen from types and shapes raises ``TypeError`` or ``ValueError`` at once. What depends on the values (a
 point that is not finite or off the grid) raises ``jax.errors.JaxRuntimeError`` or, as JAX chooses, ``ValueError``,
@@ -44,6 +45,7 @@ def signed_distance(
     *,
     normals: ArrayLike | None = None,
     options: Options | None = None,
+    backend: str = "cpu",
 ) -> jax.Array:
     """The signed distance φ of the surface through ``points``, at the cell centres of ``grid``.
 
@@ -55,6 +57,7 @@ def signed_distance(
         grid: static.
         normals: ``(N, 3)``, outward, of any length but zero, where ``options.orient`` is ``"given"`` or ``"signs"``.
         options: static; ``checks`` has no effect, since there is no report.
+        backend: static; where to compute, as for :func:`isograd.reconstruct`.
 
     Returns:
         ``(nx, ny, nz)``, in the unit of the points, negative inside, of the type of the points.
@@ -62,9 +65,10 @@ def signed_distance(
     Raises:
         TypeError: for what is no array of numbers, no grid, no options.
         ValueError: for another shape, and for normals that are missing or not used.
+        RuntimeError: for a backend that can't be had, with the reason and the remedy.
         jax.errors.JaxRuntimeError: for values that no surface can be made from.
     """
-    plan, points, normals = prepare(points, grid, normals, options)
+    plan, points, normals = prepare(points, grid, normals, options, backend)
     return _distance(plan, points, normals)
 
 
@@ -97,6 +101,7 @@ def query(
     *,
     normals: ArrayLike | None = None,
     options: Options | None = None,
+    backend: str = "cpu",
 ) -> jax.Array:
     """The signed distance from any places to the surface through ``points``: exact to each triangle of it.
 
@@ -110,14 +115,15 @@ def query(
         queries: ``(M, 3)``, on the grid or off it.
         normals: as for :func:`signed_distance`.
         options: as for :func:`signed_distance`.
+        backend: as for :func:`signed_distance`; the surface is made there, and the distances to it on the CPU.
 
     Returns:
         ``(M,)``, in the unit of the points, negative inside; NaN for a query that is not finite.
 
     Raises:
-        TypeError, ValueError, jax.errors.JaxRuntimeError: as for :func:`signed_distance`.
+        TypeError, ValueError, RuntimeError, jax.errors.JaxRuntimeError: as for :func:`signed_distance`.
     """
-    plan, points, normals = prepare(points, grid, normals, options)
+    plan, points, normals = prepare(points, grid, normals, options, backend)
     queries = floats(queries, "queries", (None, 3), points.dtype)
     return _query(plan, points, queries, normals)
 
@@ -177,6 +183,7 @@ def mesh(
     max_faces: int,
     normals: ArrayLike | None = None,
     options: Options | None = None,
+    backend: str = "cpu",
 ) -> Mesh:
     """The surface through ``points`` as triangles.
 
@@ -195,11 +202,12 @@ def mesh(
         max_faces: static; how many faces to make room for.
         normals: as for :func:`signed_distance`.
         options: as for :func:`signed_distance`.
+        backend: as for :func:`signed_distance`.
 
     Raises:
-        TypeError, ValueError, jax.errors.JaxRuntimeError: as for :func:`signed_distance`.
+        TypeError, ValueError, RuntimeError, jax.errors.JaxRuntimeError: as for :func:`signed_distance`.
     """
-    plan, points, normals = prepare(points, grid, normals, options)
+    plan, points, normals = prepare(points, grid, normals, options, backend)
     sizes = (_size(max_vertices, "max_vertices"), _size(max_faces, "max_faces"))
     vertices, faces, counts = _mesh(plan, sizes, points, normals)
     return Mesh(vertices, faces, counts[0], counts[1])
@@ -258,6 +266,7 @@ def extend(
     band: float = 3.0,
     normals: ArrayLike | None = None,
     options: Options | None = None,
+    backend: str = "cpu",
 ) -> Extension:
     """φ, and values of the samples (a surface velocity, a temperature) at the cells round the surface.
 
@@ -272,13 +281,14 @@ def extend(
         band: static; how far from the surface the values reach, in cells. No further than ``options.band``.
         normals: as for :func:`signed_distance`.
         options: as for :func:`signed_distance`.
+        backend: as for :func:`signed_distance`.
 
     Raises:
-        TypeError, ValueError, jax.errors.JaxRuntimeError: as for :func:`signed_distance`.
+        TypeError, ValueError, RuntimeError, jax.errors.JaxRuntimeError: as for :func:`signed_distance`.
     """
     if not isinstance(band, (int, float)) or not 0 < band < float("inf"):
         raise ValueError(f"band is {band!r}; give a finite number of cells above 0")
-    plan, points, normals = prepare(points, grid, normals, options, float(band))
+    plan, points, normals = prepare(points, grid, normals, options, backend, float(band))
     values = jnp.asarray(values)
     one = values.ndim == 1
     shape = (points.shape[0],) if one else (points.shape[0], None)

@@ -1,6 +1,7 @@
 """Signed distance of points for PyTorch: inside ``autograd``, ``vmap`` and ``torch.compile``.
 
-The work is done on the CPU, in the number type of the points. The operators are registered with
+Tensors are those of the CPU, and the work is done in their number type, where ``backend`` says: on another device
+points and φ, and their cotangents, are copied there and back at every call. The operators are registered with
 ``torch.library`` as ``isograd::signed_distance`` and ``isograd::signed_distance_pullback``. ``torch.func.grad``
 refuses every operator of that kind: call ``torch.autograd.grad``. Needs PyTorch 2.5.
 """
@@ -31,6 +32,7 @@ def signed_distance(
     *,
     normals: Tensor | None = None,
     options: Options | None = None,
+    backend: str = "cpu",
 ) -> Tensor:
     """φ: the signed distance to the surface that the points sample.
 
@@ -42,6 +44,7 @@ def signed_distance(
         grid: where φ is computed.
         normals: ``(N, 3)`` outward normals, for the orientations ``"given"`` and ``"signs"``.
         options: how; ``checks`` has no effect, since a tensor can't carry a report.
+        backend: where to compute, as for :func:`isograd.reconstruct`. The pullback reconstructs once more there.
 
     Returns:
         ``grid.shape`` tensor of φ at the centres of the cells, in the unit of the points: negative inside.
@@ -50,24 +53,29 @@ def signed_distance(
         TypeError: for what is no tensor, and for integers and complex numbers.
         ValueError: for another shape or device, and for what makes no surface: points that are not finite, too
             few of them, or nearer than two cells to the border of the grid.
+        RuntimeError: for a backend that can't be had, with the reason and the remedy.
     """
     points = _checked(points, "points")
     if normals is not None:
         normals = _checked(normals, "normals").to(points.dtype)
-    return _signed_distance(points, normals, _encode(grid, options, normals is not None))[0]
+    double = points.dtype == torch.float64
+    settings = _encode(grid, options, normals is not None, backend, double)
+    return _signed_distance(points, normals, settings)[0]
 
 
 # The text is the same whenever grid and options are: the compiler need not look inside.
 @torch.compiler.assume_constant_result
-def _encode(grid: Grid, options: Options | None, normals_are_given: bool) -> str:
-    return _settings.encode_pure(grid, options, normals_are_given)
+def _encode(
+    grid: Grid, options: Options | None, normals_are_given: bool, backend: str, double: bool
+) -> str:
+    return _settings.encode_pure(grid, options, normals_are_given, backend, double)
 
 
 def _checked(values: Tensor, name: str) -> Tensor:
     if not isinstance(values, Tensor):
         raise TypeError(f"{name} is a {type(values).__name__}; give a torch.Tensor")
     if values.device.type != "cpu":
-        raise ValueError(f"{name} is on {values.device}; isograd computes on the CPU: pass {name}.cpu()")
+        raise ValueError(f"{name} is on {values.device}; isograd takes tensors of the CPU: pass {name}.cpu()")
     if values.layout != torch.strided:
         raise ValueError(f"{name} is of the layout {values.layout}; pass {name}.to_dense()")
     if values.ndim != 2 or values.shape[1] != 3:

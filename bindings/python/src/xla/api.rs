@@ -15,6 +15,7 @@ use pyo3::prelude::*;
 
 use super::Target;
 use super::buffers::{Call, Data, DataMut, Input, Output};
+use crate::backend::Failure;
 
 /// The oldest version with everything used here; a newer runtime takes it, too.
 const MAJOR: c_int = 0;
@@ -156,7 +157,8 @@ pub unsafe extern "C" fn handler<W: Target>(frame: *mut CallFrame) -> Status {
     let guarded = super::guard(|| W::call(unsafe { frame.call() }?));
     match guarded {
         Ok(Ok(())) => ptr::null_mut(),
-        Ok(Err(text)) => frame.error(INVALID_ARGUMENT, &text),
+        Ok(Err(Failure::Value(text))) => frame.error(INVALID_ARGUMENT, &text),
+        Ok(Err(Failure::Device(text))) => frame.error(INTERNAL, &text),
         Err(defect) => frame.error(INTERNAL, &defect),
     }
 }

@@ -1,5 +1,6 @@
 //! The arrays of a call, as slices with their dimensions. Leading dimensions that all arrays share are a batch.
 
+use crate::backend::Failure;
 use std::vec::IntoIter;
 
 /// Values of one of the three types in use.
@@ -189,16 +190,16 @@ impl<'a> Call<'a> {
     /// Arrays that nobody took, and what `work` says, with the index where there are several.
     pub fn for_each(
         &self,
-        mut work: impl FnMut(usize) -> Result<(), String>,
-    ) -> Result<(), String> {
+        mut work: impl FnMut(usize) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
         if self.has_input() || self.outputs() > 0 {
             return Err("more arrays were passed than are used".into());
         }
         let count = self.batch.iter().flatten().product::<usize>();
         (0..count).try_for_each(|k| {
-            work(k).map_err(|text| match count {
-                1 => text,
-                _ => format!("cloud {k} of the batch: {text}"),
+            work(k).map_err(|failure| match count {
+                1 => failure,
+                _ => failure.of(&format!("cloud {k} of the batch")),
             })
         })
     }

@@ -1,10 +1,12 @@
 //! What all targets do: run a plan on the points of one member of a batch, keep what a pullback needs, and find the
 //! reconstruction again from that.
 
-use isograd::{Cotangent, PointCloud, Real, Reconstruction, Saved};
+use isograd::{Cotangent, PointCloud, Real, Saved};
+use isograd_backend::View;
 
 use super::buffers::{Batch, BatchMut, Call, Element};
 use crate::arrays::Number;
+use crate::backend::Failure;
 use crate::pool::{self, Plan};
 use crate::saved;
 
@@ -27,7 +29,7 @@ impl<T: Real> Cloud<'_, T> {
     ///
     /// # Errors
     /// See [`isograd::PointCloudError`].
-    pub fn of(&self, k: usize) -> Result<PointCloud<T>, String> {
+    pub fn of(&self, k: usize) -> Result<PointCloud<T>, Failure> {
         saved::cloud(self.points.of(k), self.given.map(|given| given.of(k)))
     }
 }
@@ -36,15 +38,12 @@ impl<T: Real> Cloud<'_, T> {
 ///
 /// # Errors
 /// What the settings, a stage or `work` say.
-pub fn with_result<T: Real, R>(
+pub fn with_result<T: Number, R>(
     settings: &str,
     cloud: &PointCloud<T>,
-    work: impl FnOnce(&Reconstruction<T>) -> Result<R, String>,
-) -> Result<R, String> {
-    pool::with_plan::<T, _>(settings, |plan| {
-        let result = plan.reconstructor.reconstruct(cloud);
-        work(result.map_err(|error| error.to_string())?)
-    })?
+    work: impl FnOnce(View<'_, T>) -> Result<R, Failure>,
+) -> Result<R, Failure> {
+    pool::with_plan::<T, _>(settings, |plan| work(plan.plan.reconstruct(cloud)?))?
 }
 
 /// Where a forward map keeps what its pullback needs, in the order of [`Saved`].
@@ -59,7 +58,7 @@ impl<'a, T: Float> Keep<'a, T> {
     ///
     /// # Errors
     /// Outputs of another type or shape.
-    pub fn take(call: &mut Call<'a>) -> Result<Self, String> {
+    pub fn take(call: &mut Call<'a>) -> Result<Self, Failure> {
         Ok(Self {
             sdf: call.output("φ", 3)?,
             closest: call.output("the closest faces", 3)?,
@@ -71,10 +70,10 @@ impl<'a, T: Float> Keep<'a, T> {
     ///
     /// # Errors
     /// Another length.
-    pub fn fill(&mut self, k: usize, result: &Reconstruction<T>) -> Result<(), String> {
-        saved::copy("φ", result.sdf().values(), self.sdf.of(k))?;
-        saved::copy("the closest faces", result.closest(), self.closest.of(k))?;
-        saved::copy("the normals", result.normals(), self.normals.of(k))
+    pub fn fill(&mut self, k: usize, result: View<'_, T>) -> Result<(), Failure> {
+        saved::copy("φ", result.sdf()?.values(), self.sdf.of(k))?;
+        saved::copy("the closest faces", result.closest()?, self.closest.of(k))?;
+        saved::copy("the normals", result.normals()?, self.normals.of(k))
     }
 }
 
@@ -90,7 +89,7 @@ impl<'a, T: Float> Kept<'a, T> {
     ///
     /// # Errors
     /// Inputs of another type or shape.
-    pub fn take(call: &mut Call<'a>) -> Result<Self, String> {
+    pub fn take(call: &mut Call<'a>) -> Result<Self, Failure> {
         Ok(Self {
             sdf: call.input("φ", 3)?,
             closest: call.input("the closest faces", 3)?,
@@ -107,22 +106,17 @@ impl<'a, T: Float> Kept<'a, T> {
         settings: &str,
         k: usize,
         cloud: &PointCloud<T>,
-        work: impl FnOnce(Restored<'_, T>) -> Result<(), String>,
-    ) -> Result<(), String> {
+        work: impl FnOnce(Restored<'_, T>) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
         let saved = Saved {
             sdf: self.sdf.of(k),
             closest: self.closest.of(k),
             normals: self.normals.of(k),
         };
         pool::with_plan::<T, _>(settings, |plan| {
-            let Plan {
-                reconstructor,
-                scratch,
-                bar,
-            } = plan;
-            let result = reconstructor.restore(cloud, &saved);
+            let Plan { plan, scratch, bar } = plan;
             work(Restored {
-                result: result.map_err(|error| error.to_string())?,
+                result: plan.restore(cloud, &saved)?,
                 cloud,
                 scratch,
                 bar,
@@ -132,16 +126,16 @@ impl<'a, T: Float> Kept<'a, T> {
 }
 
 /// A reconstruction found again, and the memory of its pullback.
-pub struct Restored<'a, T: Real> {
+pub struct Restored<'a, T: Number> {
     /// The reconstruction.
-    pub result: &'a Reconstruction<T>,
+    pub result: View<'a, T>,
     /// What it is of.
     pub cloud: &'a PointCloud<T>,
     scratch: &'a mut isograd::PullbackScratch<T>,
     bar: &'a mut isograd::CloudCotangent<T>,
 }
 
-impl<'a, T: Real> Restored<'a, T> {
+impl<'a, T: Number> Restored<'a, T> {
     /// The cotangents of the cloud.
     ///
     /// # Errors
@@ -149,11 +143,9 @@ impl<'a, T: Real> Restored<'a, T> {
     pub fn pull(
         self,
         cotangent: &Cotangent<'_, T>,
-    ) -> Result<&'a isograd::CloudCotangent<T>, String> {
-        let pulled = self
-            .result
-            .pullback_into(self.cloud, cotangent, self.scratch, self.bar);
-        pulled.map_err(|error| error.to_string())?;
+    ) -> Result<&'a isograd::CloudCotangent<T>, Failure> {
+        self.result
+            .pullback_into(self.cloud, cotangent, self.scratch, self.bar)?;
         Ok(self.bar)
     }
 }
@@ -169,7 +161,7 @@ impl<'a, T: Float> CloudBar<'a, T> {
     ///
     /// # Errors
     /// Outputs of another type or shape.
-    pub fn take(call: &mut Call<'a>, given: bool) -> Result<Self, String> {
+    pub fn take(call: &mut Call<'a>, given: bool) -> Result<Self, Failure> {
         let points = call.vectors_out("the cotangent of the points")?;
         let normals = || call.vectors_out("the cotangent of the normals");
         Ok(Self {
@@ -182,7 +174,7 @@ impl<'a, T: Float> CloudBar<'a, T> {
     ///
     /// # Errors
     /// Another length.
-    pub fn fill(&mut self, k: usize, bar: &isograd::CloudCotangent<T>) -> Result<(), String> {
+    pub fn fill(&mut self, k: usize, bar: &isograd::CloudCotangent<T>) -> Result<(), Failure> {
         saved::copy("the points' cotangent", &bar.points, self.points.of(k))?;
         let given = self.given.as_mut().map(|given| given.of(k));
         saved::copy_given(&bar.normals, given)

@@ -1,11 +1,12 @@
 //! φ and an attribute of the samples at the cells round the surface, and their pullback.
 
-use isograd::distance::extend::{Extension, Residual, Scratch};
-use isograd::{Attribute, Cotangent, ExtensionCotangent, Real, Reconstruction};
+use isograd::distance::extend::Extension;
+use isograd::{Attribute, Cotangent, ExtensionCotangent, Real};
 
 use super::Target;
 use super::buffers::Call;
 use super::common::{Cloud, CloudBar, Float, Keep, Kept, with_result};
+use crate::backend::Failure;
 use crate::saved;
 
 /// Points, `(N, C)` values, perhaps normals → values at the cells of a band and zeros elsewhere, φ, and what else the
@@ -15,7 +16,7 @@ pub struct Forward;
 impl Target for Forward {
     const NAME: &'static str = "isograd_extend";
 
-    fn run<T: Float>(mut call: Call<'_>) -> Result<(), String> {
+    fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {
         let points = call.vectors::<T>("the points")?;
         let values = call.input::<T>("the values", 2)?;
         let given = call.given()?;
@@ -26,7 +27,7 @@ impl Target for Forward {
         call.for_each(|k| {
             with_result(settings, &cloud.of(k)?, |result| {
                 let attribute = attribute(values.of(k), points.of(k).len());
-                let (extension, _) = extend(result, &attribute, band)?;
+                let (extension, _) = result.extend(&attribute, band)?;
                 let out = field.of(k);
                 out.fill(T::zero());
                 extension.scatter(out).map_err(|e| e.to_string())?;
@@ -43,7 +44,7 @@ pub struct Pullback;
 impl Target for Pullback {
     const NAME: &'static str = "isograd_extend_pullback";
 
-    fn run<T: Float>(mut call: Call<'_>) -> Result<(), String> {
+    fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {
         let points = call.vectors::<T>("the points")?;
         let values = call.input::<T>("the values", 2)?;
         let kept = Kept::<T>::take(&mut call)?;
@@ -57,7 +58,7 @@ impl Target for Pullback {
         call.for_each(|k| {
             kept.restore(settings, k, &cloud.of(k)?, |restored| {
                 let attribute = attribute(values.of(k), points.of(k).len());
-                let (extension, residual) = extend(restored.result, &attribute, band)?;
+                let (extension, residual) = restored.result.extend(&attribute, band)?;
                 let values_bar = gather(&extension, field_bar.of(k))?;
                 let of_values = ExtensionCotangent {
                     attribute: &attribute,
@@ -79,7 +80,7 @@ impl Target for Pullback {
     }
 }
 
-fn band(call: &Call<'_>) -> Result<f64, String> {
+fn band(call: &Call<'_>) -> Result<f64, Failure> {
     call.band
         .ok_or_else(|| "the attribute 'band' is missing".into())
 }
@@ -92,20 +93,8 @@ fn attribute<T: Real>(values: &[T], points: usize) -> Attribute<T> {
     }
 }
 
-fn extend<T: Real>(
-    result: &Reconstruction<T>,
-    attribute: &Attribute<T>,
-    band: f64,
-) -> Result<(Extension<T>, Residual<T>), String> {
-    let (mut residual, mut extension) = (Residual::default(), Extension::default());
-    let scratch = &mut Scratch::default();
-    let extended = result.extend_into(attribute, band, scratch, &mut residual, &mut extension);
-    extended.map_err(|e| e.to_string())?;
-    Ok((extension, residual))
-}
-
 /// The cotangents at the cells of the band, from those of all cells.
-fn gather<T: Real>(extension: &Extension<T>, dense: &[T]) -> Result<Vec<T>, String> {
+fn gather<T: Real>(extension: &Extension<T>, dense: &[T]) -> Result<Vec<T>, Failure> {
     let components = extension.components;
     let rows = extension.cells.iter().map(|&cell| {
         let start = cell as usize * components;

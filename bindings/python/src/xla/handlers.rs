@@ -5,6 +5,7 @@ use isograd::Cotangent;
 use super::Target;
 use super::buffers::Call;
 use super::common::{Cloud, CloudBar, Float, Keep, Kept, with_result};
+use crate::backend::Failure;
 use crate::saved;
 
 /// Points, perhaps normals → φ, alone or with what the pullback needs.
@@ -13,7 +14,7 @@ pub struct Forward;
 impl Target for Forward {
     const NAME: &'static str = "isograd_forward";
 
-    fn run<T: Float>(mut call: Call<'_>) -> Result<(), String> {
+    fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {
         let cloud = Cloud {
             points: call.vectors::<T>("the points")?,
             given: call.given()?,
@@ -23,7 +24,7 @@ impl Target for Forward {
             let mut sdf = call.output::<T>("φ", 3)?;
             return call.for_each(|k| {
                 with_result(settings, &cloud.of(k)?, |result| {
-                    saved::copy("φ", result.sdf().values(), sdf.of(k))
+                    saved::copy("φ", result.sdf()?.values(), sdf.of(k))
                 })
             });
         }
@@ -38,7 +39,7 @@ pub struct Pullback;
 impl Target for Pullback {
     const NAME: &'static str = "isograd_pullback";
 
-    fn run<T: Float>(mut call: Call<'_>) -> Result<(), String> {
+    fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {
         let points = call.vectors::<T>("the points")?;
         let kept = Kept::<T>::take(&mut call)?;
         let sdf_bar = call.input::<T>("the cotangent of φ", 3)?;

@@ -5,6 +5,7 @@ use isograd::{Cotangent, Mesh, Real};
 use super::Target;
 use super::buffers::Call;
 use super::common::{Cloud, CloudBar, Float, Keep, Kept, with_result};
+use crate::backend::Failure;
 
 /// Points, perhaps normals → vertices and faces, as many as fit, and how many there are of both; alone or with what
 /// the pullback needs.
@@ -13,7 +14,7 @@ pub struct Forward;
 impl Target for Forward {
     const NAME: &'static str = "isograd_mesh";
 
-    fn run<T: Float>(mut call: Call<'_>) -> Result<(), String> {
+    fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {
         let cloud = Cloud {
             points: call.vectors::<T>("the points")?,
             given: call.given()?,
@@ -28,7 +29,7 @@ impl Target for Forward {
         let settings = call.settings;
         call.for_each(|k| {
             with_result(settings, &cloud.of(k)?, |result| {
-                let mesh = result.mesh();
+                let mesh = result.mesh()?;
                 write(mesh, vertices.of(k), faces.of(k), counts.of(k))?;
                 keep.as_mut().map_or(Ok(()), |keep| keep.fill(k, result))
             })
@@ -42,7 +43,7 @@ fn write<T: Real>(
     vertices: &mut [[T; 3]],
     faces: &mut [[u32; 3]],
     counts: &mut [u32],
-) -> Result<(), String> {
+) -> Result<(), Failure> {
     let [vertex_count, face_count] = counts else {
         return Err("the counts must be two".into());
     };
@@ -68,7 +69,7 @@ pub struct Pullback;
 impl Target for Pullback {
     const NAME: &'static str = "isograd_mesh_pullback";
 
-    fn run<T: Float>(mut call: Call<'_>) -> Result<(), String> {
+    fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {
         let points = call.vectors::<T>("the points")?;
         let kept = Kept::<T>::take(&mut call)?;
         let vertices_bar = call.vectors::<T>("the cotangent of the vertices")?;
@@ -78,7 +79,7 @@ impl Target for Pullback {
         call.for_each(|k| {
             kept.restore(settings, k, &cloud.of(k)?, |restored| {
                 // Places behind the vertices are constant, and vertices that did not fit were not seen.
-                let count = restored.result.mesh().vertices().len();
+                let count = restored.result.mesh()?.vertices().len();
                 let mut bar = vertices_bar.of(k).to_vec();
                 bar.resize(count, [T::zero(); 3]);
                 let cotangent = Cotangent {

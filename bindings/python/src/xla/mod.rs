@@ -19,6 +19,7 @@ use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::backend::Failure;
 use buffers::{Call, Data, DataMut, Input, Output};
 use common::Float;
 
@@ -31,13 +32,13 @@ trait Target {
     ///
     /// # Errors
     /// What the arrays, the settings or a stage say.
-    fn run<T: Float>(call: Call<'_>) -> Result<(), String>;
+    fn run<T: Float>(call: Call<'_>) -> Result<(), Failure>;
 
     /// The same, for that of the first input.
     ///
     /// # Errors
     /// As [`Self::run`].
-    fn call(call: Call<'_>) -> Result<(), String> {
+    fn call(call: Call<'_>) -> Result<(), Failure> {
         match call.is_double() {
             true => Self::run::<f64>(call),
             false => Self::run::<f32>(call),
@@ -49,7 +50,7 @@ trait Target {
 struct Entry {
     name: &'static str,
     handler: api::Handler,
-    call: fn(Call<'_>) -> Result<(), String>,
+    call: fn(Call<'_>) -> Result<(), Failure>,
 }
 
 impl Entry {
@@ -106,9 +107,7 @@ pub fn call_target(
     let outputs = outputs.iter_mut().map(Writable::output);
     let outputs = outputs.collect::<PyResult<Vec<_>>>()?;
     let result = py.detach(|| guard(|| (target.call)(Call::new(settings, band, inputs, outputs))));
-    result
-        .map_err(PyRuntimeError::new_err)?
-        .map_err(PyValueError::new_err)
+    Ok(result.map_err(PyRuntimeError::new_err)??)
 }
 
 /// What `work` gives, or what a panic in it said.

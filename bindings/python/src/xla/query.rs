@@ -6,6 +6,7 @@ use isograd::distance::{Hit, Query};
 use super::Target;
 use super::buffers::{Batch, BatchMut, Call};
 use super::common::{Cloud, CloudBar, Float, Keep, Kept, with_result};
+use crate::backend::Failure;
 use crate::saved;
 
 /// Points, queries, perhaps normals → distances, alone or with what the pullback needs.
@@ -14,7 +15,7 @@ pub struct Forward;
 impl Target for Forward {
     const NAME: &'static str = "isograd_query";
 
-    fn run<T: Float>(mut call: Call<'_>) -> Result<(), String> {
+    fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {
         let points = call.vectors::<T>("the points")?;
         let queries = call.vectors::<T>("the queries")?;
         let given = call.given()?;
@@ -26,8 +27,8 @@ impl Target for Forward {
         let (settings, cloud) = (call.settings, Cloud { points, given });
         call.for_each(|k| {
             with_result(settings, &cloud.of(k)?, |result| {
-                let surface = Query::new(result.mesh().clone()).map_err(|e| e.to_string())?;
-                let hits = surface.query(queries.of(k), Some(result.sdf()));
+                let surface = Query::new(result.mesh()?.clone()).map_err(|e| e.to_string())?;
+                let hits = surface.query(queries.of(k), Some(result.sdf()?));
                 let distances: Vec<T> = hits.iter().map(|hit| hit.distance).collect();
                 saved::copy("the distances", &distances, distance.of(k))?;
                 match &mut keep {
@@ -49,7 +50,7 @@ pub struct Pullback;
 impl Target for Pullback {
     const NAME: &'static str = "isograd_query_pullback";
 
-    fn run<T: Float>(mut call: Call<'_>) -> Result<(), String> {
+    fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {
         let points = call.vectors::<T>("the points")?;
         let queries = call.vectors::<T>("the queries")?;
         let hits = KeptHits::<T>::take(&mut call)?;
@@ -61,7 +62,7 @@ impl Target for Pullback {
         let (settings, cloud) = (call.settings, Cloud { points, given });
         call.for_each(|k| {
             kept.restore(settings, k, &cloud.of(k)?, |restored| {
-                let surface = Query::new(restored.result.mesh().clone());
+                let surface = Query::new(restored.result.mesh()?.clone());
                 let (mut queries_bar, mut vertices_bar) = (Vec::new(), Vec::new());
                 let pulled = surface.map_err(|e| e.to_string())?.pullback(
                     queries.of(k),
@@ -92,7 +93,7 @@ struct KeepHits<'a, T> {
 }
 
 impl<'a, T: Float> KeepHits<'a, T> {
-    fn take(call: &mut Call<'a>) -> Result<Self, String> {
+    fn take(call: &mut Call<'a>) -> Result<Self, Failure> {
         Ok(Self {
             gradient: call.vectors_out("the gradients")?,
             triangle: call.output("the triangles", 1)?,
@@ -100,7 +101,7 @@ impl<'a, T: Float> KeepHits<'a, T> {
         })
     }
 
-    fn fill(&mut self, k: usize, hits: &[Hit<T>]) -> Result<(), String> {
+    fn fill(&mut self, k: usize, hits: &[Hit<T>]) -> Result<(), Failure> {
         let gradient: Vec<_> = hits.iter().map(|hit| hit.gradient).collect();
         let triangle: Vec<_> = hits.iter().map(|hit| hit.triangle).collect();
         let barycentric: Vec<_> = hits.iter().map(|hit| hit.barycentric).collect();
@@ -118,7 +119,7 @@ struct KeptHits<'a, T> {
 }
 
 impl<'a, T: Float> KeptHits<'a, T> {
-    fn take(call: &mut Call<'a>) -> Result<Self, String> {
+    fn take(call: &mut Call<'a>) -> Result<Self, Failure> {
         Ok(Self {
             gradient: call.vectors("the gradients")?,
             triangle: call.input("the triangles", 1)?,
@@ -126,7 +127,7 @@ impl<'a, T: Float> KeptHits<'a, T> {
         })
     }
 
-    fn of(&self, k: usize) -> Result<Vec<Hit<T>>, String> {
+    fn of(&self, k: usize) -> Result<Vec<Hit<T>>, Failure> {
         let triangle = self.triangle.of(k);
         let (gradient, barycentric) = (self.gradient.of(k), self.barycentric.of(k));
         if gradient.len() != triangle.len() || barycentric.len() != triangle.len() {

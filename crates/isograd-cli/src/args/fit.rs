@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use isograd::Backend;
 
 use super::{FullOr, GridArgs, Running, STATUS, finite, name_and_value, not_negative, positive};
 
@@ -126,6 +127,9 @@ pub struct Fit {
     /// Go on from a checkpoint of a run with the same target, variables and options
     #[arg(long, value_name = "FILE", help_heading = "Outputs")]
     pub resume: Option<PathBuf>,
+    /// Where to reconstruct, as for `reconstruct`; the device must have f64
+    #[arg(long, default_value = "cpu", help_heading = "Running")]
+    pub backend: Backend,
     /// How to run.
     #[command(flatten)]
     pub running: Running,

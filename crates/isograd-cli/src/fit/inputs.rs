@@ -67,6 +67,7 @@ fn options(args: &args::Fit) -> Options {
         },
         epochs: steps,
         tolerance: args.tolerance,
+        backend: args.backend,
         ..Options::default()
     }
 }

@@ -11,6 +11,7 @@ use std::time::Instant;
 use isograd_fit::{Checkpoint, Fit, Outcome};
 
 use crate::args;
+use crate::backend;
 use crate::error::Error;
 use crate::interrupt::Deferred;
 use crate::progress::Progress;
@@ -29,6 +30,10 @@ pub fn run(args: &args::Fit) -> Result<(), Error> {
     progress.step("read");
     let inputs = Inputs::read(args)?;
     let mut fit = begin(args, &inputs)?;
+    progress.detail(&format!("on {}", fit.backend()));
+    if let Some(note) = fit.backend_note() {
+        progress.warn(note);
+    }
     folder.create()?;
     let mut pictures = Pictures::new(args, &inputs.target);
     let run = Run {
@@ -45,7 +50,8 @@ pub fn run(args: &args::Fit) -> Result<(), Error> {
 fn begin(args: &args::Fit, inputs: &Inputs) -> Result<Fit, Error> {
     let (variables, options) = (inputs.variables.clone(), inputs.options.clone());
     let Some(path) = &args.resume else {
-        return Ok(Fit::new(&inputs.target, variables, options)?);
+        let fit = Fit::new(&inputs.target, variables, options);
+        return fit.map_err(|error| backend::fit_error(args.backend, error));
     };
     let unusable = |problem: String| Error::Checkpoint {
         file: path.display().to_string(),
@@ -59,7 +65,7 @@ fn begin(args: &args::Fit, inputs: &Inputs) -> Result<Fit, Error> {
     })?;
     Fit::resume(&inputs.target, variables, options, checkpoint).map_err(|error| match error {
         isograd_fit::Error::Resume { .. } => unusable(error.to_string()),
-        other => Error::Fit(other),
+        other => backend::fit_error(args.backend, other),
     })
 }
 

@@ -36,6 +36,8 @@ struct History<'a> {
 struct Result<'a> {
     version: &'static str,
     outcome: Outcome,
+    /// Where it was computed: `cpu`, or a backend and its device.
+    backend: &'a str,
     seconds: f64,
     /// The last epoch, without its parameters' names.
     epoch: Option<&'a Epoch>,
@@ -101,6 +103,7 @@ impl Folder {
         let result = Result {
             version,
             outcome,
+            backend: fit.backend(),
             seconds,
             epoch: fit.history().last(),
             shape: shape.as_ref().map(|shape| shape.name()),
@@ -110,8 +113,10 @@ impl Folder {
         isograd_io::write_cloud(&self.path("cloud.ply"), &fit.cloud()?)?;
         plot::write(&self.path("loss.png"), &plot::losses(&losses(fit)))?;
         let result = fit.reconstruction()?;
-        isograd_io::write_field(&self.path("sdf.vti"), result.sdf())?;
-        isograd_io::write_mesh(&self.path("mesh.ply"), result.mesh())?;
+        let sdf = result.sdf().map_err(isograd_fit::Error::from)?;
+        isograd_io::write_field(&self.path("sdf.vti"), sdf)?;
+        let mesh = result.mesh().map_err(isograd_fit::Error::from)?;
+        isograd_io::write_mesh(&self.path("mesh.ply"), mesh)?;
         Ok(())
     }
 }

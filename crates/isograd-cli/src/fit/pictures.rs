@@ -34,7 +34,9 @@ impl Pictures {
         let error = fit.history().last().map_or(0.0, |last| last.mean_error);
         let title = format!("epoch {epoch}: {} cells off in the mean", rounded(error));
         let result = fit.reconstruction()?;
-        let picture = self.comparison.draw(result.mesh(), result.sdf(), &title);
+        let mesh = result.mesh().map_err(isograd_fit::Error::from)?;
+        let sdf = result.sdf().map_err(isograd_fit::Error::from)?;
+        let picture = self.comparison.draw(mesh, sdf, &title);
         plot::write(&folder.path(&format!("epoch_{epoch:04}.png")), &picture)?;
         self.drawn.push((epoch, picture));
         Ok(())

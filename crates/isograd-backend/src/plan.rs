@@ -1,0 +1,164 @@
+//! A plan where a backend says.
+
+use std::ops::ControlFlow;
+
+use isograd::{Backend, Grid, Options, PointCloud, Reconstructor, Saved, Stage};
+#[cfg(feature = "gpu")]
+use isograd_gpu::host;
+
+use crate::view::{Kept, Made, Of, View};
+use crate::{Error, Number};
+
+/// [`Reconstructor`] on the CPU or on a device.
+pub struct Plan<T: Number>(On<T>);
+
+enum On<T: Number> {
+    /// And why, where that was left to the program.
+    Cpu(Box<Reconstructor<T>>, Option<String>),
+    /// With what it made last.
+    #[cfg(feature = "gpu")]
+    Device(Box<host::Plan<T>>, Option<Box<host::Reconstruction<T>>>),
+}
+
+impl<T: Number> Plan<T> {
+    /// A plan for clouds that lie on `grid`, at least 2 cells off its walls. Libraries of a GPU are loaded here, where
+    /// `backend` may mean one, and nowhere before.
+    ///
+    /// # Errors
+    /// What the grid and the options say; a backend that was not built in, or whose device can't be had.
+    pub fn new(backend: Backend, grid: Grid<T>, options: Options) -> Result<Self, Error> {
+        let note = match choose(backend, grid, &options)? {
+            Choice::Cpu(note) => note,
+            #[cfg(feature = "gpu")]
+            Choice::Device(plan) => return Ok(Self(On::Device(plan, None))),
+        };
+        let plan = Box::new(Reconstructor::new(grid, options)?);
+        Ok(Self(On::Cpu(plan, note)))
+    }
+
+    /// Who computes: `cpu`, or a backend and its device, such as `vulkan: NVIDIA H100`.
+    pub fn name(&self) -> &str {
+        match &self.0 {
+            On::Cpu(..) => "cpu",
+            #[cfg(feature = "gpu")]
+            On::Device(plan, _) => plan.name(),
+        }
+    }
+
+    /// Why it is the CPU, where that was left to the program.
+    pub fn note(&self) -> Option<&str> {
+        match &self.0 {
+            On::Cpu(_, note) => note.as_deref(),
+            #[cfg(feature = "gpu")]
+            On::Device(..) => None,
+        }
+    }
+
+    /// The same, to be said once: the next time there is none.
+    pub fn take_note(&mut self) -> Option<String> {
+        match &mut self.0 {
+            On::Cpu(_, note) => note.take(),
+            #[cfg(feature = "gpu")]
+            On::Device(..) => None,
+        }
+    }
+
+    /// Runs all stages. The result stays with the plan.
+    ///
+    /// # Errors
+    /// What a stage or the device says.
+    pub fn reconstruct(&mut self, cloud: &PointCloud<T>) -> Result<View<'_, T>, Error> {
+        self.reconstruct_observed(cloud, &mut |_| ControlFlow::Continue(()))
+    }
+
+    /// The same, calling `observer` before each stage, where it is; where it breaks, so does the work.
+    ///
+    /// # Errors
+    /// As [`Self::reconstruct`], and where the observer breaks.
+    pub fn reconstruct_observed(
+        &mut self,
+        cloud: &PointCloud<T>,
+        observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
+    ) -> Result<View<'_, T>, Error> {
+        match &mut self.0 {
+            On::Cpu(plan, _) => Ok(View(Of::Cpu(plan.reconstruct_observed(cloud, observer)?))),
+            #[cfg(feature = "gpu")]
+            On::Device(plan, made) => {
+                // Its memory is free before that of the next is asked for.
+                *made = None;
+                let result = plan.reconstruct_observed(cloud, observer)?;
+                Ok(View(Of::Device(made.insert(Box::new(result)), plan.name())))
+            }
+        }
+    }
+
+    /// The same, with a result to keep: on the CPU a copy.
+    ///
+    /// # Errors
+    /// As [`Self::reconstruct_observed`].
+    pub fn make(
+        &mut self,
+        cloud: &PointCloud<T>,
+        observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
+    ) -> Result<Made<T>, Error> {
+        match &mut self.0 {
+            On::Cpu(plan, _) => {
+                let result = plan.reconstruct_observed(cloud, observer)?;
+                Ok(Made(Kept::Cpu(Box::new(result.clone()))))
+            }
+            #[cfg(feature = "gpu")]
+            On::Device(plan, _) => {
+                let result = plan.reconstruct_observed(cloud, observer)?;
+                Ok(Made(Kept::Device(Box::new(result), plan.name().into())))
+            }
+        }
+    }
+
+    /// Finds a result of the same grid, options and cloud again, to the bit.
+    ///
+    /// # Errors
+    /// What a stage or the device says; what was saved of another result.
+    pub fn restore(
+        &mut self,
+        cloud: &PointCloud<T>,
+        saved: &Saved<'_, T>,
+    ) -> Result<View<'_, T>, Error> {
+        match &mut self.0 {
+            On::Cpu(plan, _) => Ok(View(Of::Cpu(plan.restore(cloud, saved)?))),
+            #[cfg(feature = "gpu")]
+            On::Device(plan, made) => {
+                *made = None;
+                let result = plan.restore(cloud, saved)?;
+                Ok(View(Of::Device(made.insert(Box::new(result)), plan.name())))
+            }
+        }
+    }
+}
+
+#[cfg(feature = "gpu")]
+use host::Choice;
+
+#[cfg(feature = "gpu")]
+fn choose<T: Number>(
+    backend: Backend,
+    grid: Grid<T>,
+    options: &Options,
+) -> Result<Choice<T>, Error> {
+    Ok(host::choose(backend, grid, options)?)
+}
+
+#[cfg(not(feature = "gpu"))]
+enum Choice {
+    Cpu(Option<String>),
+}
+
+#[cfg(not(feature = "gpu"))]
+fn choose<T>(backend: Backend, _: Grid<T>, _: &Options) -> Result<Choice, Error> {
+    match backend {
+        Backend::Cpu => Ok(Choice::Cpu(None)),
+        Backend::Auto => Ok(Choice::Cpu(Some(
+            "computed on the CPU: neither CUDA nor Vulkan is built into this program".into(),
+        ))),
+        backend => Err(Error::NotBuilt(backend)),
+    }
+}

@@ -1,0 +1,177 @@
+//! Results, wherever they were made.
+
+use isograd::distance::extend;
+use isograd::{
+    Attribute, CloudCotangent, Cotangent, Field, Mesh, PointCloud, PullbackScratch, Reconstruction,
+    Report,
+};
+#[cfg(feature = "gpu")]
+use isograd_gpu::host;
+
+use crate::{Error, Number};
+
+/// A result, to look at: [`Reconstruction`] on the CPU or on a device. What is asked for of a device is copied, once.
+#[derive(Clone, Copy)]
+pub struct View<'a, T: Number>(pub(crate) Of<'a, T>);
+
+/// A result, to keep.
+pub struct Made<T: Number>(pub(crate) Kept<T>);
+
+#[derive(Clone, Copy)]
+pub(crate) enum Of<'a, T: Number> {
+    Cpu(&'a Reconstruction<T>),
+    /// And who computed.
+    #[cfg(feature = "gpu")]
+    Device(&'a host::Reconstruction<T>, &'a str),
+}
+
+pub(crate) enum Kept<T: Number> {
+    Cpu(Box<Reconstruction<T>>),
+    /// And who computed.
+    #[cfg(feature = "gpu")]
+    Device(Box<host::Reconstruction<T>>, String),
+}
+
+impl<T: Number> Made<T> {
+    /// To look at.
+    pub fn view(&self) -> View<'_, T> {
+        View(match &self.0 {
+            Kept::Cpu(of) => Of::Cpu(of),
+            #[cfg(feature = "gpu")]
+            Kept::Device(of, name) => Of::Device(of, name),
+        })
+    }
+}
+
+/// Methods that give one of the results.
+macro_rules! results {
+    ($($(#[$doc:meta])+ $name:ident: $kind:ty;)*) => {$(
+        $(#[$doc])+
+        ///
+        /// # Errors
+        /// Those of the device.
+        pub fn $name(self) -> Result<$kind, Error> {
+            match self.0 {
+                Of::Cpu(of) => Ok(of.$name()),
+                #[cfg(feature = "gpu")]
+                Of::Device(of, _) => Ok(of.$name()?),
+            }
+        }
+    )*};
+}
+
+impl<'a, T: Number> View<'a, T> {
+    results! {
+        /// The signed distance φ at every cell centre, in the cloud's unit, negative inside.
+        sdf: &'a Field<T>;
+        /// The indicator χ at every cell centre.
+        indicator: &'a Field<T>;
+        /// The level of the surface.
+        iso_value: T;
+        /// The surface, in the cloud's coordinates.
+        mesh: &'a Mesh<T>;
+        /// For each cell the closest face.
+        closest: &'a [u32];
+        /// `(N, 3)` outward unit normals.
+        normals: &'a [[T; 3]];
+        /// `(N,)` from 0 to 1, how sure their sides are.
+        confidence: &'a [T];
+        /// `(N,)` area of surface that each sample stands for, in unit length².
+        areas: &'a [T];
+        /// `(N,)` samples in each neighbourhood, the sample itself included.
+        neighbour_counts: &'a [u32];
+    }
+
+    /// Cells of the grid along each axis.
+    pub fn shape(self) -> [usize; 3] {
+        match self.0 {
+            Of::Cpu(of) => of.sdf().grid().shape(),
+            #[cfg(feature = "gpu")]
+            Of::Device(of, _) => of.grid().shape(),
+        }
+    }
+
+    /// Who computed: `cpu`, or a backend and its device.
+    pub fn backend(self) -> &'a str {
+        match self.0 {
+            Of::Cpu(_) => "cpu",
+            #[cfg(feature = "gpu")]
+            Of::Device(_, name) => name,
+        }
+    }
+
+    /// Numbers, times and warnings about the reconstruction of `cloud`, the one that it was made of.
+    ///
+    /// # Errors
+    /// Those of the device; a cloud of another size, there.
+    pub fn report(
+        self,
+        #[cfg_attr(not(feature = "gpu"), allow(unused_variables))] cloud: &PointCloud<T>,
+    ) -> Result<&'a Report, Error> {
+        match self.0 {
+            Of::Cpu(of) => Ok(of.report()),
+            #[cfg(feature = "gpu")]
+            Of::Device(of, _) => Ok(of.report(cloud)?),
+        }
+    }
+
+    /// An attribute on the surface and round it, and what its pullback needs: see [`Reconstruction::extend_into`].
+    ///
+    /// # Errors
+    /// What the stage or the device says.
+    pub fn extend(
+        self,
+        attribute: &Attribute<T>,
+        band_cells: f64,
+    ) -> Result<(extend::Extension<T>, extend::Residual<T>), Error> {
+        match self.0 {
+            Of::Cpu(of) => {
+                let (mut residual, mut extension) = Default::default();
+                let scratch = &mut extend::Scratch::default();
+                of.extend_into(
+                    attribute,
+                    band_cells,
+                    scratch,
+                    &mut residual,
+                    &mut extension,
+                )?;
+                Ok((extension, residual))
+            }
+            #[cfg(feature = "gpu")]
+            Of::Device(of, _) => Ok(of.extend_with_residual(attribute, band_cells)?),
+        }
+    }
+
+    /// Cotangents of the inputs: see [`Reconstruction::pullback`].
+    ///
+    /// # Errors
+    /// Cotangents that are not those of this result; what the device says.
+    pub fn pullback(
+        self,
+        cloud: &PointCloud<T>,
+        cotangent: &Cotangent<'_, T>,
+    ) -> Result<CloudCotangent<T>, Error> {
+        let (mut scratch, mut bar) = Default::default();
+        self.pullback_into(cloud, cotangent, &mut scratch, &mut bar)?;
+        Ok(bar)
+    }
+
+    /// The same, with memory that is used again on the CPU.
+    ///
+    /// # Errors
+    /// As [`Self::pullback`].
+    pub fn pullback_into(
+        self,
+        cloud: &PointCloud<T>,
+        cotangent: &Cotangent<'_, T>,
+        scratch: &mut PullbackScratch<T>,
+        bar: &mut CloudCotangent<T>,
+    ) -> Result<(), Error> {
+        match self.0 {
+            Of::Cpu(of) => of.pullback_into(cloud, cotangent, scratch, bar)?,
+            #[cfg(feature = "gpu")]
+            Of::Device(of, _) => *bar = of.pullback(cotangent)?,
+        }
+        Ok(())
+    }
+}
