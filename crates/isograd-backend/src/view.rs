@@ -115,7 +115,7 @@ impl<'a, T: Number> View<'a, T> {
         }
     }
 
-    /// An attribute on the surface and round it, and what its pullback needs: see [`Reconstruction::extend_into`].
+    /// An attribute on the surface and round it, and what its pullback needs: see [`Reconstruction::extend_with_residual`].
     ///
     /// # Errors
     /// What the stage or the device says.
@@ -125,18 +125,7 @@ impl<'a, T: Number> View<'a, T> {
         band_cells: f64,
     ) -> Result<(extend::Extension<T>, extend::Residual<T>), Error> {
         match self.0 {
-            Of::Cpu(of) => {
-                let (mut residual, mut extension) = Default::default();
-                let scratch = &mut extend::Scratch::default();
-                of.extend_into(
-                    attribute,
-                    band_cells,
-                    scratch,
-                    &mut residual,
-                    &mut extension,
-                )?;
-                Ok((extension, residual))
-            }
+            Of::Cpu(of) => Ok(of.extend_with_residual(attribute, band_cells)?),
             #[cfg(feature = "gpu")]
             Of::Device(of, _) => Ok(of.extend_with_residual(attribute, band_cells)?),
         }

@@ -22,6 +22,7 @@ mod curvature;
 mod curvature_pullback;
 mod gradient;
 mod points;
+mod spot;
 mod stencil;
 
 pub use curvature::mean_curvature;

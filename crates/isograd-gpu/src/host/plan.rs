@@ -96,8 +96,7 @@ impl<T: Number> Plan<T> {
     }
 
     /// The result again that a plan with the same grid and options made of `cloud`: [`isograd::Reconstructor::restore`].
-    /// Of what was saved only the normals are used, which tell the sides: to compute φ anew takes no longer than to
-    /// bring it back.
+    /// Of what was saved only the normals are used, which tell the sides; all else is computed anew.
     ///
     /// # Errors
     /// As [`Self::reconstruct`]; what was saved of another result.

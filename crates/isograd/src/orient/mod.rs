@@ -55,8 +55,10 @@
 mod auto;
 pub mod decide;
 pub mod doubt;
+mod error;
 pub mod fill;
 mod flood;
+mod found;
 pub mod graph;
 #[cfg(test)]
 mod grid_tests;
@@ -79,6 +81,8 @@ mod sky;
 mod tests;
 mod winding;
 
+pub use error::Error;
+pub use found::{Decided, MethodUsed, Orientation};
 pub use parity::ParityOptions;
 pub(crate) use pullback::hold;
 pub use pullback::{axes_pullback, given_pullback};
@@ -109,113 +113,6 @@ pub enum Method {
     Sensors,
     /// The side of the normals of the call before.
     Previous,
-}
-
-/// How the signs were chosen.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum MethodUsed {
-    /// See [`Method::Auto`].
-    #[default]
-    Auto,
-    /// See [`Method::Parity`].
-    Parity {
-        /// `r_d`, in the unit of the points.
-        detection_radius: f64,
-    },
-    /// See [`Method::Given`].
-    Given,
-    /// See [`Method::Signs`].
-    Signs,
-    /// See [`Method::Sensors`].
-    Sensors,
-    /// See [`Method::Previous`]; a call that had to orient automatically has [`Self::Auto`].
-    Previous {
-        /// Axes that have turned far since the call before.
-        turned: usize,
-    },
-}
-
-impl MethodUsed {
-    /// `"auto"`, `"parity"`, `"given"`, `"signs"`, `"sensors"` or `"previous"`.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Auto => "auto",
-            Self::Parity { .. } => "parity",
-            Self::Given => "given",
-            Self::Signs => "signs",
-            Self::Sensors => "sensors",
-            Self::Previous { .. } => "previous",
-        }
-    }
-}
-
-/// How many signs were decided by what. The counts add up to the number of points.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Decided {
-    /// By what was given: normals, sensors or the call before.
-    pub given: usize,
-    /// By parity.
-    pub parity: usize,
-    /// By clear evidence at the point itself.
-    pub evidence: usize,
-    /// By what its neighbours know.
-    pub neighbors: usize,
-    /// By a rule, for want of evidence or against what there was: confidence 0.
-    pub rule: usize,
-}
-
-/// Outward normals.
-#[derive(Clone, Debug, Default)]
-pub struct Orientation<T> {
-    /// `(N, 3)` outward unit normals, in input order.
-    pub normals: Vec<[T; 3]>,
-    /// `(N,)` in 0..1: how clearly the evidence round a point speaks for its sign. 1: the point and
-    /// those round it lie between open air and enclosed matter; about 0.2 where a gap in the sampling
-    /// lets light in; 0: nothing speaks for it. Given normals have 1; given sides the cosine between normal
-    /// and axis; a clear view from a sensor 1; a sign that follows the call before what it had when it was
-    /// searched for, but at most the cosine between the two normals; with parity it is 1 where the parities of the two directions differ, as they must on a
-    /// closed surface, else 0.
-    pub confidence: Vec<T>,
-    /// Number of axes whose sign was changed.
-    pub flipped: usize,
-    /// The method, and what it found on the way.
-    pub method: MethodUsed,
-    /// What decided how many signs.
-    pub decided: Decided,
-}
-
-impl<T: Real> Orientation<T> {
-    /// Share of points, in 0..1, whose confidence is below 0.1. On closed, densely sampled bodies that
-    /// are a few spacings thick it is under 0.01; more than about a tenth says that the surface is
-    /// open, or the noise as large as the body is thick, and that signs may be wrong in whole regions.
-    pub fn doubtful(&self) -> f64 {
-        let doubtful = |c: &&T| doubt::is_doubtful(**c);
-        let count = self.confidence.iter().filter(doubtful).count();
-        count as f64 / self.confidence.len().max(1) as f64
-    }
-
-    /// Whether the sign of point `i` is one of those.
-    ///
-    /// # Panics
-    /// There is no such point.
-    pub fn is_doubtful(&self, i: usize) -> bool {
-        doubt::is_doubtful(self.confidence[i])
-    }
-
-    fn clear(&mut self) {
-        self.normals.clear();
-        self.confidence.clear();
-        self.flipped = 0;
-        self.decided = Decided::default();
-    }
-
-    fn set_sign(&mut self, i: usize, flip: bool, confidence: f64) {
-        if flip {
-            self.normals[i] = self.normals[i].map(|x| -x);
-            self.flipped += 1;
-        }
-        self.confidence[i] = T::of(confidence);
-    }
 }
 
 /// Memory that is used again from call to call.
@@ -285,68 +182,11 @@ impl<'a, T: Real> From<&'a PointCloud<T>> for Known<'a, T> {
     }
 }
 
-/// Why there is no orientation.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Error {
-    /// Given normals were asked for, and there are none.
-    #[error("the cloud has no normals to take; orient it automatically or by parity")]
-    NoNormals,
-    /// Points, axes or normals differ in number.
-    #[error("{points} points and {vectors} {kind}: give one for each point")]
-    Count {
-        /// Number of points.
-        points: usize,
-        /// Number of axes, normals or sensor positions.
-        vectors: usize,
-        /// `"axes"`, `"normals"` or `"sensor positions"`.
-        kind: &'static str,
-    },
-    /// A vector that has no direction.
-    #[error(
-        "{kind} of point {index} is zero or not finite; mend it, or orient automatically from the points alone"
-    )]
-    NoDirection {
-        /// Index of the first such point, from 0.
-        index: usize,
-        /// `"the axis"` or `"the normal"`.
-        kind: &'static str,
-    },
-    /// Sensor positions were asked for, and there are none.
-    #[error("the cloud has no sensor positions; give them, or orient automatically")]
-    NoSensors,
-    /// A point that is where its sensor is.
-    #[error(
-        "point {index} lies exactly at a sensor, so that it has no line of sight; remove it (scanners write such points for rays that met nothing)"
-    )]
-    SensorOnPoint {
-        /// Index of the first such point, from 0.
-        index: usize,
-    },
-    /// A parity option out of range.
-    #[error("the parity option {name} is {value}; give a finite number of at least {least}")]
-    Option {
-        /// Name of the option.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// The least value it can have.
-        least: f64,
-    },
-    /// The detection radius is nothing beside the extent of the cloud.
-    #[error(
-        "the parity method's detection radius is {radius:e}, a millionth of the cloud: its points come in equal pairs; remove the duplicates, or orient automatically"
-    )]
-    DetectionRadius {
-        /// `r_d`, in the unit of the points.
-        radius: f64,
-    },
-}
-
 /// Chooses the sign of every axis, or takes the given normals; see the [module](self) for the map.
 ///
 /// `axes` are those of [`normals`], or `(N, 3)` bare unit vectors of any sign (not read by
-/// [`Method::Given`], and may then be empty); `neighborhoods` must be those of `points` `(N, 3)`; `known` are the cloud's own normals, and where it was
-/// seen from. The memory of `scratch` and `out` is used again; for [`Method::Previous`], `scratch` holds the
+/// [`Method::Given`], and may then be empty); `neighborhoods` must be those of `points` `(N, 3)`; `known` are the
+/// cloud's own normals, and where it was seen from. The memory of `scratch` and `out` is used again; for [`Method::Previous`], `scratch` holds the
 /// call before. The same input gives the same bits on any number of threads.
 ///
 /// # Errors

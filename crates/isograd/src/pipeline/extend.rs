@@ -29,6 +29,18 @@ impl<T: Real> Reconstruction<T> {
                     name: name.into(),
                     known: attributes.iter().map(|a| a.name.clone()).collect(),
                 })?;
+        Ok(self.extend_with_residual(attribute, band_cells)?.0)
+    }
+
+    /// The same for one value per sample that was reconstructed, with what the pullback needs.
+    ///
+    /// # Errors
+    /// As [`extend`](Self::extend).
+    pub fn extend_with_residual(
+        &self,
+        attribute: &Attribute<T>,
+        band_cells: f64,
+    ) -> Result<(Extension<T>, Residual<T>), Error> {
         let (mut residual, mut extension) = (Residual::default(), Extension::default());
         let scratch = &mut Scratch::default();
         self.extend_into(
@@ -38,11 +50,10 @@ impl<T: Real> Reconstruction<T> {
             &mut residual,
             &mut extension,
         )?;
-        Ok(extension)
+        Ok((extension, residual))
     }
 
-    /// The same for one value per sample that was reconstructed, in memory that is used again, with what the
-    /// pullback needs.
+    /// The same, in memory that is used again.
     ///
     /// # Errors
     /// As [`extend`](Self::extend); the outputs are then not to be used.
