@@ -5,12 +5,11 @@ use cubecl::prelude::*;
 use super::scan::exclusive_sum;
 use crate::{Buffer, Device, Error};
 
-/// Units of a group, and keys that it ranks.
-const BLOCK: usize = 256;
+/// Bits of a key that one pass orders by.
+const BITS: u32 = 8;
 
-/// Bits of a key that one pass orders by, and the number of their values.
-const BITS: u32 = 4;
-const DIGITS: usize = 1 << BITS;
+/// Values of a digit; and units of a group, and keys that it ranks: each unit has a key and a digit.
+const BLOCK: usize = 1 << BITS;
 
 /// Keys in ascending order, and where each was before.
 pub struct Order {
@@ -85,7 +84,7 @@ impl Order {
     fn by_digit<R: Runtime>(&self, device: &Device<R>, shift: u32) -> Result<Self, Error> {
         let count = self.keys.len();
         let blocks = count.div_ceil(BLOCK);
-        let counts: Buffer<u32> = device.empty(blocks * DIGITS)?;
+        let counts: Buffer<u32> = device.empty(blocks * BLOCK)?;
         let ranks: Buffer<u32> = device.empty(count)?;
         let dim = CubeDim::new_1d(BLOCK as u32);
         let groups = device.groups(count, BLOCK as u32);
@@ -144,33 +143,41 @@ fn rank_digits(
     #[comptime] block: usize,
 ) {
     let mut digits = SharedMemory::<u32>::new(block);
+    let mut of_digit = SharedMemory::<u32>::new(block);
     let unit = UNIT_POS as usize;
-    let first = CUBE_POS * block;
-    let at = first + unit;
-    let mut own = 16u32;
-    if at < count as usize {
-        own = (keys[at] >> shift) & 15u32;
+    let at = CUBE_POS * block + unit;
+    let is_key = at < count as usize;
+    // No digit, where there is no key.
+    let mut own = (block as u32).runtime();
+    if is_key {
+        own = digit(keys[at], shift, block);
     }
     digits[unit] = own;
+    of_digit[unit] = 0u32;
     sync_cube();
-    if at < count as usize {
-        let mut rank = 0u32;
-        for other in 0..unit {
-            if digits[other] == own {
-                rank += 1u32;
-            }
-        }
+    let mut rank = 0u32;
+    let mut equal = 0u32;
+    for other in 0..block {
+        let same = select(digits[other] == own, 1u32, 0u32);
+        equal += same;
+        rank += select(other < unit, same, 0u32);
+    }
+    if is_key {
         ranks[at] = rank;
-    }
-    if unit < 16 && CUBE_POS < blocks as usize {
-        let mut of_digit = 0u32;
-        for other in 0..block {
-            if digits[other] == unit as u32 {
-                of_digit += 1u32;
-            }
+        if rank == 0u32 {
+            of_digit[own as usize] = equal;
         }
-        counts[unit * blocks as usize + CUBE_POS] = of_digit;
     }
+    sync_cube();
+    if CUBE_POS < blocks as usize {
+        counts[unit * blocks as usize + CUBE_POS] = of_digit[unit];
+    }
+}
+
+/// The digit of a key, of so many values.
+#[cube]
+fn digit(key: u32, shift: u32, #[comptime] values: usize) -> u32 {
+    (key >> shift) & (values as u32 - 1u32)
 }
 
 #[cube(launch)]
@@ -188,8 +195,7 @@ fn move_to_ranks(
 ) {
     if ABSOLUTE_POS < count as usize {
         let key = keys[ABSOLUTE_POS];
-        let digit = (key >> shift) & 15u32;
-        let of_block = digit * blocks + (ABSOLUTE_POS / block) as u32;
+        let of_block = digit(key, shift, block) * blocks + (ABSOLUTE_POS / block) as u32;
         let to = (before[of_block as usize] + ranks[ABSOLUTE_POS]) as usize;
         new_keys[to] = key;
         new_places[to] = places[ABSOLUTE_POS];
