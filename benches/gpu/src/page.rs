@@ -31,6 +31,13 @@ pub fn speed(results: &Results) -> String {
         fish.bytes as f64 / fish.cells() as f64,
         results.device,
     );
+    let (forward, backward) = (&fish.forward_effort, &fish.backward_effort);
+    let _ = write!(
+        text,
+        "A reconstruction of it queues {} kernels and waits {} times, for a few numbers each time; its pullback queues {} \
+         and waits\n{} times.\n\n",
+        forward.launches, forward.waits, backward.launches, backward.waits,
+    );
     text
 }
 
@@ -124,6 +131,11 @@ fn thousands(number: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::problem::Asked;
+
+    fn asked(launches: u64, waits: u64) -> Asked {
+        Asked { launches, waits }
+    }
 
     fn size(n: usize, seconds: f64) -> Size {
         Size {
@@ -134,6 +146,8 @@ mod tests {
             hold: Some(seconds),
             stages: vec![("poisson", 1e-3)],
             bytes: 40 * (n as u64).pow(3),
+            forward_effort: asked(300, 7),
+            backward_effort: asked(200, 4),
         }
     }
 
@@ -159,6 +173,7 @@ mod tests {
         };
         let text = speed(&results);
         assert!(text.contains("not measured") && text.contains("40 bytes a cell"));
+        assert!(text.contains("300 kernels and waits 7 times"));
         assert!(text.contains("1,234,567") && !text.contains("NaN"));
         results.backend = Some("CUDA");
         results.bytes_per_second = Some(1e12);

@@ -8,7 +8,7 @@ use isograd::neighbors::Radius;
 use isograd::{Grid, PointCloud, Resolution, Stage, vector};
 use isograd_gpu::orient::Method;
 use isograd_gpu::pipeline::{Cotangent, Held, Options, Reconstruction, Reconstructor};
-use isograd_gpu::{Buffer, Device};
+use isograd_gpu::{Buffer, Device, Effort};
 use isograd_page::program::Outcome;
 use isograd_page::statistics::median;
 use isograd_shapes::{Layout, Sampling, by_name};
@@ -54,6 +54,26 @@ pub struct Size {
     pub stages: Vec<(&'static str, f64)>,
     /// Bytes of the device's memory that were taken, pools included.
     pub bytes: u64,
+    /// What was asked of the device in a reconstruction.
+    pub forward_effort: Asked,
+    /// And in its pullback.
+    pub backward_effort: Asked,
+}
+
+/// How often a device was asked to do something.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Asked {
+    /// Kernels that were queued.
+    pub launches: u64,
+    /// Times that the program waited for the device.
+    pub waits: u64,
+}
+
+impl From<Effort> for Asked {
+    fn from(effort: Effort) -> Self {
+        let Effort { launches, waits } = effort;
+        Self { launches, waits }
+    }
 }
 
 impl Size {
@@ -88,8 +108,12 @@ impl Problem {
         let before = device.memory()?.reserved;
         let set = self.set(device)?;
         let held = set.hold()?;
+        let begun = device.effort();
         let result = set.plan.reconstruct(&set.points, &held)?;
-        set.pull(&result)?;
+        let between = device.effort();
+        set.queue_pullback(&result)?;
+        let end = device.effort();
+        device.wait()?;
         drop(result);
         let bytes = device.memory()?.reserved - before;
         let mut size = Size {
@@ -100,6 +124,8 @@ impl Problem {
             hold: None,
             stages: Vec::new(),
             bytes,
+            forward_effort: between.since(begun).into(),
+            backward_effort: end.since(between).into(),
         };
         if repeats > 0 {
             set.time(&held, repeats, &mut size)?;
@@ -148,12 +174,17 @@ impl<R: Runtime> Set<R> {
     }
 
     /// A cotangent at every cell: that of `Σ φ²/2`.
-    fn pull(&self, result: &Reconstruction<f32>) -> Outcome {
+    fn queue_pullback(&self, result: &Reconstruction<f32>) -> Outcome {
         let cotangent = Cotangent {
             sdf: Some(&result.sdf),
             ..Cotangent::default()
         };
         self.plan.pullback(result, &cotangent)?;
+        Ok(())
+    }
+
+    fn pull(&self, result: &Reconstruction<f32>) -> Outcome {
+        self.queue_pullback(result)?;
         Ok(self.device.wait()?)
     }
 

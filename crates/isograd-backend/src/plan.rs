@@ -27,13 +27,7 @@ impl<T: Number> Plan<T> {
     /// # Errors
     /// What the grid and the options say; a backend that was not built in, or whose device can't be had.
     pub fn new(backend: Backend, grid: Grid<T>, options: Options) -> Result<Self, Error> {
-        let note = match choose(backend, grid, &options)? {
-            Choice::Cpu(note) => note,
-            #[cfg(feature = "gpu")]
-            Choice::Device(plan) => return Ok(Self(On::Device(plan, None))),
-        };
-        let plan = Box::new(Reconstructor::new(grid, options)?);
-        Ok(Self(On::Cpu(plan, note)))
+        choose(backend, grid, options).map(Self)
     }
 
     /// Who computes: `cpu`, or a backend and its device, such as `vulkan: NVIDIA H100`.
@@ -135,30 +129,27 @@ impl<T: Number> Plan<T> {
     }
 }
 
-#[cfg(feature = "gpu")]
-use host::Choice;
+impl<T: Number> On<T> {
+    fn cpu(grid: Grid<T>, options: Options, note: Option<String>) -> Result<Self, Error> {
+        let plan = Reconstructor::new(grid, options)?;
+        Ok(Self::Cpu(Box::new(plan), note))
+    }
+}
 
 #[cfg(feature = "gpu")]
-fn choose<T: Number>(
-    backend: Backend,
-    grid: Grid<T>,
-    options: &Options,
-) -> Result<Choice<T>, Error> {
-    Ok(host::choose(backend, grid, options)?)
+fn choose<T: Number>(backend: Backend, grid: Grid<T>, options: Options) -> Result<On<T>, Error> {
+    match host::choose(backend, grid, &options)? {
+        host::Choice::Cpu(note) => On::cpu(grid, options, note),
+        host::Choice::Device(plan) => Ok(On::Device(plan, None)),
+    }
 }
 
 #[cfg(not(feature = "gpu"))]
-enum Choice {
-    Cpu(Option<String>),
-}
-
-#[cfg(not(feature = "gpu"))]
-fn choose<T>(backend: Backend, _: Grid<T>, _: &Options) -> Result<Choice, Error> {
+fn choose<T: Number>(backend: Backend, grid: Grid<T>, options: Options) -> Result<On<T>, Error> {
+    const NONE: &str = "computed on the CPU: neither CUDA nor Vulkan is built into this program";
     match backend {
-        Backend::Cpu => Ok(Choice::Cpu(None)),
-        Backend::Auto => Ok(Choice::Cpu(Some(
-            "computed on the CPU: neither CUDA nor Vulkan is built into this program".into(),
-        ))),
+        Backend::Cpu => On::cpu(grid, options, None),
+        Backend::Auto => On::cpu(grid, options, Some(NONE.into())),
         backend => Err(Error::NotBuilt(backend)),
     }
 }

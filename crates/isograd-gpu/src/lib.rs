@@ -36,4 +36,4 @@ mod vector;
 pub use device::Cuda;
 #[cfg(feature = "wgpu")]
 pub use device::Vulkan;
-pub use device::{Buffer, Device, Error, Memory, Scalar};
+pub use device::{Buffer, Device, Effort, Error, Memory, Scalar};

@@ -1,13 +1,17 @@
 //! A device, and memory on it.
 
 mod buffer;
+mod effort;
 #[cfg(feature = "cuda")]
 mod libraries;
 mod open;
 
 use cubecl::prelude::*;
 
+use effort::Counts;
+
 pub use buffer::Buffer;
+pub use effort::Effort;
 #[cfg(feature = "cuda")]
 pub use open::Cuda;
 #[cfg(feature = "wgpu")]
@@ -106,6 +110,7 @@ pub struct Device<R: Runtime> {
     client: ComputeClient<R>,
     name: String,
     has_f64: bool,
+    counts: Counts,
 }
 
 impl<R: Runtime> Device<R> {
@@ -116,6 +121,7 @@ impl<R: Runtime> Device<R> {
             has_f64: client.properties().supports_type(double),
             client,
             name,
+            counts: Counts::default(),
         }
     }
 
@@ -132,8 +138,9 @@ impl<R: Runtime> Device<R> {
         &self.name
     }
 
-    /// Where kernels are launched.
+    /// Where a kernel is launched, which counts.
     pub(crate) fn client(&self) -> &ComputeClient<R> {
+        self.counts.launch();
         &self.client
     }
 
@@ -196,7 +203,18 @@ impl<R: Runtime> Device<R> {
     /// # Errors
     /// [`Error::Failed`].
     pub fn wait(&self) -> Result<(), Error> {
+        self.counts.wait();
         cubecl::future::block_on(self.client.sync()).map_err(|e| self.failed(&e))
+    }
+
+    /// What was asked of the device since it was opened, by this value and its clones.
+    pub fn effort(&self) -> Effort {
+        self.counts.effort()
+    }
+
+    /// Bytes that the units of a group can share.
+    pub(crate) fn shared_memory(&self) -> usize {
+        self.client.properties().hardware.max_shared_memory_size
     }
 
     /// What this program has of the device's memory.

@@ -33,8 +33,7 @@ const GROUPS: usize = 256;
 
 /// Complex numbers of a tile, a power of two: the longest line.
 pub(super) fn capacity<R: Runtime, T: Scalar>(device: &Device<R>) -> usize {
-    let memory = &device.client().properties().hardware;
-    let numbers = memory.max_shared_memory_size.min(MEMORY) / size_of::<T>();
+    let numbers = device.shared_memory().min(MEMORY) / size_of::<T>();
     1 << (numbers / 4).ilog2()
 }
 
