@@ -46,6 +46,7 @@ pub fn with_plan<T: Number, R>(
         None => Box::new(create::<T>(settings)?),
     };
     let result = work(&mut plan);
+    plan.plan.release();
     put_back(settings, plan);
     Ok(result)
 }

@@ -210,6 +210,7 @@ def test_auto_takes_a_gpu_or_says_why_not():
     texts = [str(warning.message) for warning in said if warning.category is RuntimeWarning]
     if results[0].backend == "cpu":
         assert len(texts) == 1 and texts[0].startswith("computed on the CPU: ")
+        assert [w.filename for w in said if w.category is RuntimeWarning] == [__file__]
     else:
         assert texts == []
 

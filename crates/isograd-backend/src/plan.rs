@@ -108,6 +108,15 @@ impl<T: Number> Plan<T> {
         }
     }
 
+    /// Lets go of the last result, where a device has it: its memory may be wanted by others. The CPU's is part of the
+    /// plan.
+    pub fn release(&mut self) {
+        #[cfg(feature = "gpu")]
+        if let On::Device(_, made) = &mut self.0 {
+            *made = None;
+        }
+    }
+
     /// Finds a result of the same grid, options and cloud again, to the bit.
     ///
     /// # Errors

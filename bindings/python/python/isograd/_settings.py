@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import warnings
 
 from . import _core
@@ -74,9 +75,13 @@ def check_backend(backend: object) -> str:
 
 
 def say_note(note: str | None) -> None:
-    """Warns that the CPU computes, where that was left to the package."""
-    if note is not None:
-        warnings.warn(note, RuntimeWarning, stacklevel=4)
+    """Warns the first caller outside the package that the CPU computes, where that was left to it."""
+    if note is None:
+        return
+    level, frame = 2, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__package__") == __package__:
+        level, frame = level + 1, frame.f_back
+    warnings.warn(note, RuntimeWarning, stacklevel=level)
 
 
 def check_pure(options: Options) -> None:
