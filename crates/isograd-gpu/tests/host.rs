@@ -26,10 +26,16 @@ fn real<T: Number>(value: f64) -> T {
     <T as Real>::of(value)
 }
 
-fn cloud<T: Number>(count: usize) -> PointCloud<T> {
+/// Samples of a torus, with their normals.
+fn sampled<T: Number>(count: usize) -> PointCloud<T> {
     let shape = isograd_shapes::by_name("torus").unwrap();
-    let samples = shape.sample::<T>(count, &Sampling::default(), 3).unwrap();
-    PointCloud::new(samples.cloud.points().to_vec()).unwrap()
+    let samples = shape.sample::<T>(count, &Sampling::default(), 3);
+    samples.unwrap().cloud
+}
+
+/// The same without.
+fn cloud<T: Number>(count: usize) -> PointCloud<T> {
+    PointCloud::new(sampled::<T>(count).points().to_vec()).unwrap()
 }
 
 fn grid<T: Number>(cloud: &PointCloud<T>) -> Grid<T> {
@@ -374,9 +380,8 @@ fn given_normals_are_taken_and_have_cotangents() {
     let text = plan.reconstruct(&cloud).err().expect("refused").to_string();
     assert!(text.contains("no normals"), "{text}");
     // A little off, and of length 2.
-    let shape = isograd_shapes::by_name("torus").unwrap();
-    let samples = shape.sample::<f32>(2000, &Sampling::default(), 3).unwrap();
-    let given = samples.cloud.normals().unwrap().iter();
+    let samples = sampled::<f32>(2000);
+    let given = samples.normals().unwrap().iter();
     let given = given.map(|&[x, y, z]| [2.0 * x + 0.1, 2.0 * y, 2.0 * z - 0.1]);
     let cloud = cloud.with_normals(given.collect()).unwrap();
     let found = plan.reconstruct(&cloud).unwrap();
@@ -407,9 +412,7 @@ fn a_result_is_found_again_from_its_normals() {
     if !is_here::<f32>() {
         return;
     }
-    let shape = isograd_shapes::by_name("torus").unwrap();
-    let samples = shape.sample::<f32>(1500, &Sampling::default(), 3).unwrap();
-    let given = samples.cloud.normals().unwrap().to_vec();
+    let given = sampled::<f32>(1500).normals().unwrap().to_vec();
     let bare = cloud::<f32>(1500);
     let with_normals = bare.clone().with_normals(given).unwrap();
     for (cloud, orientation) in [
