@@ -1,4 +1,4 @@
-//! The distance at every cell centre over grid size, number type and threads: full, and in a band.
+//! The distance at every cell center over grid size, number type and threads: full, and in a band.
 
 mod common;
 

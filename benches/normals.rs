@@ -1,4 +1,4 @@
-//! D-PCA axes and area weights over number of points, number type and threads; the neighbours are found
+//! D-PCA axes and area weights over number of points, number type and threads; the neighbors are found
 //! before.
 
 mod common;

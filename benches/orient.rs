@@ -1,5 +1,5 @@
 //! The signs of the normals over number of points, for each method, number type and threads; axes and
-//! neighbours are found before.
+//! neighbors are found before.
 
 mod common;
 

@@ -67,7 +67,7 @@ def npz_field(folder):
     return data["sdf"], data["origin"], float(data["spacing"])
 
 
-def centres(sdf, origin, h):
+def centers(sdf, origin, h):
     index = np.stack(np.meshgrid(*map(np.arange, sdf.shape), indexing="ij"), axis=-1)
     return origin + h * index
 
@@ -75,7 +75,7 @@ def centres(sdf, origin, h):
 def check_npz(folder, dtype):
     sdf, origin, h = npz_field(folder)
     assert sdf.dtype == dtype and sdf.flags["C_CONTIGUOUS"], sdf.dtype
-    error = np.abs(sdf - torus(centres(sdf, origin, h)))
+    error = np.abs(sdf - torus(centers(sdf, origin, h)))
     assert error.max() < 0.2 * h, f"φ is {error.max() / h:.3f} cells from the torus"
     report = json.loads((folder / "report.json").read_text())
     assert report["grid"]["shape"] == list(sdf.shape)

@@ -38,15 +38,15 @@ def arguments() -> argparse.Namespace:
 def torus_field(options, folder: Path) -> None:
     """φ within three cells of the torus' surface."""
     cells = 128
-    centres = torus.centres(cells)
+    centers = torus.centers(cells)
     spacing = 2 * torus.HALF / cells
-    exact = torus.distance(centres).ravel()
+    exact = torus.distance(centers).ravel()
     near = np.abs(exact) < 3 * spacing
     points, normals = torus.samples(50_000)
     depth = 7
     for name, (vertices, faces) in surfaces(options, folder, points, normals, spacing, depth):
         scene = scene_of(vertices, faces)
-        there = o3d.core.Tensor(centres.reshape(-1, 3)[near].astype(np.float32))
+        there = o3d.core.Tensor(centers.reshape(-1, 3)[near].astype(np.float32))
         error = np.abs(scene.compute_signed_distance(there).numpy() - exact[near]) / spacing
         print(f"torus        {name:8} |error of φ| {error.mean():.4f}, most {error.max():.4f}", flush=True)
 

@@ -1,4 +1,4 @@
-"""Signed distance from one mesh at every centre of a grid: isograd, libigl, Open3D, Warp, pysdf; and in a band
+"""Signed distance from one mesh at every center of a grid: isograd, libigl, Open3D, Warp, pysdf; and in a band
 of 3 cells: isograd, OpenVDB."""
 
 import subprocess
@@ -31,10 +31,10 @@ def warp_signed_distance(
 
 
 def case(stack, program, folder, cells: int, threads: int) -> Case:
-    """Each entry gets the mesh and the centres and returns the distances: building its tree counts."""
+    """Each entry gets the mesh and the centers and returns the distances: building its tree counts."""
     folder = folder / "distance"
-    centres = torus.centres(cells)
-    field = torus.distance(centres)
+    centers = torus.centers(cells)
+    field = torus.distance(centers)
     write_input(folder, torus.grid(cells), chi=field)
     write_input(folder, torus.grid(cells), chi=field.astype(np.float32))
     stages = [
@@ -47,12 +47,12 @@ def case(stack, program, folder, cells: int, threads: int) -> Case:
     vertices = stages[-1].result("vertices").reshape(-1, 3)
     faces = stages[-1].result("faces", np.uint32).reshape(-1, 3).astype(np.int64)
     peers = [
-        peer("libigl, pseudonormal", "float64", threads, libigl(centres, vertices, faces)),
-        peer("Open3D RaycastingScene", "float32", threads, open3d(centres, vertices, faces, threads)),
-        peer("Warp mesh query, CPU", "float32", 1, warp(centres, vertices, faces)),
+        peer("libigl, pseudonormal", "float64", threads, libigl(centers, vertices, faces)),
+        peer("Open3D RaycastingScene", "float32", threads, open3d(centers, vertices, faces, threads)),
+        peer("Warp mesh query, CPU", "float32", 1, warp(centers, vertices, faces)),
     ]
     if pysdf:
-        work = nearby(centres, vertices, faces, threads)
+        work = nearby(centers, vertices, faces, threads)
         peers.append(peer("pysdf (faces of the nearest vertex)", "float32", threads, work))
     spacing = 2 * torus.HALF / cells
 
@@ -61,7 +61,7 @@ def case(stack, program, folder, cells: int, threads: int) -> Case:
         return [agreement(entry, exact, spacing) for entry in [*ours[:-1], *peers]]
 
     title = f"Distance, {cells}³ cells"
-    what = f"signed distance from {len(faces):,} triangles at every cell centre, tree included"
+    what = f"signed distance from {len(faces):,} triangles at every cell center, tree included"
     return Case(title, what, ("cell", cells**3), ours + peers, check)
 
 
@@ -72,7 +72,7 @@ def band(stack, program, folder, cells: int, threads: int) -> Case | None:
         print("no band: install Debian's python3-openvdb to compare with OpenVDB", flush=True)
         return None
     folder = folder / "band"
-    field = torus.distance(torus.centres(cells)).astype(np.float32)
+    field = torus.distance(torus.centers(cells)).astype(np.float32)
     write_input(folder, torus.grid(cells), chi=field)
     counts = sorted({1, threads})
     stages = [Stage(program, "band", folder, np.float32, count) for count in counts]
@@ -117,13 +117,13 @@ def agreement(entry, exact: np.ndarray, spacing: float) -> str:
     )
 
 
-def libigl(centres, vertices, faces):
+def libigl(centers, vertices, faces):
     kind = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
-    return lambda: igl.signed_distance(centres, vertices, faces, sign_type=kind)[0]
+    return lambda: igl.signed_distance(centers, vertices, faces, sign_type=kind)[0]
 
 
-def open3d(centres, vertices, faces, threads):
-    points = o3d.core.Tensor(centres.astype(np.float32))
+def open3d(centers, vertices, faces, threads):
+    points = o3d.core.Tensor(centers.astype(np.float32))
     positions = o3d.core.Tensor(vertices.astype(np.float32))
     triangles = o3d.core.Tensor(faces.astype(np.uint32))
 
@@ -135,23 +135,23 @@ def open3d(centres, vertices, faces, threads):
     return work
 
 
-def warp(centres, vertices, faces):
-    points = wp.array(centres.astype(np.float32), dtype=wp.vec3, device="cpu")
+def warp(centers, vertices, faces):
+    points = wp.array(centers.astype(np.float32), dtype=wp.vec3, device="cpu")
     positions = wp.array(vertices.astype(np.float32), dtype=wp.vec3, device="cpu")
     indices = wp.array(faces.astype(np.int32).ravel(), dtype=wp.int32, device="cpu")
-    out = wp.zeros(len(centres), dtype=wp.float32, device="cpu")
+    out = wp.zeros(len(centers), dtype=wp.float32, device="cpu")
 
     def work():
         mesh = wp.Mesh(positions, indices)
-        wp.launch(warp_signed_distance, len(centres), [mesh.id, points, out], device="cpu")
+        wp.launch(warp_signed_distance, len(centers), [mesh.id, points, out], device="cpu")
         return out.numpy()
 
     return work
 
 
-def nearby(centres, vertices, faces, threads):
+def nearby(centers, vertices, faces, threads):
     """pysdf: positive inside."""
-    points = centres.astype(np.float32)
+    points = centers.astype(np.float32)
     positions = vertices.astype(np.float32)
     triangles = faces.astype(np.uint32)
     return lambda: -pysdf.SDF(positions, triangles)(points, n_threads=threads)

@@ -11,7 +11,7 @@ from stage import Stage, write_input
 def case(stack, program, folder, cells: int, threads: int) -> Case:
     """Each entry gets the field and returns vertices and faces."""
     folder = folder / f"isosurface-{cells}"
-    field = torus.distance(torus.centres(cells)).astype(np.float32).reshape([cells] * 3)
+    field = torus.distance(torus.centers(cells)).astype(np.float32).reshape([cells] * 3)
     write_input(folder, torus.grid(cells), chi=field)
     stages = [
         stack.enter_context(Stage(program, "isosurface", folder, np.float32, count))

@@ -20,7 +20,7 @@ def warp_normals(
     out: wp.array(dtype=wp.vec3),
     areas: wp.array(dtype=float),
 ):
-    # Neighbouring threads take neighbouring points, as Warp's manual advises.
+    # Neighboring threads take neighboring points, as Warp's manual advises.
     i = wp.hash_grid_point_id(grid, wp.tid())
     x = points[i]
     total = float(0.0)
@@ -73,7 +73,7 @@ def case(stack, program, folder, count: int, threads: int) -> Case:
         ]
 
     title = f"D-PCA and areas, {count:,} points"
-    what = "neighbours within a radius (24 at the mean), weighted sums, least eigenvector, area"
+    what = "neighbors within a radius (24 at the mean), weighted sums, least eigenvector, area"
     return Case(title, what, ("point", count), entries, check)
 
 

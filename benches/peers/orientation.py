@@ -25,7 +25,7 @@ def case(stack, program, folder, count: int, threads: int) -> Case:
         return [shown(e.name, e.result().reshape(-1, 3), truth) for e in entries[-2:]]
 
     title = f"Oriented normals, {count:,} points"
-    what = "neighbours, planes and signs; PyMeshLab: compute_normal_for_point_clouds"
+    what = "neighbors, planes and signs; PyMeshLab: compute_normal_for_point_clouds"
     return Case(title, what, ("point", count), entries, check)
 
 

@@ -9,7 +9,7 @@ import torus
 from case import Case, peer
 from stage import Stage, write_input
 
-# Width of the Gaussian of the spectral filter in cells, as the paper's optimisation has it.
+# Width of the Gaussian of the spectral filter in cells, as the paper's optimization has it.
 SIGMA = 2.0
 
 
@@ -27,7 +27,7 @@ def case(stack, program, folder, count: int, cells: int, threads: int) -> Case:
     ]
     # XLA takes all the cores there are.
     entries.append(peer("Shape As Points in JAX", "float32", threads, sap(**arrays)))
-    inside = torus.distance(torus.centres(cells)) < 0
+    inside = torus.distance(torus.centers(cells)) < 0
 
     def check() -> list[str]:
         fields = [(e.name, e.result()) for e in (entries[0], entries[-1])]

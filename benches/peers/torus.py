@@ -10,8 +10,8 @@ def grid(cells: int) -> dict:
     return {"shape": [cells] * 3, "lower": [-HALF] * 3, "spacing": 2 * HALF / cells}
 
 
-def centres(cells: int) -> np.ndarray:
-    """(cells³, 3) centres of the cells, in C order."""
+def centers(cells: int) -> np.ndarray:
+    """(cells³, 3) centers of the cells, in C order."""
     axis = -HALF + 2 * HALF / cells * (np.arange(cells) + 0.5)
     return np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
 

@@ -13,15 +13,15 @@ def case(stack, program, folder, count: int, cells: int, threads: int) -> Case:
     folder = folder / "whole"
     points, _ = torus.samples(count)
     write_input(folder, torus.grid(cells), points=points.astype(np.float32))
-    centres = torus.centres(cells)
+    centers = torus.centers(cells)
     entries = [
         stack.enter_context(Stage(program, "whole", folder, np.float32, number)).entry("phi")
         for number in sorted({1, threads})
     ]
-    entries.append(peer("Open3D chain", "float32", threads, chain(points, centres, threads)))
+    entries.append(peer("Open3D chain", "float32", threads, chain(points, centers, threads)))
 
     def check() -> list[str]:
-        exact = torus.distance(centres)
+        exact = torus.distance(centers)
         return [f"{e.name}: {accuracy(e.result(), exact, cells)}" for e in entries[-2:]]
 
     title = f"The whole, {count:,} points, {cells}³ cells"
@@ -41,8 +41,8 @@ def accuracy(field: np.ndarray, exact: np.ndarray, cells: int) -> str:
     return f"|error| of φ near the surface: mean {error.mean():.3f}, most {error.max():.2f} cell"
 
 
-def chain(points, centres, threads):
-    queries = o3d.core.Tensor(centres.astype(np.float32))
+def chain(points, centers, threads):
+    queries = o3d.core.Tensor(centers.astype(np.float32))
 
     def work():
         cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))

@@ -15,7 +15,7 @@ pub fn grid<T: Real>(cells: usize) -> Grid<T> {
     Grid::new([T::of(-0.5 * SIDE); 3], spacing, [cells; 3]).expect("a grid of that size")
 }
 
-/// The exact signed distance at every cell centre.
+/// The exact signed distance at every cell center.
 pub fn field<T: Real>(cells: usize) -> Field<T> {
     let mut field = Field::zeros(grid(cells));
     let grid = *field.grid();

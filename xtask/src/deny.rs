@@ -1,4 +1,4 @@
-//! `cargo xtask deny`: licences, bans, sources and advisories of the dependencies, by `deny.toml`.
+//! `cargo xtask deny`: licenses, bans, sources and advisories of the dependencies, by `deny.toml`.
 
 use std::process::Stdio;
 

@@ -135,7 +135,7 @@ parameters → points → φ → loss. `cargo xtask fit` writes this page and it
 The target is known by samples of its own: another seed than that of the fit, whose samples move with the shape and
 are drawn anew every 8 epochs. So the two fields can't agree to the last bit, and the loss ends at what the
 samples leave open. (With the *same* places on the surface for both, as in
-[the example](../crates/isograd-fit/examples/fish_fit.rs), all that is left is the optimiser.)
+[the example](../crates/isograd-fit/examples/fish_fit.rs), all that is left is the optimizer.)
 
 ## What is seen
 
@@ -147,7 +147,7 @@ samples leave open. (With the *same* places on the surface for both, as in
 
 ![Four views of the fish at chosen epochs](images/fit_epochs.png)
 
-From above: the fitted surface (dark blue) with the target over it (light grey, translucent); the field in the planes
+From above: the fitted surface (dark blue) with the target over it (light gray, translucent); the field in the planes
 y = 0 (the paper's x–z plane) and x = const. (its y–z plane), with the zero contour in black and the target's in
 orange; the error φ − φ̃ in the same planes, each on a scale of its own.
 

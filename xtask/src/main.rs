@@ -29,7 +29,7 @@ Checks
                    the README
   lint             the first three of these
   python           the step of the Python package alone
-  deny             licences, sources and advisories of every dependency (needs cargo-deny);
+  deny             licenses, sources and advisories of every dependency (needs cargo-deny);
                    --offline leaves the advisories out
 
 Figures and pages

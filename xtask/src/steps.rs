@@ -37,7 +37,7 @@ impl Steps {
     }
 
     /// Prints the time of every step, then every line of what was left out.
-    pub fn summarise(&self) {
+    pub fn summarize(&self) {
         println!("\n── summary");
         for (name, time) in &self.done {
             println!("passed  {:7.1} s  {name}", time.as_secs_f64());

@@ -17,7 +17,7 @@ pub fn all() -> Outcome {
     let mut steps = Steps::default();
     let mut tally = Tally::default();
     let result = run(&mut steps, &mut tally);
-    steps.summarise();
+    steps.summarize();
     if result.is_ok() || tally.counted() > 0 {
         println!("{}", tally.summary());
     }

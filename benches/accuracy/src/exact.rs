@@ -54,7 +54,7 @@ impl Exact {
         self.field.values()[cell]
     }
 
-    /// Marching cubes of the exact distance: the error that is left when φ is exact at every cell centre.
+    /// Marching cubes of the exact distance: the error that is left when φ is exact at every cell center.
     ///
     /// # Errors
     /// A body that the grid does not see.
@@ -104,7 +104,7 @@ fn fill(
     }
 }
 
-/// The same grid in double precision, cell centres included.
+/// The same grid in double precision, cell centers included.
 ///
 /// # Errors
 /// None: what is a grid in `T` is one in double precision.

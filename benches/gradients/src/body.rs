@@ -84,7 +84,7 @@ impl Body {
         })
     }
 
-    /// The grid of the wanted shape whose longest side is that of the cloud and some air, centred.
+    /// The grid of the wanted shape whose longest side is that of the cloud and some air, centered.
     fn grid(&self, cloud: &PointCloud<f64>) -> Outcome<Grid<f64>> {
         let (low, high) = cloud.bounds().ok_or("a cloud without points")?;
         let longest = (0..3).map(|a| high[a] - low[a]).fold(0.0, f64::max);

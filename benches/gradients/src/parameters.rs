@@ -19,7 +19,7 @@ pub const OFF: f64 = 0.15;
 const SMALL: f64 = 1e-6;
 /// A step below this says more about rounding than about slopes.
 const SMALLEST: f64 = 1e-9;
-/// Step of the differences that an optimiser would see, in cells of the fastest point.
+/// Step of the differences that an optimizer would see, in cells of the fastest point.
 const REAL: f64 = 0.5;
 /// Pullbacks that are timed.
 const REPEATS: usize = 5;
@@ -35,7 +35,7 @@ pub struct Row {
     pub held: f64,
     /// Their step, in cells of the fastest point.
     pub held_step: f64,
-    /// Neighbourhoods whose number of samples is not the same on both sides of the step.
+    /// Neighborhoods whose number of samples is not the same on both sides of the step.
     pub changed: usize,
     /// By central differences of whole reconstructions, half a cell to either side.
     pub real: f64,
@@ -288,7 +288,7 @@ impl<'a> Bench<'a> {
         Ok((slope, flipped(&above, &below)))
     }
 
-    /// `∂L/∂p` with everything held, its step in cells, and how many neighbourhoods changed all the same.
+    /// `∂L/∂p` with everything held, its step in cells, and how many neighborhoods changed all the same.
     fn held(&mut self, name: &str) -> Outcome<(f64, f64, usize)> {
         let cell = self.cell_of(name)?;
         let mut size = SMALL;
@@ -306,9 +306,9 @@ impl<'a> Bench<'a> {
     }
 
     fn held_side(&mut self, name: &str, step: f64) -> Outcome<(Field<f64>, usize)> {
-        let counts = self.base.neighbour_counts().to_vec();
+        let counts = self.base.neighbor_counts().to_vec();
         let moved = self.reconstruct(name, step, true)?;
-        let pairs = moved.neighbour_counts().iter().zip(&counts);
+        let pairs = moved.neighbor_counts().iter().zip(&counts);
         let changed = pairs.filter(|(a, b)| a != b).count();
         Ok((moved.sdf().clone(), changed))
     }

@@ -1,4 +1,4 @@
-//! The local derivative over the slope across half a cell to either side: what an optimiser that takes real
+//! The local derivative over the slope across half a cell to either side: what an optimizer that takes real
 //! steps meets.
 
 use isograd::poisson::Smoothing;
@@ -126,7 +126,7 @@ pub struct Ratio {
     pub path: Option<f64>,
     /// Samples whose normal points to the other side at one end than at the other.
     pub flipped: usize,
-    /// Samples that have another number of neighbours at one end than at the other.
+    /// Samples that have another number of neighbors at one end than at the other.
     pub changed: usize,
 }
 
@@ -273,7 +273,7 @@ impl End {
         Self {
             values: Functional::ALL.map(|functional| functional.of(&weight, result.sdf())),
             normals: result.normals().to_vec(),
-            counts: result.neighbour_counts().to_vec(),
+            counts: result.neighbor_counts().to_vec(),
         }
     }
 }

@@ -26,7 +26,7 @@ pub struct Errors {
     pub axis_median: f64,
     /// Mean angle.
     pub axis_mean: f64,
-    /// Mean angle where no neighbourhood is wider than the common radius.
+    /// Mean angle where no neighborhood is wider than the common radius.
     pub axis_mean_narrow: f64,
     /// Doubtful samples, of all.
     pub doubtful: f64,
@@ -43,13 +43,13 @@ pub struct Measured {
     pub points: usize,
     /// Its errors.
     pub errors: Errors,
-    /// Seconds for neighbourhoods and axes, and for the signs.
+    /// Seconds for neighborhoods and axes, and for the signs.
     pub seconds: [f64; 2],
     /// Normals and confidence.
     pub orientation: Orientation<f32>,
 }
 
-/// A cloud with neighbourhoods and axes, in single precision, as a user has it.
+/// A cloud with neighborhoods and axes, in single precision, as a user has it.
 pub struct Prepared {
     /// `(N, 3)`.
     pub points: Vec<[f32; 3]>,
@@ -57,12 +57,12 @@ pub struct Prepared {
     pub neighborhoods: Neighborhoods<f32>,
     /// The axis of each.
     pub axes: normals::Residual<f32>,
-    /// What neighbourhoods and axes took.
+    /// What neighborhoods and axes took.
     pub seconds: f64,
 }
 
 impl Prepared {
-    /// Neighbourhoods and axes of points.
+    /// Neighborhoods and axes of points.
     ///
     /// # Panics
     /// A cloud that has none: those of the suite have.
@@ -70,7 +70,7 @@ impl Prepared {
         let points: Vec<[f32; 3]> = points.iter().map(|&p| vector::of_f64(p)).collect();
         let start = Instant::now();
         let mut neighborhoods = Neighborhoods::default();
-        neighbors::forward(&points, Radius::Auto, &mut neighborhoods).expect("neighbourhoods");
+        neighbors::forward(&points, Radius::Auto, &mut neighborhoods).expect("neighborhoods");
         let mut axes = normals::Residual::default();
         normals::forward(&neighborhoods, &mut axes);
         Self {
@@ -168,7 +168,7 @@ fn judge(body: &Body, prepared: &Prepared, out: &Orientation<f32>) -> Errors {
 fn narrow_axes(prepared: &Prepared) -> Vec<[f32; 3]> {
     let common = Radius::Fixed(f64::from(prepared.neighborhoods.common_radius));
     let (mut fixed, mut narrow) = (Neighborhoods::default(), normals::Residual::default());
-    neighbors::forward(&prepared.points, common, &mut fixed).expect("neighbourhoods");
+    neighbors::forward(&prepared.points, common, &mut fixed).expect("neighborhoods");
     normals::forward(&fixed, &mut narrow);
     narrow.normals
 }

@@ -43,21 +43,21 @@ const CHOICE: &str = "\
 
 const METHOD: &str = "\
 Where samples scatter, from noise or because they lie on both sides of a thin body, the axis is that of a wider
-neighbourhood, as far as that is smoother. Then five kinds of evidence are summed for each point, from −1 (the axis
+neighborhood, as far as that is smoother. Then five kinds of evidence are summed for each point, from −1 (the axis
 points inward) to 1 (outward):
 
 - *Enclosure.* The samples are drawn on a grid as discs in their tangent planes. What they close off from the outside is
   matter, a cavity inside matter is air again, and so on. Two grids of different cells look at this.
 - *Sky.* Where the samples leave holes, the side of the surface that sees less of the sky, along 26 directions, is the
   inner one.
-- *Sheets.* Where neighbours lie on several sheets, a robust fit tells the one through the sample from the others. A
+- *Sheets.* Where neighbors lie on several sheets, a robust fit tells the one through the sample from the others. A
   parallel sheet less than a few spacings away is the other side of a thin body, or of a narrow gap.
 - *Height.* Where noise has made one layer of the two sides of a thin body, with air on both sides of it, a sample above
   the middle of the layer belongs to the upper side.
-- *Neighbours.* Two axes next to each other hang together, reflected at the plane half-way between their samples: along a
+- *Neighbors.* Two axes next to each other hang together, reflected at the plane half-way between their samples: along a
   sheet, round an edge, and across a thin body or a narrow gap.
 
-What a point knows spreads over the graph of its neighbours. Points that agree make domains; between domains that
+What a point knows spreads over the graph of its neighbors. Points that agree make domains; between domains that
 contradict each other the *winding number* decides: the right signs are those with which it is ½ on the surface. A thin
 body and a narrow gap look alike from near; where that matters, both readings are tried, and the winding number chooses.
 Far parts of a cloud get grids of their own, so that an outlier makes none of them coarse. Time and memory are bounded by
@@ -186,8 +186,8 @@ fn moving(steps: &[Step]) -> String {
 
 The fish swims through one beat of its tail in {} steps, 50,000 random samples that move with its skin; `previous`
 orients the first and follows from there. In {} steps it followed, in no step were more than {} % of the signs wrong, and
-at most {} axes had turned far and were left to their neighbours. Following takes {} of the time of `auto` on the same
-cloud (the median of the steps; neighbourhoods and axes, which both need, aside).
+at most {} axes had turned far and were left to their neighbors. Following takes {} of the time of `auto` on the same
+cloud (the median of the steps; neighborhoods and axes, which both need, aside).
 
 The result then depends on the calls before: a plan that begins in the middle of a motion may choose another sign where
 the choice was doubtful. The functions for JAX and PyTorch have no plan, and refuse it; there, give the normals of the

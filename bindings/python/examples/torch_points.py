@@ -1,4 +1,4 @@
-"""Moves raw points until their signed distance field is that of a sphere, with an optimiser of PyTorch.
+"""Moves raw points until their signed distance field is that of a sphere, with an optimizer of PyTorch.
 
     python torch_points.py
 
@@ -35,7 +35,7 @@ def main() -> None:
     centers = torch.from_numpy(grid.centers())
     target = centers.norm(dim=-1) - RADIUS
 
-    # The radius of the neighbourhoods stays what it was at the start: the loss is then smoother. Nothing evens out what
+    # The radius of the neighborhoods stays what it was at the start: the loss is then smoother. Nothing evens out what
     # single points do: the loss should see it.
     options = isograd.Options(radius=0.3, smoothing=0, level="mean")
     # Plain descent: Adam would give all points steps of the same size, and scatter them.

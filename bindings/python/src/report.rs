@@ -43,13 +43,13 @@ fn warnings(report: &Report) -> Vec<String> {
 
 fn normals<'py>(py: Python<'py>, report: &Report) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
-    let neighbours = PyDict::new(py);
-    for (name, n) in ["min", "median", "max"].into_iter().zip(report.neighbours) {
-        neighbours.set_item(name, n)?;
+    let neighbors = PyDict::new(py);
+    for (name, n) in ["min", "median", "max"].into_iter().zip(report.neighbors) {
+        neighbors.set_item(name, n)?;
     }
     dict.set_item("radius", report.radius)?;
     dict.set_item("sample_spacing", report.sample_spacing)?;
-    dict.set_item("neighbours", neighbours)?;
+    dict.set_item("neighbours", neighbors)?;
     dict.set_item("guarded", report.guarded)?;
     Ok(dict)
 }

@@ -147,7 +147,7 @@ fn array<'py, T: Number>(
         "normals" => Ok(arrays::of_vectors(py, there(result.normals())?)),
         "confidence" => arrays::shaped(py, there(result.confidence())?.to_vec(), [count]),
         "areas" => arrays::shaped(py, there(result.areas())?.to_vec(), [count]),
-        "neighbours" => arrays::shaped(py, there(result.neighbour_counts())?.to_vec(), [count]),
+        "neighbors" => arrays::shaped(py, there(result.neighbor_counts())?.to_vec(), [count]),
         _ => Err(PyKeyError::new_err(name.to_owned())),
     }
 }

@@ -41,8 +41,8 @@ def test_results_and_gradients_on_a_device_are_those_of_the_cpu():
         assert off(getattr(found, name), getattr(expected, name)) < 2e-4, name
     assert off(found.mesh.vertices, expected.mesh.vertices) < 2e-4
     assert off(found.confidence, expected.confidence) < 1e-5
-    # A sample at the very edge of a neighbourhood.
-    assert np.abs(found.neighbours.astype(int) - expected.neighbours.astype(int)).max() <= 1
+    # A sample at the very edge of a neighborhood.
+    assert np.abs(found.neighbors.astype(int) - expected.neighbors.astype(int)).max() <= 1
     assert np.array_equal(found.mesh.faces, expected.mesh.faces)
     assert found.closest.shape == GRID.shape
     assert found.warnings == expected.warnings

@@ -46,7 +46,7 @@ def test_what_a_callback_raises_is_raised_and_bad_input_is_refused():
         (ValueError, "not both", {"shape": START, "points": SPHERE.points}),
         (TypeError, "Shape", {"shape": "sphere"}),
         (ValueError, "lbfgs", {"shape": START, "optimizer": "newton"}),
-        (ValueError, "colour", {"shape": START, "only": ["colour"]}),
+        (ValueError, "color", {"shape": START, "only": ["color"]}),
         (ValueError, "epochs", {"shape": START, "epochs": -1}),
         (ValueError, "larger grid|padding", {"shape": isograd.Shape("sphere", radius=3.0)}),
     ]:

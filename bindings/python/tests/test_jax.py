@@ -98,7 +98,7 @@ def test_the_field_is_the_distance_to_the_torus(x64):
 @pytest.mark.parametrize("with_normals", [False, True])
 def test_gradients_agree_with_differences(x64, with_normals):
     points, normals = torus()
-    # A sample that enters a neighbourhood on the way makes φ jump, so the steps are small.
+    # A sample that enters a neighborhood on the way makes φ jump, so the steps are small.
     arguments = (points, normals) if with_normals else (points,)
     # The radius is held constant by the gradient, so it must not follow the points.
     options = isograd.Options(radius=0.25, orient="given" if with_normals else "auto")

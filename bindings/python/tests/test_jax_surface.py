@@ -27,7 +27,7 @@ def volume(points, normals=None, options=None):
     return jnp.sum(a * jnp.cross(b, c)) / 6
 
 
-def test_queries_at_cell_centres_give_the_field(dtype):  # noqa: F811
+def test_queries_at_cell_centers_give_the_field(dtype):  # noqa: F811
     points, _ = torus(dtype=dtype)
     phi = ij.signed_distance(points, GRID)
     centers = GRID.centers(dtype).reshape(-1, 3)
@@ -125,7 +125,7 @@ def test_extension_is_linear_and_its_gradients_agree_with_differences(x64):  # n
     np.testing.assert_allclose(inner, jnp.vdot(values, pullback(field_weights)[0]), rtol=1e-10)
 
     def weighted(points, values):
-        # With fewer neighbours the fit at a vertex has a radius of its own, which the gradient holds constant. The
+        # With fewer neighbors the fit at a vertex has a radius of its own, which the gradient holds constant. The
         # band ends at a cell or not, a step function of the points, so only cells well inside count.
         options = isograd.Options(radius=0.4)
         sdf, field = ij.extend(points, values, GRID, options=options)

@@ -66,8 +66,8 @@ def test_gradients_are_central_differences():
     slope = (base.pullback(weights).points * direction).sum()
     h = 1e-6 * grid.spacing
     sides = [plan(points + s * direction) for s in (h, -h)]
-    # No neighbourhood, sign or cell changes over so small a step.
-    assert np.array_equal(sides[0].neighbours, sides[1].neighbours)
+    # No neighborhood, sign or cell changes over so small a step.
+    assert np.array_equal(sides[0].neighbors, sides[1].neighbors)
     difference = (weights * (sides[0].sdf - sides[1].sdf)).sum() / (2 * h)
     assert abs(slope / difference - 1) < 1e-5
 
@@ -194,7 +194,7 @@ def test_bad_arguments_are_refused_with_a_reason():
     bad = np.zeros(GRID.shape)
     bad[1, 2, 3] = np.inf
     for error, text, call in [
-        (TypeError, "no option", lambda: isograd.reconstruct(SPHERE, GRID, colour=1)),
+        (TypeError, "no option", lambda: isograd.reconstruct(SPHERE, GRID, color=1)),
         (ValueError, "'auto'", lambda: isograd.reconstruct(SPHERE, GRID, orient="left")),
         (ValueError, "normals", lambda: isograd.reconstruct(SPHERE, GRID, orient="given")),
         (ValueError, "does not use", lambda: isograd.reconstruct(SPHERE, GRID, normals=SPHERE)),

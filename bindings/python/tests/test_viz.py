@@ -44,7 +44,7 @@ def pyvista():
     return module
 
 
-def test_each_slice_shows_the_field_in_colours_symmetric_about_zero(pyplot):
+def test_each_slice_shows_the_field_in_colors_symmetric_about_zero(pyplot):
     phi = sphere()
     figure = viz.slices(phi, GRID)
     panels = figure.axes[:3]
@@ -66,7 +66,7 @@ def test_the_line_on_a_slice_is_the_surface(pyplot):
     for panel in figure.axes[:3]:
         (contour,) = [child for child in panel.collections if len(child.get_paths())]
         line = contour.get_paths()[0].vertices
-        # The slice passes half a cell from the centre at most; linear between cells.
+        # The slice passes half a cell from the center at most; linear between cells.
         radius = np.linalg.norm(line, axis=1)
         assert len(line) > 20
         assert np.abs(radius - RADIUS).max() < 0.02
@@ -123,7 +123,7 @@ def test_a_scene_shows_the_surface_and_its_points(pyvista):
         plotter.close()
 
 
-def test_values_at_the_vertices_are_the_colours(pyvista):
+def test_values_at_the_vertices_are_the_colors(pyvista):
     values = np.arange(4.0)
     plotter = viz.scene(TETRAHEDRON, values=values, label="height", opacity=0.5, off_screen=True)
     try:

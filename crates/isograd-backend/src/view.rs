@@ -62,9 +62,9 @@ macro_rules! results {
 
 impl<'a, T: Number> View<'a, T> {
     results! {
-        /// The signed distance φ at every cell centre, in the cloud's unit, negative inside.
+        /// The signed distance φ at every cell center, in the cloud's unit, negative inside.
         sdf: &'a Field<T>;
-        /// The indicator χ at every cell centre.
+        /// The indicator χ at every cell center.
         indicator: &'a Field<T>;
         /// The level of the surface.
         iso_value: T;
@@ -78,8 +78,8 @@ impl<'a, T: Number> View<'a, T> {
         confidence: &'a [T];
         /// `(N,)` area of surface that each sample stands for, in unit length².
         areas: &'a [T];
-        /// `(N,)` samples in each neighbourhood, the sample itself included.
-        neighbour_counts: &'a [u32];
+        /// `(N,)` samples in each neighborhood, the sample itself included.
+        neighbor_counts: &'a [u32];
     }
 
     /// Cells of the grid along each axis.

@@ -83,7 +83,7 @@ fn check(view: View<'_, f32>, cloud: &PointCloud<f32>, tolerance: f32) {
         expected.confidence(),
     );
     assert_eq!(view.closest().unwrap().len(), sdf.len());
-    assert_eq!(view.neighbour_counts().unwrap().len(), cloud.len());
+    assert_eq!(view.neighbor_counts().unwrap().len(), cloud.len());
     let report = view.report(cloud).unwrap();
     assert_eq!(report.warnings, expected.report().warnings);
 

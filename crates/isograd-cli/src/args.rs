@@ -184,7 +184,7 @@ pub struct Running {
 /// See [`isograd::orient::Method`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Orient {
-    /// From enclosure and neighbours
+    /// From enclosure and neighbors
     Auto,
     /// By counting crossings, as the paper prints it
     Parity,

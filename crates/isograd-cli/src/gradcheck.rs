@@ -99,7 +99,7 @@ fn table(check: &GradientCheck, step: f64) -> String {
 fn notes(check: &GradientCheck) -> Vec<String> {
     let mut lines = Vec::new();
     if check.rows.iter().any(|row| !row.small.is_smooth()) {
-        let tells = "* the small step, too, changes a neighbourhood, a sign or the cell of a sample: no derivative there";
+        let tells = "* the small step, too, changes a neighborhood, a sign or the cell of a sample: no derivative there";
         lines.push(tells.into());
     }
     let ridges = check.rows.iter().map(|row| row.ridges).max().unwrap_or(0);
@@ -119,7 +119,7 @@ fn notes(check: &GradientCheck) -> Vec<String> {
 
 fn line(row: &Row) -> String {
     let Difference {
-        neighbourhoods,
+        neighborhoods,
         normals,
         cells,
         ..
@@ -130,7 +130,7 @@ fn line(row: &Row) -> String {
     };
     let unsmooth = if row.small.is_smooth() { "" } else { " *" };
     format!(
-        "{:<14} {:>12.5e} {:>12.5e} {:>9.1e} {:>12.5e} {ratio:>7}   {neighbourhoods} neighbourhoods, {normals} normals, {cells} cells{unsmooth}",
+        "{:<14} {:>12.5e} {:>12.5e} {:>9.1e} {:>12.5e} {ratio:>7}   {neighborhoods} neighborhoods, {normals} normals, {cells} cells{unsmooth}",
         row.motion.name(),
         row.pullback,
         row.small.value,
@@ -197,7 +197,7 @@ struct MotionReport {
 struct StepReport {
     step: f64,
     value: f64,
-    neighbourhoods: usize,
+    neighborhoods: usize,
     normals: usize,
     cells: usize,
     crossings: usize,
@@ -208,7 +208,7 @@ impl From<Difference> for StepReport {
         Self {
             step: of.step,
             value: of.value,
-            neighbourhoods: of.neighbourhoods,
+            neighborhoods: of.neighborhoods,
             normals: of.normals,
             cells: of.cells,
             crossings: of.crossings,

@@ -173,10 +173,10 @@ impl Job<'_> {
     /// The result in a few lines.
     fn say(&self, progress: &Progress, report: &isograd::Report) {
         progress.say(&format!(
-            "{} points, radius {:.4e} with {} neighbours at the median, {:.2} s",
+            "{} points, radius {:.4e} with {} neighbors at the median, {:.2} s",
             report.points,
             report.radius,
-            report.neighbours[1],
+            report.neighbors[1],
             self.start.elapsed().as_secs_f64()
         ));
         progress.say(&format!(

@@ -59,20 +59,22 @@ pub struct GridReport {
     pub spacing: f64,
 }
 
-/// The neighbourhoods and normals.
+/// The neighborhoods and normals.
 #[derive(Debug, Serialize)]
 pub struct Normals {
     /// Common radius.
     pub radius: f64,
-    /// Neighbours of a point, itself included.
-    pub neighbours: Neighbours,
+    /// Neighbors of a point, itself included.
+    /// The key is part of the format of the report.
+    #[serde(rename = "neighbours")]
+    pub neighbors: Neighbors,
     /// Points without a well-defined normal.
     pub guarded: usize,
 }
 
-/// Neighbours of a point.
+/// Neighbors of a point.
 #[derive(Debug, Serialize)]
-pub struct Neighbours {
+pub struct Neighbors {
     /// Fewest.
     pub min: u32,
     /// Median.
@@ -189,7 +191,7 @@ pub struct Moments {
 pub struct Seconds {
     /// Reading the cloud.
     pub read: f64,
-    /// Neighbours, normals, area weights.
+    /// Neighbors, normals, area weights.
     pub normals: f64,
     /// Signs.
     pub orient: f64,
@@ -257,10 +259,10 @@ impl Input {
 impl Normals {
     /// What a report says of them.
     pub fn new(report: &isograd::Report) -> Self {
-        let [min, median, max] = report.neighbours;
+        let [min, median, max] = report.neighbors;
         Self {
             radius: report.radius,
-            neighbours: Neighbours { min, median, max },
+            neighbors: Neighbors { min, median, max },
             guarded: report.guarded,
         }
     }

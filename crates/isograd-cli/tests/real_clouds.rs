@@ -103,7 +103,7 @@ fn errors(folder: &Path, name: &str, orientation: Method) -> Errors {
     let mesh = result.mesh();
     let vertices = mesh.vertices().iter().map(|&v| vector::to_f64(v)).collect();
     let mesh = Mesh::new(vertices, mesh.faces().to_vec()).expect("the same mesh in f64");
-    let centres: Vec<[f64; 3]> = (0..mesh.faces().len())
+    let centers: Vec<[f64; 3]> = (0..mesh.faces().len())
         .step_by(STRIDE)
         .map(|f| {
             let [a, b, c] = mesh.corners(f);
@@ -118,7 +118,7 @@ fn errors(folder: &Path, name: &str, orientation: Method) -> Errors {
     let found = distances(&made, &points, h);
     let found = found.into_iter().zip(&thick).filter(|(_, thick)| **thick);
     Errors {
-        made: summary(distances(&truth, &centres, h)),
+        made: summary(distances(&truth, &centers, h)),
         found: summary(found.map(|(d, _)| d).collect()),
     }
 }

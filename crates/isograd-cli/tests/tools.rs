@@ -69,7 +69,7 @@ fn queries_of_a_mesh_and_of_its_field_agree_with_the_sphere() {
         if i == 4 {
             assert!(field.attributes[0].values[i].is_nan());
         } else if i > 0 {
-            // At the centre of the sphere the field has a kink that cells round off.
+            // At the center of the sphere the field has a kink that cells round off.
             assert!(
                 (field.attributes[0].values[i] - exact).abs() < 2.6e-3,
                 "{i}"

@@ -1,7 +1,7 @@
 //! The paper's inverse problem, small: a fish of random widths and heights finds those of the target by
 //! matching its signed distance field.
 //!
-//! The target is sampled at the same places of the surface as the fit: what is left is the optimiser alone.
+//! The target is sampled at the same places of the surface as the fit: what is left is the optimizer alone.
 //! `cargo xtask fit` makes docs/fit.md with a target that has samples of its own.
 
 use std::error::Error;

@@ -25,7 +25,7 @@ pub struct Options {
     pub region: Region,
     /// The method of descent.
     pub optimizer: Optimizer,
-    /// The most epochs, which are steps of the optimiser.
+    /// The most epochs, which are steps of the optimizer.
     pub epochs: usize,
     /// The fit is done when the mean `|Δφ|`, in cells, is below this.
     pub tolerance: f64,

@@ -1,4 +1,4 @@
-//! Inverse shape optimisation: a parametric shape, or the points of a cloud, are changed until their signed
+//! Inverse shape optimization: a parametric shape, or the points of a cloud, are changed until their signed
 //! distance field matches a target.
 //!
 //! ```

@@ -143,7 +143,7 @@ impl Fingerprints {
         } else if self.variables != other.variables {
             Some("variables, start or samples")
         } else if self.options != other.options {
-            Some("options or optimiser")
+            Some("options or optimizer")
         } else {
             None
         }

@@ -214,7 +214,7 @@ fn a_checkpoint_of_another_fit_is_refused_and_says_what_differs() {
         optimizer: Optimizer::Adam(Adam::default()),
         ..options.clone()
     };
-    assert!(refused(&target, &variables, &adam).contains("optimiser"));
+    assert!(refused(&target, &variables, &adam).contains("optimizer"));
     // More epochs are no difference.
     let longer = Options {
         epochs: 2,

@@ -2,13 +2,13 @@
 //!
 //! # Map
 //! [`Neighborhoods`] → `a_i = 1 / Σ_{j∈N_i} K(r_j)`, as on the page of [`isograd::splat::area`], and 0 for
-//! isolated samples: those with a grown radius of whose neighbours fewer than 1 in 8 have them as theirs.
+//! isolated samples: those with a grown radius of whose neighbors fewer than 1 in 8 have them as theirs.
 //!
 //! # Residual
-//! [`Residual`]: the areas and the neighbourhoods.
+//! [`Residual`]: the areas and the neighborhoods.
 //!
 //! # Pullback
-//! As printed there; [`pullback`] gathers, with the radius of each centre.
+//! As printed there; [`pullback`] gathers, with the radius of each center.
 //!
 //! # Not differentiable
 //! The radii and what is isolated, which are held constant.
@@ -162,19 +162,19 @@ fn find_areas<F: Float + CubeElement>(
 ) {
     let n = radii.len();
     if ABSOLUTE_POS < n {
-        let centre = Vector3::<F>::at(points, ABSOLUTE_POS);
+        let center = Vector3::<F>::at(points, ABSOLUTE_POS);
         let radius = radii[ABSOLUTE_POS];
         let scale = F::new(1.0) / (radius * radius);
         let mut crowd = F::new(0.0);
         // Both without the point itself.
         let mut count = 0u32;
         let mut mutual = 0u32;
-        let mut node = next_leaf::<F>(nodes, links, centre, radius, 0usize, false);
+        let mut node = next_leaf::<F>(nodes, links, center, radius, 0usize, false);
         while node < links.len() {
             let first = first_of_leaf(links, node);
             let mut of_leaf = F::new(0.0);
             for j in first..end_of_leaf(first, n) {
-                let offset = Vector3::<F>::at(points, j).sub(centre);
+                let offset = Vector3::<F>::at(points, j).sub(center);
                 let square = offset.dot(offset);
                 if square <= radius * radius {
                     of_leaf += plane::crowd::<F>(square * scale);
@@ -185,7 +185,7 @@ fn find_areas<F: Float + CubeElement>(
                 }
             }
             crowd += of_leaf;
-            node = next_leaf::<F>(nodes, links, centre, radius, node + 1, false);
+            node = next_leaf::<F>(nodes, links, center, radius, node + 1, false);
         }
         let isolated = is_isolated::<F>(radius, common_radius, count, mutual);
         let area = plane::area::<F>(pi, radius, crowd);
@@ -212,7 +212,7 @@ fn fill_factors<F: Float + CubeElement>(
 }
 
 /// `−Σ_c [f_k (1 − r²/R_k²) + f_c (1 − r²/R_c²)] d_c`, each where the radius reaches: what point `k` gets as a
-/// centre, and as a neighbour of the others.
+/// center, and as a neighbor of the others.
 #[cube(launch)]
 fn gather<F: Float>(
     points: &Array<F>,

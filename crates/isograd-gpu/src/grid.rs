@@ -63,9 +63,9 @@ pub(crate) fn cell_at(index: u32, ny: u32, nz: u32) -> Cell {
     }
 }
 
-/// How far `x` lies from the centre of a cell, in cells.
+/// How far `x` lies from the center of a cell, in cells.
 #[cube]
-pub(crate) fn from_centre<F: Float>(x: F, cell: u32) -> F {
+pub(crate) fn from_center<F: Float>(x: F, cell: u32) -> F {
     x - F::cast_from(cell) - F::new(0.5)
 }
 

@@ -1,4 +1,4 @@
-//! Fields between cell centres: trilinear interpolation, and its transpose.
+//! Fields between cell centers: trilinear interpolation, and its transpose.
 
 use cubecl::prelude::*;
 
@@ -16,7 +16,7 @@ pub(crate) struct Interpolated<F: Float> {
     pub z: F,
 }
 
-/// `field`, `(nx, ny, nz)`, at index coordinates; constant beyond the outermost cell centres.
+/// `field`, `(nx, ny, nz)`, at index coordinates; constant beyond the outermost cell centers.
 #[cube]
 pub(crate) fn interpolate<F: Float + CubeElement>(
     field: &Array<F>,
@@ -47,14 +47,14 @@ pub(crate) fn interpolate<F: Float + CubeElement>(
     }
 }
 
-/// Two neighbouring cell centres along an axis, and where a point is between them.
+/// Two neighboring cell centers along an axis, and where a point is between them.
 #[derive(CubeType, Clone, Copy)]
 struct Between<F: Float> {
     /// The lower one.
     cell: u32,
     /// How far the point is from it, in cells: 0 to 1.
     fraction: F,
-    /// 1 between cell centres; 0 beyond the outermost, where the field is constant.
+    /// 1 between cell centers; 0 beyond the outermost, where the field is constant.
     inside: F,
 }
 
@@ -96,10 +96,10 @@ fn edge<F: Float>(field: &Array<F>, at: usize, fraction: F) -> Edge<F> {
     }
 }
 
-/// Cells between that of a sample and the outermost between whose centres `χ` is interpolated.
+/// Cells between that of a sample and the outermost between whose centers `χ` is interpolated.
 pub(crate) const REACH: u32 = 1;
 
-/// Numbers of a sample in the form that is spread: offset from the centre of its cell, and what is spread.
+/// Numbers of a sample in the form that is spread: offset from the center of its cell, and what is spread.
 pub(crate) const NUMBERS: usize = 4;
 
 /// By the weights of trilinear interpolation. Samples keep 2 cells from the walls, where it would end.
@@ -116,7 +116,7 @@ impl Spread for Trilinear {
     }
 }
 
-/// `max(0, 1 − |Δ|)` in the cell below (0), at (1) or above (2) that of a point `f` from its centre.
+/// `max(0, 1 − |Δ|)` in the cell below (0), at (1) or above (2) that of a point `f` from its center.
 #[cube]
 pub(crate) fn tent<F: Float>(f: F, cell: u32) -> F {
     let zero = F::new(0.0);

@@ -89,11 +89,11 @@ fn all_that_is_asked_for_is_what_the_cpu_gives() {
         let (sure, wanted) = (found.confidence().unwrap(), expected.confidence());
         assert!(relative(sure, wanted) < 1e-5);
         let counts = found
-            .neighbour_counts()
+            .neighbor_counts()
             .unwrap()
             .iter()
-            .zip(expected.neighbour_counts());
-        // A sample at the very edge of a neighbourhood.
+            .zip(expected.neighbor_counts());
+        // A sample at the very edge of a neighborhood.
         assert!(counts.clone().all(|(a, b)| a.abs_diff(*b) <= 1));
         assert!(counts.filter(|(a, b)| a != b).count() <= 5);
         let same = found.closest().unwrap().iter().zip(expected.closest());
@@ -108,7 +108,7 @@ fn all_that_is_asked_for_is_what_the_cpu_gives() {
         let (report, wanted) = (found.report(&cloud).unwrap(), expected.report());
         assert_eq!(report.points, 2000);
         assert!((report.radius / wanted.radius - 1.0).abs() < tolerance);
-        assert_eq!(report.neighbours, wanted.neighbours);
+        assert_eq!(report.neighbors, wanted.neighbors);
         assert_eq!(report.doubt, wanted.doubt);
         assert_eq!(report.surface.euler, wanted.surface.euler);
         assert_eq!(report.surface.faces, wanted.surface.faces);

@@ -8,7 +8,7 @@ use crate::number::Dtype;
 /// A field on a grid, in double precision.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FieldFile {
-    /// The values at the cell centres.
+    /// The values at the cell centers.
     pub field: Field<f64>,
     /// How the file stored the values.
     pub dtype: Dtype,

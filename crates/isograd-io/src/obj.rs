@@ -127,7 +127,7 @@ impl Reader {
     }
 }
 
-/// The first three numbers of a line; what follows (weights, colours) is passed over.
+/// The first three numbers of a line; what follows (weights, colors) is passed over.
 fn three<'a>(mut fields: impl Iterator<Item = &'a [u8]>) -> Result<[f64; 3], String> {
     let mut v = [0.0; 3];
     for value in &mut v {

@@ -3,7 +3,7 @@
 //! The delimiter is `;`, `,` or white space, whichever the first row shows. A line that begins with `#`
 //! or `//` is a comment. A first line that is not all numbers, or a comment just before the first row,
 //! names the columns where it names `x`, `y` and `z`. Without names, 3 columns are points, 6 are points
-//! and normals (or colours, where all of them are whole numbers of 0 to 255), and any others are kept as
+//! and normals (or colors, where all of them are whole numbers of 0 to 255), and any others are kept as
 //! attributes. A first line with one number is the number of rows.
 
 use isograd::data::Attribute;
@@ -215,24 +215,24 @@ impl Table {
         rows.map(|row| columns.map(|column| row[column])).collect()
     }
 
-    /// Six columns without names may be points and colours: whole numbers of 0 to 255, not all 0 or 1.
-    fn tell_colours_from_normals(&mut self) {
+    /// Six columns without names may be points and colors: whole numbers of 0 to 255, not all 0 or 1.
+    fn tell_colors_from_normals(&mut self) {
         let byte = |v: f64| v.fract() == 0.0 && (0.0..=255.0).contains(&v);
         let is_unnamed = self.names.last().is_some_and(|name| name == "column_6");
-        let colours = is_unnamed
+        let colors = is_unnamed
             && self.names.len() == 6
             && (3..6).all(|c| self.column(c).all(byte))
             && (3..6).any(|c| self.column(c).any(|v| v > 1.0));
-        if colours {
+        if colors {
             self.normal = None;
-            for (name, colour) in self.names[3..].iter_mut().zip(["red", "green", "blue"]) {
-                *name = colour.into();
+            for (name, color) in self.names[3..].iter_mut().zip(["red", "green", "blue"]) {
+                *name = color.into();
             }
         }
     }
 
     fn into_geometry(mut self) -> Geometry {
-        self.tell_colours_from_normals();
+        self.tell_colors_from_normals();
         let used = |c: &usize| {
             self.xyz.contains(c) || self.normal.is_some_and(|normal| normal.contains(c))
         };

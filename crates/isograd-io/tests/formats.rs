@@ -80,7 +80,7 @@ fn text_is_read_with_any_delimiter_and_header() {
 }
 
 #[test]
-fn six_columns_are_normals_unless_they_are_colours() {
+fn six_columns_are_normals_unless_they_are_colors() {
     let file = geometry(Format::Text, "0 0 0 0 0 1\n1 0 0 0 0.6 0.8\n");
     assert_eq!(file.normals, Some(vec![[0.0, 0.0, 1.0], [0.0, 0.6, 0.8]]));
     let file = geometry(Format::Text, "0 0 0 255 0 1\n1 0 0 0 6 8\n");

@@ -108,7 +108,7 @@ fn over_cut_square(
     total
 }
 
-/// How many of a square's corners, middles of sides and centre are exposed.
+/// How many of a square's corners, middles of sides and center are exposed.
 fn exposed_of_nine(surface: &dyn Surface, patch: usize, square: Square) -> usize {
     // Off the very edge of the patch, where a map may not be smooth.
     let place = |low: f64, k: usize| (low + 0.5 * square.side * k as f64).clamp(1e-9, 1.0 - 1e-9);

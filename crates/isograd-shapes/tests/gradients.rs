@@ -54,7 +54,7 @@ fn whole_pullback_is_the_transpose_of_the_derivative() {
     }
 }
 
-/// Relative errors of `d(area)/dr = 8πr`, `d(volume)/dr = 4πr²` and mean `dφ/dr = −1` of a sphere whose centre
+/// Relative errors of `d(area)/dr = 8πr`, `d(volume)/dr = 4πr²` and mean `dφ/dr = −1` of a sphere whose center
 /// is `shift` cells from that of the grid.
 fn sphere_errors(cells: usize, shift: [f64; 3]) -> [f64; 3] {
     let radius = 0.5;
@@ -96,7 +96,7 @@ fn sphere_errors(cells: usize, shift: [f64; 3]) -> [f64; 3] {
 
 #[test]
 fn a_growing_sphere_follows_its_closed_forms_and_converges() {
-    // Where the surface passes the cell centres makes a difference: several places.
+    // Where the surface passes the cell centers makes a difference: several places.
     let shifts = [
         [0.0; 3],
         [0.3, 0.1, 0.4],

@@ -18,7 +18,7 @@ const THIN_DEPTH: f64 = 2.0;
 
 /// Samples on parts thinner than about three cells, and samples off the surface.
 ///
-/// At [`THIN_DEPTH`] cells below a sample on a thick part, φ still grows towards that sample. On a part
+/// At [`THIN_DEPTH`] cells below a sample on a thick part, φ still grows toward that sample. On a part
 /// thinner than about three cells the opposite side is nearer there, and the gradient has turned round.
 pub(crate) fn thin_and_missed<T: Real>(
     points: &[[T; 3]],
@@ -68,7 +68,7 @@ pub(crate) fn components(count: usize) -> Option<Warning> {
     (count > 1).then_some(Warning::Components { count })
 }
 
-/// Samples whose neighbours define no normal.
+/// Samples whose neighbors define no normal.
 pub(crate) fn guarded(samples: usize, points: usize) -> Option<Warning> {
     (samples as f64 > TOLERATED_SHARE * points as f64).then_some(Warning::Guarded { samples })
 }

@@ -101,7 +101,7 @@ impl<T: Real> Reconstructor<T> {
 
     /// Runs all stages but the checks on a cloud of as many points, with the radii and the signs of the normals that
     /// `held` has, and with its automatic smoothing where that does not go with the areas: the map that
-    /// [`Reconstruction::pullback`] differentiates, for those who compare it with differences. Neighbourhoods are
+    /// [`Reconstruction::pullback`] differentiates, for those who compare it with differences. Neighborhoods are
     /// those of the moved points; a sample that enters one or leaves it still makes the normal jump.
     ///
     /// # Errors
@@ -193,12 +193,12 @@ impl<T: Real> Reconstruction<T> {
         &self.options
     }
 
-    /// The signed distance φ at every cell centre, in the cloud's unit, negative inside.
+    /// The signed distance φ at every cell center, in the cloud's unit, negative inside.
     pub fn sdf(&self) -> &Field<T> {
         &self.sdf
     }
 
-    /// The indicator χ at every cell centre: below the iso-value inside, above it outside, what the
+    /// The indicator χ at every cell center: below the iso-value inside, above it outside, what the
     /// [local iso-value](isosurface::local_level) takes off included. It has no unit; without area weights also no
     /// scale.
     pub fn indicator(&self) -> &Field<T> {
@@ -215,7 +215,7 @@ impl<T: Real> Reconstruction<T> {
         &self.mesh
     }
 
-    /// For each cell, in C order, the face of the surface closest to its centre;
+    /// For each cell, in C order, the face of the surface closest to its center;
     /// [`NO_TRIANGLE`](distance::NO_TRIANGLE) outside the band.
     pub fn closest(&self) -> &[u32] {
         &self.closest
@@ -231,12 +231,12 @@ impl<T: Real> Reconstruction<T> {
         &self.orientation.confidence
     }
 
-    /// `(N,)` number of samples in the neighbourhood of each, itself included.
-    pub fn neighbour_counts(&self) -> &[u32] {
+    /// `(N,)` number of samples in the neighborhood of each, itself included.
+    pub fn neighbor_counts(&self) -> &[u32] {
         &self.residuals.neighborhoods.count
     }
 
-    /// `(N,)` number of samples in the neighbourhood that each axis was found in; empty with given normals.
+    /// `(N,)` number of samples in the neighborhood that each axis was found in; empty with given normals.
     pub(crate) fn axis_counts(&self) -> &[u32] {
         &self.residuals.normals.count
     }

@@ -47,7 +47,7 @@ fn agrees(what: &str, pulled: f64, step: f64, along: impl Fn(f64) -> f64) {
     );
 }
 
-/// A torus' neighbourhoods, and those of moved points with the same radii.
+/// A torus' neighborhoods, and those of moved points with the same radii.
 struct Near {
     points: Vec<[f64; 3]>,
     held: Neighborhoods<f64>,
@@ -74,7 +74,7 @@ impl Near {
     fn moved(&self, v: &[[f64; 3]], step: f64) -> Neighborhoods<f64> {
         let mut out = Neighborhoods::default();
         neighbors::hold(&moved(&self.points, v, step), &self.held, &mut out).expect("as before");
-        assert_eq!(out.count, self.held.count, "a neighbourhood changed");
+        assert_eq!(out.count, self.held.count, "a neighborhood changed");
         out
     }
 }
@@ -119,7 +119,7 @@ fn axes_and_areas_with_grown_radii() {
 }
 
 #[test]
-fn axes_from_wider_neighbourhoods() {
+fn axes_from_wider_neighborhoods() {
     let mut random = Random::new(11);
     let mut noise = || 0.12 * (random.uniform() + random.uniform() - 1.0);
     let rough = torus(1600, 4).into_iter().map(|s| s.0.map(|x| x + noise()));
@@ -137,7 +137,7 @@ fn axes_from_wider_neighbourhoods() {
     agrees("axes", inner(&bar, &v), step, |s| {
         let mut at = normals::Residual::default();
         normals::hold(&near.moved(&v, s), &residual, &mut at);
-        assert_eq!(at.count, residual.count, "a neighbourhood changed");
+        assert_eq!(at.count, residual.count, "a neighborhood changed");
         inner(&at.normals, &w)
     });
 }
@@ -327,7 +327,7 @@ fn iso_value_to_indicator_samples_and_grid() {
         &mut out,
     );
     let pulled = v.inner(&out) + product(&chi_bar, &along);
-    // No sample may cross a plane through cell centres, where the slope jumps.
+    // No sample may cross a plane through cell centers, where the slope jumps.
     agrees("iso-value", pulled, 1e-2 * STEP, |s| {
         let at = setting.moved(&v, s);
         let values = chi.values().iter().zip(&along).map(|(c, v)| c + s * v);
@@ -422,7 +422,7 @@ fn distance_to_vertices_and_grid() {
 
 #[test]
 fn distance_of_a_cell_on_the_surface_follows_its_normal() {
-    // Cell centres lie on the plane z = 0.5, which is all the surface there is.
+    // Cell centers lie on the plane z = 0.5, which is all the surface there is.
     let corners = vec![[-9.0, -9.0, 0.5], [9.0, -9.0, 0.5], [0.0, 9.0, 0.5]];
     let mesh = Mesh::new(corners, vec![[0, 1, 2]]).expect("finite");
     let grid = Grid::new([0.0; 3], 1.0, [2, 2, 2]).expect("a grid");

@@ -15,7 +15,7 @@ const SMALLEST_REASON: usize = 10;
 /// The parts of a reconstruction, in the order in which they run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// Neighbours, D-PCA normals and area weights.
+    /// Neighbors, D-PCA normals and area weights.
     Normals,
     /// The sign of each normal.
     Orient,
@@ -83,12 +83,12 @@ impl Seconds {
 pub struct Report {
     /// Number of points.
     pub points: usize,
-    /// The common neighbourhood radius `R`.
+    /// The common neighborhood radius `R`.
     pub radius: f64,
-    /// Typical distance between neighbouring samples.
+    /// Typical distance between neighboring samples.
     pub sample_spacing: f64,
-    /// Least, median and greatest number of neighbours of a point, itself included.
-    pub neighbours: [u32; 3],
+    /// Least, median and greatest number of neighbors of a point, itself included.
+    pub neighbors: [u32; 3],
     /// Points whose normal is not well defined (equal eigenvalues): its derivative is bounded by a guard.
     pub guarded: usize,
     /// Width of the smoothing of the indicator, in cells.
@@ -123,7 +123,7 @@ impl Report {
     pub(crate) fn measure_samples<T: Real>(&mut self, counts: &[u32], confidence: &[T]) {
         let mut counts = counts.to_vec();
         counts.sort_unstable();
-        self.neighbours = [0.0, 0.5, 1.0].map(|q| quantile(&counts, q).unwrap_or(0));
+        self.neighbors = [0.0, 0.5, 1.0].map(|q| quantile(&counts, q).unwrap_or(0));
         let mut confidence: Vec<f64> = confidence.iter().map(|c| c.f64()).collect();
         confidence.sort_unstable_by(f64::total_cmp);
         self.confidence_p05 = quantile(&confidence, 0.05).unwrap_or(0.0);
@@ -186,14 +186,14 @@ pub enum Warning {
         /// How many, and why.
         doubt: Doubt,
     },
-    /// Normals are not defined by their neighbours.
+    /// Normals are not defined by their neighbors.
     Guarded {
         /// Number of such samples.
         samples: usize,
     },
     /// Coordinates are so large that the number type rounds them visibly.
     Rounded {
-        /// Distance between neighbouring numbers of the type, in cells.
+        /// Distance between neighboring numbers of the type, in cells.
         cells: f64,
     },
 }
@@ -237,7 +237,7 @@ impl fmt::Display for Warning {
             ),
             Self::Rounded { cells } => write!(
                 f,
-                "coordinates are rounded to {cells:.1e} cells by the number type; use f64 or move the cloud towards the origin"
+                "coordinates are rounded to {cells:.1e} cells by the number type; use f64 or move the cloud toward the origin"
             ),
         }
     }

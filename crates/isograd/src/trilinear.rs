@@ -1,8 +1,8 @@
-//! Trilinear interpolation of a field between its cell centres: value and gradient at a point.
+//! Trilinear interpolation of a field between its cell centers: value and gradient at a point.
 //!
 //! Within half a cell of a wall, and outside the grid, the field goes on as a constant across the wall
-//! (its even reflection): the value is that of the nearest point between the cell centres, and the
-//! gradient has no component across the wall. The gradient jumps at the planes through cell centres.
+//! (its even reflection): the value is that of the nearest point between the cell centers, and the
+//! gradient has no component across the wall. The gradient jumps at the planes through cell centers.
 
 use rayon::prelude::*;
 
@@ -18,9 +18,9 @@ pub(crate) struct Cube<T> {
     /// Place in memory of the lowest of the eight cells.
     base: usize,
     strides: [usize; 3],
-    /// Distance from its centre, per axis, in cells: 0 to 1.
+    /// Distance from its center, per axis, in cells: 0 to 1.
     fraction: [T; 3],
-    /// Whether the point is between cell centres, per axis.
+    /// Whether the point is between cell centers, per axis.
     between: [bool; 3],
 }
 
@@ -124,7 +124,7 @@ pub(crate) fn spread<T: Real>(
 }
 
 impl<T: Real> Field<T> {
-    /// The value at a point of the user's coordinates, trilinear between cell centres and constant across
+    /// The value at a point of the user's coordinates, trilinear between cell centers and constant across
     /// the walls. NaN for a point that is not a number.
     pub fn interpolate(&self, point: [T; 3]) -> T {
         let grid = self.grid();
@@ -132,7 +132,7 @@ impl<T: Real> Field<T> {
     }
 
     /// The value at a point of the user's coordinates, as [`Self::interpolate`], and its gradient there, in
-    /// values per unit length. The gradient jumps at the planes through cell centres, and has no component
+    /// values per unit length. The gradient jumps at the planes through cell centers, and has no component
     /// across a wall that is less than half a cell away.
     pub fn interpolate_with_gradient(&self, point: [T; 3]) -> (T, [T; 3]) {
         let grid = self.grid();
@@ -183,7 +183,7 @@ mod tests {
         let field = sampled();
         for i in 0..200 {
             let t = |a: f64| (f64::from(i) * a).fract();
-            // Anywhere between the first and the last cell centre.
+            // Anywhere between the first and the last cell center.
             let x = [0.5 + 3.0 * t(0.618), 0.5 + 6.0 * t(0.414), 0.5 + t(0.732)];
             let point = field.grid().from_index(x);
             let (value, gradient) = field.interpolate_with_gradient(point);

@@ -279,7 +279,7 @@ fn all_results_are_pulled_back_to_all_inputs() {
             let plan = plan.as_mut().expect("options");
             let result = plan.reconstruct_held(&moved, &base).expect("a torus");
             assert_eq!(result.mesh().edges(), base.mesh().edges(), "a sign changed");
-            assert_eq!(result.neighbour_counts(), base.neighbour_counts());
+            assert_eq!(result.neighbor_counts(), base.neighbor_counts());
             results(result, &Extended::new(result, &moved))
         });
         // Subtracted before they are summed: the sums are large.

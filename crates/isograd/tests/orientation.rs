@@ -69,7 +69,7 @@ fn read(path: &Path) -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
 /// Per cent of wrong signs, and the orientation.
 fn measure(points: &[[f32; 3]], truth: &[[f32; 3]]) -> (f64, Orientation<f32>, f64) {
     let mut neighborhoods = Neighborhoods::default();
-    neighbors::forward(points, Radius::Auto, &mut neighborhoods).expect("neighbourhoods");
+    neighbors::forward(points, Radius::Auto, &mut neighborhoods).expect("neighborhoods");
     let mut axes = normals::Residual::default();
     normals::forward(&neighborhoods, &mut axes);
     let (mut scratch, mut out) = (orient::Scratch::default(), Orientation::default());

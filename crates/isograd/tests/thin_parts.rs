@@ -25,7 +25,7 @@ fn lens_and_ball(count: usize, thickness: f64) -> PointCloud<f64> {
             normals.push([x, y, z].map(|x| x / 0.4));
             continue;
         }
-        // Tilted, so that it lies in every way between the cell centres.
+        // Tilted, so that it lies in every way between the cell centers.
         let tilted = |[x, y, z]: [f64; 3]| [0.8 * x - 0.6 * z, y, 0.6 * x + 0.8 * z];
         let normal = [x, y, z / flat];
         points.push(tilted([x, y, flat * z]));

@@ -17,13 +17,13 @@ fn report(points: Vec<[f64; 3]>, cells: usize) -> Report {
 }
 
 /// `n` uniform random points of the unit sphere with `z` above `lowest`, moved and scaled.
-fn sphere(n: usize, lowest: f64, centre: [f64; 3], radius: f64) -> Vec<[f64; 3]> {
+fn sphere(n: usize, lowest: f64, center: [f64; 3], radius: f64) -> Vec<[f64; 3]> {
     let mut random = Uniform::new(n as u64);
     let point = |_| {
         let z = lowest + (1.0 - lowest) * random.next();
         let (turn, r) = (std::f64::consts::TAU * random.next(), (1.0 - z * z).sqrt());
         let p = [r * turn.cos(), r * turn.sin(), z];
-        std::array::from_fn(|a| centre[a] + radius * p[a])
+        std::array::from_fn(|a| center[a] + radius * p[a])
     };
     (0..n).map(point).collect()
 }

@@ -58,7 +58,7 @@ maximum of absolute errors:
 - **zero set**: exact distance of the vertices of the surface, and of the middles of its faces, in cells. Beside it
   stands the same for marching cubes of the *exact* φ, which is what flat triangles cost, whatever made them;
 - **order**: of the mean at the vertices, as a length, from the grid before to this one;
-- **φ**: difference to the exact distance at every cell centre where that is below 3 cells, in cells;
+- **φ**: difference to the exact distance at every cell center where that is below 3 cells, in cells;
 - **∇φ**: angle between the gradient of φ and the exact normal, at the samples, in degrees;
 - **area, volume**: relative error of the surface, in percent.
 ",

@@ -59,14 +59,14 @@ in every sample. This page compares it with finite differences and closed forms,
 `cargo xtask gradients` writes the page, its pictures and [all numbers](gradients.json). The seed is fixed: all but
 seconds and bytes come out the same again.
 
-**What the pullback holds constant**: which samples are neighbours of which and within what radius, the side that
+**What the pullback holds constant**: which samples are neighbors of which and within what radius, the side that
 each normal points to, which cells are inside, and which face is closest to a cell. All else is differentiated. So
 there are two kinds of differences here:
 
-- **held**: a step so small that no neighbourhood changes, with the radii and sides of the start
+- **held**: a step so small that no neighborhood changes, with the radii and sides of the start
   (`Reconstructor::reconstruct_held`). This is the map that the pullback differentiates; they must agree.
 - **across a cell**: the fastest sample moves half a cell to either side, and everything is found anew
-  (`Reconstructor::reconstruct`). This is what an optimiser meets when it takes a step.
+  (`Reconstructor::reconstruct`). This is what an optimizer meets when it takes a step.
 
 Bodies: the fish of `isograd-shapes`, {fish_samples} samples on {fish} cells; its torus, {torus_samples} samples on
 {torus} cells. The longest side of a grid is 1.2 times that of its body. All options have their defaults unless said

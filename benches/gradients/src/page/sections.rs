@@ -52,7 +52,7 @@ pullback gives `∂L/∂x` for each sample, `Shape::pullback` turns that into `�
 
 {table}
 Above each pair of bars stands the relative difference of the two. The step of the held differences is
-{step:e} cells of the fastest sample; {changed} neighbourhoods changed. A component that is small beside the others is
+{step:e} cells of the fastest sample; {changed} neighborhoods changed. A component that is small beside the others is
 the difference of large parts, and half a cell is a long way for it: `L` is curved. Where normals change sides, at the
 edge of the tail fin, `L` also jumps, and no derivative knows of it.
 ",
@@ -191,7 +191,7 @@ reconstructions, half a cell to either side. 1 is right.
     parts.push(format!(
         "### Inside the step\n\nAt the defaults, the mean of the pullbacks at five places of the step over the same \
          difference: what is off\nin one place only is right in the mean, what jumps is not. Beside it: samples whose \
-         normal changes sides over\nthe step, and samples whose number of neighbours changes.\n\n{}",
+         normal changes sides over\nthe step, and samples whose number of neighbors changes.\n\n{}",
         path_table(results)
     ));
     parts.join("\n")
@@ -221,7 +221,7 @@ fn ratio_table(results: &Results, functional: Functional) -> String {
 
 /// What happens between the ends of the step, at the defaults.
 fn path_table(results: &Results) -> String {
-    let columns = ["volume", "shell", "change sides", "change neighbours"];
+    let columns = ["volume", "shell", "change sides", "change neighbors"];
     let mut table = Table::new(&["body", "samples", "motion"], head(&columns));
     let of = |functional| {
         let groups = groups(results, functional);

@@ -5,7 +5,7 @@
     >>> result = isograd.reconstruct(points, isograd.Grid.fit(points, 32))
     >>> gradient = result.pullback(sdf=result.sdf).points   # of the loss Σ φ²/2
 
-φ is negative inside, in the unit of the points, at the centres of the cells; arrays are ``(nx, ny, nz)``, points
+φ is negative inside, in the unit of the points, at the centers of the cells; arrays are ``(nx, ny, nz)``, points
 ``(N, 3)``; float32 stays float32. ``isograd.jax`` and ``isograd.torch`` are the same inside these libraries.
 """
 

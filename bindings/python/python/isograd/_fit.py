@@ -1,4 +1,4 @@
-"""Inverse shape optimisation: a body, or points, changed until their field is that of a target."""
+"""Inverse shape optimization: a body, or points, changed until their field is that of a target."""
 
 from __future__ import annotations
 

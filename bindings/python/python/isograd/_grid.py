@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Grid:
-    """A box of cubic cells. Fields have one value for each cell, at its centre.
+    """A box of cubic cells. Fields have one value for each cell, at its center.
 
     Attributes:
         lower: corner of the box, ``(x, y, z)``, in the unit of the points.
         spacing: side of a cell, in the unit of the points.
         shape: number of cells along each axis, ``(nx, ny, nz)``.
 
-    The centre of cell ``(i, j, k)`` is ``lower + spacing * (i + 0.5, j + 0.5, k + 0.5)``.
+    The center of cell ``(i, j, k)`` is ``lower + spacing * (i + 0.5, j + 0.5, k + 0.5)``.
 
     Raises:
         ValueError: where a number is not finite, or there are no cells.
@@ -82,12 +82,12 @@ class Grid:
 
     @property
     def origin(self) -> tuple[float, float, float]:
-        """The centre of cell ``(0, 0, 0)``."""
+        """The center of cell ``(0, 0, 0)``."""
         x, y, z = (low + 0.5 * self.spacing for low in self.lower)
         return (x, y, z)
 
     def centers(self, dtype: np.typing.DTypeLike = np.float64) -> np.ndarray:
-        """``(nx, ny, nz, 3)`` centres of all cells."""
+        """``(nx, ny, nz, 3)`` centers of all cells."""
         axes = [
             low + self.spacing * (np.arange(n) + 0.5) for low, n in zip(self.lower, self.shape)
         ]

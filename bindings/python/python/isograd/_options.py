@@ -13,7 +13,7 @@ class Orient(str, Enum):
     """How the side of each normal is found."""
 
     AUTO = "auto"
-    """From enclosure, sky, sheets and neighbours."""
+    """From enclosure, sky, sheets and neighbors."""
     PARITY = "parity"
     """By counting crossings along the normal, as the paper prints it."""
     GIVEN = "given"
@@ -56,7 +56,7 @@ class Options:
     """What to compute, and how.
 
     Attributes:
-        radius: neighbourhood radius of the normals, in the unit of the points, or ``"auto"``.
+        radius: neighborhood radius of the normals, in the unit of the points, or ``"auto"``.
         orient: see :class:`Orient`.
         splat: see :class:`Splat`.
         area: whether a sample counts by the area that it stands for.

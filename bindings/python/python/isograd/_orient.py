@@ -50,7 +50,7 @@ def orient(
         points: ``(N, 3)`` samples of a surface; float32 or float64 decides the type of the result.
         normals: as :func:`reconstruct` takes them.
         sensors: as :func:`reconstruct` takes them.
-        radius: of the neighbourhoods, in the unit of the points, or ``"auto"``.
+        radius: of the neighborhoods, in the unit of the points, or ``"auto"``.
         orient: how the sides are found; ``"previous"`` needs a plan, and is ``"auto"`` here.
 
     Raises:

@@ -95,7 +95,7 @@ class Reconstruction:
 
     @cached_property
     def sdf(self) -> np.ndarray:
-        """``(nx, ny, nz)`` signed distance φ at the cell centres, in the points' unit, negative inside."""
+        """``(nx, ny, nz)`` signed distance φ at the cell centers, in the points' unit, negative inside."""
         return self._core.array("sdf")
 
     @cached_property
@@ -134,9 +134,9 @@ class Reconstruction:
         return self._core.array("areas")
 
     @cached_property
-    def neighbours(self) -> np.ndarray:
-        """``(N,)`` number of samples in the neighbourhood of each, itself included."""
-        return self._core.array("neighbours")
+    def neighbors(self) -> np.ndarray:
+        """``(N,)`` number of samples in the neighborhood of each, itself included."""
+        return self._core.array("neighbors")
 
     @cached_property
     def report(self) -> dict[str, Any]:
@@ -184,7 +184,7 @@ class Reconstruction:
             iso_value: in the level.
             extensions: an :class:`Extension` with its derivatives in ``vertices`` and ``values``, or ``None``.
 
-        Neighbourhoods, signs of normals, signs of cells and closest faces are held constant.
+        Neighborhoods, signs of normals, signs of cells and closest faces are held constant.
 
         Raises:
             TypeError, ValueError: an array of another shape or type, or one that is not finite.

@@ -47,10 +47,10 @@ def signed_distance(
     options: Options | None = None,
     backend: str = "cpu",
 ) -> jax.Array:
-    """The signed distance φ of the surface through ``points``, at the cell centres of ``grid``.
+    """The signed distance φ of the surface through ``points``, at the cell centers of ``grid``.
 
     Differentiable in ``points``, and in ``normals`` with ``orient="given"``. Held constant: which samples are
-    neighbours, the sides of the normals, which face is closest to a cell; so φ jumps where these change.
+    neighbors, the sides of the normals, which face is closest to a cell; so φ jumps where these change.
 
     Args:
         points: ``(N, 3)``, at least 2 cells off the walls of the grid.

@@ -37,7 +37,7 @@ def signed_distance(
     """φ: the signed distance to the surface that the points sample.
 
     Differentiable once in ``points``, and in ``normals`` where the options use them. What jumps is held fixed:
-    which points are neighbours, on which side a normal is, and with ``radius="auto"`` the radius too.
+    which points are neighbors, on which side a normal is, and with ``radius="auto"`` the radius too.
 
     Args:
         points: ``(N, 3)``, float32 or float64, on the CPU. float16 and bfloat16 become float32.
@@ -47,7 +47,7 @@ def signed_distance(
         backend: where to compute, as for :func:`isograd.reconstruct`. The pullback reconstructs once more there.
 
     Returns:
-        ``grid.shape`` tensor of φ at the centres of the cells, in the unit of the points: negative inside.
+        ``grid.shape`` tensor of φ at the centers of the cells, in the unit of the points: negative inside.
 
     Raises:
         TypeError: for what is no tensor, and for integers and complex numbers.

@@ -48,13 +48,13 @@ def slices(
     Args:
         phi: ``grid.shape`` field, such as ``Reconstruction.sdf``.
         grid: its grid.
-        at: the point ``(x, y, z)`` that the slices pass through, to the nearest cell; the centre of the grid
+        at: the point ``(x, y, z)`` that the slices pass through, to the nearest cell; the center of the grid
             where it is left out.
         points: ``(N, 3)``: those in the cells of a slice are drawn on it as dots.
-        limit: the value of the darkest colours, in the unit of φ; the largest of the three slices where it is
+        limit: the value of the darkest colors, in the unit of φ; the largest of the three slices where it is
             left out.
         title: above the three.
-        label: of the colours.
+        label: of the colors.
 
     Returns:
         A figure of ``matplotlib.pyplot``: ``figure.savefig("slices.png")`` or ``pyplot.show()``, then
@@ -159,8 +159,8 @@ def scene(
         mesh: such as ``Reconstruction.mesh``.
         points: ``(N, 3)``, drawn as dots.
         normals: ``(N, 3)`` of the points, drawn as arrows at 500 points at most.
-        values: ``(V,)`` at the vertices, as colours.
-        label: of these colours.
+        values: ``(V,)`` at the vertices, as colors.
+        label: of these colors.
         opacity: of the surface: 0 for nothing, 1 for solid.
         off_screen: draw without a window, for ``plotter.screenshot("scene.png")``.
 

@@ -13,7 +13,7 @@ use crate::error::Error;
 /// The normals and their sides.
 #[derive(Debug, Args)]
 pub struct OrientArgs {
-    /// Neighbourhood radius of the normals, in the cloud's unit
+    /// Neighborhood radius of the normals, in the cloud's unit
     #[arg(
         long,
         value_name = "R|auto",
@@ -57,7 +57,7 @@ impl OrientArgs {
         Ok(())
     }
 
-    /// The neighbourhood radius.
+    /// The neighborhood radius.
     pub fn radius(&self) -> Radius {
         match self.radius {
             AutoOr::Auto => Radius::Auto,

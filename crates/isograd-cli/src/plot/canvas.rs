@@ -78,7 +78,7 @@ impl Canvas {
         }
     }
 
-    /// Lays `color` over every pixel of a box, as much as `coverage(x, y)` of its centre says.
+    /// Lays `color` over every pixel of a box, as much as `coverage(x, y)` of its center says.
     fn shade(
         &mut self,
         [x0, y0, x1, y1]: [f32; 4],
@@ -98,8 +98,8 @@ impl Canvas {
 
     /// A filled box, from `(x0, y0)` to `(x1, y1)`.
     pub fn rectangle(&mut self, [x0, y0, x1, y1]: [f32; 4], color: Color) {
-        let part = |low: f32, high: f32, centre: f32| {
-            ((centre + 0.5).min(high) - (centre - 0.5).max(low)).clamp(0.0, 1.0)
+        let part = |low: f32, high: f32, center: f32| {
+            ((center + 0.5).min(high) - (center - 0.5).max(low)).clamp(0.0, 1.0)
         };
         self.shade([x0, y0, x1, y1], color, |x, y| {
             part(x0, x1, x) * part(y0, y1, y)

@@ -1,5 +1,5 @@
 //! A body beside its target: a view of both surfaces, two sections of the field with both zero contours, and
-//! the error in the same sections (the paper's figures of shape optimisation).
+//! the error in the same sections (the paper's figures of shape optimization).
 
 use isograd::{Field, Mesh, Real, vector::to_f64};
 

@@ -29,13 +29,13 @@ impl Default for Camera {
 }
 
 impl Camera {
-    /// Right, up and towards the viewer, as unit vectors.
+    /// Right, up and toward the viewer, as unit vectors.
     fn axes(&self) -> [[f64; 3]; 3] {
         let (sin_a, cos_a) = self.azimuth.to_radians().sin_cos();
         let (sin_e, cos_e) = self.elevation.to_radians().sin_cos();
         let right = [cos_a, sin_a, 0.0];
-        let towards = [sin_a * cos_e, -cos_a * cos_e, sin_e];
-        [right, cross(towards, right), towards]
+        let toward = [sin_a * cos_e, -cos_a * cos_e, sin_e];
+        [right, cross(toward, right), toward]
     }
 }
 
@@ -43,7 +43,7 @@ impl Camera {
 #[derive(Clone, Copy, Debug)]
 pub struct View {
     axes: [[f64; 3]; 3],
-    centre: [f64; 3],
+    center: [f64; 3],
     /// Width and height, in the points' unit.
     size: [f64; 2],
 }
@@ -65,10 +65,10 @@ impl View {
             (low, high) = ([-1.0; 3], [1.0; 3]);
         }
         let middle: [f64; 3] = std::array::from_fn(|a| 0.5 * (low[a] + high[a]));
-        let centre = (0..3).fold([0.0; 3], |c, a| vector::add(c, scale(axes[a], middle[a])));
+        let center = (0..3).fold([0.0; 3], |c, a| vector::add(c, scale(axes[a], middle[a])));
         Self {
             axes,
-            centre,
+            center,
             size: [high[0] - low[0], high[1] - low[1]],
         }
     }
@@ -85,7 +85,7 @@ pub struct Scene {
     canvas: Canvas,
     depth: Vec<f64>,
     axes: [[f64; 3]; 3],
-    centre: [f64; 3],
+    center: [f64; 3],
     /// Pixels per unit length.
     zoom: f64,
 }
@@ -99,15 +99,15 @@ impl Scene {
             canvas: Canvas::new(size[0], size[1], WHITE),
             depth: vec![f64::NEG_INFINITY; size[0] * size[1]],
             zoom: room(size[0], view.size[0]).min(room(size[1], view.size[1])),
-            centre: view.centre,
+            center: view.center,
             axes: view.axes,
         }
     }
 
-    /// Position on the screen, in pixels from the top left, and the depth, which grows towards the
+    /// Position on the screen, in pixels from the top left, and the depth, which grows toward the
     /// viewer.
     fn project(&self, point: [f64; 3]) -> [f64; 3] {
-        let from = sub(point, self.centre);
+        let from = sub(point, self.center);
         let [x, y, z] = self.axes.map(|axis| self.zoom * dot(axis, from));
         let (width, height) = (self.canvas.width() as f64, self.canvas.height() as f64);
         [0.5 * width + x, 0.5 * height - y, z]
@@ -231,27 +231,20 @@ impl Scene {
 
     /// A key light from above left, a weaker one from the right, light from everywhere, and a highlight.
     fn shade(&self, normal: [f64; 3], color: Color) -> Color {
-        let [right, up, towards] = self.axes;
+        let [right, up, toward] = self.axes;
         let Some(normal) = vector::normalized(normal) else {
             return color;
         };
         // Seen from behind, a surface is lit as from the front.
-        let normal = scale(
-            normal,
-            if dot(normal, towards) < 0.0 {
-                -1.0
-            } else {
-                1.0
-            },
-        );
+        let normal = scale(normal, if dot(normal, toward) < 0.0 { -1.0 } else { 1.0 });
         let light = |r: f64, u: f64, t: f64| {
             let direction: [f64; 3] =
-                std::array::from_fn(|a| r * right[a] + u * up[a] + t * towards[a]);
-            vector::normalized(direction).unwrap_or(towards)
+                std::array::from_fn(|a| r * right[a] + u * up[a] + t * toward[a]);
+            vector::normalized(direction).unwrap_or(toward)
         };
         let (key, fill) = (light(-0.5, 0.8, 0.7), light(0.9, 0.1, 0.5));
         let diffuse = 0.36 + 0.58 * dot(normal, key).max(0.0) + 0.16 * dot(normal, fill).max(0.0);
-        let half = vector::normalized(vector::add(key, towards)).unwrap_or(towards);
+        let half = vector::normalized(vector::add(key, toward)).unwrap_or(toward);
         let highlight = 0.16 * dot(normal, half).max(0.0).powi(40);
         color.map(|c| (c * diffuse as f32 + highlight as f32).min(1.0))
     }
@@ -280,7 +273,7 @@ fn vertex_normals(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> Vec<[f64; 3]> {
     normals
 }
 
-/// The mean of each vertex' unit normal and those of its neighbours.
+/// The mean of each vertex' unit normal and those of its neighbors.
 fn smoothed(normals: &[[f64; 3]], faces: &[[u32; 3]]) -> Vec<[f64; 3]> {
     let units: Vec<[f64; 3]> = normals
         .iter()
@@ -309,14 +302,14 @@ mod tests {
     #[test]
     fn the_camera_is_a_right_handed_frame() {
         for azimuth in [-70.0, 0.0, 25.0, 180.0] {
-            let [right, up, towards] = Camera {
+            let [right, up, toward] = Camera {
                 azimuth,
                 elevation: 30.0,
             }
             .axes();
             let third = cross(right, up);
             for a in 0..3 {
-                assert!((third[a] - towards[a]).abs() < 1e-12);
+                assert!((third[a] - toward[a]).abs() < 1e-12);
             }
             assert!(up[2] > 0.0, "z points upwards on the screen");
         }
@@ -380,7 +373,7 @@ mod tests {
         let ((left, right), (top, bottom)) = (range(0), range(1));
         assert!(left >= 0.0 && right <= 180.0 && top >= 0.0 && bottom <= 90.0);
         assert!(bottom - top > 85.0, "the height is what limits it");
-        assert!((left + right - 180.0).abs() < 1e-9, "centred");
+        assert!((left + right - 180.0).abs() < 1e-9, "centered");
         assert!(
             View::new(Camera::default(), &[[1.0; 3]])
                 .aspect()

@@ -6,7 +6,7 @@ use super::axis::step;
 use super::canvas::{BLACK, Canvas, Color, WHITE};
 use super::color::Range;
 
-/// A plane of cell centres.
+/// A plane of cell centers.
 #[derive(Clone, Debug)]
 pub struct Slice {
     /// The axis across the plane.
@@ -15,7 +15,7 @@ pub struct Slice {
     pub axes: [usize; 2],
     /// Where the plane lies along `normal`, in the field's unit.
     pub position: f64,
-    /// Centre of the first cell along the two axes.
+    /// Center of the first cell along the two axes.
     pub origin: [f64; 2],
     /// Cell size.
     pub spacing: f64,
@@ -104,7 +104,7 @@ impl Slice {
         })
     }
 
-    /// Value at a place in cells from the first cell's centre, bilinear.
+    /// Value at a place in cells from the first cell's center, bilinear.
     fn at(&self, [u, v]: [f64; 2]) -> f64 {
         let split = |x: f64, n: usize| {
             let x = x.clamp(0.0, (n - 1) as f64);
@@ -218,8 +218,8 @@ mod tests {
     }
 
     #[test]
-    fn the_fullest_plane_of_a_sphere_goes_through_its_centre() {
-        // Along z the centre lies between the cells 9 and 10, and the grid's middle is at 11.5.
+    fn the_fullest_plane_of_a_sphere_goes_through_its_center() {
+        // Along z the center lies between the cells 9 and 10, and the grid's middle is at 11.5.
         let slice = Slice::fullest(&sphere(), 2);
         assert!(
             (slice.position.abs() - 0.05).abs() < 1e-12,

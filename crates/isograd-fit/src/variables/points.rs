@@ -2,8 +2,8 @@
 //!
 //! Each variable is a coordinate of a displacement `u_i` from where the point was at the start, in cells. So
 //! many variables are hardly held by the field: what no cell feels is free. A term
-//! `w/|E| Σ_(i,j)∈E |u_i − u_j|²/s²` over the pairs `E` of neighbours in the cloud at the start (`s` is its
-//! spacing) asks that neighbours move alike. It is 0 for any displacement of the whole, and does not shrink
+//! `w/|E| Σ_(i,j)∈E |u_i − u_j|²/s²` over the pairs `E` of neighbors in the cloud at the start (`s` is its
+//! spacing) asks that neighbors move alike. It is 0 for any displacement of the whole, and does not shrink
 //! the body, as a penalty on the positions would.
 
 use isograd::PointCloud;
@@ -23,12 +23,12 @@ pub struct Points {
     pub cloud: PointCloud<f64>,
     /// Weight `w` of the smoothness of the displacement; 0 for none.
     pub smoothness: f64,
-    /// Neighbours of each point in that term.
+    /// Neighbors of each point in that term.
     pub neighbors: usize,
 }
 
 impl Points {
-    /// All points of `cloud`, with a smoothness of 0.01 over 8 neighbours.
+    /// All points of `cloud`, with a smoothness of 0.01 over 8 neighbors.
     pub fn new(cloud: PointCloud<f64>) -> Self {
         Self {
             cloud,
@@ -38,16 +38,16 @@ impl Points {
     }
 }
 
-/// Pairs of neighbours, as the list of each point's.
+/// Pairs of neighbors, as the list of each point's.
 #[derive(Clone, Debug, Default)]
 struct Graph {
-    /// Where each point's neighbours begin in `neighbors`, and their end.
+    /// Where each point's neighbors begin in `neighbors`, and their end.
     starts: Vec<usize>,
     neighbors: Vec<u32>,
 }
 
 impl Graph {
-    /// `i` and `j` are neighbours where one is among the `k` nearest of the other.
+    /// `i` and `j` are neighbors where one is among the `k` nearest of the other.
     fn new(points: &[[f64; 3]], k: usize) -> Self {
         let index = CellIndex::new(points);
         let nearest: Vec<Vec<u32>> = (0..points.len())
@@ -172,7 +172,7 @@ impl Degrees {
     }
 }
 
-/// Median distance of a point to its nearest neighbour.
+/// Median distance of a point to its nearest neighbor.
 fn spacing(points: &[[f64; 3]], graph: &Graph) -> f64 {
     let distance = |i: usize, j: u32| {
         isograd::vector::norm(isograd::vector::sub(points[i], points[j as usize]))

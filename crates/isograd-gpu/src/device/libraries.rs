@@ -1,6 +1,6 @@
 //! Whether the CUDA libraries are here.
 //!
-//! Unsafe because loading a library runs its initialisers; those of the NVIDIA driver and of NVRTC are made
+//! Unsafe because loading a library runs its initializers; those of the NVIDIA driver and of NVRTC are made
 //! for it, and what was loaded is let go again.
 #![allow(unsafe_code)]
 

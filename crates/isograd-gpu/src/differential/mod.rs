@@ -4,7 +4,7 @@
 //! # Map
 //! As [`isograd::differential`], walls, bounds and zeros included: central differences, one-sided at the walls;
 //! curvature `κ = div(∇φ/|∇φ|)`, within `±2/h` and 0 where the gradient is, of a `φ` that [`Options::smoothing`]
-//! passes have smoothed; at points the values at the eight cell centres round them, interpolated.
+//! passes have smoothed; at points the values at the eight cell centers round them, interpolated.
 //!
 //! # Residual
 //! `φ` alone; at points, [`Differential`].
@@ -16,7 +16,7 @@
 //! out, as on the CPU, which also counts them.
 //!
 //! # Not differentiable
-//! Where `∇φ = 0`, where `κ` is at its bound, and at a point that passes from one cell-centre cube to the next.
+//! Where `∇φ = 0`, where `κ` is at its bound, and at a point that passes from one cell-center cube to the next.
 
 mod curvature;
 mod curvature_pullback;

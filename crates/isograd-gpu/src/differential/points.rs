@@ -48,7 +48,7 @@ impl<T> Default for LocalCotangent<'_, T> {
 }
 
 impl<T: Scalar> Differential<T> {
-    /// At `(N, 3)` points, in their order: trilinear between cell centres, and on linearly in the half cell along the
+    /// At `(N, 3)` points, in their order: trilinear between cell centers, and on linearly in the half cell along the
     /// walls. The CPU refuses points outside the grid. To know costs a wait for the device: here all is zero
     /// there, and [`Self::outside`] tells of them when it is asked.
     ///
@@ -121,7 +121,7 @@ impl<T: Scalar> Differential<T> {
 
     /// Adds what the cotangents `bar` of [`Self::at_points`] mean for `phi`, the field that this was made of, and
     /// for the `(N, 3)` points to `phi_bar` `(nx, ny, nz)` and `points_bar` `(N, 3)`. The grid is held constant. At a
-    /// point that passes from one cell-centre cube to the next the derivative is that of the cube on the high
+    /// point that passes from one cell-center cube to the next the derivative is that of the cube on the high
     /// side. Points outside the grid get and give nothing.
     ///
     /// # Errors

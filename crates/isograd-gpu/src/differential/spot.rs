@@ -1,4 +1,4 @@
-//! Points between the eight cell centres round them, and the weights of trilinear interpolation.
+//! Points between the eight cell centers round them, and the weights of trilinear interpolation.
 
 use cubecl::prelude::*;
 
@@ -17,12 +17,12 @@ pub(super) struct Corner<F: Float + CubeElement> {
     pub(super) z: F,
 }
 
-/// Where a point is between the eight cell centres round it.
+/// Where a point is between the eight cell centers round it.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Spot<F: Float> {
     /// The lowest of the eight cells.
     pub(super) base: Cell,
-    /// From its centre, in cells.
+    /// From its center, in cells.
     pub(super) fraction: Vector3<F>,
     /// Whether the point is in the grid.
     pub(super) inside: bool,

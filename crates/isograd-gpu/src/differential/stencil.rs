@@ -1,6 +1,6 @@
 //! Finite differences along lines of cells, and their transposes: the stencils of the CPU's stage.
 //!
-//! A difference is `Σ_t w_t (u_t − u)`, neighbours less the cell's own value.
+//! A difference is `Σ_t w_t (u_t − u)`, neighbors less the cell's own value.
 
 use cubecl::prelude::*;
 
@@ -163,7 +163,7 @@ pub(super) fn takers(line: Line) -> usize {
     select(inside, 3usize, 5usize)
 }
 
-/// One of them: the neighbours, the cell itself, and the two ends, whose differences reach three cells inward.
+/// One of them: the neighbors, the cell itself, and the two ends, whose differences reach three cells inward.
 #[cube]
 pub(super) fn taker(line: Line, t: usize) -> usize {
     let last = line.n - 1usize;

@@ -1,4 +1,4 @@
-//! Signed distance to a triangle mesh on the device: at every cell centre of a grid, and at any point.
+//! Signed distance to a triangle mesh on the device: at every cell center of a grid, and at any point.
 //!
 //! # Map
 //! As in [`isograd::distance`]: `φ(q) = σ(q) · min_y |q − y|` over all points `y` of the mesh, in the user's

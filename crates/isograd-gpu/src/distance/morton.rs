@@ -1,4 +1,4 @@
-//! Morton codes: places in the order of a curve that keeps neighbours together.
+//! Morton codes: places in the order of a curve that keeps neighbors together.
 
 use cubecl::prelude::*;
 
@@ -12,7 +12,7 @@ use crate::{Buffer, Device, Scalar};
 /// Units of a group.
 const BLOCK: u32 = 256;
 
-/// The order of the faces by the Morton codes of their centres within `bounds`.
+/// The order of the faces by the Morton codes of their centers within `bounds`.
 pub(super) fn face_order<T: Scalar, R: Runtime>(
     device: &Device<R>,
     mesh: &Mesh<T>,
@@ -20,7 +20,7 @@ pub(super) fn face_order<T: Scalar, R: Runtime>(
 ) -> Result<sort::Order, Error> {
     let count = mesh.faces.len() / 3;
     let codes = device.empty(count)?;
-    code_centres::launch::<T, R>(
+    code_centers::launch::<T, R>(
         device.client(),
         device.groups(count, BLOCK),
         CubeDim::new_1d(BLOCK),
@@ -72,7 +72,7 @@ fn morton<F: Float>(place: Vector3<F>, bounds: &Array<F>) -> u32 {
 }
 
 #[cube(launch)]
-fn code_centres<F: Float>(
+fn code_centers<F: Float>(
     vertices: &Array<F>,
     faces: &Array<u32>,
     bounds: &Array<F>,
@@ -81,12 +81,12 @@ fn code_centres<F: Float>(
     if ABSOLUTE_POS < codes.len() {
         let t = corners::<F>(vertices, faces, ABSOLUTE_POS as u32, Vector3::<F>::zero());
         let third = F::new(1.0) / F::new(3.0);
-        let centre = Vector3::<F> {
+        let center = Vector3::<F> {
             x: t.a.x * third + t.b.x * third + t.c.x * third,
             y: t.a.y * third + t.b.y * third + t.c.y * third,
             z: t.a.z * third + t.b.z * third + t.c.z * third,
         };
-        codes[ABSOLUTE_POS] = morton::<F>(centre, bounds);
+        codes[ABSOLUTE_POS] = morton::<F>(center, bounds);
     }
 }
 

@@ -24,7 +24,7 @@ const INSIDE: u32 = 16;
 pub struct Hits<T> {
     /// `(N,)` distances, in the user's unit.
     pub distances: Buffer<T>,
-    /// `(N, 3)` their gradients with respect to the points, of unit length: away from the closest point, or towards it
+    /// `(N, 3)` their gradients with respect to the points, of unit length: away from the closest point, or toward it
     /// where the distance is negative. At distance 0 the normal of the closest face. Zero only where that has
     /// no area.
     pub gradients: Buffer<T>,
@@ -83,7 +83,7 @@ pub fn forward<T: Scalar, R: Runtime>(
     Ok(hits)
 }
 
-/// The same with the sign of each side: negative inside, with the gradients turned towards the mesh there.
+/// The same with the sign of each side: negative inside, with the gradients turned toward the mesh there.
 ///
 /// `field` is one that is negative inside, such as the distance on the lattice: where its eight values round a point
 /// agree, they give the sign. Elsewhere, and without it, the pseudonormal of the closest feature does, which is right
@@ -217,7 +217,7 @@ fn ask_field<F: Float + CubeElement>(
     }
 }
 
-/// Whether there are cell centres on both sides of `x`, counted from the first.
+/// Whether there are cell centers on both sides of `x`, counted from the first.
 #[cube]
 fn is_between<F: Float>(x: F, cells: u32) -> bool {
     x >= F::new(0.0) && x < F::cast_from(cells - 1u32)

@@ -1,10 +1,10 @@
 //! The closest triangle of cells and of points, by descent into a [`Tree`].
 //!
-//! The cells of a brick of 4 × 4 × 4 begin with the triangle that is closest to the centre of the brick, found
+//! The cells of a brick of 4 × 4 × 4 begin with the triangle that is closest to the center of the brick, found
 //! in the same way on a lattice of the bricks, and so on up to a few bricks: a bound that is never further off
 //! than the brick is wide.
 //!
-//! Near the centre of a sphere all triangles are about equally far, and a descent would try them all. One that
+//! Near the center of a sphere all triangles are about equally far, and a descent would try them all. One that
 //! takes too many steps is given up, and a whole group of units settles its cell.
 
 use cubecl::prelude::*;
@@ -35,14 +35,14 @@ const STEPS: u32 = 2048;
 pub(super) const UNPROVEN: u32 = 1 << 31;
 pub(super) const NOTHING_YET: u32 = UNPROVEN - 2;
 
-/// A lattice of cell centres, seen from its low corner.
+/// A lattice of cell centers, seen from its low corner.
 #[derive(Clone, Copy)]
 pub(super) struct Level {
     pub shape: [usize; 3],
     pub spacing: f64,
 }
 
-/// The face closest to each cell centre of a lattice whose low corner is the origin of the tree, or [`NONE`]
+/// The face closest to each cell center of a lattice whose low corner is the origin of the tree, or [`NONE`]
 /// where it is further than `width`.
 pub(super) fn cells<T: Scalar, R: Runtime>(
     device: &Device<R>,
@@ -63,7 +63,7 @@ pub(super) fn cells<T: Scalar, R: Runtime>(
     let mut seeds = None;
     while let Some(level) = levels.pop() {
         let last = levels.is_empty();
-        // A brick may be as far beyond the band as its corners are from its centre.
+        // A brick may be as far beyond the band as its corners are from its center.
         let beyond = if last { 0.0 } else { 0.87 * level.spacing };
         let bound = width.map_or(FAR, |width| (width + beyond).powi(2) * (1.0 + 1e-5));
         seeds = Some(solve_level(device, tree, level, bound, seeds, last)?);
@@ -287,7 +287,7 @@ fn nearest_of_cells<F: Float + CubeElement>(
     let j = brick / across_z % across_y * 4u32 + UNIT_POS / 4u32 % 4u32;
     let k = brick % across_z * 4u32 + UNIT_POS % 4u32;
     if i < nx && j < ny && k < nz {
-        let q = centre_of::<F>(Cell { i, j, k }, spacing);
+        let q = center_of::<F>(Cell { i, j, k }, spacing);
         let mut seed = NONE.runtime();
         if comptime!(seeded) {
             seed = seeds[brick as usize];
@@ -327,14 +327,14 @@ fn nearest_of_points<F: Float + CubeElement>(
     }
 }
 
-/// The centre of a cell in memory order, from the low corner of the grid.
+/// The center of a cell in memory order, from the low corner of the grid.
 #[cube]
-pub(super) fn centre<F: Float>(cell: u32, spacing: F, ny: u32, nz: u32) -> Vector3<F> {
-    centre_of::<F>(cell_at(cell, ny, nz), spacing)
+pub(super) fn center<F: Float>(cell: u32, spacing: F, ny: u32, nz: u32) -> Vector3<F> {
+    center_of::<F>(cell_at(cell, ny, nz), spacing)
 }
 
 #[cube]
-fn centre_of<F: Float>(cell: Cell, spacing: F) -> Vector3<F> {
+fn center_of<F: Float>(cell: Cell, spacing: F) -> Vector3<F> {
     let half = F::new(0.5);
     Vector3::<F> {
         x: spacing * (F::cast_from(cell.i) + half),

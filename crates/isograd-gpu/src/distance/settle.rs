@@ -3,7 +3,7 @@
 use cubecl::prelude::*;
 
 use super::Error;
-use super::search::{Level, NOTHING_YET, UNPROVEN, box_distance_squared, centre};
+use super::search::{Level, NOTHING_YET, UNPROVEN, box_distance_squared, center};
 use super::tree::{NONE, Tree};
 use super::triangle::{distance_squared, load_frame};
 use crate::primitives::scan::exclusive_sum;
@@ -135,7 +135,7 @@ fn settle_left<F: Float + CubeElement>(
         let q = if comptime!(of_points) {
             Vector3::<F>::at(points, query as usize)
         } else {
-            centre::<F>(query, spacing, ny, nz)
+            center::<F>(query, spacing, ny, nz)
         };
         let guess = found[query as usize] & NOT_UNPROVEN;
         let own = try_runs::<F>(pyramid, frames, faces, q, bound, guess, level, taken, units);

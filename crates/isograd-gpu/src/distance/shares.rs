@@ -125,7 +125,7 @@ pub(super) fn add_share<F: Float>(
     pull
 }
 
-/// `∇φ`: away from the closest point outside, towards it inside, and the normal of the face at distance 0.
+/// `∇φ`: away from the closest point outside, toward it inside, and the normal of the face at distance 0.
 #[cube]
 pub(super) fn gradient<F: Float>(
     offset: Vector3<F>,

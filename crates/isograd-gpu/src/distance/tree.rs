@@ -1,6 +1,6 @@
 //! A hierarchy of boxes over triangles, made on the device.
 //!
-//! The triangles are put in the order of the Morton codes of their centres (30 bits; equal codes stay in the
+//! The triangles are put in the order of the Morton codes of their centers (30 bits; equal codes stay in the
 //! order of the faces), and the hierarchy is the radix tree of that order, every node of it made on its own
 //! (T. Karras, *Maximizing parallelism in the construction of BVHs, octrees, and k-d trees*, 2012). The box of
 //! a node is that of a run of triangles, put together from the aligned runs of a pyramid: nothing waits for

@@ -91,7 +91,7 @@ impl<T: Number> Reconstruction<T> {
         self.begun.points
     }
 
-    /// The signed distance φ at every cell centre, in the cloud's unit, negative inside.
+    /// The signed distance φ at every cell center, in the cloud's unit, negative inside.
     ///
     /// # Errors
     /// Those of the device.
@@ -99,7 +99,7 @@ impl<T: Number> Reconstruction<T> {
         once(&self.copies.sdf, || self.field(&self.result.sdf))
     }
 
-    /// The indicator χ at every cell centre: below the iso-value inside, above it outside.
+    /// The indicator χ at every cell center: below the iso-value inside, above it outside.
     ///
     /// # Errors
     /// Those of the device.
@@ -133,7 +133,7 @@ impl<T: Number> Reconstruction<T> {
         })
     }
 
-    /// For each cell, in C order, the face of the surface closest to its centre;
+    /// For each cell, in C order, the face of the surface closest to its center;
     /// [`NO_TRIANGLE`](crate::distance::NO_TRIANGLE) outside the band.
     ///
     /// # Errors
@@ -186,20 +186,20 @@ impl<T: Number> Reconstruction<T> {
         Ok(held.after(&self.result)?)
     }
 
-    /// Number of axes that have turned by more than 60° since the call before, and followed their neighbours.
+    /// Number of axes that have turned by more than 60° since the call before, and followed their neighbors.
     pub(super) fn turned(&self) -> Result<usize, Error> {
         Ok(self.device.indices(&self.result.turned)?[0] as usize)
     }
 
-    /// `(N,)` number of samples in the neighbourhood of each, itself included.
+    /// `(N,)` number of samples in the neighborhood of each, itself included.
     ///
     /// # Errors
     /// Those of the device.
-    pub fn neighbour_counts(&self) -> Result<&[u32], Error> {
+    pub fn neighbor_counts(&self) -> Result<&[u32], Error> {
         Ok(&self.neighborhoods()?.count)
     }
 
-    /// The neighbourhoods, on the CPU.
+    /// The neighborhoods, on the CPU.
     fn neighborhoods(&self) -> Result<&Neighborhoods<T>, Error> {
         once(&self.copies.neighborhoods, || {
             let points = self.vectors(&self.result.points)?;

@@ -1,7 +1,7 @@
 //! The iso-value: the mean of the indicator at the samples, as [`isograd::isosurface::iso_value`].
 //!
 //! # Map
-//! `c = Σ a_i χ(x_i) / Σ a_i`, with `χ` trilinear between cell centres and constant across the walls, and `a_i`
+//! `c = Σ a_i χ(x_i) / Σ a_i`, with `χ` trilinear between cell centers and constant across the walls, and `a_i`
 //! the area that sample `i` stands for. Sums are in the number type of the field, by a fixed tree.
 //!
 //! # Residual
@@ -12,7 +12,7 @@
 //! `ā_i += c̄ (χ(x_i) − c) / Σ a`. `χ̄` is a gather per cell over the samples in the order of the splat.
 //!
 //! # Not differentiable
-//! `∇χ` jumps where a sample crosses a plane through cell centres; the gradient on its side is used.
+//! `∇χ` jumps where a sample crosses a plane through cell centers; the gradient on its side is used.
 
 mod forward;
 pub mod local;

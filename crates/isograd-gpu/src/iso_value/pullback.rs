@@ -4,7 +4,7 @@ use cubecl::prelude::*;
 
 use super::Residual;
 use crate::device::check_length;
-use crate::grid::{self, Lattice, cell_at, check_field, from_centre, place};
+use crate::grid::{self, Lattice, cell_at, check_field, from_center, place};
 use crate::primitives::fill::add;
 use crate::primitives::reduce::{BLOCK, sum_columns};
 use crate::splat::{self, SampleCotangent, Samples, subtract_from_grid};
@@ -137,9 +137,9 @@ fn sort_shares<F: Float + CubeElement>(
         let i = places[s] as usize;
         let x = place::<F>(points, i, &grid);
         let cell = cell_at(keys[s], grid.ny, grid.nz);
-        sorted[NUMBERS * s] = from_centre::<F>(x.x, cell.i);
-        sorted[NUMBERS * s + 1] = from_centre::<F>(x.y, cell.j);
-        sorted[NUMBERS * s + 2] = from_centre::<F>(x.z, cell.k);
+        sorted[NUMBERS * s] = from_center::<F>(x.x, cell.i);
+        sorted[NUMBERS * s + 1] = from_center::<F>(x.y, cell.j);
+        sorted[NUMBERS * s + 2] = from_center::<F>(x.z, cell.k);
         sorted[NUMBERS * s + 3] = shares[i];
         let slope = shares[i] / grid.spacing;
         bar_x = at_samples[4 * i + 1] * slope;

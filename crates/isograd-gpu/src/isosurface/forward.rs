@@ -18,7 +18,7 @@ use crate::{Buffer, Device, Scalar};
 /// Where the triangles begin in the table of [`Plan`].
 const TRIANGLES: usize = 257;
 
-/// The surface `χ = level`, in the user's unit, of `(nx, ny, nz)` values `chi` at the cell centres of `grid`; `level`
+/// The surface `χ = level`, in the user's unit, of `(nx, ny, nz)` values `chi` at the cell centers of `grid`; `level`
 /// is one number. Vertices and faces are those of [`isograd::isosurface::forward`], in the same order; positions
 /// agree to the rounding of coordinates in `T`.
 ///
@@ -245,8 +245,8 @@ fn emit_vertex<F: Float + CubeElement>(
     vertices[to + 2] = coordinate::<F>(values, 2u32, k, select(axis == 2u32, eta, zero));
 }
 
-/// The coordinate at the fraction `eta` of the way from the centre of cell `k` of an axis to the next, and not
-/// beyond that. Adding to the centre rounds less than the distance from the grid's corner would.
+/// The coordinate at the fraction `eta` of the way from the center of cell `k` of an axis to the next, and not
+/// beyond that. Adding to the center rounds less than the distance from the grid's corner would.
 #[cube]
 fn coordinate<F: Float + CubeElement>(
     values: &Values<F>,
@@ -256,9 +256,9 @@ fn coordinate<F: Float + CubeElement>(
 ) -> F {
     let lower = values.scales[axis as usize];
     let h = values.scales[3];
-    let centre = fma(h, F::cast_from(k) + F::new(0.5), lower);
+    let center = fma(h, F::cast_from(k) + F::new(0.5), lower);
     let next = fma(h, F::cast_from(k) + F::new(1.5), lower);
-    min(fma(h, eta, centre), next)
+    min(fma(h, eta, center), next)
 }
 
 /// One unit a cube counts its triangles, adds up those of the cubes before it in its word, and writes its own.

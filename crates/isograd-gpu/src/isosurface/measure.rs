@@ -1,7 +1,7 @@
 //! Area and enclosed volume of a triangle mesh.
 //!
 //! # Map
-//! [`forward`]: the two integrals of [`isograd::isosurface::measure`], seen from the centre of the bounding box, so
+//! [`forward`]: the two integrals of [`isograd::isosurface::measure`], seen from the center of the bounding box, so
 //! that the place of the mesh costs no digits. Pieces and topology are left to the CPU.
 //!
 //! # Residual
@@ -139,9 +139,9 @@ fn corner<F: Float + CubeElement>(mesh: &Triangles<F>, face: usize, k: usize) ->
     Vector3::<F>::at(&mesh.vertices, mesh.faces[3 * face + k] as usize)
 }
 
-/// Centre of the box.
+/// Center of the box.
 #[cube]
-fn centre<F: Float + CubeElement>(mesh: &Triangles<F>) -> Vector3<F> {
+fn center<F: Float + CubeElement>(mesh: &Triangles<F>) -> Vector3<F> {
     let half = F::new(0.5);
     Vector3::<F> {
         x: half * mesh.bounds[0] + half * mesh.bounds[3],
@@ -162,7 +162,7 @@ fn add_faces<F: Float + CubeElement>(
     let mut area = F::new(0.0);
     let mut volume = F::new(0.0);
     let mut flat = 0u32;
-    let from = centre::<F>(mesh);
+    let from = center::<F>(mesh);
     let mut face = ABSOLUTE_POS;
     while face < count as usize {
         let a = corner::<F>(mesh, face, 0usize);
@@ -201,7 +201,7 @@ fn gather_faces<F: Float + CubeElement>(
         let mut x = F::new(0.0);
         let mut y = F::new(0.0);
         let mut z = F::new(0.0);
-        let from = centre::<F>(mesh);
+        let from = center::<F>(mesh);
         let of_area = bars[0] / F::new(2.0);
         let of_volume = bars[1] / F::new(6.0);
         for at in first[ABSOLUTE_POS]..first[ABSOLUTE_POS + 1] {

@@ -1,4 +1,4 @@
-//! The isosurface stage: marching cubes on the lattice of cell centres.
+//! The isosurface stage: marching cubes on the lattice of cell centers.
 //!
 //! # Map
 //! That of [`isograd::isosurface`], with its table: the same vertices and faces in the same order.

@@ -223,7 +223,7 @@ fn add_vertices<F: Float + CubeElement>(
         lower_x += x;
         lower_y += y;
         lower_z += z;
-        // The place of the vertex in index coordinates: that of the cell's centre, and η along the edge.
+        // The place of the vertex in index coordinates: that of the cell's center, and η along the edge.
         let along = select(axis == 0u32, x, select(axis == 1u32, y, z));
         spacing += x * (F::cast_from(row / signs.ny) + F::new(0.5))
             + y * (F::cast_from(row % signs.ny) + F::new(0.5))

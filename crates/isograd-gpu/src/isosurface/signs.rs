@@ -186,7 +186,7 @@ fn moved_down(signs: &Signs, row: u32, w: u32) -> u32 {
     (word_of(signs, row, w) >> 1u32) | (next << 31u32)
 }
 
-/// The cells of word `w` that have a neighbour above them in the row.
+/// The cells of word `w` that have a neighbor above them in the row.
 #[cube]
 fn have_next(signs: &Signs, w: u32) -> u32 {
     let after = signs.nz - 1u32 - w * 32u32;

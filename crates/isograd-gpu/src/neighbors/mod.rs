@@ -1,8 +1,8 @@
 //! Which samples are close to which: a service shared by the stages.
 //!
 //! # Map
-//! Points `(N, 3)` and a radius `R_i > 0` for each → what finds the neighbourhoods
-//! `N_i = {j : |x_j − x_i| ≤ R_i}`, and the centres `{i : j ∈ N_i}` that have a point as a neighbour. Radii are
+//! Points `(N, 3)` and a radius `R_i > 0` for each → what finds the neighborhoods
+//! `N_i = {j : |x_j − x_i| ≤ R_i}`, and the centers `{i : j ∈ N_i}` that have a point as a neighbor. Radii are
 //! chosen on the CPU ([`isograd::neighbors`]) or here ([`radius`]), and held constant by pullbacks.
 //!
 //! Points are sorted along a Z-order curve and cut into leaves of eight; boxes round four leaves, round four of
@@ -19,7 +19,7 @@
 //!
 //! # Pullback
 //! None. Those of the stages gather: a node is visited where the radius at hand or the largest one below the
-//! node reaches the other, so that one walk meets both `N_k` and all centres of `k`.
+//! node reaches the other, so that one walk meets both `N_k` and all centers of `k`.
 
 mod choice;
 mod nearest;
@@ -45,7 +45,7 @@ pub(crate) const BLOCK: u32 = 64;
 /// Points of a leaf.
 pub(crate) const LEAF: usize = 8;
 
-/// Points on a device, sorted, with the radii of their neighbourhoods and the tree that finds the members.
+/// Points on a device, sorted, with the radii of their neighborhoods and the tree that finds the members.
 /// Clones share the memory.
 #[derive(Clone, Debug)]
 pub struct Neighborhoods<T> {

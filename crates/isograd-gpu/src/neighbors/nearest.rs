@@ -152,7 +152,7 @@ pub(crate) struct Near<F: Float> {
 pub(crate) const SURE_SHARE: f32 = 0.7;
 
 /// A point that is about the nearest to `x`, beginning with `guess`. To know the nearest itself would take a look at
-/// most of the points where they are about equally far, as at the centre of a sphere; to know it to a third takes a
+/// most of the points where they are about equally far, as at the center of a sphere; to know it to a third takes a
 /// few.
 #[cube]
 pub(crate) fn about_nearest<F: Float>(

@@ -18,7 +18,7 @@ const MARGIN: usize = 16;
 /// Stands for the index of a point that is not found yet.
 const NONE: u32 = u32::MAX;
 
-/// So much less than the distance to a box that no rounding can shut out a neighbour.
+/// So much less than the distance to a box that no rounding can shut out a neighbor.
 const SURE: f32 = 0.9999;
 
 /// The sorted positions `(N, k)` of the nearest other points of each sorted point, nearest first, and of equally far

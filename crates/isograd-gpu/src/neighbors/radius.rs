@@ -1,4 +1,4 @@
-//! The radius of every point's neighbourhood, found on the device by the rules of [`isograd::neighbors`].
+//! The radius of every point's neighborhood, found on the device by the rules of [`isograd::neighbors`].
 //!
 //! # Map
 //! Points `(N, 3)` and a [`Radius`] → `R_i`: a radius common to all points, given or automatic, which grows where
@@ -38,25 +38,25 @@ pub enum Error {
     Device(#[from] crate::Error),
 }
 
-/// Radii, and the neighbourhoods that they make.
+/// Radii, and the neighborhoods that they make.
 #[derive(Clone, Debug)]
 pub struct Radii<T> {
     /// `(N,)` the `R_i` in input order, in the unit of the points; at least [`Self::common`].
     pub each: Buffer<T>,
-    /// The radius of every point that has enough neighbours within it.
+    /// The radius of every point that has enough neighbors within it.
     pub common: T,
-    /// Typical distance between neighbouring samples, as [`isograd::neighbors::Neighborhoods::spacing`] has it.
+    /// Typical distance between neighboring samples, as [`isograd::neighbors::Neighborhoods::spacing`] has it.
     pub spacing: T,
     /// The points, sorted, with these radii.
     pub neighborhoods: Neighborhoods<T>,
 }
 
-/// What the neighbourhoods hold, in input order.
+/// What the neighborhoods hold, in input order.
 #[derive(Clone, Debug)]
 pub struct Census {
     /// `(N,)` number of samples within `R_i`, the point itself included.
     pub count: Buffer<u32>,
-    /// `(N,)` 1 for outliers, of whose neighbours fewer than 1 in 8 have them as theirs; else 0.
+    /// `(N,)` 1 for outliers, of whose neighbors fewer than 1 in 8 have them as theirs; else 0.
     pub isolated: Buffer<u32>,
 }
 
@@ -91,7 +91,7 @@ pub fn forward<R: Runtime, T: Scalar>(
     })
 }
 
-/// Counts the samples of the neighbourhoods, and finds those that are isolated; `common` is [`Radii::common`].
+/// Counts the samples of the neighborhoods, and finds those that are isolated; `common` is [`Radii::common`].
 ///
 /// # Errors
 /// [`crate::Error::TooLarge`].
@@ -270,15 +270,15 @@ fn count_neighbors<F: Float + CubeElement>(
 ) {
     let n = radii.len();
     if ABSOLUTE_POS < n {
-        let centre = Vector3::<F>::at(points, ABSOLUTE_POS);
+        let center = Vector3::<F>::at(points, ABSOLUTE_POS);
         let radius = radii[ABSOLUTE_POS];
         let mut count = 0u32.runtime();
         let mut mutual = 0u32.runtime();
-        let mut node = next_leaf::<F>(nodes, links, centre, radius, 0usize, false);
+        let mut node = next_leaf::<F>(nodes, links, center, radius, 0usize, false);
         while node < links.len() {
             let first = first_of_leaf(links, node);
             for j in first..end_of_leaf(first, n) {
-                let offset = Vector3::<F>::at(points, j).sub(centre);
+                let offset = Vector3::<F>::at(points, j).sub(center);
                 let square = offset.dot(offset);
                 if square <= radius * radius {
                     count += 1u32;
@@ -286,7 +286,7 @@ fn count_neighbors<F: Float + CubeElement>(
                     mutual += select(is_mutual, 1u32, 0u32);
                 }
             }
-            node = next_leaf::<F>(nodes, links, centre, radius, node + 1, false);
+            node = next_leaf::<F>(nodes, links, center, radius, node + 1, false);
         }
         let place = places[ABSOLUTE_POS] as usize;
         let alone = is_isolated::<F>(radius, common, max(count, 1u32) - 1u32, mutual);

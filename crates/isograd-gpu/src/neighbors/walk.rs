@@ -26,7 +26,7 @@ pub(crate) fn next_leaf<F: Float>(
             let other = nodes[NODE * node + 6];
             reach = select(other > radius, other, radius);
         }
-        // So much more that no rounding can shut out a neighbour.
+        // So much more that no rounding can shut out a neighbor.
         let limit = reach * reach * F::new(1.0001);
         let low = Vector3::<F>::load(nodes, NODE * node);
         let high = Vector3::<F>::load(nodes, NODE * node + 3);

@@ -132,7 +132,7 @@ fn eigenvalue_apart<F: Float>(h: F) -> F {
     with_sign::<F>(beta, h)
 }
 
-/// Unit eigenvector of a normalised matrix for an eigenvalue at least √3 away from the other two: `b − β` has
+/// Unit eigenvector of a normalized matrix for an eigenvalue at least √3 away from the other two: `b − β` has
 /// rank 2, so at least one cross product of its rows is well away from 0.
 #[cube]
 fn eigenvector_apart<F: Float>(b: Symmetric<F>, beta: F) -> Vector3<F> {

@@ -1,4 +1,4 @@
-//! Neighbourhoods to axes.
+//! Neighborhoods to axes.
 
 use cubecl::prelude::*;
 
@@ -9,13 +9,13 @@ use crate::neighbors::{BLOCK, Neighborhoods, end_of_leaf, first_of_leaf, next_le
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
-/// Sums over a neighbourhood: `Σ w`, `Σ w d` and `Σ w d dᵀ` (`xx, xy, xz, yy, yz, zz`), in units of the radius.
+/// Sums over a neighborhood: `Σ w`, `Σ w d` and `Σ w d dᵀ` (`xx, xy, xz, yy, yz, zz`), in units of the radius.
 pub(crate) const MOMENTS: usize = 10;
 
 /// The axis `(N, 3)` of the surface at every point, in input order, and what the pullback needs; see the
 /// [module](super).
 ///
-/// Where the points of a neighbourhood lie on a line or in one place, the axis is some unit vector at a right
+/// Where the points of a neighborhood lie on a line or in one place, the axis is some unit vector at a right
 /// angle to the line, or any, and counts as guarded.
 ///
 /// # Errors
@@ -66,7 +66,7 @@ pub(super) fn epsilon<F: Float>() -> F {
     F::new(1.0) / F::new(5.0)
 }
 
-/// Sums and numbers of all neighbourhoods. Each leaf is summed by itself, and sums of leaves are added up, so
+/// Sums and numbers of all neighborhoods. Each leaf is summed by itself, and sums of leaves are added up, so
 /// that rounding stays small where many points are close.
 #[cube(launch)]
 fn sum_moments<F: Float>(
@@ -80,10 +80,10 @@ fn sum_moments<F: Float>(
 ) {
     let n = radii.len();
     if ABSOLUTE_POS < n {
-        let centre = Vector3::<F>::at(points, ABSOLUTE_POS);
+        let center = Vector3::<F>::at(points, ABSOLUTE_POS);
         let mut sums = Array::<F>::new(MOMENTS);
         let radius = radii[ABSOLUTE_POS];
-        let count = moments_within::<F>(points, nodes, links, centre, radius, &mut sums);
+        let count = moments_within::<F>(points, nodes, links, center, radius, &mut sums);
         #[unroll]
         for k in 0..MOMENTS {
             moments[k * n + ABSOLUTE_POS] = sums[k];
@@ -99,7 +99,7 @@ pub(super) fn moments_within<F: Float>(
     points: &Array<F>,
     nodes: &Array<F>,
     links: &Array<u32>,
-    centre: Vector3<F>,
+    center: Vector3<F>,
     radius: F,
     sums: &mut Array<F>,
 ) -> u32 {
@@ -110,7 +110,7 @@ pub(super) fn moments_within<F: Float>(
     for k in 0..MOMENTS {
         sums[k] = F::new(0.0);
     }
-    let mut node = next_leaf::<F>(nodes, links, centre, radius, 0usize, false);
+    let mut node = next_leaf::<F>(nodes, links, center, radius, 0usize, false);
     while node < links.len() {
         #[unroll]
         for k in 0..MOMENTS {
@@ -118,7 +118,7 @@ pub(super) fn moments_within<F: Float>(
         }
         let first = first_of_leaf(links, node);
         for j in first..end_of_leaf(first, n) {
-            let offset = Vector3::<F>::at(points, j).sub(centre);
+            let offset = Vector3::<F>::at(points, j).sub(center);
             if offset.dot(offset) <= radius * radius {
                 let d = offset.scale(F::new(1.0) / radius);
                 let w = weight::<F>(F::sqrt(d.dot(d)), epsilon::<F>());
@@ -130,7 +130,7 @@ pub(super) fn moments_within<F: Float>(
         for k in 0..MOMENTS {
             sums[k] += of_leaf[k];
         }
-        node = next_leaf::<F>(nodes, links, centre, radius, node + 1, false);
+        node = next_leaf::<F>(nodes, links, center, radius, node + 1, false);
     }
     count
 }

@@ -12,11 +12,11 @@
 //! cloud. `v₃ = n × v₂`. Of the pullback, `⟨B, C⟩ = 0`, and `B` is `n` and a vector `g` made of these.
 //!
 //! # Pullback
-//! As printed there. One walk over the tree gathers both what a point gets as a neighbour of others and what it
-//! hands out as a centre, with the radius of each centre. No atomics.
+//! As printed there. One walk over the tree gathers both what a point gets as a neighbor of others and what it
+//! hands out as a center, with the radius of each center. No atomics.
 //!
 //! # Not differentiable
-//! The neighbourhoods, the radii, the sign. Where `λ₂ − λ₁` is at most `10⁻³ λ₃`, the pullback bounds
+//! The neighborhoods, the radii, the sign. Where `λ₂ − λ₁` is at most `10⁻³ λ₃`, the pullback bounds
 //! `1/(λ₁ − λ_k)`: [`Residual::guarded`].
 
 pub(crate) mod eigen;

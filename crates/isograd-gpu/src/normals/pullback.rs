@@ -1,6 +1,6 @@
 //! Cotangents of the axes to cotangents of the points.
 //!
-//! All lengths are in units of the radius of a centre: `d̂ = d/R`, `ŵ = wR`, `ĝ = R² g/(RW)`. What a centre hands
+//! All lengths are in units of the radius of a center: `d̂ = d/R`, `ŵ = wR`, `ĝ = R² g/(RW)`. What a center hands
 //! out is divided by its `R` at the end.
 
 use cubecl::prelude::*;
@@ -30,16 +30,16 @@ pub fn pullback<R: Runtime, T: Scalar>(
     if n == 0 {
         return Ok(points_bar);
     }
-    let centres: Buffer<T> = device.empty(CENTRE * n)?;
+    let centers: Buffer<T> = device.empty(CENTER * n)?;
     let (groups, dim) = (device.groups(n, BLOCK), CubeDim::new_1d(BLOCK));
-    fill_centres::launch::<T, R>(
+    fill_centers::launch::<T, R>(
         device.client(),
         groups.clone(),
         dim,
         residual.planes.arg(),
         near.places.arg(),
         normals_bar.arg(),
-        centres.arg(),
+        centers.arg(),
     );
     gather::launch::<T, R>(
         device.client(),
@@ -50,34 +50,34 @@ pub fn pullback<R: Runtime, T: Scalar>(
         near.places.arg(),
         near.nodes.arg(),
         near.links.arg(),
-        centres.arg(),
+        centers.arg(),
         points_bar.arg(),
     );
     Ok(points_bar)
 }
 
-/// Numbers that a centre hands out by: `ĝ/Ŵ`, `n` and `m̂`.
-const CENTRE: usize = 9;
+/// Numbers that a center hands out by: `ĝ/Ŵ`, `n` and `m̂`.
+const CENTER: usize = 9;
 
 /// The same numbers.
 #[derive(CubeType, Clone, Copy)]
-struct Centre<F: Float> {
+struct Center<F: Float> {
     g: Vector3<F>,
     n: Vector3<F>,
     mean: Vector3<F>,
 }
 
 #[cube]
-impl<F: Float> Centre<F> {
-    fn at(centres: &Array<F>, i: usize) -> Self {
-        Centre::<F> {
-            g: Vector3::<F>::at(centres, 3 * i),
-            n: Vector3::<F>::at(centres, 3 * i + 1),
-            mean: Vector3::<F>::at(centres, 3 * i + 2),
+impl<F: Float> Center<F> {
+    fn at(centers: &Array<F>, i: usize) -> Self {
+        Center::<F> {
+            g: Vector3::<F>::at(centers, 3 * i),
+            n: Vector3::<F>::at(centers, 3 * i + 1),
+            mean: Vector3::<F>::at(centers, 3 * i + 2),
         }
     }
 
-    /// `d̄` in units of the radius, for an offset `d̂` from the centre.
+    /// `d̄` in units of the radius, for an offset `d̂` from the center.
     fn offset_bar(self, d: Vector3<F>) -> Vector3<F> {
         let r = F::sqrt(d.dot(d));
         let w = plane::weight::<F>(r, epsilon::<F>());
@@ -104,11 +104,11 @@ fn rows<F: Float>(planes: &Array<F>, #[comptime] k: usize, n: usize) -> Vector3<
 }
 
 #[cube(launch)]
-fn fill_centres<F: Float>(
+fn fill_centers<F: Float>(
     planes: &Array<F>,
     places: &Array<u32>,
     normals_bar: &Array<F>,
-    centres: &mut Array<F>,
+    centers: &mut Array<F>,
 ) {
     let n = places.len();
     if ABSOLUTE_POS < n {
@@ -121,9 +121,9 @@ fn fill_centres<F: Float>(
         let g = second
             .scale(slope::<F>(values.y - values.x, values.z, weight) * second.dot(bar))
             .add(third.scale(slope::<F>(values.z - values.x, values.z, weight) * third.dot(bar)));
-        g.write(centres, 3 * ABSOLUTE_POS);
-        normal.write(centres, 3 * ABSOLUTE_POS + 1);
-        rows::<F>(planes, CENTROID, n).write(centres, 3 * ABSOLUTE_POS + 2);
+        g.write(centers, 3 * ABSOLUTE_POS);
+        normal.write(centers, 3 * ABSOLUTE_POS + 1);
+        rows::<F>(planes, CENTROID, n).write(centers, 3 * ABSOLUTE_POS + 2);
     }
 }
 
@@ -138,7 +138,7 @@ fn slope<F: Float>(gap: F, largest: F, weight: F) -> F {
     select(extends, F::new(-1.0) / divisor, F::new(0.0))
 }
 
-/// What each point gets as a neighbour of the others, less what it hands out as a centre.
+/// What each point gets as a neighbor of the others, less what it hands out as a center.
 #[cube(launch)]
 fn gather<F: Float>(
     points: &Array<F>,
@@ -146,7 +146,7 @@ fn gather<F: Float>(
     places: &Array<u32>,
     nodes: &Array<F>,
     links: &Array<u32>,
-    centres: &Array<F>,
+    centers: &Array<F>,
     points_bar: &mut Array<F>,
 ) {
     let n = radii.len();
@@ -154,7 +154,7 @@ fn gather<F: Float>(
         let point = Vector3::<F>::at(points, ABSOLUTE_POS);
         let radius = radii[ABSOLUTE_POS];
         let inverse = F::new(1.0) / radius;
-        let own = Centre::<F>::at(centres, ABSOLUTE_POS);
+        let own = Center::<F>::at(centers, ABSOLUTE_POS);
         let mut x = F::new(0.0);
         let mut y = F::new(0.0);
         let mut z = F::new(0.0);
@@ -173,7 +173,7 @@ fn gather<F: Float>(
                 let other = radii[j];
                 if square <= other * other {
                     let unit = F::new(1.0) / other;
-                    let into = Centre::<F>::at(centres, j).offset_bar(offset.scale(-unit));
+                    let into = Center::<F>::at(centers, j).offset_bar(offset.scale(-unit));
                     x += into.x * unit;
                     y += into.y * unit;
                     z += into.z * unit;

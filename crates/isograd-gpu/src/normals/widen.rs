@@ -1,4 +1,4 @@
-//! Wider neighbourhoods for the axes of samples that scatter: `isograd`'s `normals/widen.rs`, which says why.
+//! Wider neighborhoods for the axes of samples that scatter: `isograd`'s `normals/widen.rs`, which says why.
 
 use cubecl::prelude::*;
 use isograd::normals::widen::{GAIN, RIM, ROUGH, STEPS};
@@ -12,7 +12,7 @@ use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// The radii `(N,)` within which axes are to be found, in input order: those of the residual, and wider ones where
-/// neighbourhoods are rough and wider ones far less so. For automatic radii; one that the user gave stays.
+/// neighborhoods are rough and wider ones far less so. For automatic radii; one that the user gave stays.
 ///
 /// Only points that are still rough are tried again: their list stays on the device.
 ///
@@ -134,10 +134,10 @@ fn try_wider<F: Float + CubeElement>(
     let count = sums[sums.len() - 1];
     if ABSOLUTE_POS < count as usize {
         let at = listed[ABSOLUTE_POS] as usize;
-        let centre = Vector3::<F>::at(points, at);
+        let center = Vector3::<F>::at(points, at);
         let radius = step * radii[at];
         let mut sums = Array::<F>::new(MOMENTS);
-        moments_within::<F>(points, nodes, links, centre, radius, &mut sums);
+        moments_within::<F>(points, nodes, links, center, radius, &mut sums);
         let fit = fit::<F>(&sums, 0usize, 1usize);
         let second = fit.eigen.second.dot(fit.centroid);
         let third = fit.eigen.third.dot(fit.centroid);

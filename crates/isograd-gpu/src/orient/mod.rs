@@ -6,7 +6,7 @@
 //! [`Method::Parity`], the paper's; [`Method::Sensors`] and [`Method::Signs`], where something is known of the sides.
 //! Normals that are trusted as they are, are [`given`], and those of a step before are followed by [`previous`].
 //!
-//! The automatic method does on the device what concerns single samples, their neighbours and the cells of its grids.
+//! The automatic method does on the device what concerns single samples, their neighbors and the cells of its grids.
 //! The parts of the cloud and the domains that agree are found by the CPU's own code, from a copy of the graph.
 //!
 //! # Pullback
@@ -39,7 +39,7 @@ pub struct Axes<'a, T> {
     pub normals: &'a Buffer<T>,
     /// What they were found with, where that is known: the automatic method asks it where samples scatter.
     pub residual: Option<&'a normals::Residual<T>>,
-    /// Typical distance between neighbouring samples, above 0, in the unit of the points: the unit of length of the
+    /// Typical distance between neighboring samples, above 0, in the unit of the points: the unit of length of the
     /// automatic method.
     pub spacing: T,
 }
@@ -47,7 +47,7 @@ pub struct Axes<'a, T> {
 /// How the signs are chosen.
 #[derive(Clone, Copy, Debug)]
 pub enum Method<'a, T> {
-    /// From enclosure, sky, sheets and neighbours; nothing to set. The confidence is how clearly these speak.
+    /// From enclosure, sky, sheets and neighbors; nothing to set. The confidence is how clearly these speak.
     Auto,
     /// By parity along the normal, as the paper prints it. The confidence is 1 where the parities of the two
     /// directions differ, as they must on a closed surface, else 0.

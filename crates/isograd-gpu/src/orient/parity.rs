@@ -3,7 +3,7 @@
 //!
 //! A probe needs no nearest sample, only whether one is in reach and how far it is safe to skip. A sample that is
 //! about the nearest says both but where it is a little out of reach: there the tree is asked for any in reach. So
-//! a ray through the centre of a sphere, from which all samples are equally far, is no more work than another.
+//! a ray through the center of a sphere, from which all samples are equally far, is no more work than another.
 
 use cubecl::prelude::*;
 use isograd::orient::ParityOptions;

@@ -1,5 +1,5 @@
 //! The signs of the step before, as `isograd`'s `orient/previous.rs` takes them over: an axis keeps the side that
-//! the same point had, and one that has turned far follows its neighbours.
+//! the same point had, and one that has turned far follows its neighbors.
 
 use cubecl::prelude::*;
 
@@ -26,7 +26,7 @@ pub struct Followed<T> {
     /// `(N, 3)` outward unit normals.
     pub normals: Buffer<T>,
     /// `(N,)` from 0 to 1: what it was, but at most the cosine between axis and vector; of an axis that has turned
-    /// far, how much its neighbours agree.
+    /// far, how much its neighbors agree.
     pub confidence: Buffer<T>,
     /// `(N,)` the confidence that the next step starts from.
     pub kept: Buffer<T>,
@@ -36,7 +36,7 @@ pub struct Followed<T> {
 }
 
 /// Turns each of the `(N, 3)` axes, which are of unit length and in input order, to the side of the step before.
-/// `radii` `(N,)`, in input order, are those within which neighbours are asked. Nothing waits.
+/// `radii` `(N,)`, in input order, are those within which neighbors are asked. Nothing waits.
 ///
 /// # Errors
 /// [`crate::Error::Length`], [`crate::Error::TooLarge`].
@@ -151,7 +151,7 @@ fn follow<F: Float>(
     }
 }
 
-/// What the neighbours that have not turned say of an axis, from −1 to 1; 0 where there is none.
+/// What the neighbors that have not turned say of an axis, from −1 to 1; 0 where there is none.
 #[cube]
 fn side_among_neighbors<F: Float>(
     points: &Array<F>,

@@ -28,7 +28,7 @@ pub(crate) enum Start<'a, T: Scalar> {
     Axes(FoundAxes<T>),
 }
 
-/// Outward normals, the neighbourhoods, and where the normals come from.
+/// Outward normals, the neighborhoods, and where the normals come from.
 struct Normals<T> {
     sides: Followed<T>,
     near: neighbors::Neighborhoods<T>,

@@ -15,7 +15,7 @@ use crate::orient::previous::{self, Before, Followed};
 use crate::primitives::fill::zeros;
 use crate::{Buffer, Device, Scalar};
 
-/// The radii of a cloud's neighbourhoods, and which way is out at each of its points. Of a body that moves a
+/// The radii of a cloud's neighborhoods, and which way is out at each of its points. Of a body that moves a
 /// little, those of an earlier step will do: see [`Held::after`].
 #[derive(Clone, Debug)]
 pub struct Held<T> {
@@ -23,16 +23,16 @@ pub struct Held<T> {
     pub radii: Buffer<T>,
     /// `(N,)` within which areas are found.
     pub area_radii: Buffer<T>,
-    /// The radius of every point that has enough neighbours within it.
+    /// The radius of every point that has enough neighbors within it.
     pub common_radius: T,
-    /// Typical distance between neighbouring samples, which the smoothing follows where areas do not count.
+    /// Typical distance between neighboring samples, which the smoothing follows where areas do not count.
     pub spacing: T,
     /// `(N, 3)` roughly outward: a normal is turned to the side of its vector here.
     pub outward: Buffer<T>,
     /// `(N,)` from 0 to 1, how sure that is: see [`Orientation::confidence`].
     pub confidence: Buffer<T>,
     /// Whether the sides are those of an earlier step, since which axes may have turned far: these then follow their
-    /// neighbours.
+    /// neighbors.
     pub has_moved: bool,
 }
 
@@ -46,7 +46,7 @@ pub(crate) struct Search<T: Scalar> {
     pub flipped: usize,
 }
 
-/// The axes of a cloud's samples, and the neighbourhoods that they were found in.
+/// The axes of a cloud's samples, and the neighborhoods that they were found in.
 pub struct FoundAxes<T: Scalar> {
     pub(crate) axes: Buffer<T>,
     pub(crate) residual: Box<crate::normals::Residual<T>>,
@@ -58,7 +58,7 @@ impl<T: Scalar> Held<T> {
     /// [`reconstruct_given`](super::Reconstructor::reconstruct_given) holds.
     ///
     /// # Errors
-    /// What neighbours, normals or orientation say of the cloud; [`Error::Device`].
+    /// What neighbors, normals or orientation say of the cloud; [`Error::Device`].
     pub fn find<R: Runtime>(
         device: &Device<R>,
         cloud: &PointCloud<T>,
@@ -114,7 +114,7 @@ impl<T: Scalar> Held<T> {
     /// Finds all of it on the device, from `(N, 3)` points that are there.
     ///
     /// # Errors
-    /// What neighbours or orientation say of the cloud; [`Error::Device`].
+    /// What neighbors or orientation say of the cloud; [`Error::Device`].
     pub fn find_on_device<R: Runtime>(
         device: &Device<R>,
         points: &Buffer<T>,
@@ -193,7 +193,7 @@ impl<T: Scalar> Held<T> {
     }
 
     /// The same radii, with sides told by other `(N, 3)` vectors of any length, roughly outward. Axes that are more
-    /// than 60° off follow their neighbours.
+    /// than 60° off follow their neighbors.
     ///
     /// # Errors
     /// [`crate::Error::Length`].

@@ -42,7 +42,7 @@ pub enum Error {
     /// The device.
     #[error(transparent)]
     Device(#[from] crate::Error),
-    /// The neighbours.
+    /// The neighbors.
     #[error(transparent)]
     Neighbors(#[from] isograd::neighbors::Error),
     /// The orientation.
@@ -186,7 +186,7 @@ pub struct Reconstruction<T: Scalar> {
     /// `(N,)` from 0 to 1, how sure their sides are; 1 for given normals.
     pub confidence: Buffer<T>,
     /// `(1,)` how many axes have turned by more than 60° since the step whose sides are [`Held`], and followed their
-    /// neighbours; 0 where these sides were found in this cloud. From 3 % of the points on, find them again.
+    /// neighbors; 0 where these sides were found in this cloud. From 3 % of the points on, find them again.
     pub turned: Buffer<u32>,
     /// `(N,)` areas, in that unit squared; 1 where samples do not count by them.
     pub areas: Buffer<T>,
@@ -198,7 +198,7 @@ pub struct Reconstruction<T: Scalar> {
 
 /// What the stages kept for their pullbacks.
 struct Residuals<T: Scalar> {
-    /// The points in their tree, and the radius that most neighbourhoods have.
+    /// The points in their tree, and the radius that most neighborhoods have.
     near: neighbors::Neighborhoods<T>,
     common_radius: T,
     normals: Source<T>,
@@ -235,7 +235,7 @@ struct Width {
 }
 
 impl<T: Scalar> Reconstruction<T> {
-    /// `(nx, ny, nz)` the face of the surface closest to each cell centre, in C order;
+    /// `(nx, ny, nz)` the face of the surface closest to each cell center, in C order;
     /// [`NO_TRIANGLE`](distance::NO_TRIANGLE) outside the band.
     pub fn closest(&self) -> &Buffer<u32> {
         self.residuals.distance.closest()

@@ -16,7 +16,7 @@ const LARGEST_FACTOR: usize = 31;
 pub(super) struct Lines {
     /// Cells of a line.
     pub(super) n: usize,
-    /// Distance in memory between neighbours on a line.
+    /// Distance in memory between neighbors on a line.
     pub(super) step: usize,
     /// Lines of the field.
     pub(super) count: usize,

@@ -110,7 +110,7 @@ fn groups<R: Runtime>(device: &Device<R>, lines: Lines) -> CubeCount {
 #[derive(Clone, Copy, Debug, Hash, PartialEq, Eq)]
 struct Kind {
     inverse: bool,
-    /// Whether neighbours on a line are neighbours in memory, and then of neighbouring units.
+    /// Whether neighbors on a line are neighbors in memory, and then of neighboring units.
     contiguous: bool,
     long: bool,
 }
@@ -196,7 +196,7 @@ fn multiply_and_filter<F: Float>(
 struct Tile {
     /// Cells of a line.
     n: usize,
-    /// Distance in memory between neighbours on a line.
+    /// Distance in memory between neighbors on a line.
     step: usize,
     /// Lines of the field.
     count: usize,

@@ -1,7 +1,7 @@
 //! What more smoothing would do: [`isograd::poisson::smoothing::pullback`] on a device.
 //!
 //! With `L` the sum of second differences along the axes, even at the walls, `χ·Lχ̄ = −Σ ∇χ·∇χ̄` over the
-//! differences of neighbouring cells: fewer terms, and smaller ones.
+//! differences of neighboring cells: fewer terms, and smaller ones.
 
 use cubecl::prelude::*;
 

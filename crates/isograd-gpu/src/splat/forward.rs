@@ -4,7 +4,7 @@ use cubecl::prelude::*;
 
 use super::stencil::{BSpline, NUMBERS, Paper, REACH, hats, total};
 use super::{Residual, SampleOrder, Samples, Weights};
-use crate::grid::{self, Lattice, cell_at, from_centre, place};
+use crate::grid::{self, Lattice, cell_at, from_center, place};
 use crate::spread::{Before, spread};
 use crate::{Buffer, Device, Error, Scalar};
 
@@ -44,12 +44,12 @@ pub fn forward<R: Runtime, T: Scalar>(
 }
 
 /// `(N, 6)` offset and vector of each sample, in sorted order. The vector is over the sum of the paper's weights
-/// if `normalise` says so.
+/// if `normalize` says so.
 pub(super) fn sorted<R: Runtime, T: Scalar>(
     device: &Device<R>,
     samples: Samples<'_, T>,
     residual: &Residual<T>,
-    normalise: bool,
+    normalize: bool,
 ) -> Result<Buffer<T>, Error> {
     let sorted: Buffer<T> = device.empty(NUMBERS * samples.len())?;
     sort_samples::launch::<T, R>(
@@ -64,7 +64,7 @@ pub(super) fn sorted<R: Runtime, T: Scalar>(
         sorted.arg(),
         samples.len() as u32,
         grid::arg(&residual.grid),
-        normalise,
+        normalize,
     );
     Ok(sorted)
 }
@@ -79,19 +79,19 @@ fn sort_samples<F: Float + CubeElement>(
     sorted: &mut Array<F>,
     count: u32,
     grid: Lattice<F>,
-    #[comptime] normalise: bool,
+    #[comptime] normalize: bool,
 ) {
     let s = ABSOLUTE_POS;
     if s < count as usize {
         let i = places[s] as usize;
         let x = place::<F>(points, i, &grid);
         let cell = cell_at(keys[s], grid.ny, grid.nz);
-        let fx = from_centre::<F>(x.x, cell.i);
-        let fy = from_centre::<F>(x.y, cell.j);
-        let fz = from_centre::<F>(x.z, cell.k);
+        let fx = from_center::<F>(x.x, cell.i);
+        let fy = from_center::<F>(x.y, cell.j);
+        let fz = from_center::<F>(x.z, cell.k);
         // One division after the other: h² may underflow where a/h² is fine.
         let mut scale = areas[i] / grid.spacing / grid.spacing;
-        if normalise {
+        if normalize {
             scale /= total::<F>(hats::<F>(fx), hats::<F>(fy), hats::<F>(fz));
         }
         let at = s * NUMBERS;

@@ -133,13 +133,13 @@ fn gather_samples<F: Float + CubeElement>(
     subtract_from_grid::<F>(bar_x, bar_y, bar_z, bar_h, grid_sums);
 }
 
-/// Index coordinate at offset `f` from the centre of a cell.
+/// Index coordinate at offset `f` from the center of a cell.
 #[cube]
 fn to_place<F: Float>(f: F, cell: u32) -> F {
     F::cast_from(cell) + F::new(0.5) + f
 }
 
-/// A sample at offset `f` from the centre of its cell, with vector `v`.
+/// A sample at offset `f` from the center of its cell, with vector `v`.
 #[cube]
 fn gather_sample<F: Float + CubeElement>(
     b_bar: &Array<F>,
@@ -200,10 +200,10 @@ fn gather_paper<F: Float + CubeElement>(
     let spread_y = (p.spread_y + extra * c.spread_y) / total;
     let spread_z = (p.spread_z + extra * c.spread_z) / total;
     let whole = v.x * spread_x + v.y * spread_y + v.z * spread_z;
-    let of_centre = v.x * c.spread_x + v.y * c.spread_y + v.z * c.spread_z;
-    let extra_x = -d.x.centre * w.y.centre * w.z.centre;
-    let extra_y = -d.y.centre * w.z.centre * w.x.centre;
-    let extra_z = -d.z.centre * w.x.centre * w.y.centre;
+    let of_center = v.x * c.spread_x + v.y * c.spread_y + v.z * c.spread_z;
+    let extra_x = -d.x.center * w.y.center * w.z.center;
+    let extra_y = -d.y.center * w.z.center * w.x.center;
+    let extra_z = -d.z.center * w.x.center * w.y.center;
     let total_x = sum::<F>(d.x) * sum::<F>(w.y) * sum::<F>(w.z) + extra_x;
     let total_y = sum::<F>(d.y) * sum::<F>(w.z) * sum::<F>(w.x) + extra_y;
     let total_z = sum::<F>(d.z) * sum::<F>(w.x) * sum::<F>(w.y) + extra_z;
@@ -211,9 +211,9 @@ fn gather_paper<F: Float + CubeElement>(
         spread_x,
         spread_y,
         spread_z,
-        x: (p.x + extra_x * of_centre - whole * total_x) / total,
-        y: (p.y + extra_y * of_centre - whole * total_y) / total,
-        z: (p.z + extra_z * of_centre - whole * total_z) / total,
+        x: (p.x + extra_x * of_center - whole * total_x) / total,
+        y: (p.y + extra_y * of_center - whole * total_y) / total,
+        z: (p.z + extra_z * of_center - whole * total_z) / total,
     }
 }
 

@@ -11,7 +11,7 @@ pub(super) const REACH: u32 = 2;
 /// Cells along each axis that it reaches.
 pub(super) const WIDTH: u32 = 5;
 
-/// Numbers of a sample in the form that is spread: offset `f` from the centre of its cell, −½ to ½ cells, and
+/// Numbers of a sample in the form that is spread: offset `f` from the center of its cell, −½ to ½ cells, and
 /// the vector `a n / h²`.
 pub(super) const NUMBERS: usize = 6;
 
@@ -19,7 +19,7 @@ pub(super) const NUMBERS: usize = 6;
 #[derive(CubeType, Clone, Copy)]
 pub(crate) struct Triple<F: Float> {
     pub below: F,
-    pub centre: F,
+    pub center: F,
     pub above: F,
 }
 
@@ -28,7 +28,7 @@ pub(crate) struct Triple<F: Float> {
 pub(crate) fn bspline<F: Float>(f: F) -> Triple<F> {
     Triple::<F> {
         below: spline::below::<F>(f),
-        centre: spline::centre::<F>(f),
+        center: spline::center::<F>(f),
         above: spline::above::<F>(f),
     }
 }
@@ -38,17 +38,17 @@ pub(crate) fn bspline<F: Float>(f: F) -> Triple<F> {
 pub(crate) fn bspline_slope<F: Float>(f: F) -> Triple<F> {
     Triple::<F> {
         below: spline::below_slope::<F>(f),
-        centre: spline::centre_slope::<F>(f),
+        center: spline::center_slope::<F>(f),
         above: spline::above_slope::<F>(f),
     }
 }
 
-/// The paper's weights, not normalised.
+/// The paper's weights, not normalized.
 #[cube]
 pub(super) fn hats<F: Float>(f: F) -> Triple<F> {
     Triple::<F> {
         below: hat::weight::<F>(f + F::new(1.0)),
-        centre: hat::weight::<F>(f),
+        center: hat::weight::<F>(f),
         above: hat::weight::<F>(f - F::new(1.0)),
     }
 }
@@ -58,7 +58,7 @@ pub(super) fn hats<F: Float>(f: F) -> Triple<F> {
 pub(super) fn hat_slopes<F: Float>(f: F) -> Triple<F> {
     Triple::<F> {
         below: hat::slope::<F>(f + F::new(1.0)),
-        centre: hat::slope::<F>(f),
+        center: hat::slope::<F>(f),
         above: hat::slope::<F>(f - F::new(1.0)),
     }
 }
@@ -68,14 +68,14 @@ pub(super) fn hat_slopes<F: Float>(f: F) -> Triple<F> {
 pub(super) fn central<F: Float>() -> Triple<F> {
     Triple::<F> {
         below: F::new(0.0),
-        centre: F::new(1.0),
+        center: F::new(1.0),
         above: F::new(0.0),
     }
 }
 
 #[cube]
 pub(super) fn sum<F: Float>(w: Triple<F>) -> F {
-    w.below + w.centre + w.above
+    w.below + w.center + w.above
 }
 
 /// Weights `w` under the mass, `M = (1, 4, 1)/6`, and under the derivative, `(D u)_p = (u_{p−1} − u_{p+1})/2`,
@@ -103,7 +103,7 @@ pub(super) fn along<F: Float>(w: Triple<F>, cell: u32) -> Along<F> {
 pub(crate) fn pick<F: Float>(w: Triple<F>, at: u32) -> F {
     let zero = F::new(0.0);
     let last = select(at == 4u32, w.above, zero);
-    select(at == 2u32, w.below, select(at == 3u32, w.centre, last))
+    select(at == 2u32, w.below, select(at == 3u32, w.center, last))
 }
 
 /// The vector of sample `s`, spread by a product of weights, in the cell `(x, y, z) − 2` cells from its own.
@@ -149,21 +149,21 @@ impl Spread for Paper {
             along::<F>(wz, z),
         );
         let one = central::<F>();
-        let centre = term::<F>(
+        let center = term::<F>(
             samples,
             s,
             along::<F>(one, x),
             along::<F>(one, y),
             along::<F>(one, z),
         );
-        product + extra::<F>(wx, wy, wz) * centre
+        product + extra::<F>(wx, wy, wz) * center
     }
 }
 
 /// What the central cell has beyond the product of the paper's weights.
 #[cube]
 pub(super) fn extra<F: Float>(x: Triple<F>, y: Triple<F>, z: Triple<F>) -> F {
-    F::new(0.5) - x.centre * y.centre * z.centre
+    F::new(0.5) - x.center * y.center * z.center
 }
 
 /// The sum of the paper's 27 weights.

@@ -9,7 +9,7 @@ use isograd_shapes::{Layout, Sampling};
 use crate::devices::Numbers;
 use cubecl::prelude::Runtime;
 
-/// A cloud, and its neighbourhoods and axes on the CPU.
+/// A cloud, and its neighborhoods and axes on the CPU.
 pub struct Cloud<T> {
     pub name: &'static str,
     pub points: Vec<[T; 3]>,

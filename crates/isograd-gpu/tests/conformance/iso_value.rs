@@ -36,7 +36,7 @@ fn check_values<R: Runtime>(device: &Device<R>) {
 fn check_values_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
     for (shape, count, crowd) in CLOUDS {
         let mut cloud = Cloud::<T>::new(shape, count, crowd);
-        // Beyond the outermost cell centres and the walls, where the field goes on as a constant.
+        // Beyond the outermost cell centers and the walls, where the field goes on as a constant.
         for (i, x) in [[0.3, 2.0, 2.0], [-7.0, 99.0, 0.5], [4.9, 1e4, -1e4]]
             .iter()
             .enumerate()

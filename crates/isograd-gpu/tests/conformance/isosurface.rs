@@ -10,12 +10,12 @@ use isograd_gpu::{Device, Scalar};
 
 use crate::devices::{Numbers, in_each_number, on_each_device};
 
-/// Values at the cell centres of a grid that is not at the origin.
+/// Values at the cell centers of a grid that is not at the origin.
 fn field<T: Scalar>(shape: [usize; 3], f: impl FnMut([f64; 3]) -> f64) -> Field<T> {
     let h = 2.0 / shape.into_iter().fold(0, usize::max) as f64;
     let grid = Grid::new([-0.9, -1.1, -1.05].map(T::of), T::of(h), shape).expect("a grid");
-    let centres = (0..grid.cells()).map(|at| grid.center_f64(grid.cell(at)));
-    let values = centres.map(f).map(T::of).collect();
+    let centers = (0..grid.cells()).map(|at| grid.center_f64(grid.cell(at)));
+    let values = centers.map(f).map(T::of).collect();
     Field::new(grid, values).expect("a field")
 }
 
@@ -122,7 +122,7 @@ fn compare_surfaces<R: Runtime, T: Scalar>(device: &Device<R>) {
     println!("{number}: vertices differ by {worst} roundings of the largest coordinate");
 }
 
-/// Where neighbouring cells differ in the last digits only.
+/// Where neighboring cells differ in the last digits only.
 fn far_away<T: Scalar>() -> (&'static str, Field<T>, f64) {
     let grid = Grid::new([1e3, -2e3, 0.1].map(T::of), T::of(1e-2), [14, 15, 36]).expect("a grid");
     let values = (0..grid.cells()).map(|_| [0.0; 3]).map(noise(4)).map(T::of);

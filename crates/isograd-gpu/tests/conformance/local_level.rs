@@ -54,7 +54,7 @@ impl<T: Scalar> Setting<T> {
             let (point, normal) = samples[if i < count { i } else { 0 }];
             let place = match i < count {
                 true => point.map(T::of),
-                // Anywhere in the cell of the first sample, on all sides of its centre.
+                // Anywhere in the cell of the first sample, on all sides of its center.
                 false => grid.from_index(middle.map(|x| T::of(x + 0.49 * numbers.signed()))),
             };
             let normal = match i % 4 {

@@ -8,7 +8,7 @@ use crate::clouds::{Cloud, clouds, real, relative};
 use crate::devices::{Numbers, in_each_number, on_each_device, tolerance};
 
 #[test]
-fn neighbours_are_those_of_a_plain_loop() {
+fn neighbors_are_those_of_a_plain_loop() {
     in_each_number!(check_counts);
 }
 

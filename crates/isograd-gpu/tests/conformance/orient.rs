@@ -85,11 +85,11 @@ fn check_parity<R: Runtime, T: Scalar>(device: &Device<R>) {
 }
 
 #[test]
-fn rays_through_the_centre_of_a_sphere_are_not_much_work() {
+fn rays_through_the_center_of_a_sphere_are_not_much_work() {
     on_each_device!(check_sphere);
 }
 
-/// From the centre all samples are about equally far: a search for the nearest would look at all of them from
+/// From the center all samples are about equally far: a search for the nearest would look at all of them from
 /// every ray.
 fn check_sphere<R: Runtime>(device: &Device<R>) {
     let mut numbers = Numbers(31);

@@ -1,4 +1,4 @@
-//! The neighbour graph of the automatic orientation beside that of the CPU.
+//! The neighbor graph of the automatic orientation beside that of the CPU.
 
 use cubecl::prelude::Runtime;
 use isograd::element::coupling;
@@ -158,7 +158,7 @@ fn the_graph_is_that_of_the_cpu() {
     in_each_number!(check_graph);
 }
 
-/// Where rounding decides which of two neighbours is nearer, or which plane fits a quorum best, a point may have
+/// Where rounding decides which of two neighbors is nearer, or which plane fits a quorum best, a point may have
 /// another sheet than on the CPU: those are counted. All that is found from equal sheets is equal.
 fn check_graph<R: Runtime, T: Scalar>(device: &Device<R>) {
     let (mut sheets, mut scattering, mut strong) = (0, 0, 0);
@@ -195,7 +195,7 @@ fn check_graph<R: Runtime, T: Scalar>(device: &Device<R>) {
             worst.take("side", found.side[i], expected.side[i], 1.0);
         }
         println!(
-            "{name}, {}: {others} of {n} with other neighbours, {flips} with another sheet; {worst:?}",
+            "{name}, {}: {others} of {n} with other neighbors, {flips} with another sheet; {worst:?}",
             T::NAME
         );
         check_couplings(device, &cloud, &placed);
@@ -276,7 +276,7 @@ impl Worst {
     }
 }
 
-/// How many points have other neighbours, or the same in another order; those are equally far but for rounding, and in
+/// How many points have other neighbors, or the same in another order; those are equally far but for rounding, and in
 /// double precision and between whole numbers there are none.
 fn check_neighbors<T: Scalar>(cloud: &Cloud<T>, found: &Graph, expected: &Graph) -> usize {
     let mut others = 0;

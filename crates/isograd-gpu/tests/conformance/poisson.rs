@@ -99,15 +99,15 @@ fn check_solutions<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
     );
 }
 
-/// `A χ` from the definition: 1D stencils `(side, centre, side)` along the axes, with even reflection.
+/// `A χ` from the definition: 1D stencils `(side, center, side)` along the axes, with even reflection.
 fn stencil(chi: &[f64], shape: [usize; 3]) -> Vec<f64> {
-    let along = |field: &[f64], axis: usize, side: f64, centre: f64| -> Vec<f64> {
+    let along = |field: &[f64], axis: usize, side: f64, center: f64| -> Vec<f64> {
         let step: usize = shape[axis + 1..].iter().product();
         let at = |i: usize| {
             let p = i / step % shape[axis];
             let low = if p == 0 { i } else { i - step };
             let high = if p + 1 == shape[axis] { i } else { i + step };
-            side * (field[low] + field[high]) + centre * field[i]
+            side * (field[low] + field[high]) + center * field[i]
         };
         (0..field.len()).map(at).collect()
     };
@@ -115,12 +115,12 @@ fn stencil(chi: &[f64], shape: [usize; 3]) -> Vec<f64> {
     for stiff in 0..3 {
         let mut term = chi.to_vec();
         for axis in 0..3 {
-            let (side, centre) = if axis == stiff {
+            let (side, center) = if axis == stiff {
                 (-1.0, 2.0)
             } else {
                 (1.0 / 6.0, 4.0 / 6.0)
             };
-            term = along(&term, axis, side, centre);
+            term = along(&term, axis, side, center);
         }
         out.iter_mut().zip(term).for_each(|(o, t)| *o += t);
     }

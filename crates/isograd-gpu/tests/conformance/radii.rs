@@ -27,7 +27,7 @@ fn plate<T: Scalar>(n: usize, noise: f64) -> Vec<[T; 3]> {
     (0..n).map(&mut sample).collect()
 }
 
-/// How far numbers with the same neighbours may be from each other, of their own size.
+/// How far numbers with the same neighbors may be from each other, of their own size.
 fn rounding<T: Scalar>() -> f64 {
     if T::NAME == "f32" { 1e-5 } else { 1e-12 }
 }

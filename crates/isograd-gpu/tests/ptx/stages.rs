@@ -139,7 +139,7 @@ fn sides<T: Scalar>(
     previous::forward(device, near, &radii, &normals, before).unwrap();
 }
 
-/// The neighbour graph of the automatic orientation.
+/// The neighbor graph of the automatic orientation.
 fn graphs<T: Scalar>(device: &Device<Recorder>) {
     use orient::auto::graph;
     let (points, radii) = (

@@ -1,7 +1,7 @@
 //! ImageData: a field on a grid.
 //!
 //! VTK's first axis is the fastest, ours is the last; `Origin` is the position of the first point, which
-//! is the centre of our first cell.
+//! is the center of our first cell.
 
 use std::io::{self, Write};
 
@@ -16,7 +16,7 @@ use crate::format::Format;
 use crate::source::Source;
 
 /// Reads a field: the scalar array `sdf`, or the only one; point data (values at the points) or, without
-/// any, cell data (values at the cells' centres). Cells must be cubes along the axes.
+/// any, cell data (values at the cells' centers). Cells must be cubes along the axes.
 pub(crate) fn read(source: &Source) -> Result<FieldFile, Error> {
     let file = VtkFile::open(source, "ImageData")?;
     let image = file.data_set("ImageData")?;

@@ -33,7 +33,7 @@ pub(crate) const KIND: Kind = Kind {
             28.0,
             60.0,
         ),
-        angle("dihedral", "rise of the wing towards its tips", 5.0, 30.0),
+        angle("dihedral", "rise of the wing toward its tips", 5.0, 30.0),
         number(
             "thickness",
             "thickness of all sections",

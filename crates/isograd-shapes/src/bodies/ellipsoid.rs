@@ -55,7 +55,7 @@ impl Surface for Ellipsoid {
 ///
 /// The closest point to `q` is `a_k² q_k/(t + a_k²)` with `t` the largest root of
 /// `Σ (a_k q_k/(t + a_k²))² = 1`, a decreasing function right of its last pole (D. Eberly, "Distance
-/// from a point to an ellipse, an ellipsoid, or a hyperellipsoid"). Bisection down to neighbouring
+/// from a point to an ellipse, an ellipsoid, or a hyperellipsoid"). Bisection down to neighboring
 /// numbers cannot fail to converge.
 fn distance(axes: [f64; 3], point: [f64; 3]) -> f64 {
     let mut order = [0, 1, 2];
@@ -108,7 +108,7 @@ fn closest_point(a: [f64; 3], q: [f64; 3]) -> [f64; 3] {
     })
 }
 
-/// Closest point for a point of the plane of the two larger axes, close to the centre: there the
+/// Closest point for a point of the plane of the two larger axes, close to the center: there the
 /// closest point leaves the plane.
 fn on_the_medial_disc(a: [f64; 3], gap: [f64; 3], q: [f64; 3]) -> [f64; 3] {
     let mut closest = [0.0; 3];
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn distance_of_the_centre_is_the_smallest_half_axis() {
+    fn distance_of_the_center_is_the_smallest_half_axis() {
         assert_eq!(distance([0.8, 0.5, 0.3], [0.0; 3]), -0.3);
         assert_eq!(distance([0.5; 3], [0.0; 3]), -0.5);
         // By hand: the closest point to (0.1, 0, 0) is at x = 0.25·0.1/0.16, out of the plane z = 0.

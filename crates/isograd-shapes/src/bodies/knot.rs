@@ -6,19 +6,19 @@ use crate::jet::{Jet, JetVector, add_scaled, cross};
 use crate::kind::{Kind, ShapeError, length};
 use crate::surface::{Surface, turn};
 
-/// Turns of the centre line round the z axis, and through the hole.
+/// Turns of the center line round the z axis, and through the hole.
 const WINDINGS: [f64; 2] = [2.0, 3.0];
 
-/// Trefoil: a tube whose centre line winds twice round the z axis and three times through the hole of a
+/// Trefoil: a tube whose center line winds twice round the z axis and three times through the hole of a
 /// torus.
 pub(crate) const KIND: Kind = Kind {
     name: "knot",
     summary: "trefoil: a tube of round section, knotted on a torus round the z axis",
     parameters: &[
-        length("major", "radius of the centre line of the torus", 0.7),
+        length("major", "radius of the center line of the torus", 0.7),
         length(
             "minor",
-            "distance of the knot's centre line from that of the torus",
+            "distance of the knot's center line from that of the torus",
             0.3,
         ),
         length("tube", "radius of the tube", 0.15),
@@ -32,7 +32,7 @@ pub(crate) const KIND: Kind = Kind {
         };
         if !(knot.minor.value < knot.major.value) {
             return Err(ShapeError::Combination(
-                "knot: minor must be below major, or the centre line cuts itself".into(),
+                "knot: minor must be below major, or the center line cuts itself".into(),
             ));
         }
         if !(knot.tube.value < knot.widest_tube()) {
@@ -51,11 +51,11 @@ struct Knot {
     tube: Jet,
 }
 
-/// Places on the centre line that are compared to find where it comes nearest to itself.
+/// Places on the center line that are compared to find where it comes nearest to itself.
 const STATIONS: usize = 360;
 
 impl Knot {
-    /// The centre line, its direction (not of unit length), and the unit normal there of the torus that it
+    /// The center line, its direction (not of unit length), and the unit normal there of the torus that it
     /// lies on.
     fn center_line(&self, u: Jet) -> [JetVector; 3] {
         let [round, through] = WINDINGS;
@@ -75,7 +75,7 @@ impl Knot {
         ]
     }
 
-    /// Half the least distance between parts of the centre line that are not next to each other, and no
+    /// Half the least distance between parts of the center line that are not next to each other, and no
     /// more than the least radius of its curvature: any tube below that does not cut itself.
     fn widest_tube(&self) -> f64 {
         let stations: Vec<[f64; 3]> = (0..STATIONS)

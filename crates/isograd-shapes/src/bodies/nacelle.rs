@@ -28,7 +28,7 @@ pub(crate) const KIND: Kind = Kind {
         ),
         number(
             "incidence",
-            "angle of the chord with the axis; positive opens towards the front",
+            "angle of the chord with the axis; positive opens toward the front",
             "degree",
             4.0,
             (-45.0, 45.0),

@@ -11,7 +11,7 @@ pub(crate) const KIND: Kind = Kind {
     name: "torus",
     summary: "ring torus round the z axis; distance, area and volume in closed form",
     parameters: &[
-        length("major", "radius of the centre line", 0.7),
+        length("major", "radius of the center line", 0.7),
         length("minor", "radius of the tube", 0.25),
     ],
     time: None,

@@ -14,7 +14,7 @@ const CELLS: (usize, usize) = (4_000, 40_000);
 /// Cells along each side of a patch, at most and at least.
 const SIDE: (usize, usize) = (60, 6);
 
-/// How far the area element may exceed the greatest that was seen at the corners and the centre of a
+/// How far the area element may exceed the greatest that was seen at the corners and the center of a
 /// cell. Where a draw exceeds it all the same, the margin is raised and all begins again.
 const MARGIN: f64 = 1.2;
 
@@ -81,7 +81,7 @@ impl<'a> Source<'a> {
     fn tabulate(&mut self, patch: usize) {
         let side = self.side;
         let corners = self.elements(patch, side + 1, 0.0);
-        let centres = self.elements(patch, side, 0.5);
+        let centers = self.elements(patch, side, 0.5);
         let first = self.greatest.len();
         for cell in 0..side * side {
             let corner = cell / side * (side + 1) + cell % side;
@@ -89,7 +89,7 @@ impl<'a> Source<'a> {
             let seen = around
                 .map(|k| corners[k])
                 .into_iter()
-                .fold(centres[cell], f64::max);
+                .fold(centers[cell], f64::max);
             self.greatest.push(seen);
         }
         // A cell where the map degenerates at all five points still has some area.

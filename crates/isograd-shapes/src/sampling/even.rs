@@ -20,7 +20,7 @@ const GAMMA: f64 = 1.5;
 /// crowd each other. Across an edge of 90° they still do.
 const FACING_AWAY: f64 = -0.5;
 
-/// Samples that crowd each other, sorted so that neighbours in space are neighbours in memory.
+/// Samples that crowd each other, sorted so that neighbors in space are neighbors in memory.
 struct Crowd {
     index: CellIndex<f64>,
     positions: Vec<[f64; 3]>,
@@ -66,7 +66,7 @@ impl Crowd {
 
     /// Calls `visit` with every sample that crowds `i`, and how much: `(1 − d/2r)^α`, with `r` the
     /// smaller of the two radii, so that it is the same both ways.
-    fn for_each_neighbour(&self, i: usize, mut visit: impl FnMut(usize, f64)) {
+    fn for_each_neighbor(&self, i: usize, mut visit: impl FnMut(usize, f64)) {
         let (normal, radius) = (self.normals[i], self.radius[i]);
         self.index
             .for_each_within(self.positions[i], 2.0 * radius, |j, square| {
@@ -79,7 +79,7 @@ impl Crowd {
 
     fn crowding(&self, i: usize) -> f64 {
         let mut total = 0.0;
-        self.for_each_neighbour(i, |_, weight| total += weight);
+        self.for_each_neighbor(i, |_, weight| total += weight);
         total
     }
 
@@ -104,7 +104,7 @@ impl Crowd {
             }
             kept[i] = false;
             left -= 1;
-            self.for_each_neighbour(i, |j, weight| {
+            self.for_each_neighbor(i, |j, weight| {
                 crowding[j] = (crowding[j] - weight).max(0.0);
             });
         }

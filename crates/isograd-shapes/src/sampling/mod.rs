@@ -22,7 +22,7 @@ const OVERSAMPLING: usize = 4;
 pub enum Layout {
     /// Independent, each place as likely as its area: clumps and holes.
     Random,
-    /// Even: none much closer to its neighbours than the mean spacing (blue noise), by weighted sample
+    /// Even: none much closer to its neighbors than the mean spacing (blue noise), by weighted sample
     /// elimination from four times as many (Yuksel 2015).
     #[default]
     Even,

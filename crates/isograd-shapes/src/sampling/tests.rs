@@ -3,7 +3,7 @@ use isograd::vector::{dot, norm, sub};
 use super::{Density, Layout, Sampling};
 use crate::{Samples, by_name};
 
-/// Distance of each sample to its nearest neighbour on the same side of the body, by brute force.
+/// Distance of each sample to its nearest neighbor on the same side of the body, by brute force.
 fn nearest(samples: &Samples<f64>) -> Vec<f64> {
     let (points, normals) = (
         samples.cloud.points(),

@@ -1,9 +1,9 @@
-//! A value at every cell centre.
+//! A value at every cell center.
 
 use super::grid::Grid;
 use crate::Real;
 
-/// A grid and one value per cell, at the cell's centre; `(nx, ny, nz)` in C order.
+/// A grid and one value per cell, at the cell's center; `(nx, ny, nz)` in C order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Field<T> {
     grid: Grid<T>,

@@ -2,9 +2,9 @@
 
 use crate::{Real, vector};
 
-/// A uniform grid of `(nx, ny, nz)` cubic cells. Values sit at cell centres.
+/// A uniform grid of `(nx, ny, nz)` cubic cells. Values sit at cell centers.
 ///
-/// Index coordinates are `x̂ = (x − lower)/h`: cell `(i, j, k)` is centred at `(i+½, j+½, k+½)`.
+/// Index coordinates are `x̂ = (x − lower)/h`: cell `(i, j, k)` is centered at `(i+½, j+½, k+½)`.
 /// Memory order is C: the last axis is the fastest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid<T> {
@@ -117,9 +117,9 @@ pub enum GridError {
         /// Number of points.
         points: usize,
     },
-    /// Neighbouring cell centres are not distinct numbers of this type.
+    /// Neighboring cell centers are not distinct numbers of this type.
     #[error(
-        "cells of {spacing} at coordinates up to {extent} can't be told apart in {real}; use f64, a coarser grid, or move the cloud towards the origin"
+        "cells of {spacing} at coordinates up to {extent} can't be told apart in {real}; use f64, a coarser grid, or move the cloud toward the origin"
     )]
     Unresolvable {
         /// Cell size.
@@ -244,7 +244,7 @@ impl<T: Real> Grid<T> {
         std::array::from_fn(|a| self.lower[a] + self.spacing * T::of_usize(self.shape[a]))
     }
 
-    /// Centre of cell `(0, 0, 0)`: the position of the first value, what VTK calls the origin.
+    /// Center of cell `(0, 0, 0)`: the position of the first value, what VTK calls the origin.
     pub fn origin(&self) -> [T; 3] {
         self.center([0, 0, 0])
     }
@@ -264,7 +264,7 @@ impl<T: Real> Grid<T> {
         self.shape[0] * self.shape[1] * self.shape[2]
     }
 
-    /// Distance in memory between neighbours along each axis: `(ny·nz, nz, 1)`.
+    /// Distance in memory between neighbors along each axis: `(ny·nz, nz, 1)`.
     pub fn strides(&self) -> [usize; 3] {
         [self.shape[1] * self.shape[2], self.shape[2], 1]
     }
@@ -282,14 +282,14 @@ impl<T: Real> Grid<T> {
         [row / self.shape[1], row % self.shape[1], k]
     }
 
-    /// Centre of cell `(i, j, k)`, in the user's unit.
+    /// Center of cell `(i, j, k)`, in the user's unit.
     #[inline(always)]
     pub fn center(&self, cell: [usize; 3]) -> [T; 3] {
         let center = self.center_f64(cell);
         vector::of_f64(center)
     }
 
-    /// Centre of cell `(i, j, k)` in double precision, before rounding to `T`.
+    /// Center of cell `(i, j, k)` in double precision, before rounding to `T`.
     #[inline(always)]
     pub fn center_f64(&self, cell: [usize; 3]) -> [f64; 3] {
         let h = self.spacing.f64();

@@ -6,7 +6,7 @@ use crate::Real;
 
 impl<T: Real> Grid<T> {
     /// The grid round a cloud: its bounding box, widened on every side by `padding` times the longest
-    /// side and by at least [`Self::MARGIN_CELLS`] cells, centred. The longest side has as many cells as
+    /// side and by at least [`Self::MARGIN_CELLS`] cells, centered. The longest side has as many cells as
     /// asked for; the others are rounded up to a number whose Fourier transform is fast.
     ///
     /// # Errors
@@ -54,8 +54,8 @@ impl<T: Real> Grid<T> {
             }
         }
         let lower = std::array::from_fn(|a| {
-            let centre = 0.5 * (low[a].f64() + high[a].f64());
-            T::of(centre - 0.5 * spacing * shape[a] as f64)
+            let center = 0.5 * (low[a].f64() + high[a].f64());
+            T::of(center - 0.5 * spacing * shape[a] as f64)
         });
         Self::new(lower, T::of(spacing), shape)
     }
@@ -93,7 +93,7 @@ impl<T: Real> Grid<T> {
         let at = |axis: usize, end: usize| cloud.points()[ends[axis][end]][axis].f64();
         let extent = [0, 1, 2].map(|a| at(a, 1) - at(a, 0));
         let longest = (1..3).fold(0, |m, a| if extent[a] > extent[m] { a } else { m });
-        // lower = centre − shape · spacing / 2
+        // lower = center − shape · spacing / 2
         let spacing_bar = (0..3).fold(bar.spacing.f64(), |sum, a| {
             sum - 0.5 * shape[a] as f64 * bar.lower[a].f64()
         });

@@ -2,7 +2,7 @@
 
 use crate::{Real, vector};
 
-/// The lattice edge on which a vertex of an isosurface lies: from a cell centre to the next one along
+/// The lattice edge on which a vertex of an isosurface lies: from a cell center to the next one along
 /// an axis. It names the vertex, whatever order the vertices are stored in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct LatticeEdge(u64);

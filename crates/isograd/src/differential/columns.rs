@@ -5,7 +5,7 @@ use super::rows::{Order, Stencil};
 use crate::Real;
 
 /// The cells along an axis whose difference takes the value at one place, with the weight that it has there: the
-/// neighbours, the place itself, and the two ends, whose differences reach three cells inward.
+/// neighbors, the place itself, and the two ends, whose differences reach three cells inward.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Column<T> {
     pub(super) at: [usize; 5],

@@ -2,7 +2,7 @@
 //! `|∇φ|` is to 1.
 //!
 //! # Map
-//! With `φ` at cell centres (negative inside) and `h` the cell size:
+//! With `φ` at cell centers (negative inside) and `h` the cell size:
 //!
 //! - **gradient** `g = ∇φ`, per unit length: central differences, at the walls one-sided ones over three
 //!   cells. Second order in `h` everywhere (first order on an axis of two cells).
@@ -12,7 +12,7 @@
 //!   what is called `H` where the mean is meant literally. Second order in `h`, at the walls too (axes of
 //!   four cells or more). It is bounded by `±2/h`, that of a sphere of one cell, and is 0 where `g = 0`:
 //!   a grid holds no sharper body.
-//! - **at a point**: trilinear interpolation of the values at the eight cell centres round it (linear
+//! - **at a point**: trilinear interpolation of the values at the eight cell centers round it (linear
 //!   extrapolation in the half cell along the walls); second order and continuous. It is not the
 //!   derivative of an interpolated `φ`.
 //!
@@ -21,7 +21,7 @@
 //! its plain second differences do not converge: on a sphere they are off by 12 % at 32 and at 96 cells
 //! alike, after two passes by 0.7 % and 0.3 %. Smoothing adds an error of second order.
 //!
-//! Differences of neighbouring values are formed first, so in `f32` the error is that of `φ` itself: about
+//! Differences of neighboring values are formed first, so in `f32` the error is that of `φ` itself: about
 //! `|φ| ε/h` in the gradient and `4 |φ| ε/h²` in the curvature, small near the surface, where `|φ|` is.
 //!
 //! # Residual
@@ -40,7 +40,7 @@
 //!   gradient of the weights.
 //!
 //! # Not differentiable
-//! Where `g = 0`, where `κ` is at its bound, and at a point that passes from one cell-centre cube to the
+//! Where `g = 0`, where `κ` is at its bound, and at a point that passes from one cell-center cube to the
 //! next. On the medial axis `φ` itself has a crease: `|g|` drops below 1 there and `κ` is large.
 //!
 //! # Source

@@ -1,6 +1,6 @@
 //! Finite differences, a row of cells at a time.
 //!
-//! A difference is `Σ_t w_t (u_t − u)`: neighbours less the cell's own value, so that large values that
+//! A difference is `Σ_t w_t (u_t − u)`: neighbors less the cell's own value, so that large values that
 //! differ little lose nothing.
 
 use crate::Real;

@@ -99,7 +99,7 @@ fn within<T: Real>(point: [T; 3], lower: [T; 3], upper: [T; 3]) -> bool {
     (0..3).all(|a| lower[a] <= point[a] && point[a] <= upper[a])
 }
 
-/// The eight cells whose centres surround a point, as places in memory, with their trilinear weights. In
+/// The eight cells whose centers surround a point, as places in memory, with their trilinear weights. In
 /// the half cell along a wall the nearest eight, and weights that go on linearly.
 #[inline(always)]
 fn corners<T: Real>(grid: &Grid<T>, point: [T; 3]) -> Option<[(usize, T); 8]> {
@@ -112,12 +112,12 @@ fn corners<T: Real>(grid: &Grid<T>, point: [T; 3]) -> Option<[(usize, T); 8]> {
     }))
 }
 
-/// Where a point of the grid is between the eight cell centres round it.
+/// Where a point of the grid is between the eight cell centers round it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     /// The lowest of the eight cells.
     pub(super) base: [usize; 3],
-    /// From its centre, in cells.
+    /// From its center, in cells.
     fraction: [f64; 3],
 }
 

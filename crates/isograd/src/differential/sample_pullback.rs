@@ -25,7 +25,7 @@ impl<T: Real> Differential<T> {
     /// to its length, new entries being zero, so that an empty one will do. The same bits for any number of
     /// threads.
     ///
-    /// The grid is held constant. At a point that passes from one cell-centre cube to the next the derivative is
+    /// The grid is held constant. At a point that passes from one cell-center cube to the next the derivative is
     /// that of the cube on the high side. Returns how many points and cells are guarded: where a gradient is 0 or
     /// a curvature at its bound, a cotangent that is not 0 is left out.
     ///

@@ -29,7 +29,7 @@ pub struct Hit<T> {
     /// Signed distance, in the user's unit, negative inside.
     pub distance: T,
     /// Its gradient with respect to the point, of unit length: away from the closest point on the outside, and
-    /// towards it inside. At distance 0 the normal of the closest face. Zero only where that has no area.
+    /// toward it inside. At distance 0 the normal of the closest face. Zero only where that has no area.
     pub gradient: [T; 3],
     /// The closest point of the mesh.
     pub point: [T; 3],
@@ -77,7 +77,7 @@ impl<T: Real> Query<T> {
             .collect()
     }
 
-    /// Place in the tree of the triangle closest to each point. The points are taken in packets of neighbours
+    /// Place in the tree of the triangle closest to each point. The points are taken in packets of neighbors
     /// along a Morton curve.
     fn nearest_triangles(&self, points: &[[T; 3]]) -> Vec<u32> {
         let mut order: Vec<(u64, u32)> = points
@@ -155,11 +155,11 @@ fn side_on_lattice<T: Real>(field: &Field<T>, point: [T; 3]) -> Option<bool> {
     let x = grid.to_index(point);
     let mut cell = [0; 3];
     for a in 0..3 {
-        let from_centre = x[a] - T::of(0.5);
-        if !(from_centre >= T::zero()) {
+        let from_center = x[a] - T::of(0.5);
+        if !(from_center >= T::zero()) {
             return None;
         }
-        cell[a] = from_centre.to_usize().filter(|i| i + 1 < grid.shape()[a])?;
+        cell[a] = from_center.to_usize().filter(|i| i + 1 < grid.shape()[a])?;
     }
     let inside = |corner: usize| {
         let at = std::array::from_fn(|a| cell[a] + (corner >> a & 1));

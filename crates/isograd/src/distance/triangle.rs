@@ -377,7 +377,7 @@ fn any_perpendicular(u: [f64; 3]) -> [f64; 3] {
 
 /// The most by which a point of the triangle can be closer (squared) than its closest corner: for the point
 /// `Σ β_k y_k` that is `Σ_{j<k} β_j β_k |y_j − y_k|²`, the power of the point in the circumscribed circle,
-/// so `R²` where its centre is inside the triangle, else a quarter of the longest edge squared.
+/// so `R²` where its center is inside the triangle, else a quarter of the longest edge squared.
 fn slack(base: f64, apex: [f64; 2]) -> f64 {
     let longest = base * base;
     let left = apex[0] * apex[0] + apex[1] * apex[1];

@@ -1,4 +1,4 @@
-//! How the signs of two neighbouring axes hang together, and what spreads along such ties: see
+//! How the signs of two neighboring axes hang together, and what spreads along such ties: see
 //! [`crate::orient::graph`]. Lengths are in sample spacings, so that single precision serves any unit.
 
 #[cfg(cube)]
@@ -6,16 +6,16 @@ use cubecl::prelude::*;
 
 use super::Element;
 
-/// Neighbours of a point in the graph.
+/// Neighbors of a point in the graph.
 pub const NEIGHBORS: usize = 16;
 
-/// The reach of a sample is its distance to this neighbour: the first ring round it.
+/// The reach of a sample is its distance to this neighbor: the first ring round it.
 pub const RING: usize = 6;
 
-/// Rounds in which every point takes the mean of its own evidence and what its neighbours say.
+/// Rounds in which every point takes the mean of its own evidence and what its neighbors say.
 pub const ROUNDS: usize = 60;
 
-/// A sample reaches at most this many times as far as its neighbours do at the median: an outlier
+/// A sample reaches at most this many times as far as its neighbors do at the median: an outlier
 /// stands for no more surface than the samples that are nearest to it.
 const REACH_GROWTH: f32 = 1.5;
 
@@ -28,8 +28,8 @@ const APART: f32 = 3.0;
 /// Stands for the gap where a sheet is not known: no length reaches it.
 const UNKNOWN: f32 = f32::MAX;
 
-/// A neighbour of a coupling above this along the same direction lies on the same sheet; and the least share
-/// of the neighbours that do.
+/// A neighbor of a coupling above this along the same direction lies on the same sheet; and the least share
+/// of the neighbors that do.
 const SAME_SHEET: f32 = 0.1;
 const LEAST_SHARE: f32 = 1.0 / 3.0;
 
@@ -102,7 +102,7 @@ pub fn blur(reach: f32, spreads: f32, thicknesses: f32, gap: f32) -> f32 {
     blunt * blunt + rough
 }
 
-/// How the signs of two neighbouring axes `a` and `b` hang together, `d` apart: `a` is reflected at the
+/// How the signs of two neighboring axes `a` and `b` hang together, `d` apart: `a` is reflected at the
 /// plane half-way between the two samples and compared with `b`. Along a sheet that is `a·b`; round an
 /// edge it turns with the surface; and two sheets that face each other, whether matter or air is
 /// between them, have opposite outward normals. A [`blur`] takes the reflection back
@@ -158,14 +158,14 @@ pub fn parted(coupling: f32, both: f32, parallel: f32, side: f32, other: f32) ->
     coupling + both * (trusted(parallel * side * other) - coupling)
 }
 
-/// Whether a neighbour lies on the same sheet, and takes a share of its area.
+/// Whether a neighbor lies on the same sheet, and takes a share of its area.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn on_same_sheet(coupling: f32, parallel: f32) -> bool {
     coupling * parallel > SAME_SHEET
 }
 
-/// The area that a sample stands for with so many neighbours on the same sheet.
+/// The area that a sample stands for with so many neighbors on the same sheet.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn area(reach: f32, same: f32) -> f32 {
@@ -176,7 +176,7 @@ pub fn area(reach: f32, same: f32) -> f32 {
     PI * reach * reach / (IN_RING * share)
 }
 
-/// How much a neighbour lies off the sheet of a sample: above 0 where its `height`, along the axis, is. `square` is
+/// How much a neighbor lies off the sheet of a sample: above 0 where its `height`, along the axis, is. `square` is
 /// its squared distance, above 0.
 #[cfg_attr(cube, cube)]
 #[inline(always)]

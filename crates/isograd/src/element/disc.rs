@@ -26,7 +26,7 @@ pub fn half<F: Element>(x: F, y: F, z: F) -> F {
     F::new(0.5) * (absolute::<F>(x) + absolute::<F>(y) + absolute::<F>(z))
 }
 
-/// Whether a disc covers a cell whose centre is so far from its own, squared, and so high above its plane.
+/// Whether a disc covers a cell whose center is so far from its own, squared, and so high above its plane.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn covers<F: Element>(square: F, height: F, half: F, radius: F) -> bool {

@@ -1,11 +1,11 @@
-//! The paper's weight of a cell (eq. `alpha_product`, not normalised), and its derivative.
+//! The paper's weight of a cell (eq. `alpha_product`, not normalized), and its derivative.
 
 #[cfg(cube)]
 use cubecl::prelude::*;
 
 use super::Element;
 
-/// `½ max(0, 1 − |Δ|/2)` along one axis; `Δ` is how far the point lies from the cell's centre, in cells.
+/// `½ max(0, 1 − |Δ|/2)` along one axis; `Δ` is how far the point lies from the cell's center, in cells.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn weight<F: Element>(distance: F) -> F {
@@ -20,7 +20,7 @@ pub fn weight<F: Element>(distance: F) -> F {
     F::new(0.5) * share
 }
 
-/// Derivative of [`weight`] within 2 cells; 0 at the centre, where there is none.
+/// Derivative of [`weight`] within 2 cells; 0 at the center, where there is none.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn slope<F: Element>(distance: F) -> F {

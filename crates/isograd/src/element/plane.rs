@@ -27,7 +27,7 @@ pub fn area<F: Element>(pi: F, radius: F, crowd: F) -> F {
     pi * radius * radius / (F::new(3.0) * crowd)
 }
 
-/// `λ₁λ/(λ − λ₁)²`: what one of the two larger eigenvalues adds to the roughness of a neighbourhood; they differ
+/// `λ₁λ/(λ − λ₁)²`: what one of the two larger eigenvalues adds to the roughness of a neighborhood; they differ
 /// from the smallest.
 #[cfg_attr(cube, cube)]
 #[inline(always)]

@@ -1,5 +1,5 @@
 //! The quadratic B-spline: weights of the cells below, at and above a point that lies `f` cells from the
-//! centre of its own, −½ to ½; and their derivatives.
+//! center of its own, −½ to ½; and their derivatives.
 
 #[cfg(cube)]
 use cubecl::prelude::*;
@@ -16,7 +16,7 @@ pub fn below<F: Element>(f: F) -> F {
 /// Weight of the cell of the point.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn centre<F: Element>(f: F) -> F {
+pub fn center<F: Element>(f: F) -> F {
     F::new(0.75) - f * f
 }
 
@@ -34,10 +34,10 @@ pub fn below_slope<F: Element>(f: F) -> F {
     f - F::new(0.5)
 }
 
-/// Derivative of [`centre`].
+/// Derivative of [`center`].
 #[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn centre_slope<F: Element>(f: F) -> F {
+pub fn center_slope<F: Element>(f: F) -> F {
     -(f + f)
 }
 

@@ -16,7 +16,7 @@ pub fn are_few(turned: usize, points: usize) -> bool {
     turned as f64 <= MOST_FAR * points as f64
 }
 
-/// Offsets shorter than this share of a neighbourhood's radius have no direction to speak of.
+/// Offsets shorter than this share of a neighborhood's radius have no direction to speak of.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn blunt<F: Element>(radius: F) -> F {
@@ -24,17 +24,17 @@ pub fn blunt<F: Element>(radius: F) -> F {
     share * share
 }
 
-/// What the word of a neighbour weighs, by the square of its distance.
+/// What the word of a neighbor weighs, by the square of its distance.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn weight<F: Element>(square: F, blunt: F) -> F {
     F::new(1.0) / (square + blunt)
 }
 
-/// What a neighbour says of an axis, −1 to 1: their cosine, once its normal is reflected at the plane half-way
+/// What a neighbor says of an axis, −1 to 1: their cosine, once its normal is reflected at the plane half-way
 /// between the two, so that it turns with the surface round an edge, and changes sides across a thin body.
 /// `parallel` is the cosine of axis and normal, `axis_along` and `normal_along` their products with the offset
-/// between the two, and `weight` is that of the neighbour.
+/// between the two, and `weight` is that of the neighbor.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn carried<F: Element>(parallel: F, axis_along: F, normal_along: F, weight: F) -> F {

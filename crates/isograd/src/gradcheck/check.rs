@@ -125,7 +125,7 @@ impl<'a> Check<'a> {
         let difference = Difference {
             step,
             value: slopes.iter().sum(),
-            neighbourhoods: unequal(&plus.counts, &minus.counts),
+            neighborhoods: unequal(&plus.counts, &minus.counts),
             normals: normals.filter(|(a, b)| dot(**a, **b) < 0.0).count(),
             cells: unequal(&plus.inside, &minus.inside),
             crossings: unequal(&plus.between, &minus.between),
@@ -150,7 +150,7 @@ impl<'a> Check<'a> {
             parts: self.functional.parts(result.sdf()),
             inside: values.iter().map(|&phi| phi < 0.0).collect(),
             between: places.map(|x| x.map(between)).collect(),
-            counts: [result.neighbour_counts(), result.axis_counts()].concat(),
+            counts: [result.neighbor_counts(), result.axis_counts()].concat(),
             normals: result.normals().to_vec(),
             surface: held.then(|| (result.mesh().clone(), result.closest().to_vec())),
         })

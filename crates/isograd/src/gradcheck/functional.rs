@@ -15,8 +15,8 @@ const BLOCK: usize = 8;
 /// `u = 1 + ⅓ Σ_a sin(π ξ_a) + 4/3 (ξ_x ξ_y + ξ_y ξ_z + ξ_z ξ_x)`, `ξ` from −½ to ½ across the bounding box.
 /// It rises from one end of the body to the other, so that translations change `L` by as much as can be; the
 /// last term is for rotations.
-fn weight(centre: [f64; 3], size: [f64; 3], place: [f64; 3]) -> f64 {
-    let x = sub(place, centre);
+fn weight(center: [f64; 3], size: [f64; 3], place: [f64; 3]) -> f64 {
+    let x = sub(place, center);
     let [x, y, z] = [0, 1, 2].map(|a| x[a] / size[a].max(f64::MIN_POSITIVE));
     let rise = |t: f64| (std::f64::consts::PI * t.clamp(-0.5, 0.5)).sin();
     let products = x * y + y * z + z * x;
@@ -33,9 +33,9 @@ pub(super) struct Functional {
 impl Functional {
     pub(super) fn new(cloud: &PointCloud<f64>, grid: &Grid<f64>) -> Self {
         let (low, high) = cloud.bounds().unwrap_or_default();
-        let (centre, size) = (scale(add(low, high), 0.5), sub(high, low));
+        let (center, size) = (scale(add(low, high), 0.5), sub(high, low));
         let volume = grid.spacing().powi(3);
-        let weight = |cell: usize| volume * weight(centre, size, grid.center_f64(grid.cell(cell)));
+        let weight = |cell: usize| volume * weight(center, size, grid.center_f64(grid.cell(cell)));
         Self {
             weights: (0..grid.cells()).into_par_iter().map(weight).collect(),
             width: WIDTH * grid.spacing(),

@@ -7,14 +7,14 @@
 //! [direction](Motion), whose longest vector has length 1, and three derivatives of `L` are taken:
 //!
 //! - by [pullback](crate::Reconstruction::pullback);
-//! - by central differences over a step so small that no neighbourhood and no sign changes, with the radii
+//! - by central differences over a step so small that no neighborhood and no sign changes, with the radii
 //!   and signs [held](crate::Reconstructor::reconstruct_held): what the pullback is the derivative of, so both agree to
 //!   many digits;
-//! - by central differences over a step of half a cell either way, with nothing held: what an optimiser sees
+//! - by central differences over a step of half a cell either way, with nothing held: what an optimizer sees
 //!   that takes real steps.
 //!
 //! Where the last two part, [`Row::parting`] says by how much, where most of it comes from, and how many
-//! neighbourhoods and signs changed on the way.
+//! neighborhoods and signs changed on the way.
 
 mod check;
 mod functional;
@@ -80,13 +80,13 @@ pub struct Difference {
     pub step: f64,
     /// Its value, per unit length of that motion.
     pub value: f64,
-    /// Points whose number of neighbours changed.
-    pub neighbourhoods: usize,
+    /// Points whose number of neighbors changed.
+    pub neighborhoods: usize,
     /// Points whose normal changed sides.
     pub normals: usize,
     /// Cells that changed from inside to outside, or back.
     pub cells: usize,
-    /// Points that passed a plane through cell centres, where the slope of the iso-value jumps, or a face of a cell,
+    /// Points that passed a plane through cell centers, where the slope of the iso-value jumps, or a face of a cell,
     /// where those of the gains and the trust of the local iso-value do, and with the paper's weights the indicator.
     pub crossings: usize,
 }
@@ -94,14 +94,14 @@ pub struct Difference {
 impl Difference {
     /// Whether nothing changed that has no derivative.
     pub fn is_smooth(&self) -> bool {
-        self.neighbourhoods + self.normals + self.cells + self.crossings == 0
+        self.neighborhoods + self.normals + self.cells + self.crossings == 0
     }
 }
 
 /// Where the difference over a large step is not the derivative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parting {
-    /// Centre of the block of cells from which most of it comes, in the cloud's coordinates.
+    /// Center of the block of cells from which most of it comes, in the cloud's coordinates.
     pub place: [f64; 3],
     /// What comes from that block, as a share of all that all blocks differ by, from 0 to 1.
     pub share: f64,

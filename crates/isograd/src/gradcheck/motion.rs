@@ -11,9 +11,9 @@ pub enum Motion {
     Waves,
     /// Along an axis: 0, 1 or 2.
     Translation(usize),
-    /// Round an axis through the centre of the bounding box.
+    /// Round an axis through the center of the bounding box.
     Rotation(usize),
-    /// Away from the centre of the bounding box, in proportion to the distance.
+    /// Away from the center of the bounding box, in proportion to the distance.
     Growth,
     /// Across the longest side of the bounding box, with the square of the distance from its middle.
     Bending,
@@ -53,7 +53,7 @@ impl Motion {
     /// `(N, 3)` directions for these points.
     pub fn direction(self, points: &[[f64; 3]], seed: u64) -> Vec<[f64; 3]> {
         let (low, high) = crate::data::bounds(points).unwrap_or_default();
-        let (centre, size) = (scale(add(low, high), 0.5), sub(high, low));
+        let (center, size) = (scale(add(low, high), 0.5), sub(high, low));
         let unit = |axis: usize| {
             let mut unit = [0.0; 3];
             unit[axis.min(2)] = 1.0;
@@ -64,19 +64,19 @@ impl Motion {
             Self::Noise => points.iter().map(|_| random.direction()).collect(),
             Self::Waves => {
                 let waves = [0; 3].map(|_| Wave::new(norm(size), &mut random));
-                let at = |p: &[f64; 3]| waves.each_ref().map(|wave| wave.at(sub(*p, centre)));
+                let at = |p: &[f64; 3]| waves.each_ref().map(|wave| wave.at(sub(*p, center)));
                 points.iter().map(at).collect()
             }
             Self::Translation(axis) => vec![unit(axis); points.len()],
             Self::Rotation(axis) => {
-                let around = |p: &[f64; 3]| cross(unit(axis), sub(*p, centre));
+                let around = |p: &[f64; 3]| cross(unit(axis), sub(*p, center));
                 points.iter().map(around).collect()
             }
-            Self::Growth => points.iter().map(|p| sub(*p, centre)).collect(),
+            Self::Growth => points.iter().map(|p| sub(*p, center)).collect(),
             Self::Bending => {
                 let long = (1..3).fold(0, |m, a| if size[a] > size[m] { a } else { m });
                 let across = unit((long + 1) % 3);
-                let bent = |p: &[f64; 3]| scale(across, (p[long] - centre[long]).powi(2));
+                let bent = |p: &[f64; 3]| scale(across, (p[long] - center[long]).powi(2));
                 points.iter().map(bent).collect()
             }
         };

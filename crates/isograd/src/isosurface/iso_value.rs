@@ -1,7 +1,7 @@
 //! The iso-value: the mean of the indicator at the samples.
 //!
 //! # Map
-//! `c = Σ a_i χ(x_i) / Σ a_i`, with `χ` trilinear between cell centres and `a_i` the area that sample `i`
+//! `c = Σ a_i χ(x_i) / Σ a_i`, with `χ` trilinear between cell centers and `a_i` the area that sample `i`
 //! stands for. The paper takes the value "near the input point samples", after Kazhdan, Bolitho and
 //! Hoppe, *Poisson surface reconstruction* (SGP 2006), §4.4; the weights make it the mean over the
 //! surface, whatever the density of the samples. Sums are in double precision, in one fixed order.
@@ -14,7 +14,7 @@
 //! `ā_i += c̄ (χ(x_i) − c) / Σ a`: [`pullback`]. Whoever used `χ(x_i)` besides adds its cotangents to `s_i`.
 //!
 //! # Not differentiable
-//! `∇χ` jumps where a sample crosses a plane through cell centres; the gradient on its side is used.
+//! `∇χ` jumps where a sample crosses a plane through cell centers; the gradient on its side is used.
 
 use rayon::prelude::*;
 

@@ -136,7 +136,7 @@ impl Scratch {
     }
 }
 
-/// The crossed edges that start from 64 neighbouring cells of a row.
+/// The crossed edges that start from 64 neighboring cells of a row.
 struct Row {
     crossed: [u64; 3],
     /// `crossed[0]`, moved down by one cell.
@@ -201,8 +201,8 @@ fn emit_vertices<T: Real>(
     }
 }
 
-/// The point at the fraction `eta` of the way from the centre of `cell` to the next along `axis`. Each
-/// step rounds monotonically, so the point lies between the two rounded centres.
+/// The point at the fraction `eta` of the way from the center of `cell` to the next along `axis`. Each
+/// step rounds monotonically, so the point lies between the two rounded centers.
 #[inline(always)]
 fn position<T: Real>(grid: &Grid<T>, cell: [usize; 3], axis: usize, eta: T) -> [T; 3] {
     let mut point = grid.center_f64(cell);

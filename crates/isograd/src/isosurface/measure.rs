@@ -19,7 +19,7 @@ pub struct Measures {
     pub area: f64,
     /// Enclosed volume by the divergence theorem, in unit length³; positive where faces are
     /// counter-clockwise seen from outside. Of a mesh that is not closed it is the volume of the cone
-    /// from the centre of its bounding box, and means little.
+    /// from the center of its bounding box, and means little.
     pub volume: f64,
     /// Number of pieces; faces that share a vertex are of one piece.
     pub components: usize,
@@ -29,7 +29,7 @@ pub struct Measures {
     pub closed: bool,
     /// Edges of one face only.
     pub boundary_edges: usize,
-    /// Edges of two faces that run through it in the same direction: neighbours wound against each other.
+    /// Edges of two faces that run through it in the same direction: neighbors wound against each other.
     pub misaligned_edges: usize,
     /// Edges of three faces or more.
     pub crowded_edges: usize,
@@ -44,7 +44,7 @@ pub struct Scratch {
     uses: Vec<u64>,
 }
 
-/// Measures a mesh. Sums run in double precision relative to the mesh's own centre and in a fixed order,
+/// Measures a mesh. Sums run in double precision relative to the mesh's own center and in a fixed order,
 /// so neither the place of the mesh nor the number of threads changes a digit that counts.
 ///
 /// A face that names a vertex twice has two edges that close on each other and one from the vertex to
@@ -93,7 +93,7 @@ fn integrals<T: Real>(mesh: &Mesh<T>) -> [f64; 2] {
     [twice_and_six[0] / 2.0, twice_and_six[1] / 6.0]
 }
 
-/// Centre of the bounding box; the origin where there are no vertices.
+/// Center of the bounding box; the origin where there are no vertices.
 pub(super) fn center<T: Real>(vertices: &[[T; 3]]) -> [f64; 3] {
     let bounds = crate::data::bounds(vertices);
     bounds.map_or([0.0; 3], |(low, high)| {

@@ -72,7 +72,7 @@ fn gradient_agrees_with_finite_differences_also_of_an_open_mesh() {
     let wave = |v: usize, a: usize| (3.7 * v as f64 + 1.9 * a as f64).sin();
     for open in [false, true] {
         if open {
-            // Round the box's centre that stays where it is, as the head says: no face at the ends is taken.
+            // Round the box's center that stays where it is, as the head says: no face at the ends is taken.
             mesh.faces.truncate(mesh.faces.len() / 2);
         }
         let (weights, step) = ([0.8, -1.7], 1e-6);

@@ -1,11 +1,11 @@
-//! The isosurface stage: marching cubes on the lattice of cell centres.
+//! The isosurface stage: marching cubes on the lattice of cell centers.
 //!
 //! # Map
 //! `(χ, c) → mesh`. A cell with `χ < c` is inside; a value exactly at the level is outside. Each lattice
-//! edge `(p, q)` from a cell centre to the next one along an axis whose ends differ carries one vertex,
+//! edge `(p, q)` from a cell center to the next one along an axis whose ends differ carries one vertex,
 //! `y = (1−η) p + η q` with `η = (c − χ_p)/(χ_q − χ_p)`. The triangles of a cube depend on the signs of
 //! its eight corners alone. On a face with two inside corners on a diagonal those two are kept apart,
-//! whichever side the face is looked at from, so neighbouring cubes fit: away from the walls every edge
+//! whichever side the face is looked at from, so neighboring cubes fit: away from the walls every edge
 //! belongs to exactly two triangles, with opposite directions, and the triangles round a vertex form one
 //! ring. Faces are counter-clockwise seen from the side where `χ ≥ c`.
 //!
@@ -13,7 +13,7 @@
 //! their cube. A triangle may have no area: where a corner lies exactly at the level, the vertices round
 //! it coincide.
 //!
-//! The lattice ends at the outermost cell centres. Where inside cells reach them the surface is left
+//! The lattice ends at the outermost cell centers. Where inside cells reach them the surface is left
 //! **open**: a cap would need vertices that lie on no lattice edge, and moving the wall is the real
 //! remedy. [`Report::walls`] says where.
 //!
@@ -30,7 +30,7 @@
 //!
 //! # Not differentiable
 //! The signs, hence the list of faces. When a value passes the level, vertices appear or vanish at that
-//! cell centre; positions stay continuous.
+//! cell center; positions stay continuous.
 //!
 //! # Source
 //! Lorensen and Cline, *Marching cubes*, SIGGRAPH 1987; the rule for faces is that of Montani, Scateni and

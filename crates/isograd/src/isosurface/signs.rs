@@ -20,7 +20,7 @@ pub(super) struct Signs {
     bits: Vec<u64>,
 }
 
-/// 64 neighbouring cubes of a row.
+/// 64 neighboring cubes of a row.
 pub(super) struct Block {
     /// Bit `k` of `corners[c]`: whether corner `c` (see [`super::tables`]) of cube `k` is inside.
     corners: [u64; 8],
@@ -87,7 +87,7 @@ impl Signs {
         [own, own >> 1 | next << (WORD - 1)]
     }
 
-    /// The cells of word `w` that have a neighbour above them in the row.
+    /// The cells of word `w` that have a neighbor above them in the row.
     #[inline(always)]
     fn has_next(&self, w: usize) -> u64 {
         match self.shape[2] - 1 - w * WORD {

@@ -62,7 +62,7 @@ impl Table {
 /// Weight of each axis in the number of a corner.
 const BIT: [u8; 3] = [4, 2, 1];
 
-/// The edge between two neighbouring corners.
+/// The edge between two neighboring corners.
 fn edge(a: u8, b: u8) -> u8 {
     let low = a & b;
     match a ^ b {
@@ -241,12 +241,12 @@ mod tests {
                 let triangles = triangulate(&cycle)
                     .unwrap_or_else(|| panic!("case {case:08b}: none for {cycle:?}"));
                 assert_eq!(triangles.len(), cycle.len() - 2);
-                let neighbours = |a, b| {
+                let neighbors = |a, b| {
                     (0..cycle.len()).any(|i| [cycle[i], cycle[(i + 1) % cycle.len()]] == [a, b])
                 };
                 for t in triangles {
                     for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
-                        let diagonal = !neighbours(a, b) && !neighbours(b, a);
+                        let diagonal = !neighbors(a, b) && !neighbors(b, a);
                         assert!(
                             !diagonal || !share_face(a, b),
                             "case {case:08b}: {a}-{b} in {cycle:?}"
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbouring_cubes_meet_along_the_same_segments_in_opposite_directions() {
+    fn neighboring_cubes_meet_along_the_same_segments_in_opposite_directions() {
         let faces = faces();
         for axis in 0..3 {
             let on_face = |e: u8, high: bool| {

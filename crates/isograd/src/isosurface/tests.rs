@@ -19,7 +19,7 @@ impl Noise {
     }
 }
 
-/// A field of the function `f` of the cell centre, in the user's unit.
+/// A field of the function `f` of the cell center, in the user's unit.
 fn field<T: Real>(grid: Grid<T>, f: impl Fn([f64; 3]) -> f64) -> Field<T> {
     let values = (0..grid.cells()).map(|at| T::of(f(grid.center_f64(grid.cell(at)))));
     Field::new(grid, values.collect()).expect("one value a cell")
@@ -210,7 +210,7 @@ fn values_at_the_level_are_outside() {
     chi.values_mut()[center] = 1.0;
     let refused = forward(&chi, 1.0, &mut Scratch::default(), &mut Mesh::default());
     assert!(matches!(refused, Err(Error::NothingInside { .. })));
-    // All neighbours at the level: the vertices lie exactly on them, and the octahedron is closed.
+    // All neighbors at the level: the vertices lie exactly on them, and the octahedron is closed.
     chi.values_mut().fill(1.0);
     chi.values_mut()[center] = 0.0;
     let (mesh, report) = surface(&chi, 1.0);

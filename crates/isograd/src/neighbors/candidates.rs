@@ -1,4 +1,4 @@
-//! Candidates for membership in a neighbourhood, laid out for loops over several at a time.
+//! Candidates for membership in a neighborhood, laid out for loops over several at a time.
 
 use super::cell_index::{CELL, box_distance_squared};
 use crate::Real;

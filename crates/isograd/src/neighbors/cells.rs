@@ -1,4 +1,4 @@
-//! The points that those of a cell may have as neighbours, for every cell of an index.
+//! The points that those of a cell may have as neighbors, for every cell of an index.
 
 use std::ops::Range;
 

@@ -1,9 +1,9 @@
 //! Cotangents of offsets, gathered: what the pullbacks of functions of `d_j = x_j − x_i` have in common.
 //!
-//! A point `k` gets `−Σ_j d̄_j` as the centre of its own neighbourhood, and the `d̄_k` of every other centre
-//! that has it as a neighbour. Where both have the common radius, `k` is a neighbour of `c` exactly where
+//! A point `k` gets `−Σ_j d̄_j` as the center of its own neighborhood, and the `d̄_k` of every other center
+//! that has it as a neighbor. Where both have the common radius, `k` is a neighbor of `c` exactly where
 //! `c` is one of `k`, rounding included; so one walk over the points within that radius gathers both. The
-//! few centres with a wider radius hand out what they have in a fixed order.
+//! few centers with a wider radius hand out what they have in a fixed order.
 
 use rayon::prelude::*;
 
@@ -48,8 +48,8 @@ impl<T: Real> Neighborhoods<T> {
             .for_each(|(bar, &position)| *bar = vector::add(*bar, sorted[position as usize]));
     }
 
-    /// Adds to `(N, 3)` `points_bar` what the centres contribute whose `radius` is above the common one:
-    /// `offset_bar(centre, neighbour, offset)` is `d̄_j`, not called for the centre itself.
+    /// Adds to `(N, 3)` `points_bar` what the centers contribute whose `radius` is above the common one:
+    /// `offset_bar(center, neighbor, offset)` is `d̄_j`, not called for the center itself.
     pub(crate) fn add_from_wide(
         &self,
         radius: &[T],
@@ -58,11 +58,11 @@ impl<T: Real> Neighborhoods<T> {
     ) {
         let wide = (0..radius.len()).filter(|&i| radius[i] > self.common_radius);
         let wide: Vec<usize> = wide.collect();
-        // Rounds of a fixed number of centres, so that the lists stay short.
+        // Rounds of a fixed number of centers, so that the lists stay short.
         for round in wide.chunks(4 * CHUNK) {
             let lists: Vec<Vec<(u32, [T; 3])>> = round
                 .par_chunks(CHUNK / 8)
-                .map(|centres| self.contributions(radius, centres, offset_bar))
+                .map(|centers| self.contributions(radius, centers, offset_bar))
                 .collect();
             for (j, bar) in lists.into_iter().flatten() {
                 points_bar[j as usize] = vector::add(points_bar[j as usize], bar);
@@ -73,17 +73,17 @@ impl<T: Real> Neighborhoods<T> {
     fn contributions(
         &self,
         radius: &[T],
-        centres: &[usize],
+        centers: &[usize],
         offset_bar: &impl Fn(usize, usize, [T; 3]) -> [T; 3],
     ) -> Vec<(u32, [T; 3])> {
         let mut list = Vec::new();
-        for &i in centres {
-            let centre = self.index.point(self.position()[i] as usize);
+        for &i in centers {
+            let center = self.index.point(self.position()[i] as usize);
             let mut total = [T::zero(); 3];
-            self.index.for_each_within(centre, radius[i], |j, _| {
+            self.index.for_each_within(center, radius[i], |j, _| {
                 if j != i {
                     let point = self.index.point(self.position()[j] as usize);
-                    let bar = offset_bar(i, j, vector::sub(point, centre));
+                    let bar = offset_bar(i, j, vector::sub(point, center));
                     total = vector::sub(total, bar);
                     list.push((j as u32, bar));
                 }

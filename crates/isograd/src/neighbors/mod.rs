@@ -1,22 +1,22 @@
 //! Which samples are close to which: a service shared by the stages.
 //!
 //! # Map
-//! Points `(N, 3)` → a radius `R_i` per point and the neighbourhoods `N_i = {j : |x_j − x_i| ≤ R_i}`,
+//! Points `(N, 3)` → a radius `R_i` per point and the neighborhoods `N_i = {j : |x_j − x_i| ≤ R_i}`,
 //! each of which contains `i`. The radius is common to all points (given, or chosen so that a sample
-//! has about 24 neighbours), and grows where fewer than 8 samples are within it:
-//! `R_i = max(R, 1.05 · distance to the 8th neighbour)`, counting `i` itself. With 10:1 density a
-//! common radius would leave one or two. A sample whose neighbours do not have it as theirs is marked as
+//! has about 24 neighbors), and grows where fewer than 8 samples are within it:
+//! `R_i = max(R, 1.05 · distance to the 8th neighbor)`, counting `i` itself. With 10:1 density a
+//! common radius would leave one or two. A sample whose neighbors do not have it as theirs is marked as
 //! isolated.
 //!
 //! # Residual
 //! [`Neighborhoods`] is its own residual: the tree and the radii.
 //!
 //! # Pullback
-//! None: neighbourhoods are sets, and the radii are held constant by every pullback that uses them. What
-//! those pullbacks share, sums over all centres that have a point as a neighbour, is in `gather.rs`.
+//! None: neighborhoods are sets, and the radii are held constant by every pullback that uses them. What
+//! those pullbacks share, sums over all centers that have a point as a neighbor, is in `gather.rs`.
 //!
 //! # Not differentiable
-//! A sample that enters or leaves a neighbourhood, and the choice of the radius. `j ∈ N_i` and
+//! A sample that enters or leaves a neighborhood, and the choice of the radius. `j ∈ N_i` and
 //! `i ∈ N_j` are the same where both radii are the common one, not where one has grown.
 
 mod candidates;

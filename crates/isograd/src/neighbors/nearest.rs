@@ -9,7 +9,7 @@ impl<T: Real> CellIndex<T> {
     /// The `k` points nearest to `query` as `(input index, distance²)`, nearest first, and the lower
     /// index first among equals; all points where there are fewer than `k`. Includes the point itself
     /// where `query` is one of the points. Exact. Takes `O(log N)` for a query near the points, in a
-    /// cluster or far outside; only where nearly all points are equally far (the centre of a sphere) does
+    /// cluster or far outside; only where nearly all points are equally far (the center of a sphere) does
     /// it have to look at most of them.
     pub fn nearest(&self, query: [T; 3], k: usize, out: &mut Vec<(u32, T)>) {
         out.clear();

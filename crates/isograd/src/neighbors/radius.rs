@@ -1,4 +1,4 @@
-//! The radius of every point's neighbourhood.
+//! The radius of every point's neighborhood.
 
 use rayon::prelude::*;
 
@@ -11,21 +11,21 @@ use super::rule::{
 };
 use crate::{Real, vector};
 
-/// Share of a neighbourhood whose own radius must reach back to the sample, or the sample is isolated.
+/// Share of a neighborhood whose own radius must reach back to the sample, or the sample is isolated.
 const SMALLEST_MUTUAL_SHARE: f64 = 0.125;
 
-/// How large a neighbourhood is.
+/// How large a neighborhood is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Radius {
     /// 1.001 times the median, over a fixed choice of points, of the distance to the 24th sample: half the
-    /// points have more neighbours than that, half fewer.
+    /// points have more neighbors than that, half fewer.
     #[default]
     Auto,
     /// This length, in the unit of the points.
     Fixed(f64),
 }
 
-/// Why there are no neighbourhoods.
+/// Why there are no neighborhoods.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
     /// Too few points to bound a volume.
@@ -44,7 +44,7 @@ pub enum Error {
     },
     /// The radius given is not a positive number.
     #[error(
-        "a neighbourhood radius of {radius} cannot be used; give a positive length in the unit of the points, or leave it automatic"
+        "a neighborhood radius of {radius} cannot be used; give a positive length in the unit of the points, or leave it automatic"
     )]
     Radius {
         /// The radius.
@@ -68,14 +68,14 @@ pub enum Error {
     },
 }
 
-/// The neighbourhood of every point of a cloud, and the index that finds its members.
+/// The neighborhood of every point of a cloud, and the index that finds its members.
 #[derive(Clone, Debug, Default)]
 pub struct Neighborhoods<T> {
     /// The points, sorted into cells.
     pub index: CellIndex<T>,
     /// How the radius was chosen.
     pub rule: Radius,
-    /// `R`: the radius of every point that has enough neighbours within it.
+    /// `R`: the radius of every point that has enough neighbors within it.
     pub common_radius: T,
     /// `(N,)` the radius `R_i` of each point, in input order; at least [`Self::common_radius`].
     pub radius: Vec<T>,
@@ -86,7 +86,7 @@ pub struct Neighborhoods<T> {
     /// other; outliers have only samples that are closer to one another. A clump of outliers is not told
     /// from a sparse surface.
     pub isolated: Vec<bool>,
-    /// `(N,)` `Σ_j (1 − r_j²/R_i²)²` over the neighbourhood, in input order.
+    /// `(N,)` `Σ_j (1 − r_j²/R_i²)²` over the neighborhood, in input order.
     pub(crate) crowd: Vec<T>,
     /// See [`Self::spacing`].
     spacing: T,
@@ -128,7 +128,7 @@ impl<T: Real> Neighborhoods<T> {
         [tree + needed, work + size_of_val(self.sorted.as_slice())]
     }
 
-    /// Typical distance between neighbouring samples, in the unit of the points: the side of the square
+    /// Typical distance between neighboring samples, in the unit of the points: the side of the square
     /// that one sample has to itself on the surface, at the median, `√(π/24)` of the automatic radius.
     pub fn spacing(&self) -> T {
         self.spacing
@@ -185,7 +185,7 @@ impl<T: Real> Neighborhoods<T> {
     }
 }
 
-/// Finds the neighbourhood of every one of the `(N, 3)` points, into `out` (whose memory is used again).
+/// Finds the neighborhood of every one of the `(N, 3)` points, into `out` (whose memory is used again).
 ///
 /// # Errors
 /// Fewer than 4 points, a point that is not finite, all points equal, a radius that is not positive, or
@@ -201,7 +201,7 @@ pub fn forward<T: Real>(
     done
 }
 
-/// The same, and in the same walk what `sum(point, R_i, candidates)` makes of every neighbourhood, in sorted
+/// The same, and in the same walk what `sum(point, R_i, candidates)` makes of every neighborhood, in sorted
 /// order; the candidates hold all of `N_i`. To gather them takes longer than to sum over them.
 ///
 /// # Errors
@@ -225,7 +225,7 @@ pub(crate) fn forward_with<T: Real, U: Copy + Default + Send + Sync>(
     Ok(())
 }
 
-/// The neighbourhoods of moved points with the radii of `held`, and what was isolated there: what pullbacks
+/// The neighborhoods of moved points with the radii of `held`, and what was isolated there: what pullbacks
 /// hold constant. Counts are those of the moved points.
 ///
 /// # Errors
@@ -251,13 +251,13 @@ pub(crate) fn hold<T: Real>(
 pub struct Radii<'a, T> {
     /// `(N,)` the radius of each point; at least [`Self::common`].
     pub each: &'a [T],
-    /// The radius of every point that has enough neighbours within it.
+    /// The radius of every point that has enough neighbors within it.
     pub common: T,
     /// See [`Neighborhoods::spacing`].
     pub spacing: T,
 }
 
-/// The neighbourhoods of `(N, 3)` points with radii that were found elsewhere.
+/// The neighborhoods of `(N, 3)` points with radii that were found elsewhere.
 ///
 /// # Errors
 /// As [`forward`], and [`Error::TooFew`] where there are not as many points as radii.
@@ -397,7 +397,7 @@ fn grown<T: Real, U>(
     }
 }
 
-/// Marks the samples that are not neighbours of their neighbours.
+/// Marks the samples that are not neighbors of their neighbors.
 fn find_isolated<T: Real>(out: &mut Neighborhoods<T>) {
     let (index, position, radius) = (&out.index, &out.position, &out.radius);
     let common = out.common_radius;
@@ -409,7 +409,7 @@ fn find_isolated<T: Real>(out: &mut Neighborhoods<T>) {
     samples.map(isolated).collect_into_vec(&mut out.isolated);
 }
 
-/// Share of the neighbours of sample `i` that have `i` among theirs.
+/// Share of the neighbors of sample `i` that have `i` among theirs.
 fn mutual_share<T: Real>(index: &CellIndex<T>, radius: &[T], i: usize, position: usize) -> f64 {
     let (mut all, mut mutual) = (0u32, 0u32);
     index.for_each_within(index.point(position), radius[i], |j, d2| {

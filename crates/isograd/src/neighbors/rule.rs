@@ -1,4 +1,4 @@
-//! What decides about radii: shared with those who look for neighbours elsewhere than on the CPU.
+//! What decides about radii: shared with those who look for neighbors elsewhere than on the CPU.
 
 use super::radius::{Error, Radius};
 use crate::{Real, vector};
@@ -6,18 +6,18 @@ use crate::{Real, vector};
 /// Fewest points that can bound a volume.
 pub const FEWEST_POINTS: usize = 4;
 
-/// Fewest samples in a neighbourhood, its centre included: a plane through fewer is mostly chance.
+/// Fewest samples in a neighborhood, its center included: a plane through fewer is mostly chance.
 pub const FEWEST_NEIGHBORS: usize = 8;
 
-/// By how much a grown radius passes the neighbour that it has to reach, so that this one gets some of
+/// By how much a grown radius passes the neighbor that it has to reach, so that this one gets some of
 /// a weight that falls to 0 at the radius.
 pub const GROWTH_MARGIN: f64 = 1.05;
 
-/// Samples that the automatic radius holds at the median, the centre included.
+/// Samples that the automatic radius holds at the median, the center included.
 pub const AUTO_NEIGHBORS: usize = 24;
 
 /// By how much the automatic radius passes the median: else one sample would lie exactly on the radius of
-/// another, and the least motion would change their neighbourhoods.
+/// another, and the least motion would change their neighborhoods.
 pub const AUTO_MARGIN: f64 = 1.001;
 
 /// Most points that are asked for the automatic radius.
@@ -34,12 +34,12 @@ pub fn automatic<T: Real>(median: Option<T>, points: usize, bounds: [[T; 3]; 2])
     }
 }
 
-/// Typical distance between neighbouring samples; see [`Neighborhoods::spacing`](super::Neighborhoods::spacing).
+/// Typical distance between neighboring samples; see [`Neighborhoods::spacing`](super::Neighborhoods::spacing).
 pub fn spacing<T: Real>(automatic: T, points: usize) -> T {
     automatic * T::of((std::f64::consts::PI / AUTO_NEIGHBORS.min(points) as f64).sqrt())
 }
 
-/// The radius of every point that has enough neighbours within it.
+/// The radius of every point that has enough neighbors within it.
 ///
 /// # Errors
 /// [`Error::Radius`].

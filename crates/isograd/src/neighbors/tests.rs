@@ -203,7 +203,7 @@ fn radii_grow_to_the_eighth_sample_and_counts_agree_with_brute_force() {
 }
 
 #[test]
-fn isolated_samples_are_those_that_their_neighbours_do_not_have() {
+fn isolated_samples_are_those_that_their_neighbors_do_not_have() {
     for (name, points) in ugly_clouds::<f64>() {
         let mut found = Neighborhoods::default();
         forward(&points, Radius::Auto, &mut found).expect(name);

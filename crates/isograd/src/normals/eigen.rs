@@ -115,7 +115,7 @@ fn eigenvalue_apart(h: f64) -> f64 {
     beta.copysign(h)
 }
 
-/// Unit eigenvector of a normalised matrix for an eigenvalue at least √3 away from the other two:
+/// Unit eigenvector of a normalized matrix for an eigenvalue at least √3 away from the other two:
 /// `b − β` has rank 2, so at least one cross product of its rows is well away from 0.
 #[inline(always)]
 fn eigenvector_apart([xx, xy, xz, yy, yz, zz]: Symmetric, beta: f64) -> [f64; 3] {

@@ -1,4 +1,4 @@
-//! Points and neighbourhoods to axes.
+//! Points and neighborhoods to axes.
 
 use pulp::Arch;
 use rayon::prelude::*;
@@ -19,14 +19,14 @@ pub(super) const SMALLEST_GAP: f64 = 1e-3;
 /// Estimates the axis of the surface at every point; see the [module](super) for the map.
 ///
 /// `neighborhoods` must be those of these points. The memory of `out` is used again. Nothing fails:
-/// where the points of a neighbourhood lie on a line or in one place, the axis is some unit vector at a
+/// where the points of a neighborhood lie on a line or in one place, the axis is some unit vector at a
 /// right angle to the line, or any, and is marked [`Plane::guarded`].
 pub fn forward<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residual<T>) {
     find_in_own(neighborhoods, out);
     widen::choose(neighborhoods, out);
 }
 
-/// The axes of moved points, in neighbourhoods as wide as those of `held`: what the pullback holds constant.
+/// The axes of moved points, in neighborhoods as wide as those of `held`: what the pullback holds constant.
 /// `neighborhoods` are those of the moved points, as many as before, with the radii of before.
 pub(crate) fn hold<T: Real>(
     neighborhoods: &Neighborhoods<T>,
@@ -37,7 +37,7 @@ pub(crate) fn hold<T: Real>(
     widen::repeat(neighborhoods, &held.radius, out);
 }
 
-/// Axes in the neighbourhoods as they are.
+/// Axes in the neighborhoods as they are.
 fn find_in_own<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residual<T>) {
     let arch = Arch::new();
     out.sorted
@@ -48,7 +48,7 @@ fn find_in_own<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residual<T>)
     find_all_planes(neighborhoods, arch, out);
 }
 
-/// [`neighbors::forward`] and [`forward`] in one walk over all neighbours, in four fifths of the time of both.
+/// [`neighbors::forward`] and [`forward`] in one walk over all neighbors, in four fifths of the time of both.
 ///
 /// # Errors
 /// As [`neighbors::forward`].
@@ -72,7 +72,7 @@ pub fn forward_with_neighborhoods<T: Real>(
     Ok(())
 }
 
-/// `Σ w`, `Σ w d` and `Σ w d dᵀ` over a neighbourhood: `xx, xy, xz, yy, yz, zz`.
+/// `Σ w`, `Σ w d` and `Σ w d dᵀ` over a neighborhood: `xx, xy, xz, yy, yz, zz`.
 pub(super) type Moments<T> = [T; 10];
 
 pub(super) fn moments<T: Real>(

@@ -1,7 +1,7 @@
 //! The axis of the surface at every sample: distance-weighted principal components (D-PCA).
 //!
 //! # Map
-//! Points `(N, 3)` and their neighbourhoods `N_i` → unit vectors `(N, 3)` along the surface normal,
+//! Points `(N, 3)` and their neighborhoods `N_i` → unit vectors `(N, 3)` along the surface normal,
 //! after the paper's section on normal estimation. With `d_j = x_j − x_i`, `r_j = |d_j|` and
 //! `w_j = 1/(r_j + ε)`,
 //! `W = Σ w_j`, `m = Σ w_j d_j / W`, `C = Σ w_j d_j d_jᵀ / W − m mᵀ`,
@@ -11,7 +11,7 @@
 //!
 //! `ε = R_i/5`. The paper asks for a small constant; but a tiny one gives the sample itself nearly all of
 //! the weight, so that its own noise tilts the plane. Mean error of the axes in degrees, uniform random
-//! samples of a torus (24 neighbours) with noise along all axes, and the faces and edges of a cube:
+//! samples of a torus (24 neighbors) with noise along all axes, and the faces and edges of a cube:
 //!
 //! | `ε/R_i` | 10⁻⁶ | 10⁻³ | 0.01 | 0.1 | 0.3 | 1 | 10 |
 //! |---|---|---|---|---|---|---|---|
@@ -21,7 +21,7 @@
 //! | cube, no noise | 5.99 | 5.94 | 5.63 | 5.19 | 5.19 | 5.27 | 5.38 |
 //!
 //! Where samples scatter about their plane by a large part of the radius, from noise or because they lie on
-//! both sides of a thin body, neighbourhoods of up to `2√2 R_i` are tried, and the axis is that of the first
+//! both sides of a thin body, neighborhoods of up to `2√2 R_i` are tried, and the axis is that of the first
 //! that is far less rough than those before it ([`Residual::radius`]; a radius that the caller has given
 //! stays). Mean error of the axes in degrees, with the same radius given and with the automatic one:
 //!
@@ -52,7 +52,7 @@
 //! `N_i`, and over all `i` with `j ∈ N_i`: [`pullback`].
 //!
 //! # Not differentiable
-//! The neighbourhoods and radii (held constant, `ε` with them; the choice of a wider one too), and the sign. Where `λ₂ − λ₁` is at most
+//! The neighborhoods and radii (held constant, `ε` with them; the choice of a wider one too), and the sign. Where `λ₂ − λ₁` is at most
 //! `10⁻³ λ₃` (a line, an isolated point, a corner as thick as it is wide) the axis itself is ill defined:
 //! such a plane is marked [`Plane::guarded`], and the pullback bounds `1/(λ₁ − λ_k)` there.
 
@@ -75,7 +75,7 @@ use crate::neighbors::Found;
 /// The local plane of one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Plane<T> {
-    /// `m`: weighted centroid of the neighbourhood relative to the sample, in the unit of the points.
+    /// `m`: weighted centroid of the neighborhood relative to the sample, in the unit of the points.
     pub centroid: [T; 3],
     /// `W`: sum of the weights, in one over the unit of the points.
     pub weight: T,

@@ -121,7 +121,7 @@ fn sort_values<T: Real>(
     });
 }
 
-/// `d̄` in units of the radius, for an offset `d̂` of length `r̂ > 0` from the centre:
+/// `d̄` in units of the radius, for an offset `d̂` of length `r̂ > 0` from the center:
 /// `ŵ (g (n·e) + n (g·e)) − ŵ² (g·e)(n·e) d̂/r̂` with `e = d̂ − m̂` and `g` standing for `ĝ/Ŵ`.
 #[inline(always)]
 fn offset_bar<T: Real>(g: [T; 3], n: [T; 3], mean: [T; 3], d: [T; 3], r: T) -> [T; 3] {
@@ -135,7 +135,7 @@ fn offset_bar<T: Real>(g: [T; 3], n: [T; 3], mean: [T; 3], d: [T; 3], r: T) -> [
     )
 }
 
-/// What a point gets as a neighbour of the others, less what it hands out as a centre.
+/// What a point gets as a neighbor of the others, less what it hands out as a center.
 #[inline(always)]
 fn gather<T: Real>(
     center: [T; 3],

@@ -16,7 +16,7 @@ fn axes<T: Real>(points: &[[T; 3]]) -> (Neighborhoods<T>, Residual<T>) {
     (neighborhoods, residual)
 }
 
-/// Members of a neighbourhood, relative to its centre.
+/// Members of a neighborhood, relative to its center.
 fn members<T: Real>(points: &[[T; 3]], i: usize, radius: T) -> Vec<(usize, [f64; 3])> {
     let offsets = points
         .iter()

@@ -1,10 +1,10 @@
-//! Wider neighbourhoods for the axes of samples that scatter.
+//! Wider neighborhoods for the axes of samples that scatter.
 //!
 //! How far an axis is off because its samples lie off their plane is, by first-order perturbation of the
 //! eigenvectors of a covariance of `n` independent samples, an angle whose square is `q/n`, with the
 //! *roughness* `q = λ₁λ₂/(λ₂−λ₁)² + λ₁λ₃/(λ₃−λ₁)²`. In twice the radius, noise is a quarter of the roughness;
 //! two sheets of a thin body, which looks as thick as wide, less still. At an edge it stays, and where the
-//! surface is curved it grows fourfold. So whether noise is what makes a neighbourhood rough is seen from
+//! surface is curved it grows fourfold. So whether noise is what makes a neighborhood rough is seen from
 //! wider ones.
 //!
 //! Source of the compromise between noise and curvature: N. Mitra, A. Nguyen, L. Guibas, "Estimating surface
@@ -29,16 +29,16 @@ pub const STEPS: [f64; 3] = [
 /// Roughness up to which an axis is left alone: with 24 samples, it is off by 4 degrees.
 pub const ROUGH: f64 = 0.12;
 
-/// A wider neighbourhood is taken where its roughness is at most this share of the one at hand.
+/// A wider neighborhood is taken where its roughness is at most this share of the one at hand.
 pub const GAIN: f64 = 0.5;
 
-/// A neighbourhood whose centroid is off its middle by this share of the radius is one-sided.
+/// A neighborhood whose centroid is off its middle by this share of the radius is one-sided.
 pub const RIM: f64 = 0.2;
 
 /// Points of one task.
 const TASK: usize = 256;
 
-/// The axis of one sample in a neighbourhood wider than its own.
+/// The axis of one sample in a neighborhood wider than its own.
 #[derive(Clone, Copy, Debug)]
 struct Found<T> {
     position: u32,
@@ -48,7 +48,7 @@ struct Found<T> {
     plane: Plane<T>,
 }
 
-/// Replaces the axes of rough neighbourhoods by those of wider ones that are far less rough. A radius that was
+/// Replaces the axes of rough neighborhoods by those of wider ones that are far less rough. A radius that was
 /// given stays.
 pub(super) fn choose<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residual<T>) {
     if neighborhoods.rule == Radius::Auto {
@@ -60,7 +60,7 @@ pub(super) fn choose<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residu
     }
 }
 
-/// Replaces the axes of the samples whose radius is above that of their neighbourhood by those within the radius.
+/// Replaces the axes of the samples whose radius is above that of their neighborhood by those within the radius.
 pub(super) fn repeat<T: Real>(
     neighborhoods: &Neighborhoods<T>,
     radius: &[T],
@@ -119,7 +119,7 @@ fn in_tasks<T: Real>(
     tasks.flat_map_iter(run).collect()
 }
 
-/// For each point of a task that has one: the least rough of the wider neighbourhoods.
+/// For each point of a task that has one: the least rough of the wider neighborhoods.
 fn smoothest<T: Real>(
     neighborhoods: &Neighborhoods<T>,
     planes: &[Plane<T>],

@@ -1,4 +1,4 @@
-//! Which neighbourhoods are widened, and what that is good for.
+//! Which neighborhoods are widened, and what that is good for.
 
 use super::{Residual, forward};
 use crate::neighbors::tests::{Random, torus};
@@ -8,7 +8,7 @@ use crate::vector;
 /// Points and true normals.
 type Samples = Vec<([f64; 3], [f64; 3])>;
 
-/// Mean angle in degrees between axes and true normals, and the share of axes from wider neighbourhoods, with
+/// Mean angle in degrees between axes and true normals, and the share of axes from wider neighborhoods, with
 /// the automatic radius and with the same radius given.
 fn measure(samples: &Samples) -> [(f64, f64); 2] {
     let points: Vec<[f64; 3]> = samples.iter().map(|s| s.0).collect();
@@ -72,7 +72,7 @@ fn cube(n: usize) -> Samples {
 }
 
 #[test]
-fn noise_widens_neighbourhoods_to_better_axes() {
+fn noise_widens_neighborhoods_to_better_axes() {
     // Samples of this torus are 0.024 apart.
     let samples = || torus(12_000, 3);
     for (deviation, gain) in [(0.01, 1.5), (0.015, 2.0), (0.02, 2.5)] {
@@ -100,7 +100,7 @@ fn both_sides_of_a_thin_plate_get_the_axis_of_the_plate() {
 }
 
 #[test]
-fn curved_surfaces_and_edges_without_noise_keep_their_neighbourhoods() {
+fn curved_surfaces_and_edges_without_noise_keep_their_neighborhoods() {
     for (name, samples) in [("torus", torus(8_000, 3)), ("cube", cube(8_000))] {
         let [automatic, given] = measure(&samples);
         assert!(automatic.1 < 0.02, "{name}: {automatic:?}");

@@ -1,4 +1,4 @@
-//! The default method: evidence from fills at two scales, spread along the neighbour graph.
+//! The default method: evidence from fills at two scales, spread along the neighbor graph.
 
 use std::convert::Infallible;
 

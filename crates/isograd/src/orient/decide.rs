@@ -46,7 +46,7 @@ pub trait Beliefs {
     /// Why they can't be heard.
     type Error;
 
-    /// For each sample, from −1 to 1: its own evidence, and what it believes once it has heard its neighbours.
+    /// For each sample, from −1 to 1: its own evidence, and what it believes once it has heard its neighbors.
     ///
     /// # Errors
     /// They can't be heard.
@@ -102,7 +102,7 @@ impl Domains<'_> {
 pub enum Decision {
     /// Evidence at the sample itself.
     Evidence,
-    /// Its neighbours.
+    /// Its neighbors.
     Neighbors,
     /// A rule, for want of evidence or against what there was.
     Rule,

@@ -281,7 +281,7 @@ impl Disc {
         }
     }
 
-    /// Marks the cells whose centre is in the disc, and the cell of its own centre, in the planes from
+    /// Marks the cells whose center is in the disc, and the cell of its own center, in the planes from
     /// `first_plane` on that `cells` holds.
     fn draw(&self, first_plane: usize, [ny, nz]: [usize; 2], cells: &mut [u8]) {
         let planes = first_plane..first_plane + cells.len() / (ny * nz);

@@ -48,7 +48,7 @@ impl Regions {
         ((z as u32) < runs[run].1).then(|| self.region[start + run])
     }
 
-    /// Joins the runs of two neighbouring rows that overlap.
+    /// Joins the runs of two neighboring rows that overlap.
     fn join_rows(&mut self, a: usize, b: usize) {
         let (mut i, mut j) = (self.rows[a], self.rows[b]);
         let (i_end, j_end) = (self.rows[a + 1], self.rows[b + 1]);

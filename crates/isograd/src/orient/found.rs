@@ -52,7 +52,7 @@ pub struct Decided {
     pub parity: usize,
     /// By clear evidence at the point itself.
     pub evidence: usize,
-    /// By what its neighbours know.
+    /// By what its neighbors know.
     pub neighbors: usize,
     /// By a rule, for want of evidence or against what there was: confidence 0.
     pub rule: usize,

@@ -1,8 +1,8 @@
-//! The neighbour graph: who is next to whom, and how the signs of two neighbours hang together.
+//! The neighbor graph: who is next to whom, and how the signs of two neighbors hang together.
 //!
 //! # Map
 //! [`Axes`] and [`Neighborhoods`] → [`Graph`], on which the [automatic method](super::Method::Auto) spreads its
-//! evidence. Formulas of single neighbours are those of [`coupling`] and [`crate::element::sheet`].
+//! evidence. Formulas of single neighbors are those of [`coupling`] and [`crate::element::sheet`].
 //!
 //! # Not differentiable
 //! Nothing here has a derivative: it decides about signs.
@@ -17,7 +17,7 @@ use crate::normals::Plane;
 use crate::parallel::CHUNK;
 use crate::{Real, vector};
 
-/// Neighbours, axes and couplings, all in the sorted order of the neighbour index
+/// Neighbors, axes and couplings, all in the sorted order of the neighbor index
 /// ([`CellIndex::order`](crate::neighbors::CellIndex::order)); lengths are in sample spacings
 /// ([`Neighborhoods::spacing`]) of the whole cloud, so that single precision serves any unit.
 #[derive(Clone, Debug, Default)]
@@ -38,7 +38,7 @@ pub struct Graph {
     /// `(N,)` the area of surface that each sample stands for, in squares of the spacing.
     pub area: Vec<f32>,
     /// `(N,)` how far samples lie off their common plane, where they scatter so much that the axis was sought in a
-    /// wider neighbourhood: root mean square, in spacings; else 0.
+    /// wider neighborhood: root mean square, in spacings; else 0.
     pub spread: Vec<f32>,
     /// `(N,)` in −1..1: how clearly such a sample lies on the side of that plane that its axis points to; else 0.
     pub side: Vec<f32>,
@@ -129,7 +129,7 @@ impl Graph {
             });
     }
 
-    /// Takes the axis of its own sheet for each point whose neighbours lie on several.
+    /// Takes the axis of its own sheet for each point whose neighbors lie on several.
     fn find_sheets(&mut self) {
         self.scatter.resize(self.offset.len(), 0.0);
         let points = self.axis.par_iter_mut().zip(&mut self.scatter);
@@ -256,7 +256,7 @@ impl Graph {
         coupling::sheet_evidence(signed, total)
     }
 
-    /// Spreads the evidence `(N,)`, in −1..1: repeated weighted means of what a point's neighbours believe and its
+    /// Spreads the evidence `(N,)`, in −1..1: repeated weighted means of what a point's neighbors believe and its
     /// own evidence, held with its strength. `next` is scratch.
     ///
     /// # Panics

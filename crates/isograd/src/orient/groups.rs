@@ -17,10 +17,10 @@ const MOST_CELLS: usize = 1 << 24;
 /// Discs grow with the cell, from this many median reaches on.
 const FINE: f64 = 1.1;
 
-/// Two neighbours belong together where they are at most this many reaches apart.
+/// Two neighbors belong together where they are at most this many reaches apart.
 const LINK: f32 = 8.0;
 
-/// Neighbours that are asked.
+/// Neighbors that are asked.
 const ASKED: usize = 8;
 
 /// Fewer samples than this are no body; they get no grid, and mark none.

@@ -7,14 +7,14 @@
 //! - [`Method::Auto`], the default, weighs evidence of five kinds. *Enclosure*: the samples are drawn on a
 //!   grid as discs in their tangent planes, and what they close off from the outside is matter (a cavity
 //!   inside matter is air again, and so on). *Sky*: where the samples leave holes, the side of the
-//!   surface that sees less of the sky, along 26 directions, is the inner one. *Sheets*: where neighbours
+//!   surface that sees less of the sky, along 26 directions, is the inner one. *Sheets*: where neighbors
 //!   lie on several sheets, the one through the sample is told from the others by a robust fit; a parallel
 //!   sheet close by is the other side of a thin body, or of a narrow gap. Where noise has made one layer of
 //!   the two sides of a thin body, a sample above the middle of the layer belongs to the upper side.
-//!   *Neighbours*: two axes next to
+//!   *Neighbors*: two axes next to
 //!   each other hang together, reflected at the plane half-way between their samples, so that the tie
 //!   holds along a sheet, round an edge, and across a thin body or a narrow gap. What these say is spread
-//!   over the neighbour graph; points that agree make domains, and between domains that contradict each
+//!   over the neighbor graph; points that agree make domains, and between domains that contradict each
 //!   other the *winding number* decides: the right signs are those with which it is ½ on the surface.
 //!   Thin bodies and narrow gaps look alike from near; where that matters, both readings are tried, and
 //!   the winding number chooses. Time and memory are `O(N log N)`, wherever outliers are.
@@ -26,7 +26,7 @@
 //! - [`Method::Sensors`]: each axis, turned to the side from which the sample was seen; grazing views, and
 //!   points of which the sensors disagree, are settled as in the automatic method.
 //! - [`Method::Previous`], in a plan: each axis, turned to the side of the normal that the same point had in
-//!   the call before; axes that have turned by more than 60° follow their neighbours. The first call orients
+//!   the call before; axes that have turned by more than 60° follow their neighbors. The first call orients
 //!   automatically, and so does one with another number of points, or where more than 3 % have turned so far.
 //!   *The result then depends on the calls before it*, in whose order it can be had again.
 //!
@@ -100,7 +100,7 @@ const DOUBTFUL: f64 = 0.1;
 /// How the signs are chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Method {
-    /// From enclosure, sky, sheets and neighbours; nothing to set.
+    /// From enclosure, sky, sheets and neighbors; nothing to set.
     #[default]
     Auto,
     /// By parity along the normal, as the paper prints it.

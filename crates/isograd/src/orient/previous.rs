@@ -3,7 +3,7 @@
 //! Between two steps of a simulation an axis turns by a few degrees, and keeps its side. So its sign is that
 //! of the normal which the same point had in the step before: a product for each point, instead of a search.
 //! Where an axis has jumped (at a sharp edge it may belong to one side now and to the other then) the
-//! neighbours decide.
+//! neighbors decide.
 
 use super::{MethodUsed, Orientation};
 use crate::element::turned;
@@ -89,7 +89,7 @@ impl Previous {
         turned::are_few(self.turned.len(), axes.len())
     }
 
-    /// What the neighbours that have not turned say of the axis of point `i`, from −1 to 1; `None` where there
+    /// What the neighbors that have not turned say of the axis of point `i`, from −1 to 1; `None` where there
     /// is none.
     fn side_among_neighbors<T: Real>(
         &self,

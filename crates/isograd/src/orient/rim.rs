@@ -7,20 +7,20 @@ use crate::neighbors::{Candidates, LANES, Neighborhoods};
 use crate::simd::dispatch;
 use crate::{Real, vector};
 
-/// A sample whose neighbours lie this far to one side, in radii, may be at a rim. Half a disc, which is
+/// A sample whose neighbors lie this far to one side, in radii, may be at a rim. Half a disc, which is
 /// what a sample on the edge of a sheet sees, has its weighted centroid at 0.32 radii.
 const RIM_OFFSET: f64 = 0.15;
-/// It is at a rim where the neighbours leave out a sector of the tangent plane of at least this many
-/// radians (135°; it is 180° on a straight rim). Of 24 random neighbours, one sample in 2,000 sees that.
+/// It is at a rim where the neighbors leave out a sector of the tangent plane of at least this many
+/// radians (135°; it is 180° on a straight rim). Of 24 random neighbors, one sample in 2,000 sees that.
 const RIM_GAP: f64 = 0.75 * std::f64::consts::PI;
-/// Mean normal of the neighbours of a rim sample: near 1 on a sheet, small on the edge of a solid.
+/// Mean normal of the neighbors of a rim sample: near 1 on a sheet, small on the edge of a solid.
 const RIM_FLATNESS: f64 = 0.9;
-/// A rim is a line of samples: this many neighbours are at a rim too.
+/// A rim is a line of samples: this many neighbors are at a rim too.
 const RIM_NEIGHBORS: usize = 3;
 
 /// `(N,)` whether each sample is at a rim, of an open surface or of a hole in the sampling.
 ///
-/// Such a sample sees its neighbours on one side only, and they all face the same way. A sharp edge of a
+/// Such a sample sees its neighbors on one side only, and they all face the same way. A sharp edge of a
 /// solid looks the same but for the last part: there the two sides face different ways. Stray samples
 /// look like rims now and then, but not several side by side.
 pub(crate) fn rims<T: Real>(
@@ -52,7 +52,7 @@ pub(crate) fn rims<T: Real>(
     samples.map(|i| at_rim[i] && has_company(i)).collect()
 }
 
-/// Distance from a point to the centroid of its neighbours weighted by `1/r`, itself left out, in radii.
+/// Distance from a point to the centroid of its neighbors weighted by `1/r`, itself left out, in radii.
 #[inline(always)]
 fn offset<T: Real>(center: [T; 3], radius: T, candidates: &Candidates<T>) -> T {
     let mut sums = [[T::zero(); LANES]; 4];
@@ -79,7 +79,7 @@ fn offset<T: Real>(center: [T; 3], radius: T, candidates: &Candidates<T>) -> T {
     vector::norm([x, y, z]) / (weight.max(T::min_positive_value()) * radius)
 }
 
-/// Whether the neighbours face the same way but leave out a wide sector of the tangent plane.
+/// Whether the neighbors face the same way but leave out a wide sector of the tangent plane.
 fn borders_a_gap<T: Real>(
     i: usize,
     points: &[[T; 3]],

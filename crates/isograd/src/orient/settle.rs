@@ -8,7 +8,7 @@ use super::graph::Graph;
 use super::winding::Misfit;
 use crate::vector;
 
-/// Neighbours whose coupling is at least this strong belong to one domain if their beliefs agree.
+/// Neighbors whose coupling is at least this strong belong to one domain if their beliefs agree.
 const STRONG: f32 = 0.5;
 
 /// Fewest points of a domain about which the winding number is asked, and the most such domains: the
@@ -88,8 +88,8 @@ impl Settle {
     /// `evidence` and `belief` are what the samples said; `winding` is what one at which the winding number is wrong by
     /// 1 weighs, beside evidence of 1.
     ///
-    /// Domains of neighbours that agree are first oriented as a whole, the strongest tie first: to the
-    /// evidence, or to the domain next to them. So a part whose evidence is weak follows the neighbours
+    /// Domains of neighbors that agree are first oriented as a whole, the strongest tie first: to the
+    /// evidence, or to the domain next to them. So a part whose evidence is weak follows the neighbors
     /// on which it borders, however large it is. What is tied to no evidence at all turns its axes away
     /// from its centroid.
     pub(super) fn run<B: Beliefs>(
@@ -255,7 +255,7 @@ impl Settle {
     }
 
     /// Marks the domains whose signs are against most of what their points believed: the winding number of all
-    /// domains together, or their neighbours, said otherwise.
+    /// domains together, or their neighbors, said otherwise.
     fn find_overruled(&mut self, domains: usize, belief: &[f32]) {
         let mut heard = vec![[0.0; 2]; domains];
         for (p, &domain) in self.domain.iter().enumerate() {

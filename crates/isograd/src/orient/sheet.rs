@@ -1,13 +1,13 @@
 //! The sheet of surface that a sample lies on, where other sheets pass close by.
 //!
-//! At an edge, and where a body is thinner than a neighbourhood is wide, neighbours lie on several sheets, and
-//! the axis of all of them together is that of none. Planes through the sample and two neighbours are
-//! tried; one that fits a good third of the neighbours far better than the others lie from it is the
+//! At an edge, and where a body is thinner than a neighborhood is wide, neighbors lie on several sheets, and
+//! the axis of all of them together is that of none. Planes through the sample and two neighbors are
+//! tried; one that fits a good third of the neighbors far better than the others lie from it is the
 //! sheet.
 //!
 //! Source: robust fits by least order statistics, after P. Rousseeuw, "Least median of squares
 //! regression" (1984), over planes as in A. Boulch, R. Marlet, "Fast and robust normal estimation for
-//! point clouds with sharp features" (2012), but over all pairs of near neighbours instead of random
+//! point clouds with sharp features" (2012), but over all pairs of near neighbors instead of random
 //! ones.
 
 use crate::element::coupling::NEIGHBORS;
@@ -26,7 +26,7 @@ pub(super) struct Sheet {
 
 type Offsets = [[f32; 3]; NEIGHBORS];
 
-/// The sheet through a sample, from the offsets to its neighbours and the axis of all of them together;
+/// The sheet through a sample, from the offsets to its neighbors and the axis of all of them together;
 /// `None` where one plane serves for all, or none stands out.
 pub(super) fn find(offset: &Offsets, axis: [f32; 3]) -> Option<Sheet> {
     let together = residuals(offset, axis);
@@ -49,7 +49,7 @@ pub(super) fn find(offset: &Offsets, axis: [f32; 3]) -> Option<Sheet> {
     })
 }
 
-/// Of the given plane and those spanned by two near neighbours, the one closest to a quorum, and how close.
+/// Of the given plane and those spanned by two near neighbors, the one closest to a quorum, and how close.
 fn best_plane(offset: &Offsets, axis: [f32; 3], fit: f32) -> ([f32; 3], f32) {
     let mut best = (axis, fit);
     for j in 0..SPANNING {
@@ -87,7 +87,7 @@ fn plane(offsets: impl Iterator<Item = [f32; 3]>) -> ([f32; 3], f32) {
     (normal, found.values[0].max(0.0).sqrt() as f32)
 }
 
-/// Distances of the neighbours from a plane through the sample.
+/// Distances of the neighbors from a plane through the sample.
 #[inline(always)]
 fn residuals(offset: &Offsets, normal: [f32; 3]) -> [f32; NEIGHBORS] {
     offset.map(|d| vector::dot(d, normal).abs())
@@ -103,7 +103,7 @@ mod tests {
     use super::super::shapes::Random;
     use super::*;
 
-    /// Neighbours of the origin on two sheets, `z = 0` and `z = gap − slope x`, by turns, as far as 2 away,
+    /// Neighbors of the origin on two sheets, `z = 0` and `z = gap − slope x`, by turns, as far as 2 away,
     /// and off their sheets by up to `noise`.
     fn two_sheets(gap: f64, slope: f64, noise: f64, random: &mut Random) -> Offsets {
         std::array::from_fn(|k| {

@@ -2,7 +2,7 @@
 
 use crate::element::sight;
 
-/// Directions of one sweep: the neighbours of a cell that come before it in C order.
+/// Directions of one sweep: the neighbors of a cell that come before it in C order.
 const DIRECTIONS: u32 = 13;
 
 const _: () = assert!(2 * DIRECTIONS as usize == sight::RAYS);
@@ -24,7 +24,7 @@ struct Sweep {
 }
 
 impl Sky {
-    /// From each cell a ray starts in each of the 26 directions to its neighbours; it is free if it
+    /// From each cell a ray starts in each of the 26 directions to its neighbors; it is free if it
     /// leaves the grid without meeting an occupied cell.
     pub(super) fn look(&mut self, occupied: &[u8], shape: [usize; 3]) {
         let [forward, backward] = &mut self.sweeps;

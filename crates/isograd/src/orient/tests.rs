@@ -126,7 +126,7 @@ fn thin_plates_have_two_sides() {
         plate.wrong
     );
     let plate = orient(&cuboid(20_000, [1.0, 1.0, 0.02], 5));
-    // At two spacings a neighbourhood holds both sides, and a quarter of the axes lie in the plate.
+    // At two spacings a neighborhood holds both sides, and a quarter of the axes lie in the plate.
     assert!(
         plate.wrong * 100 <= plate.judged,
         "2 spacings: {}",

@@ -1,4 +1,4 @@
-//! The generalised winding number as an arbiter.
+//! The generalized winding number as an arbiter.
 //!
 //! With outward normals, the winding number of a closed surface is 0 outside, 1 inside and ½ on the
 //! surface itself, however deep bodies and cavities are nested. It is a sum over samples: that of domains

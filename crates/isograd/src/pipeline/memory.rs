@@ -41,7 +41,7 @@ impl<T: Real> Reconstruction<T> {
     /// (search tree, radii, fitted planes, order, the indicator there, and
     /// what the local iso-value made of it).
     pub fn residual_bytes(&self) -> usize {
-        let [[neighbours, _], [normals, _]] = self.of_samples();
+        let [[neighbors, _], [normals, _]] = self.of_samples();
         size_of_val(self.indicator.values())
             + size_of_val(self.closest.as_slice())
             + size_of_val(self.mesh.edges())
@@ -49,14 +49,14 @@ impl<T: Real> Reconstruction<T> {
             + size_of_val(self.residuals.splat.order.as_slice())
             + size_of_val(self.residuals.iso_value.at_samples.as_slice())
             + self.residuals.local_level.bytes()
-            + neighbours
+            + neighbors
             + normals
     }
 
     /// Bytes of work space that stays with the result, so that the next call of its plan need not take it again.
     pub fn work_bytes(&self) -> usize {
-        let [[_, neighbours], [_, normals]] = self.of_samples();
-        neighbours + normals
+        let [[_, neighbors], [_, normals]] = self.of_samples();
+        neighbors + normals
     }
 
     fn of_samples(&self) -> [[usize; 2]; 2] {

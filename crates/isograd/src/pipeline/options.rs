@@ -6,7 +6,7 @@ use crate::{distance, isosurface, neighbors, orient, poisson, splat};
 /// What to compute, and how. Nothing here says where or on how many threads.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Neighbourhood radius of the normals and the area weights.
+    /// Neighborhood radius of the normals and the area weights.
     pub radius: neighbors::Radius,
     /// How the sign of each normal is found, or that the cloud's own normals are to be used.
     pub orientation: orient::Method,
@@ -62,12 +62,12 @@ pub enum Error {
     /// The screening makes no sense.
     #[error("the screening is {0}; it must be 0 or more, and finite")]
     Screening(f64),
-    /// Neighbours.
+    /// Neighbors.
     #[error(transparent)]
     Neighbors(#[from] neighbors::Error),
     /// The samples lie on a line, or are isolated points: nothing spans a surface.
     #[error(
-        "none of the {points} points has neighbours that span a plane (the points lie on a line or are isolated), so there is no surface; check that the right columns were read as coordinates"
+        "none of the {points} points has neighbors that span a plane (the points lie on a line or are isolated), so there is no surface; check that the right columns were read as coordinates"
     )]
     NoPlane {
         /// Number of points.

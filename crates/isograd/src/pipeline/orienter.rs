@@ -32,7 +32,7 @@ impl<T: Real> Default for Orienter<T> {
 }
 
 impl<T: Real> Orienter<T> {
-    /// A plan with this neighbourhood radius and this way to choose signs, which are checked by its calls.
+    /// A plan with this neighborhood radius and this way to choose signs, which are checked by its calls.
     pub fn new(radius: Radius, method: Method) -> Self {
         Self {
             radius,
@@ -53,7 +53,7 @@ impl<T: Real> Orienter<T> {
     /// Outward unit normals of a cloud, and the confidence in each.
     ///
     /// # Errors
-    /// That of the neighbours or of the orientation, or [`Error::NoPlane`]; the result of an earlier call is
+    /// That of the neighbors or of the orientation, or [`Error::NoPlane`]; the result of an earlier call is
     /// then gone.
     pub fn orient(&mut self, cloud: &PointCloud<T>) -> Result<&Orientation<T>, Error> {
         T::orient(self, cloud)?;
@@ -104,7 +104,7 @@ impl<T: Real> Orienter<T> {
         Ok(())
     }
 
-    /// The neighbourhoods of the last cloud.
+    /// The neighborhoods of the last cloud.
     pub fn neighborhoods(&self) -> &Neighborhoods<T> {
         &self.residuals.neighborhoods
     }

@@ -37,7 +37,7 @@ impl<T: Real> Reconstruction<T> {
     /// transpose of the derivative of the whole pipeline, stage by stage in reverse. `cloud` is the one that
     /// was reconstructed.
     ///
-    /// Held constant, as the stages say: neighbourhoods and their radii, signs of the normals, which cells are
+    /// Held constant, as the stages say: neighborhoods and their radii, signs of the normals, which cells are
     /// inside, which face is closest. Where a derivative has no bound it is bounded, and counted in
     /// [`CloudCotangent::guarded`]. The same bits for any number of threads.
     ///

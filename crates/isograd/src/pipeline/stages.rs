@@ -287,7 +287,7 @@ impl Report {
     }
 }
 
-/// Neighbourhoods, with the radii of `held` where there is such a thing, and the axis of every point, unless
+/// Neighborhoods, with the radii of `held` where there is such a thing, and the axis of every point, unless
 /// all normals are given.
 pub(super) fn find_axes<T: Real>(
     cloud: &PointCloud<T>,

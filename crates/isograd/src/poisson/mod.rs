@@ -2,7 +2,7 @@
 //!
 //! # Map
 //! `b → χ`, both one value per cell of a grid of `(nx, ny, nz)` cells, in index space (cell size 1, no
-//! unit). Trilinear elements at the cell centres with even reflection at the walls (homogeneous
+//! unit). Trilinear elements at the cell centers with even reflection at the walls (homogeneous
 //! Neumann) give, per axis, with `θ_k = πk/n`,
 //!
 //! - stiffness `K = tridiag(−1, 2, −1)`, end rows `(1, −1)`, eigenvalues `2 − 2 cos θ_k`;

@@ -8,7 +8,7 @@ use super::axis::{Axis, Gain};
 use super::scratch::{Lines, Scratch, first};
 use crate::{Real, simd};
 
-/// Complex lines handled together where a line's places are far apart in memory: neighbouring lines
+/// Complex lines handled together where a line's places are far apart in memory: neighboring lines
 /// share cache lines.
 const BLOCK: usize = 16;
 

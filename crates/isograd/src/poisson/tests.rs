@@ -23,15 +23,15 @@ fn right_hand_side(cells: usize, seed: u64) -> Vec<f64> {
     b.iter().map(|v| v - mean).collect()
 }
 
-/// `(side, centre, side)` along one axis, with even reflection at the walls.
-fn along(field: &[f64], shape: [usize; 3], axis: usize, side: f64, centre: f64) -> Vec<f64> {
+/// `(side, center, side)` along one axis, with even reflection at the walls.
+fn along(field: &[f64], shape: [usize; 3], axis: usize, side: f64, center: f64) -> Vec<f64> {
     let stride: usize = shape[axis + 1..].iter().product();
     let n = shape[axis];
     let at = |i: usize| {
         let p = i / stride % n;
         let low = if p == 0 { i } else { i - stride };
         let high = if p + 1 == n { i } else { i + stride };
-        side * (field[low] + field[high]) + centre * field[i]
+        side * (field[low] + field[high]) + center * field[i]
     };
     (0..field.len()).map(at).collect()
 }

@@ -1,18 +1,18 @@
 //! The area of surface that each sample stands for.
 //!
 //! # Map
-//! Neighbourhoods → `a_i = 1 / Σ_{j∈N_i} K(r_j)` with `r_j = |x_j − x_i|` and
+//! Neighborhoods → `a_i = 1 / Σ_{j∈N_i} K(r_j)` with `r_j = |x_j − x_i|` and
 //! `K(r) = 3/(π R_i²) · (1 − r²/R_i²)²`, whose integral over the disk of radius `R_i` is 1: the sum is the
 //! density of samples at `x_i`, in samples a unit of area. The paper has no such weight; without it the
 //! reconstructed surface moves away from where samples are few. An isolated sample (an outlier, see
 //! [`Neighborhoods::isolated`]) stands for no surface: `a_i = 0`. By the sum alone it would stand for
 //! about the square of its distance to the surface, and one in a hundred would outweigh the surface.
 //!
-//! The sum is made where the neighbours are counted ([`crate::neighbors`]): every other pass over all
-//! neighbours would cost ten times as much as the sum.
+//! The sum is made where the neighbors are counted ([`crate::neighbors`]): every other pass over all
+//! neighbors would cost ten times as much as the sum.
 //!
 //! # Residual
-//! The areas and the neighbourhoods themselves.
+//! The areas and the neighborhoods themselves.
 //!
 //! # Pullback
 //! Given `ā_i`, with `d_j = x_j − x_i`:
@@ -116,7 +116,7 @@ pub fn pullback<T: Real>(
     });
 }
 
-/// `−Σ_c (f_k + f_c)(1 − r_c²/R²) d_c`: what point `k` gets as a centre, and as a neighbour of the others.
+/// `−Σ_c (f_k + f_c)(1 − r_c²/R²) d_c`: what point `k` gets as a center, and as a neighbor of the others.
 #[inline(always)]
 fn gather<T: Real>(center: [T; 3], own: T, radius: T, candidates: &Candidates<T, 1>) -> [T; 3] {
     let scale = T::one() / (radius * radius);

@@ -125,7 +125,7 @@ fn the_pullback_on_the_page_agrees_with_finite_differences() {
         for j in 0..points.len() {
             let d = vector::sub(points[j], points[i]);
             let d2 = vector::norm_squared(d);
-            // Away from the radius, so that a step changes no neighbourhood.
+            // Away from the radius, so that a step changes no neighborhood.
             if j == i || d2 > 0.99 * r2 {
                 continue;
             }

@@ -1,4 +1,4 @@
-//! Samples in the order of the grid, so that neighbours in memory are neighbours in space.
+//! Samples in the order of the grid, so that neighbors in memory are neighbors in space.
 
 use std::ops::Range;
 

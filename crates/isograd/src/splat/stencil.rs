@@ -42,7 +42,7 @@ impl<T: Real> Term<T> {
     }
 }
 
-/// Hands over the terms of a sample: `vector = a n / h²` at offset `f` from the centre of its central
+/// Hands over the terms of a sample: `vector = a n / h²` at offset `f` from the center of its central
 /// cell, in cells, −½ to ½.
 #[inline(always)]
 pub(super) fn for_each_term<T: Real>(
@@ -64,9 +64,9 @@ pub(super) fn for_each_term<T: Real>(
                 .fold(T::one(), |p, w| p * (w[0] + w[1] + w[2]))
                 + extra;
             let vector = vector.map(|v| v / total);
-            let centre = [T::zero(), T::one(), T::zero()];
+            let center = [T::zero(), T::one(), T::zero()];
             visit(Term::new(vector, weights));
-            visit(Term::new(vector.map(|v| v * extra), [centre; 3]));
+            visit(Term::new(vector.map(|v| v * extra), [center; 3]));
         }
     }
 }
@@ -107,17 +107,17 @@ fn gather_paper<T: Real>(vector: [T; 3], f: [T; 3], block: &Block<T>) -> Gathere
     let (sums, sum_slopes) = (weights.map(sum), slopes.map(sum));
     let extra = T::of(0.5) - weights[0][1] * weights[1][1] * weights[2][1];
     let total = sums[0] * sums[1] * sums[2] + extra;
-    let centre = [T::zero(), T::one(), T::zero()];
+    let center = [T::zero(), T::one(), T::zero()];
     let product = gather_product(vector, weights, slopes, block);
-    let central = gather_product(vector, [centre; 3], [[T::zero(); 3]; 3], block);
+    let central = gather_product(vector, [center; 3], [[T::zero(); 3]; 3], block);
     let spread: [T; 3] =
         std::array::from_fn(|d| (product.spread[d] + extra * central.spread[d]) / total);
-    let (whole, of_centre) = (dot(vector, spread), dot(vector, central.spread));
+    let (whole, of_center) = (dot(vector, spread), dot(vector, central.spread));
     let gradient = std::array::from_fn(|a| {
         let others = |values: [T; 3]| values[(a + 1) % 3] * values[(a + 2) % 3];
         let extra_slope = -slopes[a][1] * others(weights.map(|w| w[1]));
         let total_slope = sum_slopes[a] * others(sums) + extra_slope;
-        (product.gradient[a] + extra_slope * of_centre - whole * total_slope) / total
+        (product.gradient[a] + extra_slope * of_center - whole * total_slope) / total
     });
     Gathered { spread, gradient }
 }
@@ -177,7 +177,7 @@ fn along<T: Real>(row: &[T; WIDTH], weight: &[T; WIDTH]) -> T {
 /// Weights of the quadratic B-spline on the cell below, the central cell and the cell above.
 #[inline(always)]
 fn quadratic_bspline<T: Real>(f: T) -> [T; 3] {
-    [spline::below(f), spline::centre(f), spline::above(f)]
+    [spline::below(f), spline::center(f), spline::above(f)]
 }
 
 /// [`quadratic_bspline`] along each axis. By name: mapped over an array, it is not inlined.
@@ -205,12 +205,12 @@ pub(crate) fn bspline_slopes<T: Real>([x, y, z]: [T; 3]) -> [[T; 3]; 3] {
 fn quadratic_bspline_slope<T: Real>(f: T) -> [T; 3] {
     [
         spline::below_slope(f),
-        spline::centre_slope(f),
+        spline::center_slope(f),
         spline::above_slope(f),
     ]
 }
 
-/// The paper's weights on the cell below, the central cell and the cell above, not normalised.
+/// The paper's weights on the cell below, the central cell and the cell above, not normalized.
 #[inline(always)]
 pub(super) fn hat<T: Real>(f: T) -> [T; 3] {
     [
@@ -220,7 +220,7 @@ pub(super) fn hat<T: Real>(f: T) -> [T; 3] {
     ]
 }
 
-/// Derivatives of [`hat`]; 0 for the central cell at its centre, where there is none.
+/// Derivatives of [`hat`]; 0 for the central cell at its center, where there is none.
 #[inline(always)]
 pub(super) fn hat_slope<T: Real>(f: T) -> [T; 3] {
     [
@@ -233,12 +233,12 @@ pub(super) fn hat_slope<T: Real>(f: T) -> [T; 3] {
 /// `M u`, with `M = (1, 4, 1)/6`.
 #[inline(always)]
 fn mass<T: Real>([a, b, c]: [T; 3]) -> [T; WIDTH] {
-    let (side, centre) = (T::of(1.0 / 6.0), T::of(4.0 / 6.0));
+    let (side, center) = (T::of(1.0 / 6.0), T::of(4.0 / 6.0));
     [
         side * a,
-        centre * a + side * b,
-        side * (a + c) + centre * b,
-        side * b + centre * c,
+        center * a + side * b,
+        side * (a + c) + center * b,
+        side * b + center * c,
         side * c,
     ]
 }

@@ -70,7 +70,7 @@ fn splat<T: Real>(grid: &Grid<f64>, cloud: &Cloud, weights: Weights) -> Vec<f64>
     b.values().iter().map(|v| v.f64()).collect()
 }
 
-/// The 27 weights at offset `f` from the centre of the central cell, as the design or the paper print
+/// The 27 weights at offset `f` from the center of the central cell, as the design or the paper print
 /// them, in C order.
 fn printed_weights(weights: Weights, f: [f64; 3]) -> [f64; 27] {
     let offset = |o: usize| [o / 9, o / 3 % 3, o % 3].map(|d| d as f64 - 1.0);
@@ -111,7 +111,7 @@ fn dense_vectors(grid: &Grid<f64>, cloud: &Cloud, weights: Weights) -> [Vec<f64>
     v
 }
 
-/// `low·u_{p−1} + centre·u_p + high·u_{p+1}` along one axis; beyond a wall, `u` is reflected, times `sign`.
+/// `low·u_{p−1} + center·u_p + high·u_{p+1}` along one axis; beyond a wall, `u` is reflected, times `sign`.
 fn along(grid: &Grid<f64>, u: &[f64], axis: usize, row: [f64; 3], sign: f64) -> Vec<f64> {
     let (n, stride) = (grid.shape()[axis], grid.strides()[axis]);
     let at = |i: usize| {
@@ -364,7 +364,7 @@ fn indicator_of_a_sphere_rises_by_one_from_inside_to_outside() {
         for point in [[0.0; 3], [0.5, 0.0, 0.0], [-0.3, 0.3, 0.4]] {
             let rise = outside - chi.interpolate(point);
             // The surface is 3.6 and more cells away. What is left is the unevenness of the samples, and for
-            // the paper's weights that their centre of mass is not the sample.
+            // the paper's weights that their center of mass is not the sample.
             let tolerance = if weights == Weights::Paper {
                 5e-3
             } else {

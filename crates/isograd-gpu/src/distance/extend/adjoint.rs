@@ -188,7 +188,7 @@ impl<F: Float> Adjoint<F> {
         records[at + 14] = self.level;
     }
 
-    /// A neighbour with `ū·(v_j − u)`.
+    /// A neighbor with `ū·(v_j − u)`.
     pub fn see(self, n: Neighbor<F>, contracted: F) -> Seen<F> {
         let e = n.offset.sub(self.mean);
         let t = self.level - self.tilt.dot(e);

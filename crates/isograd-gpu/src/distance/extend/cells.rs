@@ -3,7 +3,7 @@
 use cubecl::prelude::*;
 
 use super::super::NO_TRIANGLE;
-use super::super::search::centre;
+use super::super::search::center;
 use super::super::triangle::{closest, corners};
 use super::{BLOCK, Surface};
 use crate::primitives::scan::exclusive_sum;
@@ -117,7 +117,7 @@ fn blend_cells<F: Float + CubeElement>(
         let cell = cells[ABSOLUTE_POS];
         let face = found[cell as usize];
         let t = corners::<F>(vertices, faces, face, Vector3::<F> { x, y, z });
-        let weights = closest::<F>(t, centre::<F>(cell, spacing, ny, nz)).weights;
+        let weights = closest::<F>(t, center::<F>(cell, spacing, ny, nz)).weights;
         weights.write(barycentric, ABSOLUTE_POS);
         let components = components as usize;
         let a = faces[3 * face as usize] as usize * components;

@@ -2,7 +2,7 @@
 
 use cubecl::prelude::*;
 
-use super::super::search::centre;
+use super::super::search::center;
 use super::super::shares::{Corners, by_face};
 use super::super::tangent::tangent;
 use super::super::triangle::{closest, corners};
@@ -271,7 +271,7 @@ fn pull_cells<F: Float + CubeElement>(
             let components = components as usize;
             for element in table[3 * ABSOLUTE_POS + 1]..table[3 * ABSOLUTE_POS + 2] {
                 let row = order[element as usize] as usize;
-                let place = centre::<F>(cells[row], F::new(1.0), ny, nz);
+                let place = center::<F>(cells[row], F::new(1.0), ny, nz);
                 let found = closest::<F>(t, place.scale(spacing));
                 let gains = Vector3::<F> {
                     x: gain::<F>(values, a, b, values_bar, row, components),

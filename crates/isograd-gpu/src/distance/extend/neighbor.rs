@@ -84,7 +84,7 @@ pub(super) struct Neighbor<F: Float> {
     pub weight: F,
 }
 
-/// The neighbour with the offset `d_j` and the area `a_j + a₀`.
+/// The neighbor with the offset `d_j` and the area `a_j + a₀`.
 #[cube]
 pub(super) fn neighbor<F: Float>(offset: Vector3<F>, unit: F, area: F) -> Neighbor<F> {
     let offset = offset.scale(unit);

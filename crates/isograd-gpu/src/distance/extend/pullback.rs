@@ -23,7 +23,7 @@ pub struct Cotangent<T> {
     pub areas: Buffer<T>,
     /// `(V, 3)` of the vertices of the surface.
     pub vertices: Buffer<T>,
-    /// `(4,)` of the low corner of the grid and of its spacing, through the centres of the cells.
+    /// `(4,)` of the low corner of the grid and of its spacing, through the centers of the cells.
     pub grid: Buffer<T>,
     /// `(1,)` cells and vertices where a derivative does not exist or has no bound, and a bounded one was taken.
     pub guarded: Buffer<u32>,

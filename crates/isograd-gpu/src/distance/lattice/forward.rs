@@ -3,7 +3,7 @@
 use cubecl::prelude::*;
 use isograd::Grid;
 
-use super::super::search::centre;
+use super::super::search::center;
 use super::super::tree::{NONE, Tree};
 use super::super::triangle::{closest, corners};
 use super::super::{Band, Error, FAR, Mesh, search};
@@ -14,7 +14,7 @@ use crate::{Buffer, Device, Scalar};
 
 const BLOCK: u32 = 64;
 
-/// The signed distance `φ` from every cell centre of `grid` to `mesh`, in the user's unit and in memory order.
+/// The signed distance `φ` from every cell center of `grid` to `mesh`, in the user's unit and in memory order.
 ///
 /// The sign is that of `χ − c` at the cell, `level` being the one number `c`: negative inside, and positive at
 /// the level itself. Inside and at distance 0 it is the smallest negative number, so that the sign holds there
@@ -103,7 +103,7 @@ fn measure_cells<F: Float + CubeElement>(
         let mut distance = width;
         if face != NONE {
             let t = corners::<F>(vertices, faces, face, Vector3::<F> { x, y, z });
-            let q = centre::<F>(ABSOLUTE_POS as u32, spacing, ny, nz);
+            let q = center::<F>(ABSOLUTE_POS as u32, spacing, ny, nz);
             let measured = closest::<F>(t, q).offset.norm();
             if measured > width {
                 found[ABSOLUTE_POS] = NONE;

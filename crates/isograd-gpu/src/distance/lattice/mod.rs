@@ -1,4 +1,4 @@
-//! Distance at every cell centre.
+//! Distance at every cell center.
 
 mod forward;
 mod pullback;
@@ -42,6 +42,6 @@ impl<T> Residual<T> {
 pub struct Cotangents<T> {
     /// `(V, 3)`, of the vertices.
     pub vertices: Buffer<T>,
-    /// Four numbers: of the low corner of the grid, and of its cell size, through the cell centres.
+    /// Four numbers: of the low corner of the grid, and of its cell size, through the cell centers.
     pub grid: Buffer<T>,
 }

@@ -6,7 +6,7 @@
 use cubecl::prelude::*;
 
 use super::super::Error;
-use super::super::search::centre;
+use super::super::search::center;
 use super::super::shares::{FACE, add_share, by_face, gather_corners};
 use super::super::triangle::{closest, corners};
 use super::{Cotangents, Residual};
@@ -72,7 +72,7 @@ fn pull_faces<T: Scalar, R: Runtime>(
 }
 
 /// The sum over all faces, as the cotangent of the grid. The weights of a point have the sum 1, so that what
-/// the three corners get is, but for its sign, what the cell centre gets.
+/// the three corners get is, but for its sign, what the cell center gets.
 fn total<T: Scalar, R: Runtime>(
     device: &Device<R>,
     of_faces: &Buffer<T>,
@@ -130,7 +130,7 @@ fn pull_cells<F: Float + CubeElement>(
             }
             for element in table[ABSOLUTE_POS * 3 + 1]..table[ABSOLUTE_POS * 3 + 2] {
                 let cell = cells[element as usize];
-                let place = centre::<F>(cell, F::new(1.0), ny, nz);
+                let place = center::<F>(cell, F::new(1.0), ny, nz);
                 let found = closest::<F>(t, place.scale(spacing));
                 let inside = phi[cell as usize] < F::new(0.0);
                 let pull = add_share::<F>(&mut sum, found, inside, phi_bar[cell as usize]);

@@ -169,7 +169,7 @@ struct OfSample<F: Float> {
     offset: F,
 }
 
-/// From `m̄` and `p̄` of a sample to itself, by the 2³ cell centres round it; `y` and `−y v` of those become its
+/// From `m̄` and `p̄` of a sample to itself, by the 2³ cell centers round it; `y` and `−y v` of those become its
 /// form to spread.
 #[cube]
 fn pull_forecast<F: Float + CubeElement>(
@@ -279,10 +279,10 @@ fn gather_cells_back<F: Float + CubeElement>(
             let low = s * sum_bars[row] + area_bars[row];
             let middle = s * sum_bars[row + 1] + area_bars[row + 1];
             let high = s * sum_bars[row + 2] + area_bars[row + 2];
-            let along = z.below * low + z.centre * middle + z.above * high;
-            let slope = dz.below * low + dz.centre * middle + dz.above * high;
+            let along = z.below * low + z.center * middle + z.above * high;
+            let slope = dz.below * low + dz.center * middle + dz.above * high;
             let sum = z.below * sum_bars[row]
-                + z.centre * sum_bars[row + 1]
+                + z.center * sum_bars[row + 1]
                 + z.above * sum_bars[row + 2];
             offset_bar += wx * wy * sum;
             area_bar += wx * wy * along;

@@ -7,7 +7,7 @@ use crate::grid::Lattice;
 use crate::splat::{bspline, bspline_slope, pick};
 use crate::vector::Vector3;
 
-/// Numbers of a sample in the form that is worked with: offset from the centre of its cell, normal, `â`, `ω`.
+/// Numbers of a sample in the form that is worked with: offset from the center of its cell, normal, `â`, `ω`.
 pub(super) const SAMPLE: usize = 8;
 
 /// Numbers of a sample as it was before a pass: `s`, `u`.
@@ -19,7 +19,7 @@ pub(super) const SEEN: usize = 3;
 /// A sample.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Sample<F: Float> {
-    /// Offset from the centre of its cell, −½ to ½ cells.
+    /// Offset from the center of its cell, −½ to ½ cells.
     pub f: Vector3<F>,
     pub normal: Vector3<F>,
     /// `â`.
@@ -84,7 +84,7 @@ pub(super) fn without<F: Float>(
     }
 }
 
-/// One of the two cell centres round a sample, along an axis.
+/// One of the two cell centers round a sample, along an axis.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Side<F: Float> {
     /// Which of the three cells it is.
@@ -97,7 +97,7 @@ pub(super) struct Side<F: Float> {
     pub bump_slope: F,
 }
 
-/// The lower (0) or upper (1) cell centre round a sample `f` from the centre of its cell.
+/// The lower (0) or upper (1) cell center round a sample `f` from the center of its cell.
 #[cube]
 pub(super) fn side<F: Float>(f: F, upper: u32) -> Side<F> {
     let one = F::new(1.0);
@@ -114,7 +114,7 @@ pub(super) fn side<F: Float>(f: F, upper: u32) -> Side<F> {
     }
 }
 
-/// Which of the three cells along an axis is the lower cell centre of a sample.
+/// Which of the three cells along an axis is the lower cell center of a sample.
 #[cube]
 pub(super) fn lowest<F: Float>(f: F) -> u32 {
     select(f < F::new(0.0), 0u32, 1u32)
@@ -191,8 +191,8 @@ pub(super) fn derivatives<F: Float + CubeElement>(
             let low = value::<F>(values, areas, row, means);
             let middle = value::<F>(values, areas, row + 1, means);
             let high = value::<F>(values, areas, row + 2, means);
-            let along = z.below * low + z.centre * middle + z.above * high;
-            let slope = dz.below * low + dz.centre * middle + dz.above * high;
+            let along = z.below * low + z.center * middle + z.above * high;
+            let slope = dz.below * low + dz.center * middle + dz.above * high;
             let bend = low - two * middle + high;
             out.x += sx * wy * along;
             out.y += wx * sy * along;

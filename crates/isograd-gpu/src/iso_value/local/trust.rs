@@ -7,7 +7,7 @@ use super::near::Near;
 use super::plate::{self, Usual, plate_of, shift};
 use super::sample::{SAMPLE, STATE, corner, derivatives, is_held, sample};
 use crate::element::plate::trust;
-use crate::grid::{self, Lattice, cell_at, from_centre, place};
+use crate::grid::{self, Lattice, cell_at, from_center, place};
 use crate::iso_value;
 use crate::primitives::reduce::{BLOCK, sum_columns, sum_of_group};
 use crate::splat::Samples;
@@ -107,9 +107,9 @@ fn pack_samples<F: Float + CubeElement>(
         if is_held::<F>(keys[s], &grid) {
             let x = place::<F>(points, i, &grid);
             let cell = cell_at(keys[s], grid.ny, grid.nz);
-            f.x = from_centre::<F>(x.x, cell.i);
-            f.y = from_centre::<F>(x.y, cell.j);
-            f.z = from_centre::<F>(x.z, cell.k);
+            f.x = from_center::<F>(x.x, cell.i);
+            f.y = from_center::<F>(x.y, cell.j);
+            f.z = from_center::<F>(x.z, cell.k);
             normal.x = normals[3 * i];
             normal.y = normals[3 * i + 1];
             normal.z = normals[3 * i + 2];

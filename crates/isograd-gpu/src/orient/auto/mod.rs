@@ -1,6 +1,6 @@
 //! The automatic method on a device, as `isograd`'s `orient/auto.rs` does it.
 //!
-//! What concerns single samples, their neighbours and the cells of the grids is done on the device: the graph, the
+//! What concerns single samples, their neighbors and the cells of the grids is done on the device: the graph, the
 //! fills, the evidence, and how it spreads. What concerns the cloud as a whole is the CPU's own code: the parts that
 //! get a grid of their own, and the domains of samples that agree, whose signs are chosen together; for that the
 //! graph and the beliefs are copied.

@@ -1,4 +1,4 @@
-//! What single samples say of their signs, and what they believe once their neighbours were heard.
+//! What single samples say of their signs, and what they believe once their neighbors were heard.
 
 use cubecl::prelude::*;
 use isograd::orient::decide::{Beliefs, Domains, Reading};

@@ -1,4 +1,4 @@
-//! The generalised winding number of domains of samples, at some of the samples: `isograd`'s `orient/winding.rs`.
+//! The generalized winding number of domains of samples, at some of the samples: `isograd`'s `orient/winding.rs`.
 
 use cubecl::prelude::*;
 use isograd::orient::decide::Domains;

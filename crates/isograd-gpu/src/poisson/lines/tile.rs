@@ -11,7 +11,7 @@ use super::BLOCK;
 pub(super) struct Tile {
     /// Cells of a line.
     pub(super) n: usize,
-    /// Distance in memory between neighbours on a line.
+    /// Distance in memory between neighbors on a line.
     pub(super) step: usize,
     /// Lines of the field.
     pub(super) count: usize,
@@ -21,7 +21,7 @@ pub(super) struct Tile {
     pub(super) pair: usize,
     pub(super) begin: usize,
     pub(super) stride: usize,
-    /// Whether neighbours on a line are neighbours in memory, or else cells of neighbouring lines: the field
+    /// Whether neighbors on a line are neighbors in memory, or else cells of neighboring lines: the field
     /// is read and written in that order.
     #[cube(comptime)]
     pub(super) contiguous: bool,

@@ -4,7 +4,7 @@ use cubecl::prelude::*;
 use isograd::poisson::screened::{self, MOST_ITERATIONS};
 
 use super::{Equation, Error};
-use crate::grid::{self, Lattice, cell_at, from_centre, place};
+use crate::grid::{self, Lattice, cell_at, from_center, place};
 use crate::primitives::fill::zeros;
 use crate::primitives::reduce::{BLOCK, sum, sum_of_group};
 use crate::spread::{Before, spread};
@@ -241,9 +241,9 @@ fn start<F: Float + CubeElement>(
         let x = place::<F>(points, i, &grid);
         let cell = cell_at(keys[s], grid.ny, grid.nz);
         roots[s] = (areas[i] * per_area).sqrt();
-        carriers[NUMBERS * s] = from_centre::<F>(x.x, cell.i);
-        carriers[NUMBERS * s + 1] = from_centre::<F>(x.y, cell.j);
-        carriers[NUMBERS * s + 2] = from_centre::<F>(x.z, cell.k);
+        carriers[NUMBERS * s] = from_center::<F>(x.x, cell.i);
+        carriers[NUMBERS * s + 1] = from_center::<F>(x.y, cell.j);
+        carriers[NUMBERS * s + 2] = from_center::<F>(x.z, cell.k);
         carriers[NUMBERS * s + 3] = F::new(0.0);
     }
 }

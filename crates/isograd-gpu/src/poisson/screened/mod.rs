@@ -10,7 +10,7 @@
 //! As printed there: the residual of the iso-value of `χ`, and a second solve.
 //!
 //! # Not differentiable
-//! `∇χ` jumps where a sample crosses a plane through cell centres. `α` is held.
+//! `∇χ` jumps where a sample crosses a plane through cell centers. `α` is held.
 
 mod forward;
 mod gradients;

@@ -1,4 +1,4 @@
-//! The distance at cell centres.
+//! The distance at cell centers.
 
 use cubecl::prelude::Runtime;
 use isograd::distance::NO_TRIANGLE;

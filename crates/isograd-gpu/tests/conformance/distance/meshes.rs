@@ -34,7 +34,7 @@ pub fn torus<T: Real>(around: usize, across: usize) -> Mesh<T> {
     Mesh::new(vertices, quads(around, across, true)).unwrap()
 }
 
-/// The sphere of radius 0.9: all of it is closest to its centre.
+/// The sphere of radius 0.9: all of it is closest to its center.
 pub fn sphere<T: Real>(rows: usize, columns: usize) -> Mesh<T> {
     let vertex = |index: usize| {
         let polar = std::f64::consts::PI * (index / columns) as f64 / (rows - 1) as f64;
@@ -66,11 +66,11 @@ pub fn fish<T: Real>(cells: usize) -> Mesh<T> {
 
 /// A triangle of any kind: well shaped, huge, tiny, a sliver, a needle, a segment, a point.
 fn triangle(numbers: &mut Numbers) -> [[f64; 3]; 3] {
-    let centre = [(); 3].map(|()| numbers.signed());
+    let center = [(); 3].map(|()| numbers.signed());
     let kind = numbers.bits() as usize % 8;
     let size = [0.1, 0.1, 2.0, 1e-3, 0.3, 0.3, 0.3, 0.0][kind];
     let mut near = |p: [f64; 3], size: f64| p.map(|x| x + size * numbers.signed());
-    let [a, b, c] = [(); 3].map(|()| near(centre, size));
+    let [a, b, c] = [(); 3].map(|()| near(center, size));
     let on_edge: [f64; 3] = std::array::from_fn(|k| a[k] + 0.3 * (b[k] - a[k]));
     match kind {
         4 => [a, b, near(on_edge, 1e-4)],
@@ -101,7 +101,7 @@ pub fn point<T: Real>(faces: usize) -> Mesh<T> {
     Mesh::new(vec![[0.3, 0.4, 0.5].map(T::of)], vec![[0, 0, 0]; faces]).unwrap()
 }
 
-/// One triangle, named by several faces. No cell centre of the tests is on it: there `φ` has no derivative.
+/// One triangle, named by several faces. No cell center of the tests is on it: there `φ` has no derivative.
 pub fn copies<T: Real>(faces: usize) -> Mesh<T> {
     let vertices = [
         [-0.413, -0.207, 0.111],

@@ -128,7 +128,7 @@ fn cotangent_at_distance_zero_is_along_the_normal() {
     on_each_device!(check_on_surface);
 }
 
-/// The plane of the triangle goes through centres of cells.
+/// The plane of the triangle goes through centers of cells.
 fn check_on_surface<R: Runtime>(device: &Device<R>) {
     let grid = grid::<f32>([-1.0; 3], 0.5, [4, 4, 5]);
     let vertices = vec![[-9.0, -9.0, -0.25], [9.0, -9.0, -0.25], [0.0, 9.0, -0.25]];

@@ -22,7 +22,7 @@ fn check_hits_in<R: Runtime, T: Scalar>(device: &Device<R>) {
     for (mesh, count, size) in [
         (meshes::soup::<T>(300, 21), 701, 1.5),
         (meshes::torus(60, 21), 257, 4.0),
-        // Near the centre of it.
+        // Near the center of it.
         (meshes::sphere(50, 51), 20, 1e-3),
         (meshes::copies(1), 100, 1.0),
         (meshes::line(), 100, 1.0),

@@ -56,7 +56,7 @@ fn sphere(n: usize, center: [f64; 3], radius: f64, numbers: &mut Numbers) -> Vec
     (0..n).map(sample).collect()
 }
 
-/// Samples whose neighbours are a spacing apart.
+/// Samples whose neighbors are a spacing apart.
 fn even<T: Scalar>(name: &'static str, samples: &[[[f64; 3]; 2]], spacing: f64) -> Body<T> {
     let mut numbers = Numbers(5);
     let reach: Vec<f32> = samples

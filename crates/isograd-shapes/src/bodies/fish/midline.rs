@@ -1,4 +1,4 @@
-//! The midline of a swimming fish: a travelling wave of an inextensible line, in lengths of the body.
+//! The midline of a swimming fish: a traveling wave of an inextensible line, in lengths of the body.
 //!
 //! `y(s, t) = a e(s) sin(2π(s/λ − t/T))` and `dx = √(ds² − dy²)` from the nose, which stays at `x = 0`.
 //! The envelope `e`, 1 at the tail, is Carling's `(s + 0.03125)/1.03125` (Carling, Williams & Bowtell

@@ -158,7 +158,7 @@ pub(crate) const EEL: Kind = Kind {
     },
 };
 
-/// A body of elliptic sections: nose at the origin, `x` towards the tail, `y` sideways, `z` up.
+/// A body of elliptic sections: nose at the origin, `x` toward the tail, `y` sideways, `z` up.
 #[derive(Debug)]
 struct Fish {
     length: Jet,
@@ -201,12 +201,12 @@ impl Surface for Fish {
     fn map(&self, patch: usize, u: Jet, v: Jet) -> JetVector {
         let section = self.profile.section(patch, v);
         let (sideways, up) = turn(u);
-        let centre = self.midline.at(section.station);
+        let center = self.midline.at(section.station);
         let across = section.half_width * sideways;
-        let [cos, sin] = centre.direction;
+        let [cos, sin] = center.direction;
         [
-            (centre.x - across * sin) * self.length,
-            (centre.y + across * cos) * self.length,
+            (center.x - across * sin) * self.length,
+            (center.y + across * cos) * self.length,
             section.half_height * up * self.length,
         ]
     }

@@ -21,7 +21,7 @@ pub(super) struct Branch {
     sin: Jet,
     cos: Jet,
     length: Jet,
-    /// A sphere round it: centre and squared radius.
+    /// A sphere round it: center and squared radius.
     bound: ([f64; 3], f64),
 }
 
@@ -83,18 +83,18 @@ impl Branch {
         }
     }
 
-    /// The point at `turns` of a ring round the axis, `axial` beyond `centre`.
-    fn ring(&self, centre: JetVector, axial: Jet, radius: Jet, turns: Jet) -> JetVector {
+    /// The point at `turns` of a ring round the axis, `axial` beyond `center`.
+    fn ring(&self, center: JetVector, axial: Jet, radius: Jet, turns: Jet) -> JetVector {
         let (cos, sin) = turn(turns);
-        let axis = add_scaled(centre, axial, self.along);
+        let axis = add_scaled(center, axial, self.along);
         let spoke = add_scaled(scaled(self.across[0], cos), sin, self.across[1]);
         add_scaled(axis, radius, spoke)
     }
 
     /// Whether `point` is inside.
     pub fn contains(&self, point: [f64; 3]) -> bool {
-        let (centre, reach) = self.bound;
-        norm_squared(sub(point, centre)) < reach && self.distance(point).distance < 0.0
+        let (center, reach) = self.bound;
+        norm_squared(sub(point, center)) < reach && self.distance(point).distance < 0.0
     }
 
     /// Exact inside and outside: the closest point is on the cap whose cone of normals holds the point,
@@ -126,17 +126,17 @@ impl Branch {
     }
 }
 
-/// Cap of the unit sphere of height `size`, at `u` from its pole to its rim: height above the centre
+/// Cap of the unit sphere of height `size`, at `u` from its pole to its rim: height above the center
 /// and distance from the axis, both smooth at the pole.
 fn cap(size: Jet, u: Jet) -> (Jet, Jet) {
     let height = 1.0 - size * u.squared();
     (height, u * (size * (height + 1.0)).sqrt())
 }
 
-fn to_sphere(from_centre: [f64; 3], radius: f64, otherwise: [f64; 3]) -> Closest {
-    let r = norm(from_centre);
+fn to_sphere(from_center: [f64; 3], radius: f64, otherwise: [f64; 3]) -> Closest {
+    let r = norm(from_center);
     let outward = if r > 0.0 {
-        scale(from_centre, 1.0 / r)
+        scale(from_center, 1.0 / r)
     } else {
         otherwise
     };

@@ -19,12 +19,12 @@ pub(in crate::distance) struct Region {
     high: [f64; 3],
     /// Slack, and what rounding may have taken from a difference of squares.
     margin: f64,
-    /// Sets farther than this (squared) from the centre are of no interest.
+    /// Sets farther than this (squared) from the center are of no interest.
     reach: f64,
 }
 
 impl Region {
-    /// `reach` is a distance from the centre of the box, infinite for no limit; `slack` is how much closer
+    /// `reach` is a distance from the center of the box, infinite for no limit; `slack` is how much closer
     /// (squared) than a set something may be that counts with it; `rounding` is the error of the coordinates.
     pub(in crate::distance) fn new(
         [low, high]: [[f64; 3]; 2],
@@ -37,8 +37,8 @@ impl Region {
             let (to_low, to_high) = (low[a] - y[a], high[a] - y[a]);
             [to_low * to_low, to_high * to_high]
         });
-        let centre = scale(add(low, high), 0.5);
-        let radius = norm(sub(centre, y)) + norm(sub(high, low));
+        let center = scale(add(low, high), 0.5);
+        let radius = norm(sub(center, y)) + norm(sub(high, low));
         Self {
             to_faces,
             low,
@@ -108,7 +108,7 @@ impl Node {
         let mut excess = [region.margin; WIDTH];
         let mut squared = [0.0; WIDTH];
         for a in 0..3 {
-            let centre = 0.5 * (region.low[a] + region.high[a]);
+            let center = 0.5 * (region.low[a] + region.high[a]);
             for s in 0..WIDTH {
                 let (low, high) = (self.low[a][s], self.high[a][s]);
                 let from_low = interval_distance(low, high, region.low[a]);
@@ -116,7 +116,7 @@ impl Node {
                 let at_low = region.to_faces[a][0] - from_low * from_low;
                 let at_high = region.to_faces[a][1] - from_high * from_high;
                 excess[s] += if at_low > at_high { at_low } else { at_high };
-                let d = interval_distance(low, high, centre);
+                let d = interval_distance(low, high, center);
                 squared[s] += d * d;
             }
         }

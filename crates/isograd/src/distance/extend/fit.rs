@@ -53,7 +53,7 @@ pub(super) fn fit(radius: f64, neighbors: &mut [Neighbor]) -> Fit {
     }
 }
 
-/// `C` as `xx, yy, zz, yz, xz, xy`, of neighbours with weights `p_j` and offsets `e_j`.
+/// `C` as `xx, yy, zz, yz, xz, xy`, of neighbors with weights `p_j` and offsets `e_j`.
 pub(super) fn covariance(neighbors: &[Neighbor]) -> [f64; 6] {
     let mut covariance = [0.0; 6];
     for n in neighbors {

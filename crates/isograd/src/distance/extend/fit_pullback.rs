@@ -18,7 +18,7 @@ pub(super) struct Share {
     pub area: f64,
 }
 
-/// The fit at a vertex and what its pullback needs; made by [`Adjoint::new`] from neighbours with weights `w_j`.
+/// The fit at a vertex and what its pullback needs; made by [`Adjoint::new`] from neighbors with weights `w_j`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Adjoint {
     /// `W`, `m` and `s`.
@@ -36,7 +36,7 @@ pub(super) struct Adjoint {
 }
 
 impl Adjoint {
-    /// Makes the fit, which turns the weights of the neighbours into `p_j`, and its adjoint. `contracted` holds
+    /// Makes the fit, which turns the weights of the neighbors into `p_j`, and its adjoint. `contracted` holds
     /// `ū_v v_j` for each of them, and then `q_j`.
     pub(super) fn new(radius: f64, neighbors: &mut [Neighbor], contracted: &mut [f64]) -> Self {
         let made = fit::fit(radius, neighbors);
@@ -91,7 +91,7 @@ impl Adjoint {
         )
     }
 
-    /// What a neighbour gets: `q` is its `q_j`, `area` is `a_j + a₀`.
+    /// What a neighbor gets: `q` is its `q_j`, `area` is `a_j + a₀`.
     #[inline(always)]
     pub(super) fn share(&self, n: &Neighbor, q: f64, area: f64) -> Share {
         let e = n.offset;

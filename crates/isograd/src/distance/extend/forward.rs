@@ -294,7 +294,7 @@ fn extend_to_cells<T: Real>(
         });
 }
 
-/// Barycentric coordinates of the point of a face that is closest to a cell's centre.
+/// Barycentric coordinates of the point of a face that is closest to a cell's center.
 fn closest_weights<T: Real>(grid: &Grid<T>, cell: usize, mesh: &Mesh<T>, face: usize) -> [T; 3] {
     let center = grid.center_f64(grid.cell(cell));
     let closest = triangle::closest_point(center, mesh.corners(face).map(to_f64));

@@ -22,7 +22,7 @@
 //! where a vertex is far from its samples compared with how far they are from each other (`τ` of 16 and
 //! more), where a slope would be extrapolated. Nothing depends on the unit of length.
 //!
-//! `R_v` is the common radius of the neighbourhoods where a vertex has enough samples round it. Else it is
+//! `R_v` is the common radius of the neighborhoods where a vertex has enough samples round it. Else it is
 //! `max(R, min(1.5 r₆, 1.05 r₆₄))` with `r_k` the distance to the `k`-th nearest sample: a vertex in a hole
 //! sees the samples round the hole. `a₀` is a millionth of the mean area: outliers, whose area is 0, count
 //! only where there is nothing else.
@@ -44,7 +44,7 @@
 //!       − w̄_j (a_j + a₀) (4/R_v²) (1 − r_j²/R_v²) d_j
 //! x̄_j += d̄_j,   ȳ_v −= Σ_j d̄_j,   ā_j += w̄_j K(r_j)
 //! ```
-//! To the surface through `β`, per cell of centre `q`: let `y_0` be a corner of the feature (face, edge or
+//! To the surface through `β`, per cell of center `q`: let `y_0` be a corner of the feature (face, edge or
 //! vertex) that holds the closest point `p`, `E` the columns `y_k − y_0` for its other corners, `o = q − p`
 //! and, summed over components, `δ_k = ū (u_k − u_0)`. Then with `γ = (EᵀE)⁻¹ δ` and `G = E γ`
 //! ```text
@@ -78,7 +78,7 @@ use crate::{Field, Mesh, Real};
 /// The samples whose attribute is extended.
 #[derive(Clone, Copy, Debug)]
 pub struct Samples<'a, T> {
-    /// Their neighbourhoods, which hold the points.
+    /// Their neighborhoods, which hold the points.
     pub neighborhoods: &'a Neighborhoods<T>,
     /// `(N,)` area of each, not negative; any common factor makes no difference.
     pub areas: &'a [T],
@@ -140,7 +140,7 @@ pub enum Error {
         "{areas} areas and {values} values of {components} components for {samples} samples; give one area and one value for each sample, and at least one sample and one component"
     )]
     Samples {
-        /// Number of samples in the neighbourhoods.
+        /// Number of samples in the neighborhoods.
         samples: usize,
         /// Number of areas.
         areas: usize,

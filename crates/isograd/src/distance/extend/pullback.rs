@@ -24,7 +24,7 @@ pub struct Cotangent<T> {
     pub areas: Vec<T>,
     /// `(V, 3)` of the vertices of the surface.
     pub vertices: Vec<[T; 3]>,
-    /// Of the grid, through the centres of the cells.
+    /// Of the grid, through the centers of the cells.
     pub grid: GridCotangent<T>,
     /// Cells and vertices where a derivative does not exist or has no bound, and a bounded one was taken.
     pub guarded: usize,

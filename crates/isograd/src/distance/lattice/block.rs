@@ -43,24 +43,24 @@ impl Block {
 
 /// The cells of a block of side 4.
 pub(super) struct Cells {
-    /// Their centres along each axis, in the user's unit; that of the last cell inside the grid for those outside.
-    pub centres: [[f64; SIDE]; 3],
+    /// Their centers along each axis, in the user's unit; that of the last cell inside the grid for those outside.
+    pub centers: [[f64; SIDE]; 3],
     /// Cells inside the grid along each axis.
     pub count: [usize; 3],
 }
 
 impl Cells {
     pub(super) fn new<T: Real>(grid: &Grid<T>, block: &Block) -> Self {
-        let mut centres = [[0.0; SIDE]; 3];
+        let mut centers = [[0.0; SIDE]; 3];
         for step in 0..SIDE {
             let cell = std::array::from_fn(|a| (block.start[a] + step).min(block.end[a] - 1));
-            let centre = grid.center_f64(cell);
+            let center = grid.center_f64(cell);
             for a in 0..3 {
-                centres[a][step] = centre[a];
+                centers[a][step] = center[a];
             }
         }
         Self {
-            centres,
+            centers,
             count: std::array::from_fn(|a| block.end[a] - block.start[a]),
         }
     }
@@ -75,13 +75,13 @@ impl Cells {
         x < self.count[0] && y < self.count[1] && z < self.count[2]
     }
 
-    /// Centres of the children of the block.
-    pub(super) fn centres_of_children(&self) -> Points {
+    /// Centers of the children of the block.
+    pub(super) fn centers_of_children(&self) -> Points {
         let mut points = [[0.0; LANES]; 3];
         for l in 0..LANES {
             for a in 0..3 {
                 let first = 2 * bit(l, a);
-                points[a][l] = 0.5 * (self.centres[a][first] + self.centres[a][first + 1]);
+                points[a][l] = 0.5 * (self.centers[a][first] + self.centers[a][first + 1]);
             }
         }
         points
@@ -93,12 +93,12 @@ pub(super) fn bit(index: usize, axis: usize) -> usize {
     index >> (2 - axis) & 1
 }
 
-/// Centre, half diagonal and ends of the box of the cell centres of a block.
+/// Center, half diagonal and ends of the box of the cell centers of a block.
 #[derive(Clone, Copy)]
 pub(super) struct Extent {
     pub low: [f64; 3],
     pub high: [f64; 3],
-    pub centre: [f64; 3],
+    pub center: [f64; 3],
     pub radius: f64,
 }
 
@@ -109,7 +109,7 @@ impl Extent {
         Self {
             low,
             high,
-            centre: scale(add(low, high), 0.5),
+            center: scale(add(low, high), 0.5),
             radius: 0.5 * norm(sub(high, low)),
         }
     }
@@ -118,7 +118,7 @@ impl Extent {
 /// The children of a block, with the boxes of those inside the grid.
 pub(super) type Children = [(Block, Option<Extent>); CHILDREN];
 
-/// The children of a block and the boxes of their cell centres; `None` for those outside the grid.
+/// The children of a block and the boxes of their cell centers; `None` for those outside the grid.
 pub(super) fn children<T: Real>(grid: &Grid<T>, block: &Block) -> Children {
     std::array::from_fn(|l| {
         let child = block.child(l);
@@ -129,11 +129,11 @@ pub(super) fn children<T: Real>(grid: &Grid<T>, block: &Block) -> Children {
     })
 }
 
-/// Centres of the children; `otherwise` for those outside the grid.
-pub(super) fn centres(children: &Children, otherwise: [f64; 3]) -> Points {
+/// Centers of the children; `otherwise` for those outside the grid.
+pub(super) fn centers(children: &Children, otherwise: [f64; 3]) -> Points {
     let mut points = [[0.0; LANES]; 3];
     for l in 0..LANES {
-        let c = children[l].1.map_or(otherwise, |extent| extent.centre);
+        let c = children[l].1.map_or(otherwise, |extent| extent.center);
         for a in 0..3 {
             points[a][l] = c[a];
         }

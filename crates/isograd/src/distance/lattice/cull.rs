@@ -1,6 +1,6 @@
 //! From the lists of a block to those of its children.
 
-use super::block::{CHILDREN, Children, Extent, bit, centres, closest_of};
+use super::block::{CHILDREN, Children, Extent, bit, centers, closest_of};
 use super::kernels::{self, MARGIN};
 use super::site_list::{Boxes, closest};
 use super::task::{Local, Task};
@@ -31,28 +31,28 @@ impl<T: Real> Task<'_, T> {
         );
     }
 
-    /// A point of the mesh close to the centre of each child, where the lists hold one.
+    /// A point of the mesh close to the center of each child, where the lists hold one.
     fn feet(
         &self,
         local: &Local,
         lists: Lists,
         children: &Children,
     ) -> [Option<[f64; 3]>; CHILDREN] {
-        let centres = centres(children, local.centre);
-        let sites = (!lists.sites.is_empty()).then(|| self.closest_sites(local, lists, &centres));
+        let centers = centers(children, local.center);
+        let sites = (!lists.sites.is_empty()).then(|| self.closest_sites(local, lists, &centers));
         let large = (!lists.large.is_empty()).then(|| {
             self.arch.dispatch(kernels::ClosestListed {
                 bvh: self.bvh,
                 list: lists.large,
-                points: &centres,
+                points: &centers,
             })
         });
         std::array::from_fn(|l| {
-            let centre = children[l].1?.centre;
+            let center = children[l].1?.center;
             let site =
                 sites.map(|sites| self.sites.position(local.sites[sites[l] as usize].number));
-            let on_large = large.map(|found| self.bvh.frame(found.triangle[l]).nearest(centre));
-            closest_of([site, on_large], centre)
+            let on_large = large.map(|found| self.bvh.frame(found.triangle[l]).nearest(center));
+            closest_of([site, on_large], center)
         })
     }
 
@@ -67,7 +67,7 @@ impl<T: Real> Task<'_, T> {
         let mut in_cells = [[0.0; LANES]; 3];
         for a in 0..3 {
             for l in 0..LANES {
-                in_cells[a][l] = ((points[a][l] - local.centre[a]) * per_cell) as f32;
+                in_cells[a][l] = ((points[a][l] - local.center[a]) * per_cell) as f32;
             }
         }
         dispatch(
@@ -80,11 +80,11 @@ impl<T: Real> Task<'_, T> {
     fn set_box(&self, boxes: &mut Boxes, l: usize, local: &Local, extent: &Extent, foot: [f64; 3]) {
         let per_cell = 1.0 / self.grid.spacing().f64();
         for a in 0..3 {
-            boxes.centre[a][l] = ((extent.centre[a] - local.centre[a]) * per_cell) as f32;
+            boxes.center[a][l] = ((extent.center[a] - local.center[a]) * per_cell) as f32;
             boxes.side[a][l] = ((extent.high[a] - extent.low[a]) * per_cell) as f32;
-            boxes.foot[a][l] = ((foot[a] - local.centre[a]) * per_cell) as f32;
+            boxes.foot[a][l] = ((foot[a] - local.center[a]) * per_cell) as f32;
         }
-        let away = norm(sub(extent.centre, foot));
+        let away = norm(sub(extent.center, foot));
         let far = away + 2.0 * extent.radius + local.radius;
         let margin = far * (MARGIN * far + self.rounding());
         boxes.bound[l] = ((away * away + margin) * per_cell * per_cell) as f32;

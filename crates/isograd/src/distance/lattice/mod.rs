@@ -1,4 +1,4 @@
-//! Distance at every cell centre.
+//! Distance at every cell center.
 //!
 //! The grid is cut into blocks of a fixed size, each solved on its own and in one order: so the result has the
 //! same bits for any number of threads.
@@ -65,7 +65,7 @@ impl<T> Scratch<T> {
     }
 }
 
-/// Writes the signed distance from every cell centre to `mesh` into `phi`, `(nx, ny, nz)`, in the user's unit,
+/// Writes the signed distance from every cell center to `mesh` into `phi`, `(nx, ny, nz)`, in the user's unit,
 /// and the closest face of each cell into `closest`, the residual.
 ///
 /// The distance is exact: computed in double precision from [`Grid::center_f64`] to the vertices as they stand,

@@ -14,7 +14,7 @@ use crate::simd::multiply_add;
 /// Cells of a packet, in halves of [`LANES`].
 pub(super) const CELLS: usize = 2 * LANES;
 
-/// Bounds the error of single precision, when multiplied by the way from the centre of the block to a cell and
+/// Bounds the error of single precision, when multiplied by the way from the center of the block to a cell and
 /// on to a triangle.
 ///
 /// In units of 2⁻²⁴: what is between a cell and a corner is off by 2 of them, its coordinates in the frame of
@@ -22,11 +22,11 @@ pub(super) const CELLS: usize = 2 * LANES;
 /// difference of two by `92 d`. Where a product and a sum are rounded at once, it is less.
 const ERROR: f32 = 128.0 / (1u32 << 24) as f32;
 
-/// The centres of the cells of a packet.
+/// The centers of the cells of a packet.
 pub(super) struct Packet {
     /// In the user's unit, by halves.
     pub points: [Points; 2],
-    /// In cells from the centre of the block, `[axis][cell]`.
+    /// In cells from the center of the block, `[axis][cell]`.
     local: [[f32; CELLS]; 3],
 }
 
@@ -40,10 +40,10 @@ impl Packet {
             local: [[0.0; CELLS]; 3],
         };
         for a in 0..3 {
-            let local = cells.centres[a].map(|centre| ((centre - origin[a]) * per_cell) as f32);
+            let local = cells.centers[a].map(|center| ((center - origin[a]) * per_cell) as f32);
             for l in 0..CELLS {
                 let step = first[a] + offset(l)[a];
-                packet.points[l / LANES][a][l % LANES] = cells.centres[a][step];
+                packet.points[l / LANES][a][l % LANES] = cells.centers[a][step];
                 packet.local[a][l] = local[step];
             }
         }
@@ -71,7 +71,7 @@ pub(super) struct Search<'a> {
     pub listed: &'a [u32],
     /// Large triangles, by their places in the tree.
     pub large: &'a [u32],
-    /// In cells, with the distance to a triangle, more than that from the centre of the block to a cell and to
+    /// In cells, with the distance to a triangle, more than that from the center of the block to a cell and to
     /// any corner of the triangle together.
     pub way: f32,
     pub per_cell: f64,

@@ -24,7 +24,7 @@ pub struct PullbackScratch<T> {
 }
 
 /// Adds to the `(V, 3)` `vertices_bar` what the cotangents `phi_bar` (in memory order) of the distances mean
-/// for the vertices, and returns what they mean for the grid through its cell centres. `mesh`, `phi` and
+/// for the vertices, and returns what they mean for the grid through its cell centers. `mesh`, `phi` and
 /// `closest` are those of [`forward`](super::forward). Cells outside the band count for nothing: there `φ` is
 /// constant.
 pub fn pullback<T: Real>(

@@ -2,38 +2,38 @@
 
 use super::block::CHILDREN;
 
-/// A vertex as culling sees it, in cells from the centre of the block.
+/// A vertex as culling sees it, in cells from the center of the block.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(32))]
 pub(super) struct Site {
     pub position: [f32; 3],
     /// The largest slack of its triangles (see `Frame`).
     pub slack: f32,
-    /// The square of its distance from the centre of the block, less the slack.
+    /// The square of its distance from the center of the block, less the slack.
     pub power: f32,
     /// Its number.
     pub number: u32,
 }
 
-/// The children of a block as culling sees them, `[axis][child]`, in cells from the centre of the block.
+/// The children of a block as culling sees them, `[axis][child]`, in cells from the center of the block.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Boxes {
-    /// Centres of the boxes of cell centres.
-    pub centre: [[f32; CHILDREN]; 3],
+    /// Centers of the boxes of cell centers.
+    pub center: [[f32; CHILDREN]; 3],
     /// Their sides.
     pub side: [[f32; CHILDREN]; 3],
     /// A point of the mesh near each.
     pub foot: [[f32; CHILDREN]; 3],
-    /// `|centre − foot|²` and what rounding may have taken.
+    /// `|center − foot|²` and what rounding may have taken.
     pub bound: [f32; CHILDREN],
-    /// Squares of the distances from the centres beyond which nothing matters.
+    /// Squares of the distances from the centers beyond which nothing matters.
     pub reach: [f32; CHILDREN],
 }
 
 impl Boxes {
     /// Boxes for which no site matters.
     pub(super) const NOTHING: Self = Self {
-        centre: [[0.0; CHILDREN]; 3],
+        center: [[0.0; CHILDREN]; 3],
         side: [[0.0; CHILDREN]; 3],
         foot: [[0.0; CHILDREN]; 3],
         bound: [f32::NEG_INFINITY; CHILDREN],
@@ -52,7 +52,7 @@ impl Boxes {
             let mut squared = 0.0;
             let mut gain = 0.0;
             for a in 0..3 {
-                let d = v[a] - self.centre[a][l];
+                let d = v[a] - self.center[a][l];
                 gain += self.side[a][l] * (v[a] - self.foot[a][l]).abs();
                 squared += d * d;
             }

@@ -12,7 +12,7 @@ use crate::{Mesh, Real};
 pub(super) const LARGE: f64 = 4.0;
 
 /// The vertices of the small triangles, numbered as the leaves of the tree first name them: so every leaf
-/// owns a run of them, and neighbours in space are neighbours in memory.
+/// owns a run of them, and neighbors in space are neighbors in memory.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sites {
     /// Where the sites of each leaf begin.

@@ -48,7 +48,7 @@ pub(super) struct Local<'a> {
     /// Its first cell.
     origin: [usize; 3],
     pub sites: &'a [Site],
-    pub centre: [f64; 3],
+    pub center: [f64; 3],
     pub radius: f64,
 }
 
@@ -73,7 +73,7 @@ impl<T: Real> Task<'_, T> {
         let local = Local {
             origin: block.start,
             sites,
-            centre: extent.centre,
+            center: extent.center,
             radius: extent.radius,
         };
         let lists = Lists {
@@ -83,7 +83,7 @@ impl<T: Real> Task<'_, T> {
         self.refine(&local, block, lists, levels, measured, output);
     }
 
-    /// How far from the centre of a box of this radius the corner of a triangle may be that lies within the
+    /// How far from the center of a box of this radius the corner of a triangle may be that lies within the
     /// band of some point of the box.
     pub(super) fn reach(&self, radius: f64) -> f64 {
         (self.width * self.width + self.largest_slack()).sqrt() + radius
@@ -100,15 +100,15 @@ impl<T: Real> Task<'_, T> {
         1e-14 * self.magnitude
     }
 
-    /// The point of the mesh closest to the centre of a block, if any matters.
+    /// The point of the mesh closest to the center of a block, if any matters.
     fn foot(&self, extent: &Extent, stack: &mut Stack) -> Option<[f64; 3]> {
         let reach = self.reach(extent.radius);
         let place = dispatch(
             self.arch,
             #[inline(always)]
-            || self.bvh.nearest_to(extent.centre, reach * reach, stack),
+            || self.bvh.nearest_to(extent.center, reach * reach, stack),
         )?;
-        Some(self.bvh.frame(place).nearest(extent.centre))
+        Some(self.bvh.frame(place).nearest(extent.center))
     }
 
     /// Lists what may be closest to some cell of a block.
@@ -142,7 +142,7 @@ impl<T: Real> Task<'_, T> {
             sites.extend(
                 self.sites
                     .of_leaf(leaf)
-                    .map(|number| self.site(number, extent.centre)),
+                    .map(|number| self.site(number, extent.center)),
             );
             if self.sites.any_large() {
                 large.extend(bvh.leaf(leaf).filter(|&place| self.sites.is_large(place)));
@@ -153,10 +153,10 @@ impl<T: Real> Task<'_, T> {
     }
 
     #[inline(always)]
-    fn site(&self, number: u32, centre: [f64; 3]) -> Site {
+    fn site(&self, number: u32, center: [f64; 3]) -> Site {
         let per_cell = 1.0 / self.grid.spacing().f64();
         let slack = self.sites.slack(number) * per_cell * per_cell;
-        let v = scale(sub(self.sites.position(number), centre), per_cell).map(|x| x as f32);
+        let v = scale(sub(self.sites.position(number), center), per_cell).map(|x| x as f32);
         let slack = (slack * (1.0 + 2.0 * kernels::MARGIN)) as f32;
         Site {
             position: v,
@@ -212,7 +212,7 @@ impl<T: Real> Task<'_, T> {
             width: (width * width) as f32,
         };
         let cells = Cells::new(self.grid, block);
-        let seeds = self.closest_sites(local, lists, &cells.centres_of_children());
+        let seeds = self.closest_sites(local, lists, &cells.centers_of_children());
         for index in (0..PACKETS).filter(|&index| cells.contain(Cells::packet(index))) {
             let seeds = [seeds[2 * index], seeds[2 * index + 1]];
             let mut found = [Found::NOTHING; 2];
@@ -220,7 +220,7 @@ impl<T: Real> Task<'_, T> {
                 search: &search,
                 cells: &cells,
                 index,
-                origin: local.centre,
+                origin: local.center,
                 seeds,
                 measured,
                 found: &mut found,

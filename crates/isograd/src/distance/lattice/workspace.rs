@@ -53,7 +53,7 @@ pub(super) struct Candidate {
     pub place: u32,
     /// The corner that is at `from`.
     pub corner: u32,
-    /// In cells from the centre of the block.
+    /// In cells from the center of the block.
     pub from: [f32; 3],
 }
 

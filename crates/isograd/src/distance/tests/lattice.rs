@@ -207,10 +207,10 @@ fn face_does_not_depend_on_what_single_precision_leaves_over() {
 }
 
 #[test]
-fn centre_of_a_sphere_where_all_triangles_are_closest_stays_cheap_and_exact() {
+fn center_of_a_sphere_where_all_triangles_are_closest_stays_cheap_and_exact() {
     let mesh = sphere::<f64>(40, 1.0);
     let grid = Grid::new([-1.1; 3], 2.2 / 63.0, [63; 3]).expect("valid");
-    // The middle cell of an odd grid is the centre of the sphere itself.
+    // The middle cell of an odd grid is the center of the sphere itself.
     let (phi, _) = solve(&mesh, &signs(grid, 1), Band::Full);
     for cell in [
         [31, 31, 31],

@@ -37,18 +37,18 @@ impl Random {
         (self.next() % n as u64) as usize
     }
 
-    /// A point within `size` of `centre` along each axis.
-    pub(super) fn near(&mut self, centre: [f64; 3], size: f64) -> [f64; 3] {
+    /// A point within `size` of `center` along each axis.
+    pub(super) fn near(&mut self, center: [f64; 3], size: f64) -> [f64; 3] {
         let p = self.point();
-        std::array::from_fn(|a| centre[a] + size * p[a])
+        std::array::from_fn(|a| center[a] + size * p[a])
     }
 
     /// A triangle of any kind: well shaped, huge, tiny, a sliver, a needle, a segment, a point.
     pub(super) fn triangle(&mut self) -> [[f64; 3]; 3] {
-        let centre = self.point();
+        let center = self.point();
         let kind = self.below(8);
         let size = [0.1, 0.1, 2.0, 1e-3, 0.3, 0.3, 0.3, 0.0][kind];
-        let [a, b, mut c] = [(); 3].map(|()| self.near(centre, size));
+        let [a, b, mut c] = [(); 3].map(|()| self.near(center, size));
         let t = 0.5 + 0.5 * self.signed();
         let on_edge: [f64; 3] = std::array::from_fn(|k| a[k] + t * (b[k] - a[k]));
         match kind {

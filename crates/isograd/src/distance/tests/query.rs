@@ -156,7 +156,7 @@ fn lattice_gives_the_sign_where_its_cells_agree() {
     );
     assert!(
         !sign([1.9, 0.3, 0.5]) && sign([1.9, 0.3, -0.5]),
-        "beyond the centres of the cells"
+        "beyond the centers of the cells"
     );
 }
 

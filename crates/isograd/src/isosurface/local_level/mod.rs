@@ -2,10 +2,10 @@
 //!
 //! # Map
 //! `χ` rises through the surface as a step that the grid has smoothed. Where the surface is curved, thin or
-//! sharp, where samples are uneven, and with its place between cell centres, the value of `χ` on it is a little
-//! off the mean `c`. The samples know by how much. With `r_i = χ(x_i) + δ_i − c`, trilinear between cell centres,
+//! sharp, where samples are uneven, and with its place between cell centers, the value of `χ` on it is a little
+//! off the mean `c`. The samples know by how much. With `r_i = χ(x_i) + δ_i − c`, trilinear between cell centers,
 //! `â_i` the area of a sample in cells², `B` the product of quadratic B-splines, and `ω_i` from 0 to 1 and `δ_i` as
-//! below, every cell centre `o` within reach of a sample gets
+//! below, every cell center `o` within reach of a sample gets
 //!
 //! `e_o = Σ_i â_i B_o(x_i) ω_i r_i / D_o`, `D_o = ε + Σ_i â_i B_o(x_i)`, and `χ_o ← χ_o − λ e_o`,
 //!
@@ -15,7 +15,7 @@
 //!
 //! **Samples that are off the surface** must not be followed. Two tests see them, and set the gain `λ`:
 //! - does `p`, which is `e` at a sample, found without that sample, foretell `s = ω r`? `λ` is the coefficient of the
-//!   linear fit of `s` by it, from 0 to 1: 0 for noise that has nothing to do with that of its neighbours;
+//!   linear fit of `s` by it, from 0 to 1: 0 for noise that has nothing to do with that of its neighbors;
 //! - does `e` rise across the surface, `ρ = Σ â w u / Σ â u²`, with the slopes `w` of `e` and `u` of `χ` along the
 //!   normals? What samples on one surface say does not, but samples scattered over a layer as thick as a cell would
 //!   flatten `χ`. `ρ s` is taken off the forecast, and `λ` falls to 0 where the passes together would take half of the
@@ -53,7 +53,7 @@
 //! [`iso_value::pullback`](super::iso_value::pullback) adds for `r̄`. `σ̄` is that of the width of the step.
 //!
 //! # Not differentiable
-//! `∇(Te)` jumps where a sample crosses a plane through cell centres, `∇(n·∇χ)` and `∇(n·∇e)` where it crosses a face
+//! `∇(Te)` jumps where a sample crosses a plane through cell centers, `∇(n·∇χ)` and `∇(n·∇e)` where it crosses a face
 //! of a cell. `λ` has kinks where the fit is 1, where `ρ` or `λ`
 //! is 0.
 

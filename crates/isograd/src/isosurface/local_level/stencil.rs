@@ -8,16 +8,16 @@ use crate::{Grid, Real, splat};
 pub(super) struct Stencil<T> {
     /// The lowest of the 3³ cells.
     pub(super) corner: [usize; 3],
-    /// Distance from the centre of the middle cell, per axis, −½ to ½.
+    /// Distance from the center of the middle cell, per axis, −½ to ½.
     offset: [T; 3],
 }
 
-/// The 2³ cell centres round a sample and its trilinear weights.
+/// The 2³ cell centers round a sample and its trilinear weights.
 #[derive(Clone, Copy)]
 pub(super) struct Corners<T> {
     /// Place of the lowest of them in the 3³.
     pub(super) place: [usize; 3],
-    /// Distance from its centre, per axis, 0 to 1.
+    /// Distance from its center, per axis, 0 to 1.
     fraction: [T; 3],
 }
 
@@ -90,7 +90,7 @@ impl<T: Real> Stencil<T> {
         }
     }
 
-    /// The cell centres round the point, which are among the 3³.
+    /// The cell centers round the point, which are among the 3³.
     #[inline(always)]
     pub(super) fn corners(&self) -> Corners<T> {
         let (mut place, mut fraction) = ([0; 3], self.offset);

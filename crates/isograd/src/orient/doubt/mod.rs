@@ -1,11 +1,11 @@
 //! Why signs are doubtful.
 //!
 //! # Map
-//! Points `(N, 3)`, their [`Orientation`] and neighbourhoods → a [`Reason`] for each point whose
+//! Points `(N, 3)`, their [`Orientation`] and neighborhoods → a [`Reason`] for each point whose
 //! [confidence](Orientation::confidence) is below 0.1. The first of these that holds:
 //!
 //! - *sparse*: its 24 nearest samples are twice as far apart as those of the cloud at the median;
-//! - *open*: a sample along a rim or hole is among its neighbours;
+//! - *open*: a sample along a rim or hole is among its neighbors;
 //! - *thin*: its 24 nearest samples lie in two sheets, told apart by their height along its normal, or by the
 //!   sides that they face. 24 samples of one sheet reach 2.8 spacings, so such sheets are closer than that;
 //! - *noisy*: its 24 nearest samples scatter by 0.3 of their spacing about the quadric fitted to them, and so

@@ -1,10 +1,10 @@
 //! The screened Poisson equation: the indicator is drawn to one value at the samples.
 //!
 //! # Map
-//! `x₀ → χ`, where `x₀` is the solution of the plain equation `A x₀ = b`. `χ` minimises
+//! `x₀ → χ`, where `x₀` is the solution of the plain equation `A x₀ = b`. `χ` minimizes
 //! `½ χᵀAχ − bᵀχ + ½ α Σ_i â_i (χ(x_i) − c)²` over `χ` and `c` (Kazhdan and Hoppe, *Screened Poisson surface
 //! reconstruction*, ACM TOG 2013, eq. 4, with samples that count by their area and a level that is free), with
-//! `χ(x_i)` trilinear between cell centres and `â_i` the area of a sample in cells². With `S` the rows
+//! `χ(x_i)` trilinear between cell centers and `â_i` the area of a sample in cells². With `S` the rows
 //! `√â_i w_iᵀ`, `A⁺` the [direct solve](super::Plan::solve), `d = S 1` and `P = I − d dᵀ/dᵀd`:
 //!
 //! `χ = x₀ − α A⁺ Sᵀ u`, `P (I + α S A⁺ Sᵀ) P u = P S x₀`, and then `u_i = √â_i (χ(x_i) − c)`.
@@ -26,7 +26,7 @@
 //! ```
 //!
 //! # Not differentiable
-//! `∇χ` jumps where a sample crosses a plane through cell centres. `α` is held.
+//! `∇χ` jumps where a sample crosses a plane through cell centers. `α` is held.
 
 mod forward;
 mod pullback;

@@ -1,4 +1,4 @@
-//! The oracle is a dense minimisation on a tiny grid.
+//! The oracle is a dense minimization on a tiny grid.
 
 use super::*;
 use crate::isosurface::iso_value;
@@ -91,7 +91,7 @@ fn product(a: &[f64], b: &[f64]) -> f64 {
 }
 
 #[test]
-fn solution_is_that_of_the_dense_minimisation() {
+fn solution_is_that_of_the_dense_minimization() {
     let setting = Setting::<f64>::new(40, [0.3; 3], 0.5);
     let (grid, cells) = (*setting.x0.grid(), setting.x0.values().len());
     for screening in [0.0, 0.5, 20.0] {

@@ -165,7 +165,7 @@ fn end_cell(center: f32, radius: f32, cells: u32) -> u32 {
     min(u32::cast_from(center + radius) + 1u32, cells)
 }
 
-/// Sets the bits of the cells whose centre is in a disc, and of the cell of its own centre. The order in which units do
+/// Sets the bits of the cells whose center is in a disc, and of the cell of its own center. The order in which units do
 /// that makes no difference.
 #[cube(launch)]
 fn draw_discs(

@@ -1,6 +1,6 @@
 //! Regions of free cells that are joined through faces.
 //!
-//! The free cells of a word are runs, numbered in the order of memory. Every run is first given a neighbour before it as
+//! The free cells of a word are runs, numbered in the order of memory. Every run is first given a neighbor before it as
 //! its parent: these trees are no deeper than a row is long, and doubling makes every root the parent of its whole tree.
 //! What is left are trees that touch; they are joined root to root, the higher to the lower, by units that do not wait
 //! for each other (after J. Jaiganesh, M. Burtscher, "A high-performance connected components implementation for GPUs",

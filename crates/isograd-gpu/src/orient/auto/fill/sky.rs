@@ -1,6 +1,6 @@
 //! How much of the sky every free cell sees.
 //!
-//! From each cell a ray starts in each of the 26 directions to its neighbours; it is free if it leaves the grid without
+//! From each cell a ray starts in each of the 26 directions to its neighbors; it is free if it leaves the grid without
 //! meeting an occupied cell. The first cells of all rays of a direction are a bit each; what is found for so many cells is
 //! joined with what the cell that far away has found, which doubles them, until the grid ends. No unit walks.
 

@@ -32,7 +32,7 @@ pub(super) fn take<R: Runtime, T: Scalar>(
     Ok(axis)
 }
 
-/// Spread and side `(N,)` of the samples whose axes are of wider neighbourhoods than their own; 0 for others.
+/// Spread and side `(N,)` of the samples whose axes are of wider neighborhoods than their own; 0 for others.
 pub(super) fn spreads<R: Runtime, T: Scalar>(
     device: &Device<R>,
     neighborhoods: &Neighborhoods<T>,
@@ -92,7 +92,7 @@ fn find_spreads<F: Float + CubeElement>(
     let p = ABSOLUTE_POS;
     if p < n {
         let mut deviation = 0.0f32;
-        let mut towards = 0.0f32;
+        let mut toward = 0.0f32;
         let value = planes[VALUES * n + p];
         if within[p] > radii[p] && value > F::new(0.0) {
             let centroid = Vector3::<F> {
@@ -103,9 +103,9 @@ fn find_spreads<F: Float + CubeElement>(
             let axis = Vector3::<F>::at(axes, places[p] as usize);
             let off = F::sqrt(value);
             deviation = f32::cast_from(off * within[p] * per_spacing);
-            towards = coupling::side(f32::cast_from(-centroid.dot(axis) / off));
+            toward = coupling::side(f32::cast_from(-centroid.dot(axis) / off));
         }
         spread[p] = deviation;
-        side[p] = towards;
+        side[p] = toward;
     }
 }

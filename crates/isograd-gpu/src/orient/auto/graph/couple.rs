@@ -1,4 +1,4 @@
-//! How the signs of neighbours hang together, and what follows from it: areas, and evidence from a second sheet.
+//! How the signs of neighbors hang together, and what follows from it: areas, and evidence from a second sheet.
 
 use cubecl::prelude::*;
 
@@ -105,7 +105,7 @@ pub fn sheet_evidence<R: Runtime, T: Scalar>(
     Ok(evidence)
 }
 
-/// A unit for each neighbour of each point.
+/// A unit for each neighbor of each point.
 #[cube(launch)]
 fn couple_pairs<F: Float + CubeElement>(
     points: &Array<F>,
@@ -161,7 +161,7 @@ fn find_shares(
     }
 }
 
-/// A unit for each neighbour of each point.
+/// A unit for each neighbor of each point.
 #[cube(launch)]
 fn part_pairs(
     near: &Array<u32>,

@@ -1,8 +1,8 @@
-//! The neighbour graph: who is next to whom, and how the signs of two neighbours hang together. What it holds, and
+//! The neighbor graph: who is next to whom, and how the signs of two neighbors hang together. What it holds, and
 //! why, is on the page of [`isograd::orient::graph`].
 //!
 //! # Map
-//! [`Neighborhoods`], axes and the planes that they are of → [`Graph`]. Offsets between neighbours are not kept: 192
+//! [`Neighborhoods`], axes and the planes that they are of → [`Graph`]. Offsets between neighbors are not kept: 192
 //! bytes a point are more than the time to take them again. A coupling is one unit, all else one unit a point.
 //!
 //! # Not differentiable
@@ -26,10 +26,10 @@ use crate::primitives::smallest::median;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
-/// Neighbours whose median distance from the tangent plane is the thickness.
+/// Neighbors whose median distance from the tangent plane is the thickness.
 const NEAREST: usize = NEIGHBORS / 2;
 
-/// Neighbours, axes and couplings, all in the sorted order of the [`Neighborhoods`]; lengths are in sample spacings
+/// Neighbors, axes and couplings, all in the sorted order of the [`Neighborhoods`]; lengths are in sample spacings
 /// of the whole cloud, so that single precision serves any unit.
 #[derive(Clone, Debug)]
 pub struct Graph {
@@ -47,7 +47,7 @@ pub struct Graph {
     /// `(N,)` the area of surface that each sample stands for, in squares of the spacing.
     pub area: Buffer<f32>,
     /// `(N,)` how far samples lie off their common plane, where they scatter so much that the axis was sought in a
-    /// wider neighbourhood: root mean square, in spacings; else 0.
+    /// wider neighborhood: root mean square, in spacings; else 0.
     pub spread: Buffer<f32>,
     /// `(N,)` in −1..1: how clearly such a sample lies on the side of that plane that its axis points to; else 0.
     pub side: Buffer<f32>,
@@ -70,7 +70,7 @@ impl Graph {
 /// The graph of the points of `neighborhoods`, whose typical distance `spacing` is above 0
 /// ([`Radii::spacing`](crate::neighbors::radius::Radii::spacing)). `axes` `(N, 3)`, in input order, may
 /// have any sign. `planes` are those of the axes, within radii that may be wider than those of `neighborhoods`: of
-/// [`crate::normals::forward`] in the same neighbourhoods or in those of [`crate::neighbors::with_radii`]. Without
+/// [`crate::normals::forward`] in the same neighborhoods or in those of [`crate::neighbors::with_radii`]. Without
 /// them no sample counts as scattering.
 ///
 /// # Errors

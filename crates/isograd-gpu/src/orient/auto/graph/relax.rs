@@ -9,7 +9,7 @@ use crate::neighbors::BLOCK;
 use crate::{Buffer, Device, Error};
 
 /// Beliefs `(N,)` from evidence `(N,)`, both in −1..1 and in sorted order: repeated weighted means of what a point's
-/// neighbours believe and its own evidence, held with its strength.
+/// neighbors believe and its own evidence, held with its strength.
 ///
 /// # Errors
 /// [`Error::Length`], [`Error::TooLarge`].

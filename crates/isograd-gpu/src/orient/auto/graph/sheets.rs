@@ -21,7 +21,7 @@ const OFFSETS: usize = 3 * NEIGHBORS;
 /// [`QUORUM`] as the kernel counts.
 const FITTED: u32 = QUORUM as u32;
 
-/// The axis `(N, 3)` of the own sheet of each point whose neighbours lie on several, else the one given, and how far
+/// The axis `(N, 3)` of the own sheet of each point whose neighbors lie on several, else the one given, and how far
 /// the samples of the sheet lie off it, else 0; in sorted order.
 pub(super) fn find<R: Runtime, T: Scalar>(
     device: &Device<R>,
@@ -71,7 +71,7 @@ fn find_sheets<F: Float + CubeElement>(
         measure_distances(&offsets, own, &mut distances);
         let rest_together = ranked::<f32>(&distances, NEIGHBORS, REST);
         let mut fit = ranked::<f32>(&distances, NEIGHBORS, QUORUM);
-        // Of the given plane and those spanned by two near neighbours, the one closest to a quorum.
+        // Of the given plane and those spanned by two near neighbors, the one closest to a quorum.
         let mut best_x = own.x;
         let mut best_y = own.y;
         let mut best_z = own.z;
@@ -110,7 +110,7 @@ fn find_sheets<F: Float + CubeElement>(
     }
 }
 
-/// Distances of the neighbours from a plane through the sample.
+/// Distances of the neighbors from a plane through the sample.
 #[cube]
 fn measure_distances(offsets: &Array<f32>, normal: Vector3<f32>, distances: &mut Array<f32>) {
     #[unroll]
@@ -137,7 +137,7 @@ struct Plane<F: Float> {
     deviation: F,
 }
 
-/// Least-squares plane of the sample itself and the neighbours whose distance from the plane at hand is within the
+/// Least-squares plane of the sample itself and the neighbors whose distance from the plane at hand is within the
 /// limit.
 #[cube]
 fn plane_within<F: Float>(offsets: &Array<F>, distances: &Array<F>, limit: F) -> Plane<F> {

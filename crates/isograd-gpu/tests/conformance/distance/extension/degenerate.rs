@@ -3,7 +3,7 @@
 use super::*;
 use isograd::distance::NO_TRIANGLE;
 
-/// Samples on a device without neighbourhoods of the CPU, and the torus.
+/// Samples on a device without neighborhoods of the CPU, and the torus.
 fn of_samples<R: Runtime, T: Scalar>(
     device: &Device<R>,
     points: &[[f64; 3]],

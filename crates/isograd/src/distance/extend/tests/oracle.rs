@@ -30,7 +30,7 @@ fn radius(distances: &mut [f64], common: f64) -> f64 {
     common.max((1.5 * distances[5.min(last)]).min(1.05 * distances[63.min(last)]))
 }
 
-/// Value at zero of the `(α, β)` that minimise `Σ w (v − α − β·d)² + W ε |β|²`, lengths in units of `R_v`.
+/// Value at zero of the `(α, β)` that minimize `Σ w (v − α − β·d)² + W ε |β|²`, lengths in units of `R_v`.
 fn fitted_value(weights: &[f64], offsets: &[[f64; 3]], values: &[f64]) -> f64 {
     let total: f64 = weights.iter().sum();
     let samples = || weights.iter().zip(offsets);

@@ -115,7 +115,7 @@ fn pullback_is_the_derivative_in_all_inputs() {
         let w = numbers(cells, &mut random);
         let rates = Rates::new(900, cells, &mut random);
         let pulled = setting.pulled(area_weights, thin, &w, &rates);
-        // No sample may cross a plane through cell centres, where slopes jump.
+        // No sample may cross a plane through cell centers, where slopes jump.
         let step = 1e-7;
         let at = |s: f64| {
             let (chi, ..) = setting.moved(&rates, s).run(area_weights, thin);

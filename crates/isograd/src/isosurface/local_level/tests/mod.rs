@@ -114,7 +114,7 @@ fn bspline(x: f64) -> f64 {
     }
 }
 
-/// The product over the axes of `f` between a cell centre and index coordinates.
+/// The product over the axes of `f` between a cell center and index coordinates.
 fn weight(f: fn(f64) -> f64, cell: [usize; 3], x: [f64; 3]) -> f64 {
     (0..3).map(|a| f(cell[a] as f64 + 0.5 - x[a])).product()
 }

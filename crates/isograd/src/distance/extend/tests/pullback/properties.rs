@@ -161,7 +161,7 @@ fn degenerate_samples_and_faces_give_finite_cotangents() {
 #[test]
 fn thin_faces_are_guarded_and_counted() {
     let mut scene = Scene::<f64>::random(2000, 20);
-    // A speck of a triangle, in the way of a row of cell centres along x.
+    // A speck of a triangle, in the way of a row of cell centers along x.
     let [_, y, z] = scene.phi.grid().center([0, 10, 10]);
     let around = [[-1.0, -1.0], [1.0, -1.0], [0.0, 1.0]];
     let vertices = around
