@@ -109,7 +109,7 @@ fn fill(
 /// # Errors
 /// None: what is a grid in `T` is one in double precision.
 pub fn widened<T: Real>(grid: &Grid<T>) -> Outcome<Grid<f64>> {
-    let lower = isograd::vector::to_f64(grid.lower());
+    let lower = isograd_element::vector::to_f64(grid.lower());
     Ok(Grid::new(lower, grid.spacing().f64(), grid.shape())?)
 }
 

@@ -2,7 +2,8 @@
 
 use isograd::differential::{self, Bins, Differential, EikonalOptions, eikonal};
 use isograd::isosurface::Measures;
-use isograd::{Field, Mesh, PointCloud, Real, Reconstruction, Reconstructor, vector};
+use isograd::{Field, Mesh, PointCloud, Real, Reconstruction, Reconstructor};
+use isograd_element::vector;
 use isograd_shapes::Shape;
 use serde::Serialize;
 

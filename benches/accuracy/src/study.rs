@@ -2,7 +2,8 @@
 
 use std::collections::HashMap;
 
-use isograd::{Grid, PointCloud, Real, Reconstructor, Resolution, vector};
+use isograd::{Grid, PointCloud, Real, Reconstructor, Resolution};
+use isograd_element::vector;
 use isograd_shapes::{Shape, by_name};
 use serde::Serialize;
 

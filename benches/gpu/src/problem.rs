@@ -5,7 +5,8 @@ use std::time::Instant;
 
 use cubecl::prelude::Runtime;
 use isograd::neighbors::Radius;
-use isograd::{Grid, PointCloud, Resolution, Stage, vector};
+use isograd::{Grid, PointCloud, Resolution, Stage};
+use isograd_element::vector;
 use isograd_gpu::orient::Method;
 use isograd_gpu::pipeline::{Cotangent, Held, Options, Reconstruction, Reconstructor};
 use isograd_gpu::{Buffer, Device, Effort};

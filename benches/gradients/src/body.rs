@@ -1,6 +1,7 @@
 //! Bodies, their samples, and the grids they are reconstructed on.
 
-use isograd::{Grid, PointCloud, Real, vector};
+use isograd::{Grid, PointCloud, Real};
+use isograd_element::vector;
 use isograd_shapes::{Density, Layout, Sampling, Shape, SurfaceCoordinate, by_name};
 use serde::Serialize;
 

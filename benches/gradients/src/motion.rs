@@ -1,7 +1,7 @@
 //! Motions of a cloud, the fastest point at unit speed.
 
 use isograd::PointCloud;
-use isograd::vector::{add, dot, norm, normalized, scale, sub};
+use isograd_element::vector::{add, dot, norm, normalized, scale, sub};
 use serde::Serialize;
 
 use crate::Outcome;
@@ -146,7 +146,7 @@ impl Frame {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use isograd::vector::cross;
+    use isograd_element::vector::cross;
 
     const FRAME: Frame = Frame {
         middle: [0.1, 0.2, 0.3],

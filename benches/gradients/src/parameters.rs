@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use isograd::{
     CloudCotangent, Cotangent, Field, Options, PullbackScratch, Reconstruction, Reconstructor,
-    vector,
 };
+use isograd_element::vector;
 use isograd_page::statistics::median;
 use isograd_shapes::Shape;
 use serde::Serialize;

@@ -2,11 +2,11 @@
 //! steps meets.
 
 use isograd::poisson::Smoothing;
-use isograd::vector::dot;
 use isograd::{
     Cotangent, Options, PointCloud, Reconstruction, Reconstructor, distance, isosurface, orient,
     splat,
 };
+use isograd_element::vector::dot;
 use serde::Serialize;
 
 use crate::Outcome;

@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use isograd::isosurface::measure_pullback;
-use isograd::vector::dot;
 use isograd::{Cotangent, Options, Reconstructor};
+use isograd_element::vector::dot;
 use serde::Serialize;
 
 use crate::Outcome;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use isograd::vector::{add, norm, normalized, sub};
+use isograd_element::vector::{add, norm, normalized, sub};
 use isograd_shapes::{Density, Layout, Sampling, by_name};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};

@@ -3,9 +3,10 @@
 use std::time::Instant;
 
 use isograd::neighbors::{self, CellIndex, Neighborhoods, Radius};
+use isograd::normals;
 use isograd::orient::doubt::{Doubt, Reason, reasons};
 use isograd::orient::{self, Known, Method, Orientation};
-use isograd::{normals, vector};
+use isograd_element::vector;
 use serde::Serialize;
 
 use crate::body::{Body, Clean};

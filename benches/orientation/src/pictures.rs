@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use isograd::orient::{Method, ParityOptions};
-use isograd::vector;
 use isograd_cli::plot::canvas::{Anchor, Canvas, Color, WHITE};
 use isograd_cli::plot::{Camera, Scene, View, write};
+use isograd_element::vector;
 use isograd_page::bars::legend;
 use isograd_page::chart::LETTERS;
 use isograd_page::layout::WIDTH;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use isograd::orient::{self, Known, Method, MethodUsed, ParityOptions};
-use isograd::vector;
+use isograd_element::vector;
 use isograd_shapes::{Layout, Sampling, by_name};
 use serde::Serialize;
 

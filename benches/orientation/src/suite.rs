@@ -290,7 +290,7 @@ mod tests {
             let body = by_name(name).expect("in the suite").body();
             assert_eq!(body.points.len(), body.normals.len());
             for n in body.normals {
-                let length = isograd::vector::norm(n);
+                let length = isograd_element::vector::norm(n);
                 assert!(length == 0.0 || (length - 1.0).abs() < 1e-9, "{name}");
             }
         }

@@ -4,8 +4,9 @@ use std::time::Instant;
 
 use isograd::{
     CloudCotangent, Cotangent, Grid, Options, PointCloud, PullbackScratch, Reconstructor,
-    Resolution, Stage, vector,
+    Resolution, Stage,
 };
+use isograd_element::vector;
 use isograd_page::program::Outcome;
 use isograd_page::statistics::median;
 use isograd_shapes::{Layout, Sampling, by_name};

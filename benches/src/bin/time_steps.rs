@@ -10,8 +10,9 @@ use std::time::Instant;
 
 use isograd::neighbors::Radius;
 use isograd::orient::Method;
-use isograd::{Grid, Options, PointCloud, Reconstructor, Seconds, Stage, vector};
+use isograd::{Grid, Options, PointCloud, Reconstructor, Seconds, Stage};
 use isograd_benches::pool;
+use isograd_element::vector;
 use isograd_shapes::{Sampling, Shape, SurfaceCoordinate, by_name};
 
 type Outcome<T = ()> = Result<T, Box<dyn Error + Send + Sync>>;

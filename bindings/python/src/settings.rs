@@ -4,9 +4,8 @@
 use isograd::distance::Band;
 use isograd::neighbors::Radius;
 use isograd::poisson::Smoothing;
-use isograd::{
-    Backend, Grid, GridError, Options, Real, UnknownBackend, isosurface, orient, splat, vector,
-};
+use isograd::{Backend, Grid, GridError, Options, Real, UnknownBackend, isosurface, orient, splat};
+use isograd_element::vector;
 use serde::Deserialize;
 
 use crate::backend::Failure;

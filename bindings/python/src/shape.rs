@@ -1,6 +1,6 @@
 //! Parametric bodies, behind `isograd.Shape`.
 
-use isograd::vector::of_f64;
+use isograd_element::vector::of_f64;
 use isograd_shapes::{Density, Layout, Sampling, SurfaceCoordinate, by_name};
 use pyo3::prelude::*;
 

@@ -1,6 +1,6 @@
 //! Samples of a mesh, for clouds that come as meshes.
 
-use isograd::vector::{add, cross, norm, normalized, scale, sub};
+use isograd_element::vector::{add, cross, norm, normalized, scale, sub};
 use isograd_io::Geometry;
 
 /// `n` points of the surface with the normals of their faces, as many per area everywhere: one in each of

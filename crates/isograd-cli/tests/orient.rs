@@ -3,7 +3,7 @@
 mod common;
 
 use common::Bench;
-use isograd::vector::{dot, norm};
+use isograd_element::vector::{dot, norm};
 use isograd_io::{Dtype, Geometry};
 use serde_json::Value;
 

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use isograd::distance::Query;
 use isograd::orient::Method;
-use isograd::{Grid, Mesh, Options, PointCloud, Reconstructor, Resolution, vector};
+use isograd::{Grid, Mesh, Options, PointCloud, Reconstructor, Resolution};
+use isograd_element::vector;
 use isograd_io::{read_geometry, read_mesh};
 
 const CLOUDS: [&str; 10] = [

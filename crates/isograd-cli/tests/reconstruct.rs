@@ -99,7 +99,7 @@ fn the_points_keep_their_order_and_their_attributes() {
     assert!(
         normals
             .iter()
-            .all(|&n| (isograd::vector::norm(n) - 1.0).abs() < 1e-5)
+            .all(|&n| (isograd_element::vector::norm(n) - 1.0).abs() < 1e-5)
     );
 }
 
@@ -216,7 +216,7 @@ fn coordinates_far_from_the_origin_are_computed_in_double_and_it_says_so() {
     let report = String::from_utf8(bench.read("r.json")).expect("text");
     assert!(report.contains("computed in f64"));
     let mesh = isograd_io::read_mesh(&bench.path("m.ply")).expect("reads");
-    let radius = |v: &[f64; 3]| isograd::vector::norm([v[0] - 1e6, v[1] + 1e6, v[2] - 1e6]);
+    let radius = |v: &[f64; 3]| isograd_element::vector::norm([v[0] - 1e6, v[1] + 1e6, v[2] - 1e6]);
     // A tenth of a cell, which is 1.25/32.
     assert!(mesh.points.iter().all(|v| (radius(v) - 0.5).abs() < 4e-3));
 }

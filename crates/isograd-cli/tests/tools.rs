@@ -63,7 +63,7 @@ fn queries_of_a_mesh_and_of_its_field_agree_with_the_sphere() {
     );
     assert_eq!(names(&field), ["distance", "gradient"]);
     for (i, point) in mesh.points.iter().enumerate() {
-        let exact = isograd::vector::norm(*point) - 0.5;
+        let exact = isograd_element::vector::norm(*point) - 0.5;
         // A tenth of a cell, which is 1.25/48.
         assert!((mesh.attributes[0].values[i] - exact).abs() < 2.6e-3, "{i}");
         if i == 4 {

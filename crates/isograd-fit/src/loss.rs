@@ -121,7 +121,7 @@ mod tests {
     }
 
     fn sphere(h: f64, radius: f64) -> Field<f64> {
-        field(h, |x| isograd::vector::norm(x) - radius)
+        field(h, |x| isograd_element::vector::norm(x) - radius)
     }
 
     #[test]

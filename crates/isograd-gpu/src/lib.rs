@@ -3,7 +3,7 @@
 //!
 //! A stage is one file, forward and pullback side by side, as in [`isograd`]; data stay in [`Buffer`]s on a
 //! [`Device`] from the points to φ and back, and only what [`Device::download`] asks for is copied. Formulas
-//! of single elements are those of [`isograd::element`], the same lines.
+//! of single elements are those of [`isograd_element`], compiled a second time as parts of kernels.
 //!
 //! # Determinism
 //! The same input gives the same bits on the same device, every time: sums have a fixed order, and nothing
@@ -16,7 +16,6 @@ pub mod area;
 mod device;
 pub mod differential;
 pub mod distance;
-mod element;
 mod grid;
 pub mod host;
 pub mod iso_value;
@@ -31,6 +30,8 @@ pub mod splat;
 mod spread;
 mod trilinear;
 mod vector;
+
+include!(concat!(env!("OUT_DIR"), "/element.rs"));
 
 #[cfg(feature = "cuda")]
 pub use device::Cuda;

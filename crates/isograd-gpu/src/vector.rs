@@ -2,20 +2,10 @@
 
 use cubecl::prelude::*;
 
-/// Three numbers: a place, a direction, or one number for each corner of a triangle.
-#[derive(CubeType, Clone, Copy)]
-pub(crate) struct Vector3<F: Float> {
-    pub x: F,
-    pub y: F,
-    pub z: F,
-}
+pub(crate) use crate::element::vector3::{Vector3, Vector3Expand};
 
 #[cube]
 impl<F: Float> Vector3<F> {
-    pub fn of(x: F, y: F, z: F) -> Self {
-        Vector3::<F> { x, y, z }
-    }
-
     /// Row `i` of an `(N, 3)` array.
     pub fn at(array: &Array<F>, i: usize) -> Self {
         Vector3::<F>::load(array, 3 * i)
@@ -46,51 +36,6 @@ impl<F: Float> Vector3<F> {
         array[start] += self.x;
         array[start + 1] += self.y;
         array[start + 2] += self.z;
-    }
-
-    pub fn add(self, other: Self) -> Self {
-        Vector3::<F> {
-            x: self.x + other.x,
-            y: self.y + other.y,
-            z: self.z + other.z,
-        }
-    }
-
-    pub fn sub(self, other: Self) -> Self {
-        Vector3::<F> {
-            x: self.x - other.x,
-            y: self.y - other.y,
-            z: self.z - other.z,
-        }
-    }
-
-    pub fn scale(self, factor: F) -> Self {
-        Vector3::<F> {
-            x: self.x * factor,
-            y: self.y * factor,
-            z: self.z * factor,
-        }
-    }
-
-    pub fn dot(self, other: Self) -> F {
-        self.x * other.x + self.y * other.y + self.z * other.z
-    }
-
-    pub fn cross(self, other: Self) -> Self {
-        Vector3::<F> {
-            x: self.y * other.z - self.z * other.y,
-            y: self.z * other.x - self.x * other.z,
-            z: self.x * other.y - self.y * other.x,
-        }
-    }
-
-    /// `self` where the condition holds, else `other`.
-    pub fn choose(self, condition: bool, other: Self) -> Self {
-        Vector3::<F> {
-            x: select(condition, self.x, other.x),
-            y: select(condition, self.y, other.y),
-            z: select(condition, self.z, other.z),
-        }
     }
 
     /// Squared distance to the box between two corners; 0 inside.

@@ -1,7 +1,8 @@
 //! What a file of points or of a mesh holds.
 
 use isograd::data::Attribute;
-use isograd::{Mesh, MeshError, PointCloud, PointCloudError, Real, Sensors, vector};
+use isograd::{Mesh, MeshError, PointCloud, PointCloudError, Real, Sensors};
+use isograd_element::vector;
 
 use crate::format::Format;
 use crate::number::Dtype;

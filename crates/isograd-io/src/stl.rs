@@ -6,7 +6,8 @@
 use std::collections::HashMap;
 use std::io::{self, Write};
 
-use isograd::{Mesh, Real, vector};
+use isograd::{Mesh, Real};
+use isograd_element::vector;
 
 use crate::error::{Error, Place};
 use crate::format::Format;

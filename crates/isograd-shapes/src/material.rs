@@ -2,7 +2,7 @@
 //! the pullback of the map from parameters to points.
 
 use isograd::Real;
-use isograd::vector::of_f64;
+use isograd_element::vector::of_f64;
 use rayon::prelude::*;
 
 use crate::jet::{Jet, SLOTS, values};

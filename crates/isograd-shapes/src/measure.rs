@@ -1,6 +1,6 @@
 //! Area and volume by quadrature over the patches.
 
-use isograd::vector::{dot, norm};
+use isograd_element::vector::{dot, norm};
 use rayon::prelude::*;
 
 use crate::shape::evaluate;

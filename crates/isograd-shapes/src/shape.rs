@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use isograd::vector::{cross, normalized};
+use isograd_element::vector::{cross, normalized};
 
 use crate::bodies;
 use crate::jet::{Jet, PARAMETER, U, V, slopes, values};

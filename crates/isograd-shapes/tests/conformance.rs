@@ -1,6 +1,6 @@
 //! What every shape owes, checked on every shape, at its defaults and away from them.
 
-use isograd::vector::{add, cross, dot, norm, normalized, scale, sub};
+use isograd_element::vector::{add, cross, dot, norm, normalized, scale, sub};
 use isograd_shapes::{Layout, Sampling, Shape, SurfaceCoordinate, all, by_name};
 
 const RANDOM: Sampling = Sampling {

@@ -72,7 +72,9 @@ fn sphere_errors(cells: usize, shift: [f64; 3]) -> [f64; 3] {
     let derivative = |cotangent: &Cotangent<'_, f64>| -> f64 {
         let pulled = result.pullback(&cloud, cotangent).expect("a pullback");
         let pairs = pulled.points.iter().zip(&outward);
-        pairs.map(|(a, b)| isograd::vector::dot(*a, *b)).sum()
+        pairs
+            .map(|(a, b)| isograd_element::vector::dot(*a, *b))
+            .sum()
     };
     let of_measure = |area: f64, volume: f64| {
         let mut vertices = Vec::new();

@@ -176,7 +176,7 @@ proptest! {
             prop_assert_eq!(samples.cloud.len(), 40);
             for (x, n) in samples.cloud.points().iter().zip(samples.cloud.normals().unwrap_or(&[])) {
                 prop_assert!(x.iter().all(|c| c.is_finite()));
-                prop_assert!((isograd::vector::norm(*n) - 1.0).abs() < 1e-12);
+                prop_assert!((isograd_element::vector::norm(*n) - 1.0).abs() < 1e-12);
                 shape.distance(*x);
                 shape.contains(*x);
             }

@@ -2,8 +2,8 @@
 
 use isograd::neighbors::Radius;
 use isograd::orient::{Method, MethodUsed};
-use isograd::vector::dot;
 use isograd::{Orienter, PointCloud};
+use isograd_element::vector::dot;
 use isograd_shapes::{Layout, Sampling, by_name};
 
 /// Samples of the fish.

@@ -1,6 +1,6 @@
 //! The map from parameters to points and its pullback, on every shape.
 
-use isograd::vector::{dot, norm, sub};
+use isograd_element::vector::{dot, norm, sub};
 use isograd_shapes::{Layout, Sampling, Shape, SurfaceCoordinate, all, by_name};
 
 const RANDOM: Sampling = Sampling {

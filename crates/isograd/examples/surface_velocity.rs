@@ -1,8 +1,8 @@
 //! A torus that moves and turns: the velocity of its samples, brought to the cells round its surface, as a
 //! flow solver with an immersed boundary wants it.
 
-use isograd::vector::{add, cross, norm, sub};
 use isograd::{Attribute, Grid, Options, PointCloud, Reconstructor, Resolution};
+use isograd_element::vector::{add, cross, norm, sub};
 
 const MAJOR: f64 = 0.7;
 const MINOR: f64 = 0.25;

@@ -11,7 +11,6 @@ mod concrete;
 pub mod data;
 pub mod differential;
 pub mod distance;
-pub mod element;
 pub(crate) mod gather;
 pub mod gradcheck;
 pub mod isosurface;
@@ -28,7 +27,8 @@ mod report;
 pub(crate) mod simd;
 pub mod splat;
 pub(crate) mod trilinear;
-pub mod vector;
+
+use isograd_element::{self as element, vector};
 
 pub use backend::{Backend, UnknownBackend};
 pub use data::{

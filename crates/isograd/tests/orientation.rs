@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use isograd::neighbors::{self, Neighborhoods, Radius};
+use isograd::normals;
 use isograd::orient::{self, Method, Orientation};
-use isograd::{normals, vector};
+use isograd_element::vector;
 
 /// Most wrong signs, in per cent of the axes within 60° of the truth: half a per cent on clean clouds and
 /// where samples are missing, a tenth where they are uneven or the noise is small beside the body, and 3

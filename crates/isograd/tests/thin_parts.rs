@@ -5,7 +5,8 @@ mod common;
 use common::Uniform;
 use isograd::isosurface::Level;
 use isograd::orient::Method;
-use isograd::{Grid, Options, PointCloud, Reconstructor, Resolution, vector};
+use isograd::{Grid, Options, PointCloud, Reconstructor, Resolution};
+use isograd_element::vector;
 
 /// A lens of radius 1, `thickness` in its middle, and a ball beside it, with exact normals.
 fn lens_and_ball(count: usize, thickness: f64) -> PointCloud<f64> {

@@ -1,7 +1,8 @@
 //! A body beside its target: a view of both surfaces, two sections of the field with both zero contours, and
 //! the error in the same sections (the paper's figures of shape optimization).
 
-use isograd::{Field, Mesh, Real, vector::to_f64};
+use isograd::{Field, Mesh, Real};
+use isograd_element::vector::to_f64;
 
 use super::axis::{label, step};
 use super::canvas::{Anchor, Canvas, Color, WHITE};

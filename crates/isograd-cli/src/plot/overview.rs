@@ -1,6 +1,7 @@
 //! A cloud, the surface through it and a slice of its field, side by side.
 
-use isograd::{Field, Mesh, PointCloud, Real, vector::to_f64};
+use isograd::{Field, Mesh, PointCloud, Real};
+use isograd_element::vector::to_f64;
 
 use super::canvas::{Canvas, Color, WHITE};
 use super::color::Range;

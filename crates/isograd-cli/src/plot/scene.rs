@@ -1,6 +1,6 @@
 //! Three-dimensional views: shaded triangles and points with a depth buffer.
 
-use isograd::vector::{self, cross, dot, scale, sub};
+use isograd_element::vector::{self, cross, dot, scale, sub};
 
 use super::canvas::{Canvas, Color, WHITE};
 

@@ -200,7 +200,7 @@ mod tests {
         let mut field = Field::zeros(grid);
         for cell in 0..grid.cells() {
             let x = grid.center(grid.cell(cell));
-            field.values_mut()[cell] = isograd::vector::norm(x) - 0.5;
+            field.values_mut()[cell] = isograd_element::vector::norm(x) - 0.5;
         }
         field
     }

@@ -175,7 +175,7 @@ impl Degrees {
 /// Median distance of a point to its nearest neighbor.
 fn spacing(points: &[[f64; 3]], graph: &Graph) -> f64 {
     let distance = |i: usize, j: u32| {
-        isograd::vector::norm(isograd::vector::sub(points[i], points[j as usize]))
+        isograd_element::vector::norm(isograd_element::vector::sub(points[i], points[j as usize]))
     };
     let nearest = |i: usize| {
         let all = graph.of(i).iter().map(|&j| distance(i, j));

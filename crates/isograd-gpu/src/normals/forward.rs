@@ -2,8 +2,8 @@
 
 use cubecl::prelude::*;
 
-use super::eigen::{Eigen, Symmetric, eigen};
 use super::{CENTROID, PLANE, Residual, TANGENT, VALUES, WEIGHT};
+use crate::element::eigen::{Eigen, Symmetric, eigen};
 use crate::element::plane::weight;
 use crate::neighbors::{BLOCK, Neighborhoods, end_of_leaf, first_of_leaf, next_leaf};
 use crate::vector::Vector3;

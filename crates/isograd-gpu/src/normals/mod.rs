@@ -19,12 +19,10 @@
 //! The neighborhoods, the radii, the sign. Where `λ₂ − λ₁` is at most `10⁻³ λ₃`, the pullback bounds
 //! `1/(λ₁ − λ_k)`: [`Residual::guarded`].
 
-pub(crate) mod eigen;
 mod forward;
 mod pullback;
 mod widen;
 
-pub(crate) use eigen::{Eigen, Symmetric};
 pub use forward::forward;
 pub(crate) use forward::{MOMENTS, add_moments, fit};
 pub use pullback::pullback;
@@ -105,7 +103,7 @@ impl<T: Scalar> Residual<T> {
                 eigenvalues: of([l1, l2, l3], radius * radius),
                 tangents: [
                     of(tangent, 1.0),
-                    of(isograd::vector::cross(normal, tangent), 1.0),
+                    of(isograd_element::vector::cross(normal, tangent), 1.0),
                 ],
                 guarded: !(1000.0 * (l2 - l1) > f64::from(SMALLEST_GAP) * l3),
             };

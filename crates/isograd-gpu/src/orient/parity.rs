@@ -7,7 +7,7 @@
 
 use cubecl::prelude::*;
 use isograd::orient::ParityOptions;
-use isograd::vector;
+use isograd_element::vector;
 
 use super::{Decided, Error, Turned};
 use crate::neighbors::radius::bounds;

@@ -1,7 +1,8 @@
 //! Areas and their pullback beside those of the CPU and the formulas as printed.
 
 use cubecl::prelude::Runtime;
-use isograd::{Real, splat, vector};
+use isograd::{Real, splat};
+use isograd_element::vector;
 use isograd_gpu::{Device, Scalar, area, neighbors};
 
 use crate::clouds::{Cloud, clouds, real, relative};

@@ -1,7 +1,8 @@
 //! Axes and their pullback beside those of the CPU and the formulas as printed.
 
 use cubecl::prelude::Runtime;
-use isograd::{Real, vector};
+use isograd::Real;
+use isograd_element::vector;
 use isograd_gpu::{Device, Scalar, neighbors, normals};
 
 use crate::clouds::{Cloud, clouds, real, relative};

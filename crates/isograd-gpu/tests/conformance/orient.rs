@@ -1,8 +1,9 @@
 //! Signs by parity and by given normals, and given normals themselves, beside those of the CPU.
 
 use cubecl::prelude::Runtime;
+use isograd::Real;
 use isograd::orient::{self as cpu, Orientation, ParityOptions};
-use isograd::{Real, vector};
+use isograd_element::vector;
 use isograd_gpu::orient::{self, Axes, Error, Method, given};
 use isograd_gpu::{Buffer, Device, Scalar, neighbors};
 

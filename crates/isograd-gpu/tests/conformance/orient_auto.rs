@@ -1,9 +1,10 @@
 //! The automatic orientation beside that of the CPU.
 
 use cubecl::prelude::Runtime;
+use isograd::Real;
 use isograd::orient::{self as cpu, Orientation, Scratch};
-use isograd::vector::{add, dot, scale};
-use isograd::{Real, vector};
+use isograd_element::vector;
+use isograd_element::vector::{add, dot, scale};
 use isograd_gpu::orient::{self, Axes, Method};
 use isograd_gpu::{Device, Scalar, neighbors, normals};
 use isograd_shapes::{Layout, Sampling};

@@ -1,9 +1,10 @@
 //! The neighbor graph of the automatic orientation beside that of the CPU.
 
 use cubecl::prelude::Runtime;
-use isograd::element::coupling;
+use isograd::Real;
 use isograd::orient::graph::{Graph, NEIGHBORS};
-use isograd::{Real, vector};
+use isograd_element::coupling;
+use isograd_element::vector;
 use isograd_gpu::orient::auto::graph::{self, part_slabs, relax, sheet_evidence};
 use isograd_gpu::{Device, Scalar, neighbors, normals};
 use isograd_shapes::{Layout, Sampling};

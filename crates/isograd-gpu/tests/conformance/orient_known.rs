@@ -3,8 +3,9 @@
 use cubecl::prelude::Runtime;
 use isograd::neighbors::Radius;
 use isograd::orient::{self as cpu, Known, MethodUsed, Orientation, Scratch};
-use isograd::vector::{add, scale};
-use isograd::{PointCloud, Real, vector};
+use isograd::{PointCloud, Real};
+use isograd_element::vector;
+use isograd_element::vector::{add, scale};
 use isograd_gpu::orient::previous::{self, Before};
 use isograd_gpu::orient::{self, Axes, Error, Method, Sensors};
 use isograd_gpu::pipeline::{Held, Reconstructor};

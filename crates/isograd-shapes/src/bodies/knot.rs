@@ -1,6 +1,6 @@
 //! Torus knot.
 
-use isograd::vector::{norm, sub};
+use isograd_element::vector::{norm, sub};
 
 use crate::jet::{Jet, JetVector, add_scaled, cross};
 use crate::kind::{Kind, ShapeError, length};

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use isograd::vector::norm;
+use isograd_element::vector::norm;
 
 use crate::jet::{Jet, JetVector};
 use crate::kind::{Kind, ShapeError, UNIT_OF_LENGTH, length, number};

@@ -2,7 +2,7 @@
 
 mod branch;
 
-use isograd::vector::{add, scale};
+use isograd_element::vector::{add, scale};
 
 use crate::jet::{Jet, JetVector, add_scaled, cross, scaled};
 use crate::kind::{Kind, Parameter, length, number};

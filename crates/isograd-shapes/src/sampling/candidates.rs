@@ -1,6 +1,6 @@
 //! Random points of a surface, each place as likely as its area (times the density wanted).
 
-use isograd::vector::{norm, normalized};
+use isograd_element::vector::{norm, normalized};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 

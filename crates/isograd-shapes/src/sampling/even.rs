@@ -4,7 +4,7 @@
 use std::collections::BinaryHeap;
 
 use isograd::neighbors::CellIndex;
-use isograd::vector::dot;
+use isograd_element::vector::dot;
 use rayon::prelude::*;
 
 use super::OVERSAMPLING;

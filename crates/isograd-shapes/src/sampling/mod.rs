@@ -5,8 +5,8 @@ mod even;
 #[cfg(test)]
 mod tests;
 
-use isograd::vector::of_f64;
 use isograd::{PointCloud, PointCloudError, Real, data::Attribute};
+use isograd_element::vector::of_f64;
 
 use crate::shape::{Shape, SurfaceCoordinate};
 use candidates::{Candidate, Source};

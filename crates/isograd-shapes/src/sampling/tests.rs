@@ -1,4 +1,4 @@
-use isograd::vector::{dot, norm, sub};
+use isograd_element::vector::{dot, norm, sub};
 
 use super::{Density, Layout, Sampling};
 use crate::{Samples, by_name};

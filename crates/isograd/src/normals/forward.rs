@@ -3,9 +3,8 @@
 use pulp::Arch;
 use rayon::prelude::*;
 
-use super::eigen::{Eigen, eigen};
 use super::{Plane, Residual, widen};
-use crate::element::plane;
+use crate::element::{eigen::eigen, plane};
 use crate::neighbors::{self, Candidates, Found, LANES, Lanes, Neighborhoods, Radius, sum_lanes};
 use crate::parallel::CHUNK;
 use crate::{Real, simd, vector};
@@ -214,7 +213,9 @@ fn planes_of(moments: &Moments<[f64; LANES]>) -> Planes {
             m[7] - m[1] * m[2],
             m[8] - m[2] * m[2],
         ];
-        let Eigen { values, vectors } = eigen(covariance);
+        let eigen = eigen(covariance.into());
+        let values: [f64; 3] = eigen.values.into();
+        let vectors: [[f64; 3]; 3] = [eigen.first.into(), eigen.second.into(), eigen.third.into()];
         for a in 0..3 {
             found.centroid[a][l] = m[a];
             found.values[a][l] = if values[a] > 0.0 { values[a] } else { 0.0 };

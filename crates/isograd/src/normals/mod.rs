@@ -56,7 +56,6 @@
 //! `10⁻³ λ₃` (a line, an isolated point, a corner as thick as it is wide) the axis itself is ill defined:
 //! such a plane is marked [`Plane::guarded`], and the pullback bounds `1/(λ₁ − λ_k)` there.
 
-mod eigen;
 mod forward;
 mod pullback;
 #[cfg(test)]
@@ -65,7 +64,6 @@ pub mod widen;
 #[cfg(test)]
 mod widen_tests;
 
-pub(crate) use eigen::{Symmetric, eigen};
 pub(crate) use forward::hold;
 pub use forward::{forward, forward_with_neighborhoods};
 pub use pullback::{Scratch, pullback};

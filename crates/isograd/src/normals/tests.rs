@@ -2,9 +2,9 @@
 
 use rayon::ThreadPoolBuilder;
 
-use super::eigen::{Symmetric, eigen};
 use super::forward::EPSILON;
 use super::{Residual, forward, forward_with_neighborhoods};
+use crate::element::eigen::eigen;
 use crate::neighbors::tests::{Random, even_sphere, torus, ugly_clouds};
 use crate::neighbors::{self, Neighborhoods, Radius};
 use crate::{Real, vector};
@@ -27,7 +27,7 @@ fn members<T: Real>(points: &[[T; 3]], i: usize, radius: T) -> Vec<(usize, [f64;
 }
 
 /// `W`, `m` and `C` as the module's page prints them.
-fn covariance(members: &[(usize, [f64; 3])], radius: f64) -> (f64, [f64; 3], Symmetric) {
+fn covariance(members: &[(usize, [f64; 3])], radius: f64) -> (f64, [f64; 3], [f64; 6]) {
     let weighted = || {
         members
             .iter()
@@ -280,7 +280,7 @@ fn the_residual_holds_all_that_the_pullback_needs() {
                     )
                 })
                 .collect();
-            let n = eigen(covariance(&moved, radius).2).vectors[0];
+            let n = eigen(covariance(&moved, radius).2.into()).first.into();
             vector::dot(n, normal_bar) * vector::dot(n, found.normals[i]).signum()
         };
         let numeric = (value(step) - value(-step)) / (2.0 * step);

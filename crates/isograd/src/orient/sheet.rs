@@ -11,8 +11,8 @@
 //! ones.
 
 use crate::element::coupling::NEIGHBORS;
+use crate::element::eigen::eigen;
 use crate::element::sheet::{self, QUORUM, REST, SPANNING};
-use crate::normals::{Symmetric, eigen};
 use crate::vector;
 
 /// A local sheet.
@@ -81,10 +81,10 @@ fn plane(offsets: impl Iterator<Item = [f32; 3]>) -> ([f32; 3], f32) {
         count += 1.0;
     }
     let mean = vector::scale(mean, 1.0 / count);
-    let covariance: Symmetric = std::array::from_fn(|k| second[k] / count - products(mean)[k]);
-    let found = eigen(covariance);
-    let normal = found.vectors[0].map(|x| x as f32);
-    (normal, found.values[0].max(0.0).sqrt() as f32)
+    let covariance: [f64; 6] = std::array::from_fn(|k| second[k] / count - products(mean)[k]);
+    let found = eigen(covariance.into());
+    let normal = vector::of_f64(found.first.into());
+    (normal, found.values.x.max(0.0).sqrt() as f32)
 }
 
 /// Distances of the neighbors from a plane through the sample.

@@ -5,9 +5,10 @@ use isograd::distance::extend::rule::{ENOUGH, MARGIN, MOST, REACH, SMALLEST_AREA
 
 use super::neighbor::{Fitted, Sorted, neighbor, sum_moments};
 use super::{BLOCK, FIT, Samples, columns};
+use crate::element::eigen::{Eigen, Symmetric};
 use crate::element::fit;
 use crate::neighbors::{end_of_leaf, first_of_leaf, next_leaf, reach_squared};
-use crate::normals::{Eigen, MOMENTS, Symmetric, fit as plane_of};
+use crate::normals::{MOMENTS, fit as plane_of};
 use crate::primitives::reduce;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};

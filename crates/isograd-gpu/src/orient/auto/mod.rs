@@ -11,11 +11,11 @@ mod voices;
 pub mod winding;
 
 use cubecl::prelude::*;
-use isograd::element::evidence::is_clear;
 use isograd::orient::decide::{Decision, Place, Signs};
 use isograd::orient::graph as cpu;
 use isograd::orient::groups::Groups;
-use isograd::vector;
+use isograd_element::evidence::is_clear;
+use isograd_element::vector;
 
 use super::{Axes, Decided, Error, Turned};
 use crate::element::evidence;

@@ -1,6 +1,7 @@
 //! Members of clouds: closed bodies, in each other and beside each other, open ones, and heaps.
 
-use isograd::{Real, vector};
+use isograd::Real;
+use isograd_element::vector;
 use isograd_gpu::Scalar;
 
 use crate::clouds::{clouds, real};

@@ -1,6 +1,6 @@
 //! One branch: a round cone, the convex hull of two spheres.
 
-use isograd::vector::{add, dot, norm, norm_squared, scale, sub};
+use isograd_element::vector::{add, dot, norm, norm_squared, scale, sub};
 
 use crate::jet::{Jet, JetVector, add_scaled, cross, scaled, values};
 use crate::surface::{between, turn};

@@ -8,9 +8,9 @@ use cubecl::prelude::*;
 
 use super::offset;
 use crate::element::coupling::NEIGHBORS;
+use crate::element::eigen::{Symmetric, eigen};
 use crate::element::sheet::{self, QUORUM, REST, SPANNING};
 use crate::neighbors::{BLOCK, Neighborhoods};
-use crate::normals::eigen::{Symmetric, eigen};
 use crate::primitives::smallest::ranked;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};

@@ -1,4 +1,4 @@
-//! The linear fit of samples at a vertex, and its pullback: see [`crate::distance::extend`], whose letters these are.
+//! The linear fit of samples at a vertex, and its pullback: see `isograd::distance::extend`, whose letters these are.
 //! Vectors go in and out by component.
 
 #[cfg(cube)]

@@ -1,4 +1,4 @@
-//! What a sample sees along a ray, and what that says about its axis: see [`crate::orient::fill`]. Lengths in cells.
+//! What a sample sees along a ray, and what that says about its axis: see `isograd::orient::fill`. Lengths in cells.
 
 #[cfg(cube)]
 use cubecl::prelude::*;

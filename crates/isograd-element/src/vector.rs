@@ -1,9 +1,6 @@
-//! Vectors of three components: small pure functions, the same lines for every stage.
+//! Vectors of three components in loops on the CPU.
 
 use num_traits::Float;
-
-/// A point or a direction, `(x, y, z)`.
-pub type Vector<T> = [T; 3];
 
 /// `a + b`.
 #[inline(always)]
@@ -81,14 +78,16 @@ pub fn is_finite<T: Float>(a: [T; 3]) -> bool {
     a[0].is_finite() && a[1].is_finite() && a[2].is_finite()
 }
 
-/// The same vector in double precision (exact).
+/// `a` in double precision (exact).
 #[inline(always)]
-pub fn to_f64<T: crate::Real>(a: [T; 3]) -> [f64; 3] {
-    [a[0].f64(), a[1].f64(), a[2].f64()]
+pub fn to_f64<T: Float>(a: [T; 3]) -> [f64; 3] {
+    let exact = |x: T| x.to_f64().unwrap_or(f64::NAN);
+    [exact(a[0]), exact(a[1]), exact(a[2])]
 }
 
 /// The nearest vector of type `T`.
 #[inline(always)]
-pub fn of_f64<T: crate::Real>(a: [f64; 3]) -> [T; 3] {
-    [T::of(a[0]), T::of(a[1]), T::of(a[2])]
+pub fn of_f64<T: Float>(a: [f64; 3]) -> [T; 3] {
+    let nearest = |x: f64| T::from(x).unwrap_or_else(T::nan);
+    [nearest(a[0]), nearest(a[1]), nearest(a[2])]
 }

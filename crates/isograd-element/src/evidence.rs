@@ -1,4 +1,4 @@
-//! What speaks for the sign of one axis, from −1 to 1, in the automatic orientation: see [`crate::orient`].
+//! What speaks for the sign of one axis, from −1 to 1, in the automatic orientation: see `isograd::orient`.
 
 #[cfg(cube)]
 use cubecl::prelude::*;

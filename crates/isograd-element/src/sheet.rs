@@ -1,4 +1,4 @@
-//! When a plane through a sample counts as the sheet that it lies on: see [`crate::orient::graph`].
+//! When a plane through a sample counts as the sheet that it lies on: see `isograd::orient::graph`.
 
 #[cfg(cube)]
 use cubecl::prelude::*;

@@ -1,4 +1,4 @@
-//! Axes between one step of a moving body and the next: see [`crate::orient::Method::Previous`].
+//! Axes between one step of a moving body and the next: see `isograd::orient::Method::Previous`.
 
 #[cfg(cube)]
 use cubecl::prelude::*;

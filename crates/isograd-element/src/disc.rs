@@ -1,4 +1,4 @@
-//! A sample that is drawn on a grid as a disc in its tangent plane: see [`crate::orient::fill`]. Lengths in cells.
+//! A sample that is drawn on a grid as a disc in its tangent plane: see `isograd::orient::fill`. Lengths in cells.
 
 #[cfg(cube)]
 use cubecl::prelude::*;

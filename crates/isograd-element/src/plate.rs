@@ -1,5 +1,5 @@
 //! A plate that is thinner than the step of the indicator is wide, and how far samples on it are followed: see
-//! [`crate::isosurface::local_level`].
+//! `isograd::isosurface::local_level`.
 
 #[cfg(cube)]
 use cubecl::prelude::*;

@@ -1,5 +1,5 @@
 //! What one pair of samples adds to the plane, the crowd and the area of a sample: see
-//! [`crate::normals`] and [`crate::splat::area`].
+//! `isograd::normals` and `isograd::splat::area`.
 
 #[cfg(cube)]
 use cubecl::prelude::*;

@@ -1,5 +1,5 @@
 //! How the signs of two neighboring axes hang together, and what spreads along such ties: see
-//! [`crate::orient::graph`]. Lengths are in sample spacings, so that single precision serves any unit.
+//! `isograd::orient::graph`. Lengths are in sample spacings, so that single precision serves any unit.
 
 #[cfg(cube)]
 use cubecl::prelude::*;

@@ -1,5 +1,5 @@
 //! Mean curvature from the unit normal `n = g/|g|` and the Hessian `H` of a field, and its cotangents: see
-//! [`crate::differential`].
+//! `isograd::differential`.
 
 #[cfg(cube)]
 use cubecl::prelude::*;

@@ -1,4 +1,4 @@
-//! What a sample adds to the generalized winding number, in the automatic orientation: see [`crate::orient`].
+//! What a sample adds to the generalized winding number, in the automatic orientation: see `isograd::orient`.
 
 #[cfg(cube)]
 use cubecl::prelude::*;
