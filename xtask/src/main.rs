@@ -2,10 +2,13 @@
 
 mod bench;
 mod deny;
+mod environment;
 mod examples;
 mod fit;
+mod limits;
 mod links;
 mod nvrtc;
+mod packages;
 mod pages;
 mod peers;
 mod process;
@@ -19,16 +22,18 @@ mod workspace;
 use std::process::ExitCode;
 
 use process::Outcome;
+use test::Scope;
 
 const HELP: &str = "\
 cargo xtask COMMAND
 
 Checks
-  test             everything a change must pass, cheapest first: format, links, clippy, docs,
-                   tests, doc tests, the Python package, examples, and the commands and code of
-                   the README
-  lint             the first three of these
-  python           the step of the Python package alone
+  test [--all]     everything a change must pass, cheapest first: format, limits, links, clippy,
+                   docs, tests, doc tests, the Python package, examples, and the commands and code
+                   of the README; --all adds the GPU kernels on Vulkan and as PTX, PyTorch, the
+                   benchmarks, and crates and source distribution as they are published
+  lint             the first four of these, for the whole workspace
+  python           the tests of the Python package alone
   deny             licenses, sources and advisories of every dependency (needs cargo-deny);
                    --offline leaves the advisories out
 
@@ -78,7 +83,8 @@ fn main() -> ExitCode {
 /// Runs a command, or returns `None` where there is none of that form.
 fn run(command: &str, rest: &[String]) -> Option<Outcome> {
     match (command, rest) {
-        ("test", []) => Some(test::all()),
+        ("test", []) => Some(test::run(Scope::Default)),
+        ("test", [flag]) if flag == "--all" => Some(test::run(Scope::All)),
         ("lint", []) => Some(test::lint()),
         ("python", []) => Some(test::python()),
         ("deny", []) => Some(deny::run(false)),

@@ -1,4 +1,4 @@
-//! The README's shell commands, run as a new user would run them.
+//! The README's shell commands, run as a new user would, and the files it lists.
 //!
 //! Its Rust code is compiled and run as a doc test of `isograd`.
 
@@ -6,31 +6,36 @@ use std::fs;
 use std::process::Command;
 
 use crate::process::{self, Outcome};
+use crate::workspace::Workspace;
 
-/// Runs every command in the README's `sh` blocks, then looks for every `out/…` path it names.
+/// The README's way to build and run the program. The tests run the program that they have built.
+const PROGRAM: &str = "cargo run --release --";
+
+/// Runs every command in the README's `sh` blocks, then checks that every `out/…` path it lists exists.
 pub fn run() -> Outcome<Vec<String>> {
     let path = process::root().join("README.md");
     let text = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let program = Workspace::load()?.program();
     for command in commands(&text) {
+        let command = command.replace(PROGRAM, &format!("'{}'", program.display()));
         println!("$ {command}");
         process::run(
             Command::new("sh")
-                .args(["-c", command])
+                .args(["-c", &command])
                 .current_dir(process::root()),
         )?;
     }
     for name in output_paths(&text) {
-        let made = process::root().join(name);
-        if !made.exists() {
+        if !process::root().join(name).exists() {
             return Err(format!(
-                "the README names {name}, but its commands did not make it"
+                "the README lists {name}, but its commands did not write it"
             ));
         }
     }
     Ok(Vec::new())
 }
 
-/// The commands in `sh` blocks, in order. Those of `cargo xtask` are left out: this is one.
+/// The commands in `sh` blocks, in order, except those of `cargo xtask`, which runs this.
 fn commands(text: &str) -> Vec<&str> {
     let mut inside = false;
     let mut found = Vec::new();
@@ -49,7 +54,7 @@ fn is_command(line: &str) -> bool {
     !line.is_empty() && !line.starts_with('#') && !line.starts_with("cargo xtask")
 }
 
-/// The files below `out/` that the text names in code marks: `` `out/fish/mesh.ply` ``.
+/// The files below `out/` in code spans of the text: `` `out/fish/mesh.ply` ``.
 fn output_paths(text: &str) -> Vec<&str> {
     text.split('`')
         .filter(|part| part.starts_with("out/") && !part.contains(char::is_whitespace))
@@ -86,7 +91,7 @@ echo done
     }
 
     #[test]
-    fn files_named_in_code_marks_are_found() {
+    fn files_in_code_spans_are_found() {
         assert_eq!(output_paths(TEXT), ["out/fish/mesh.ply"]);
     }
 }

@@ -1,22 +1,71 @@
-//! `cargo xtask test`: everything a change must pass, cheapest first.
+//! `cargo xtask test [--all]`: everything a change must pass, cheapest first.
+
+use std::process::Command;
 
 use crate::examples;
+use crate::limits;
 use crate::links;
 use crate::nvrtc::Nvrtc;
+use crate::packages;
 use crate::process::{self, Outcome};
 use crate::python;
 use crate::readme;
 use crate::steps::Steps;
 use crate::tally::Tally;
 
-/// Features of the tests: the kernels are built for their own tests in any case.
-pub const FEATURES: &str = "isograd-cli/vulkan,isograd-python/vulkan";
+/// Which packages and features a run covers.
+///
+/// Every cargo command of a run selects the same packages and features, so that each dependency is built once: cargo
+/// builds a crate anew wherever its features differ.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Scope {
+    /// The default members of the workspace, without GPU kernels.
+    Default,
+    /// All members; kernels on Vulkan and as PTX, PyTorch, packages.
+    All,
+}
+
+impl Scope {
+    /// `cargo COMMAND` on the packages of this scope.
+    fn cargo(self, command: &str) -> Command {
+        let mut cargo = process::cargo([command]);
+        if self == Self::All {
+            cargo.arg("--workspace");
+        }
+        cargo
+    }
+
+    /// `cargo COMMAND` with the features that are built, not only checked.
+    fn cargo_built(self, command: &str) -> Command {
+        let mut cargo = self.cargo(command);
+        if self == Self::All {
+            cargo.args(["--features", "isograd-cli/vulkan,isograd-python/vulkan"]);
+        }
+        cargo
+    }
+
+    /// `cargo COMMAND` with the features that are checked.
+    fn cargo_checked(self, command: &str) -> Command {
+        let mut cargo = self.cargo(command);
+        if self == Self::All {
+            cargo.arg("--all-features");
+        }
+        cargo
+    }
+
+    /// Builds libraries, programs, examples and tests, in the dev profile.
+    pub fn build(self) -> Outcome<Vec<String>> {
+        let mut build = self.cargo_built("build");
+        process::run(build.args(["--lib", "--bins", "--examples", "--tests"]))?;
+        Ok(Vec::new())
+    }
+}
 
 /// All steps, a summary, and the count of tests as the last line.
-pub fn all() -> Outcome {
+pub fn run(scope: Scope) -> Outcome {
     let mut steps = Steps::default();
     let mut tally = Tally::default();
-    let result = run(&mut steps, &mut tally);
+    let result = run_steps(scope, &mut steps, &mut tally);
     steps.summarize();
     if result.is_ok() || tally.counted() > 0 {
         println!("{}", tally.summary());
@@ -27,71 +76,75 @@ pub fn all() -> Outcome {
 /// The tests of the Python package.
 pub fn python() -> Outcome {
     let mut tally = Tally::default();
-    python::run(&mut tally)?;
+    Scope::Default.build()?;
+    python::run(Scope::Default, &mut tally)?;
     println!("{}", tally.summary());
     Ok(())
 }
 
-/// Format, links and clippy.
+/// Format, limits, links and clippy.
 pub fn lint() -> Outcome {
-    let mut steps = Steps::default();
-    lint_steps(&mut steps)
+    lint_steps(Scope::All, &mut Steps::default())
 }
 
-fn run(steps: &mut Steps, tally: &mut Tally) -> Outcome {
-    lint_steps(steps)?;
-    steps.step("docs", docs)?;
-    steps.step("tests", || {
-        let nvrtc = Nvrtc::fetch()
-            .inspect_err(|reason| println!("PTX tests are left out: {reason}"))
-            .ok();
-        tests(tally, &["--tests"], nvrtc.as_ref())
-    })?;
-    steps.step("doc tests", || tests(tally, &["--doc"], None))?;
-    steps.step("Python", || python::run(tally))?;
+fn run_steps(scope: Scope, steps: &mut Steps, tally: &mut Tally) -> Outcome {
+    lint_steps(scope, steps)?;
+    steps.step("docs", || docs(scope))?;
+    steps.step("build", || scope.build())?;
+    let nvrtc = (scope == Scope::All).then(Nvrtc::fetch).and_then(|nvrtc| {
+        nvrtc
+            .inspect_err(|reason| println!("PTX tests are skipped: {reason}"))
+            .ok()
+    });
+    steps.step("tests", || tests(scope, tally, "--tests", nvrtc.as_ref()))?;
+    steps.step("doc tests", || tests(scope, tally, "--doc", None))?;
+    steps.step("Python", || python::run(scope, tally))?;
     steps.step("examples", examples::run)?;
-    steps.step("README commands", readme::run)
+    steps.step("README commands", readme::run)?;
+    if scope == Scope::All {
+        steps.step("crates", packages::crates)?;
+        steps.step("source distribution", packages::source_distribution)?;
+    }
+    Ok(())
 }
 
-fn lint_steps(steps: &mut Steps) -> Outcome {
+fn lint_steps(scope: Scope, steps: &mut Steps) -> Outcome {
     steps.step("format", format)?;
+    steps.step("limits", limits::run)?;
     steps.step("links", links::run)?;
-    steps.step("clippy", clippy)
+    steps.step("clippy", || clippy(scope))
 }
 
 fn format() -> Outcome<Vec<String>> {
     process::run(&mut process::cargo(["fmt", "--all", "--check"]))
-        .map_err(|failure| format!("{failure}; `cargo fmt` mends it"))?;
+        .map_err(|failure| format!("{failure}; run `cargo fmt`"))?;
     Ok(Vec::new())
 }
 
-fn clippy() -> Outcome<Vec<String>> {
-    process::run(&mut process::cargo([
-        "clippy",
-        "--workspace",
-        "--all-targets",
-        "--all-features",
-        "--",
-        "-D",
-        "warnings",
-    ]))?;
+fn clippy(scope: Scope) -> Outcome<Vec<String>> {
+    let mut clippy = scope.cargo_checked("clippy");
+    process::run(clippy.args(["--all-targets", "--", "-D", "warnings"]))?;
     Ok(Vec::new())
 }
 
-fn docs() -> Outcome<Vec<String>> {
-    let mut command = process::cargo(["doc", "--workspace", "--no-deps", "--all-features"]);
-    process::run(command.env("RUSTDOCFLAGS", "-D warnings"))?;
+fn docs(scope: Scope) -> Outcome<Vec<String>> {
+    let mut docs = scope.cargo_checked("doc");
+    process::run(docs.arg("--no-deps").env("RUSTDOCFLAGS", "-D warnings"))?;
     Ok(Vec::new())
 }
 
-/// Runs tests to the end, failures or not, and returns the lines of those left out by this call.
-fn tests(tally: &mut Tally, targets: &[&str], nvrtc: Option<&Nvrtc>) -> Outcome<Vec<String>> {
+/// Runs tests to the end, failures or not, and returns the `SKIPPED` lines of this call.
+fn tests(
+    scope: Scope,
+    tally: &mut Tally,
+    targets: &str,
+    nvrtc: Option<&Nvrtc>,
+) -> Outcome<Vec<String>> {
     let before = tally.skipped_lines().len();
-    let mut command = process::cargo(["test", "--workspace", "--no-fail-fast"]);
-    command.args(["--features", FEATURES]);
-    command.args(targets).args(["--", "--show-output"]);
+    let mut command = scope.cargo_built("test");
+    command.args(["--no-fail-fast", targets, "--", "--show-output"]);
     if let Some(nvrtc) = nvrtc {
-        nvrtc.tell(&mut command);
+        nvrtc.set_paths(&mut command);
     }
     process::run_by_line(&mut command, |line| {
         if tally.read(line) {

@@ -1,4 +1,4 @@
-//! What cargo knows of the workspace.
+//! The metadata of the workspace.
 
 use std::path::PathBuf;
 
@@ -6,16 +6,18 @@ use serde_json::Value;
 
 use crate::process::{self, Outcome};
 
-/// The target folder and the names of all examples.
+/// Paths and names from `cargo metadata`.
 pub struct Workspace {
-    /// Where cargo puts what it builds.
+    /// Folder of all build products.
     pub target: PathBuf,
     /// Names of the examples of every package, sorted.
     pub examples: Vec<String>,
+    /// Names of the packages that can be published.
+    pub published: Vec<String>,
 }
 
 impl Workspace {
-    /// Asks cargo.
+    /// Runs `cargo metadata`.
     pub fn load() -> Outcome<Self> {
         let mut command = process::cargo(["metadata", "--no-deps", "--format-version", "1"]);
         let output = command
@@ -29,11 +31,18 @@ impl Workspace {
             .map_err(|error| format!("`cargo metadata` printed no JSON: {error}"))?;
         let target = metadata["target_directory"]
             .as_str()
-            .ok_or("`cargo metadata` names no target folder")?;
+            .ok_or("`cargo metadata` lists no target folder")?;
         Ok(Self {
             target: PathBuf::from(target),
             examples: examples(&metadata),
+            published: published(&metadata),
         })
+    }
+
+    /// The program of the command line that the last build made.
+    pub fn program(&self) -> PathBuf {
+        let name = format!("isograd{}", std::env::consts::EXE_SUFFIX);
+        self.target.join("debug").join(name)
     }
 }
 
@@ -42,6 +51,16 @@ fn examples(metadata: &Value) -> Vec<String> {
         .flat_map(|package| each(&package["targets"]))
         .filter(|target| each(&target["kind"]).any(|kind| kind == "example"))
         .filter_map(|target| target["name"].as_str().map(str::to_owned))
+        .collect();
+    names.sort();
+    names
+}
+
+/// Packages without `publish = false`, sorted.
+fn published(metadata: &Value) -> Vec<String> {
+    let mut names: Vec<String> = each(&metadata["packages"])
+        .filter(|package| package["publish"].is_null())
+        .filter_map(|package| package["name"].as_str().map(str::to_owned))
         .collect();
     names.sort();
     names
@@ -56,12 +75,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn examples_of_every_package_are_found() {
+    fn examples_and_published_packages_are_found() {
         let metadata = serde_json::json!({"packages": [
-            {"targets": [{"name": "b", "kind": ["example"]}, {"name": "x", "kind": ["lib"]}]},
-            {"targets": [{"name": "a", "kind": ["example"]}]},
+            {"name": "isograd-x", "publish": [], "targets": [{"name": "b", "kind": ["example"]}, {"name": "x", "kind": ["lib"]}]},
+            {"name": "isograd", "publish": null, "targets": [{"name": "a", "kind": ["example"]}]},
         ]});
         assert_eq!(examples(&metadata), ["a", "b"]);
+        assert_eq!(published(&metadata), ["isograd"]);
         assert!(examples(&Value::Null).is_empty());
     }
 }

@@ -80,7 +80,10 @@ impl Problem {
         let memory = PeakAlloc;
         let before = memory.current_usage();
         memory.reset_peak_usage();
-        let options = Options::default().checks(false);
+        let options = Options {
+            checks: false,
+            ..Options::default()
+        };
         let mut plan = Reconstructor::new(grid, options)?;
         let (mut scratch, mut out) = (PullbackScratch::default(), CloudCotangent::default());
         let mut peaks = [0; 2];

@@ -100,9 +100,11 @@ fn first_call(points: &[[f32; 3]], grid: Grid<f32>) -> Outcome<(Call, Found)> {
 }
 
 fn steps_after(found: &Found, clouds: &[Vec<[f32; 3]>], grid: Grid<f32>) -> Outcome<Vec<Call>> {
-    let options = unchecked()
-        .radius(Radius::Fixed(found.radius))
-        .orient(Method::Signs);
+    let options = Options {
+        radius: Radius::Fixed(found.radius),
+        orientation: Method::Signs,
+        ..unchecked()
+    };
     let mut plan = Reconstructor::new(grid, options)?;
     let mut normals = found.normals.clone();
     let mut calls = Vec::new();
@@ -120,7 +122,10 @@ fn steps_after(found: &Found, clouds: &[Vec<[f32; 3]>], grid: Grid<f32>) -> Outc
 }
 
 fn unchecked() -> Options {
-    Options::default().checks(false)
+    Options {
+        checks: false,
+        ..Options::default()
+    }
 }
 
 fn show(threads: usize, first: &Call, second: &Call, later: &[Call]) {

@@ -39,7 +39,7 @@ pub fn run(args: &args::Gradcheck) -> Result<(), Error> {
         source,
     })?;
     let options = Options {
-        reconstruction: args.method.options(),
+        reconstruction: args.method.options(grid.spacing()),
         step: args.step,
         seed: args.seed,
         ..Options::default()

@@ -105,7 +105,10 @@ impl Target {
         grid: Grid<f64>,
         options: &isograd::Options,
     ) -> Result<Self, TargetError> {
-        let options = options.clone().checks(false);
+        let options = isograd::Options {
+            checks: false,
+            ..options.clone()
+        };
         let mut plan = Reconstructor::new(grid, options)?;
         plan.reconstruct(cloud)?;
         Self::from_sdf(plan.into_reconstruction().sdf().clone())

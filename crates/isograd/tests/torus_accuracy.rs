@@ -13,7 +13,10 @@ fn reconstruct(cloud: &PointCloud<f32>, cells: usize, options: Options) -> Recon
 }
 
 fn exact_normals() -> Options {
-    Options::default().orient(Method::Given)
+    Options {
+        orientation: Method::Given,
+        ..Options::default()
+    }
 }
 
 /// Mean and maximum of |distance to the true torus| over the vertices of the surface, in cells.

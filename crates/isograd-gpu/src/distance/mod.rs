@@ -84,11 +84,11 @@ pub enum Error {
     Empty,
     /// The width of the band is not a positive number.
     #[error(
-        "the band has a width of {width}; give a positive, finite length in the unit of the points, or use the full field"
+        "a band of {cells} cells on either side has no width; give a positive number of cells, or ask for the full field"
     )]
     Band {
-        /// Distance from the surface to the end of the band.
-        width: f64,
+        /// The width asked for, in cells.
+        cells: f64,
     },
     /// A flat `(N, 3)` array whose length is not 3N.
     #[error("{what} has {length} numbers, which is not three for each")]

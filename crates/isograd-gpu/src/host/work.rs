@@ -72,7 +72,7 @@ pub trait Work<T: Scalar>: Send + Sync {
         &self,
         result: &Reconstruction<T>,
         attribute: &Attribute<T>,
-        band: f64,
+        band_cells: f64,
     ) -> Result<(Extension<T>, Residual<T>), Error>;
 
     /// A copy of numbers.
@@ -290,9 +290,9 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
         &self,
         result: &Reconstruction<T>,
         attribute: &Attribute<T>,
-        band: f64,
+        band_cells: f64,
     ) -> Result<(Extension<T>, Residual<T>), Error> {
-        extend::forward(self, result, attribute, band)
+        extend::forward(self, result, attribute, band_cells)
     }
 
     fn numbers(&self, buffer: &Buffer<T>) -> Result<Vec<T>, Error> {

@@ -205,7 +205,7 @@ fn unit_of_length_makes_no_difference() {
             samples,
             &attribute,
             surface,
-            3.0 * scene.phi.grid().spacing(),
+            3.0,
             scratch,
             &mut residual,
             &mut found,
@@ -278,13 +278,12 @@ fn memory_is_used_again() {
         )
     };
     let before = addresses(&extension, &residual);
-    let spacing = f64::from(scene.phi.grid().spacing());
     let (samples, surface, scratch) = (scene.samples(), scene.surface(), &mut Scratch::default());
     forward(
         samples,
         &attribute,
         surface,
-        spacing,
+        1.0,
         scratch,
         &mut residual,
         &mut extension,
@@ -294,7 +293,7 @@ fn memory_is_used_again() {
         samples,
         &attribute,
         surface,
-        3.0 * spacing,
+        3.0,
         scratch,
         &mut residual,
         &mut extension,
