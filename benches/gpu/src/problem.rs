@@ -168,7 +168,7 @@ impl Problem {
 
 impl<R: Runtime> Set<R> {
     fn hold(&self) -> Outcome<Held<f32>> {
-        let method = Method::Signs(&self.normals);
+        let method = Method::Signs(self.normals.clone());
         let held = Held::find_on_device(&self.device, &self.points, Radius::Auto, &method)?;
         self.device.wait()?;
         Ok(held)

@@ -14,7 +14,6 @@
 
 pub mod area;
 mod device;
-pub mod differential;
 pub mod distance;
 mod grid;
 pub mod host;

@@ -366,6 +366,27 @@ fn a_call_with_other_points_finds_their_sides_anew() {
 }
 
 #[test]
+fn sensors_tell_the_sides_as_on_the_cpu() {
+    if !is_here::<f32>() {
+        return;
+    }
+    let sensors = isograd::Sensors::Any(vec![[0.0, 0.0, 6.0], [0.0, 0.0, -6.0]]);
+    let cloud = cloud::<f32>(1500).with_sensors(sensors).unwrap();
+    let options = Options {
+        orientation: Method::Sensors,
+        ..options()
+    };
+    let grid = grid(&cloud);
+    let mut plan = Plan::new(Backend::Vulkan, grid, options.clone()).unwrap();
+    let found = plan.reconstruct(&cloud).unwrap();
+    assert_eq!(found.report(&cloud).unwrap().orientation, "sensors");
+    let mut plan = Reconstructor::new(grid, options).unwrap();
+    let expected = plan.reconstruct(&cloud).unwrap();
+    let phi = found.sdf().unwrap().values();
+    assert!(relative(phi, expected.sdf().values()) < 2e-4);
+}
+
+#[test]
 fn given_normals_are_taken_and_have_cotangents() {
     if !is_here::<f32>() {
         return;

@@ -1,10 +1,8 @@
-//! Signed distance to a triangle mesh on the device: at every cell center of a grid, and at any point.
+//! Signed distance to a triangle mesh on the device, at every cell center of a grid.
 //!
 //! # Map
 //! As in [`isograd::distance`]: `φ(q) = σ(q) · min_y |q − y|` over all points `y` of the mesh, in the user's
 //! unit, negative inside; exact but for rounding. [`lattice::forward`] takes the sign from `χ − c` at the cell.
-//! [`query::forward`] gives the distance without a sign, its gradient, the closest point, its face and its weights;
-//! [`query::signed`] the same with the sign of the closest feature's pseudonormal, or of a field.
 //! [`mod@extend`] carries what is known at samples of the surface to the cells round it.
 //! Triangles are found in a hierarchy of boxes that is made on the device; of triangles equally far, to the
 //! last bit, the lowest face is named.
@@ -13,10 +11,9 @@
 //! The closest face of every cell. The barycentric weights `β` of the closest point follow from it.
 //!
 //! # Pullback
-//! [`lattice::pullback`], and [`query::pullback`] with `q̄ += φ̄ ∇φ` for the points. By the envelope theorem,
-//! with `β` held constant: `ȳ_k += −β_k φ̄ ∇φ`, with `∇φ = σ (q − y)/|q − y|`, or the normal of the face at distance 0.
-//! Cotangents of closest points go through `β` too. Every sum is cut into pieces of a fixed size, however many cells
-//! have the same closest face.
+//! [`lattice::pullback`]. By the envelope theorem, with `β` held constant: `ȳ_k += −β_k φ̄ ∇φ`, with
+//! `∇φ = σ (q − y)/|q − y|`, or the normal of the face at distance 0. Every sum is cut into pieces of a fixed size,
+//! however many cells have the same closest face.
 //!
 //! # Not differentiable
 //! On the medial axis, where the closest point jumps, and on the mesh itself at its edges and corners. The sign
@@ -29,9 +26,6 @@
 pub mod extend;
 pub mod lattice;
 mod morton;
-mod pseudonormals;
-pub mod query;
-mod query_pullback;
 mod search;
 mod settle;
 mod shares;

@@ -32,25 +32,6 @@ pub(super) fn face_order<T: Scalar, R: Runtime>(
     Ok(sort::order(device, &codes, 1 << 30)?)
 }
 
-/// The order of points by their Morton codes within `bounds`.
-pub(super) fn point_order<T: Scalar, R: Runtime>(
-    device: &Device<R>,
-    points: &Buffer<T>,
-    bounds: &Buffer<T>,
-) -> Result<sort::Order, Error> {
-    let count = points.len() / 3;
-    let codes = device.empty(count)?;
-    code_points::launch::<T, R>(
-        device.client(),
-        device.groups(count, BLOCK),
-        CubeDim::new_1d(BLOCK),
-        points.arg(),
-        bounds.arg(),
-        codes.arg(),
-    );
-    Ok(sort::order(device, &codes, 1 << 30)?)
-}
-
 /// Ten bits of where `x` is between two numbers.
 #[cube]
 fn ten_bits<F: Float>(x: F, low: F, high: F) -> u32 {
@@ -87,12 +68,5 @@ fn code_centers<F: Float>(
             z: t.a.z * third + t.b.z * third + t.c.z * third,
         };
         codes[ABSOLUTE_POS] = morton::<F>(center, bounds);
-    }
-}
-
-#[cube(launch)]
-fn code_points<F: Float>(points: &Array<F>, bounds: &Array<F>, codes: &mut Array<u32>) {
-    if ABSOLUTE_POS < codes.len() {
-        codes[ABSOLUTE_POS] = morton::<F>(Vector3::<F>::at(points, ABSOLUTE_POS), bounds);
     }
 }

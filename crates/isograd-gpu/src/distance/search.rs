@@ -1,4 +1,4 @@
-//! The closest triangle of cells and of points, by descent into a [`Tree`].
+//! The closest triangle of cells, by descent into a [`Tree`].
 //!
 //! The cells of a brick of 4 × 4 × 4 begin with the triangle that is closest to the center of the brick, found
 //! in the same way on a lattice of the bricks, and so on up to a few bricks: a bound that is never further off
@@ -9,8 +9,7 @@
 
 use cubecl::prelude::*;
 
-use super::morton::point_order;
-use super::settle::{Queries, settle};
+use super::settle::settle;
 use super::tree::{LEAF, NONE, Tree};
 use super::triangle::{distance_squared, load_frame};
 use super::{Error, FAR};
@@ -101,49 +100,7 @@ fn solve_level<T: Scalar, R: Runtime>(
         seeded,
         last,
     );
-    let queries = Queries {
-        points: device.empty(0)?,
-        of_points: false,
-        level,
-        bound,
-        last,
-    };
-    settle(device, tree, &queries, &found)?;
-    Ok(found)
-}
-
-/// The face closest to each of the `(N, 3)` points. The tree has its origin at zero.
-pub(super) fn points<T: Scalar, R: Runtime>(
-    device: &Device<R>,
-    tree: &Tree<T>,
-    points: &Buffer<T>,
-) -> Result<Buffer<u32>, Error> {
-    let order = point_order(device, points, &tree.bounds)?;
-    let found = device.empty(points.len() / 3)?;
-    nearest_of_points::launch::<T, R>(
-        device.client(),
-        device.groups(found.len(), UNITS),
-        CubeDim::new_1d(UNITS),
-        tree.boxes.arg(),
-        tree.children.arg(),
-        tree.frames.arg(),
-        tree.faces.arg(),
-        points.arg(),
-        order.places.arg(),
-        found.arg(),
-        T::of(FAR),
-    );
-    let queries = Queries {
-        points: points.clone(),
-        of_points: true,
-        level: Level {
-            shape: [0; 3],
-            spacing: 0.0,
-        },
-        bound: FAR,
-        last: true,
-    };
-    settle(device, tree, &queries, &found)?;
+    settle(device, tree, level, bound, last, &found)?;
     Ok(found)
 }
 
@@ -300,30 +257,6 @@ fn nearest_of_cells<F: Float + CubeElement>(
             result = faces[result as usize];
         }
         found[((i * ny + j) * nz + k) as usize] = result;
-    }
-}
-
-/// The points are taken in Morton order, so that the units of a group go the same ways.
-#[cube(launch)]
-fn nearest_of_points<F: Float + CubeElement>(
-    boxes: &Array<F>,
-    children: &Array<u32>,
-    frames: &Array<F>,
-    faces: &Array<u32>,
-    points: &Array<F>,
-    order: &Array<u32>,
-    found: &mut Array<u32>,
-    bound: F,
-) {
-    if ABSOLUTE_POS < found.len() {
-        let point = order[ABSOLUTE_POS];
-        let q = Vector3::<F>::at(points, point as usize);
-        let place = nearest::<F>(boxes, children, frames, faces, q, bound, NONE.runtime());
-        let mut result = place;
-        if place < UNPROVEN {
-            result = faces[place as usize];
-        }
-        found[point as usize] = result;
     }
 }
 

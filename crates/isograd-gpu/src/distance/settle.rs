@@ -21,21 +21,14 @@ const TAKEN: usize = 64;
 /// What [`UNPROVEN`] marks, without the mark.
 const NOT_UNPROVEN: u32 = UNPROVEN - 1;
 
-/// What was asked, of points or of the cells of a lattice, and whether faces are the answer.
-pub(super) struct Queries<T> {
-    pub points: Buffer<T>,
-    pub of_points: bool,
-    pub level: Level,
-    /// Squared.
-    pub bound: f64,
-    pub last: bool,
-}
-
-/// Solves what descents have left in `found`, a group each.
+/// Solves what descents to the cells of `level` have left in `found`, a group each; `bound` is squared, and faces are
+/// written where `last`.
 pub(super) fn settle<T: Scalar, R: Runtime>(
     device: &Device<R>,
     tree: &Tree<T>,
-    queries: &Queries<T>,
+    level: Level,
+    bound: f64,
+    last: bool,
     found: &Buffer<u32>,
 ) -> Result<(), Error> {
     let count = found.len();
@@ -66,18 +59,16 @@ pub(super) fn settle<T: Scalar, R: Runtime>(
         tree.pyramid.arg(),
         tree.frames.arg(),
         tree.faces.arg(),
-        queries.points.arg(),
         left.arg(),
         before.arg(),
         found.arg(),
-        T::of(queries.level.spacing),
-        T::of(queries.bound),
-        queries.level.shape[1] as u32,
-        queries.level.shape[2] as u32,
+        T::of(level.spacing),
+        T::of(bound),
+        level.shape[1] as u32,
+        level.shape[2] as u32,
         (tree.width() / taken) as u32,
         taken as u32,
-        queries.of_points,
-        queries.last,
+        last,
         SETTLER_UNITS as usize,
     );
     Ok(())
@@ -110,7 +101,6 @@ fn settle_left<F: Float + CubeElement>(
     pyramid: &Array<F>,
     frames: &Array<F>,
     faces: &Array<u32>,
-    points: &Array<F>,
     left: &Array<u32>,
     before: &Array<u32>,
     found: &mut Array<u32>,
@@ -120,7 +110,6 @@ fn settle_left<F: Float + CubeElement>(
     nz: u32,
     level: u32,
     taken: u32,
-    #[comptime] of_points: bool,
     #[comptime] last: bool,
     #[comptime] units: usize,
 ) {
@@ -132,11 +121,7 @@ fn settle_left<F: Float + CubeElement>(
     let mut turn = CUBE_POS as u32;
     while turn < count {
         let query = left[turn as usize];
-        let q = if comptime!(of_points) {
-            Vector3::<F>::at(points, query as usize)
-        } else {
-            center::<F>(query, spacing, ny, nz)
-        };
+        let q = center::<F>(query, spacing, ny, nz);
         let guess = found[query as usize] & NOT_UNPROVEN;
         let own = try_runs::<F>(pyramid, frames, faces, q, bound, guess, level, taken, units);
         least_of[unit] = own.least;

@@ -40,8 +40,6 @@ pub(super) struct Tree<T> {
     pub faces: Buffer<u32>,
     /// Boxes of aligned runs of them, as a heap: entry 1 is that of all.
     pub pyramid: Buffer<T>,
-    /// Low and high corner of all vertices.
-    pub bounds: Buffer<T>,
 }
 
 impl<T: Scalar> Tree<T> {
@@ -78,7 +76,6 @@ impl<T: Scalar> Tree<T> {
             frames: placed.frames,
             faces: placed.faces,
             pyramid: placed.pyramid,
-            bounds,
         })
     }
 

@@ -6,6 +6,8 @@
 //! compiled here, once for each number type.
 //!
 //! # What differs from the CPU
+//! - The signs of [`Method::Auto`](isograd::orient::Method::Auto) and
+//!   [`Method::Sensors`](isograd::orient::Method::Sensors), and the radii with them, are found on the CPU.
 //! - With [`Method::Previous`](isograd::orient::Method::Previous) radii are found by the first call, by one with another
 //!   number of points, and where more than 3 % of the axes have turned far. Every other call keeps them.
 
@@ -14,7 +16,6 @@ mod error;
 mod extend;
 mod plan;
 mod result;
-mod sides;
 mod work;
 
 pub use backend::{Choice, choose};

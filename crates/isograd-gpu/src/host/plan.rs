@@ -164,10 +164,19 @@ impl<T: Number> Plan<T> {
             clock.note(&mut of_normals, Stage::Normals);
             observer(Stage::Orient)
         };
+        // As the signs of the plan, so that a result that is restored has the radii that it had.
+        let on_cpu = matches!(
+            self.options.orientation,
+            Method::Auto | Method::Sensors | Method::Previous
+        );
+        let method = match method {
+            Method::Previous => Method::Auto,
+            method => method,
+        };
         let radius = self.options.radius;
         let mut begun = self
             .device
-            .find(cloud, points, radius, method, &mut begin)?;
+            .find(cloud, points, radius, method, on_cpu, &mut begin)?;
         begun.report.seconds = of_normals.seconds;
         clock.note(&mut begun.report, Stage::Orient);
         Ok(begun)

@@ -6,15 +6,17 @@ use std::sync::Arc;
 use cubecl::prelude::{CubeElement, Runtime};
 use isograd::distance::extend::{Extension, Residual};
 use isograd::neighbors::Radius;
-use isograd::orient::Method;
+use isograd::orient::{self, Method};
 use isograd::{
     Attribute, Backend, CloudCotangent, Cotangent, Grid, GridCotangent, PointCloud, Report, Stage,
 };
 
 use super::Error;
 use super::extend::{self, Uploaded};
-use super::sides::Sides;
-use crate::pipeline::{self, FoundAxes, Held, Options, Reconstruction, Reconstructor, Start};
+use crate::orient as on_device;
+use crate::pipeline::{
+    self, FoundAxes, Held, Options, Reconstruction, Reconstructor, Search, Start,
+};
 use crate::{Buffer, Device, Scalar};
 
 /// What is done on a device, whose runtime is not named.
@@ -28,8 +30,8 @@ pub trait Work<T: Scalar>: Send + Sync {
     /// Those of the device.
     fn upload(&self, vectors: &[[T; 3]]) -> Result<Buffer<T>, Error>;
 
-    /// The radii of a cloud, whose `points` are there, and the sides of its axes; `begin` is called before the sides are
-    /// looked for, when the axes are there.
+    /// The radii of a cloud, whose `points` are there, and the signs of its axes; `begin` is called before the signs are
+    /// chosen. What the device has no method for is found on the CPU, as is all with `on_cpu`.
     ///
     /// # Errors
     /// Those of the pipeline; [`Error::Interrupted`] where `begin` breaks.
@@ -39,6 +41,7 @@ pub trait Work<T: Scalar>: Send + Sync {
         points: &Buffer<T>,
         radius: Radius,
         method: Method,
+        on_cpu: bool,
         begin: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Begun<T>, Error>;
 
@@ -168,37 +171,54 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
         points: &Buffer<T>,
         radius: Radius,
         method: Method,
+        on_cpu: bool,
         begin: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<Begun<T>, Error> {
         let device = self.device();
-        let sides = Sides::upload(device, cloud, method)?;
-        let (held, search) = match sides.method() {
-            Some(method) => {
-                let (held, search) = Held::search(device, points, radius, &method, begin)?;
-                (held, Some(search))
-            }
-            None if begin().is_break() => return Err(Error::Interrupted(Stage::Orient)),
-            None => (Held::radii(device, points, radius)?, None),
+        let refused = |reason: orient::Error| Error::Host(reason.into());
+        let normals = || {
+            let normals = cloud.normals();
+            normals.ok_or_else(|| refused(orient::Error::NoNormals))
         };
-        let guarded = search.as_ref().map_or(0, |search| search.guarded);
+        let search = match method {
+            Method::Given => {
+                normals()?;
+                if begin().is_break() {
+                    return Err(Error::Interrupted(Stage::Orient));
+                }
+                Held::search_radii(device, points, radius)?
+            }
+            Method::Parity(options) if !on_cpu => {
+                let method = on_device::Method::Parity(options);
+                Held::search_on_device(device, points, radius, &method, begin)?
+            }
+            Method::Signs if !on_cpu => {
+                let method = on_device::Method::Signs(self.upload(normals()?)?);
+                Held::search_on_device(device, points, radius, &method, begin)?
+            }
+            _ => Held::search_on_cpu(device, cloud, radius, &method, begin)?,
+        };
+        let Search {
+            held,
+            axes,
+            method,
+            guarded,
+            flipped,
+        } = search;
         if guarded == cloud.len() {
             let points = cloud.len();
             return Err(isograd::Error::NoPlane { points }.into());
         }
         let report = Report {
             points: cloud.len(),
-            orientation: sides.name(),
-            flipped: search.as_ref().map_or(0, |search| search.flipped),
+            orientation: method,
+            flipped,
             radius: isograd::Real::f64(held.common_radius),
             sample_spacing: isograd::Real::f64(held.spacing),
             guarded,
             ..Report::default()
         };
-        Ok(Begun {
-            held,
-            axes: search.map(|search| search.axes),
-            report,
-        })
+        Ok(Begun { held, axes, report })
     }
 
     fn reconstruct(

@@ -14,12 +14,9 @@
 //! # Pullback
 //! [`pullback`]: each cell collects what the vertices on its six edges mean for it; the level and the grid get
 //! sums over all vertices, as a tree of fixed shape.
-//!
-//! [`measure`] is where the cotangents of vertices may come from: area and volume.
 
 mod error;
 mod forward;
-pub mod measure;
 mod pullback;
 mod signs;
 mod sums;

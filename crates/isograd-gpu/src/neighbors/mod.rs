@@ -24,14 +24,12 @@
 mod choice;
 mod nearest;
 mod order;
-mod others;
 pub mod radius;
 mod tree;
 mod walk;
 
 pub(crate) use nearest::{SURE_SHARE, about_nearest, any_within, reach_squared, reaches};
 pub(crate) use order::{gather, scatter};
-pub(crate) use others::nearest_others;
 pub(crate) use walk::{end_of_leaf, first_of_leaf, is_isolated, next_leaf};
 
 use cubecl::prelude::*;

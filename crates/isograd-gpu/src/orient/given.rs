@@ -8,7 +8,7 @@
 
 use cubecl::prelude::*;
 
-use super::{Decided, Error, Turned};
+use super::Error;
 use crate::device::check_length;
 use crate::neighbors::BLOCK;
 use crate::primitives::flags;
@@ -80,11 +80,11 @@ pub(super) fn turn_to<R: Runtime, T: Scalar>(
     device: &Device<R>,
     axes: &Buffer<T>,
     given: &Buffer<T>,
-) -> Result<Turned<T>, Error> {
+    [normals, confidence]: [&Buffer<T>; 2],
+) -> Result<(), Error> {
     check_length("the given normals", given, axes.len())?;
     let units = forward(device, given)?;
     let n = axes.len() / 3;
-    let (normals, confidence) = (device.empty(3 * n)?, device.empty(n)?);
     if n > 0 {
         turn_axes::launch::<T, R>(
             device.client(),
@@ -96,15 +96,7 @@ pub(super) fn turn_to<R: Runtime, T: Scalar>(
             confidence.arg(),
         );
     }
-    Ok(Turned {
-        normals,
-        confidence,
-        decided: Decided {
-            given: n,
-            ..Decided::default()
-        },
-        detection_radius: None,
-    })
+    Ok(())
 }
 
 #[cube(launch)]

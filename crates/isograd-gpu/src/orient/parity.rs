@@ -9,7 +9,7 @@ use cubecl::prelude::*;
 use isograd::orient::ParityOptions;
 use isograd_element::vector;
 
-use super::{Decided, Error, Turned};
+use super::Error;
 use crate::neighbors::radius::bounds;
 use crate::neighbors::{BLOCK, Neighborhoods, SURE_SHARE, about_nearest, any_within, reaches};
 use crate::primitives::ends::ends;
@@ -27,22 +27,18 @@ struct Ray<F: Float + CubeElement> {
     probes: u32,
 }
 
+/// Writes normals and confidence, and returns the detection radius.
 pub(super) fn forward<R: Runtime, T: Scalar>(
     device: &Device<R>,
     neighborhoods: &Neighborhoods<T>,
     axes: &Buffer<T>,
     options: &ParityOptions,
-) -> Result<Turned<T>, Error> {
+    [normals, confidence]: [&Buffer<T>; 2],
+) -> Result<f64, Error> {
     options.check()?;
     let n = neighborhoods.len();
-    let (normals, confidence) = (device.empty(3 * n)?, device.empty(n)?);
     if n == 0 {
-        return Ok(Turned {
-            normals,
-            confidence,
-            decided: Decided::default(),
-            detection_radius: Some(0.0),
-        });
+        return Ok(0.0);
     }
     let radius = detection_radius(device, neighborhoods, options)?;
     let [low, high] = bounds(device, &neighborhoods.points)?.map(vector::to_f64);
@@ -82,15 +78,7 @@ pub(super) fn forward<R: Runtime, T: Scalar>(
         confidence.arg(),
         u32::try_from(options.tolerance).unwrap_or(u32::MAX),
     );
-    Ok(Turned {
-        normals,
-        confidence,
-        decided: Decided {
-            parity: n,
-            ..Decided::default()
-        },
-        detection_radius: Some(radius),
-    })
+    Ok(radius)
 }
 
 /// `r_d`, by the most lonely point.

@@ -10,7 +10,6 @@ use isograd::{PointCloud, Stage, normals};
 use super::{Error, Reconstruction};
 use crate::device::check_length;
 use crate::neighbors::radius;
-use crate::orient::Axes;
 use crate::orient::previous::{self, Before, Followed};
 use crate::primitives::fill::zeros;
 use crate::{Buffer, Device, Scalar};
@@ -36,10 +35,13 @@ pub struct Held<T> {
     pub has_moved: bool,
 }
 
-/// What is found beside it.
+/// Radii and signs of a cloud, with statistics of the search.
 pub(crate) struct Search<T: Scalar> {
-    /// The axes that the sides were looked for with.
-    pub axes: FoundAxes<T>,
+    pub held: Held<T>,
+    /// The axes that were oriented, if they are on the device.
+    pub axes: Option<FoundAxes<T>>,
+    /// Name of the method, for a report.
+    pub method: &'static str,
     /// Points whose axis is ill defined.
     pub guarded: usize,
     /// Axes whose sign was changed.
@@ -65,24 +67,44 @@ impl<T: Scalar> Held<T> {
         radius: Radius,
         method: &Method,
     ) -> Result<Self, Error> {
+        let begin = &mut || ControlFlow::Continue(());
+        Ok(Self::search_on_cpu(device, cloud, radius, method, begin)?.held)
+    }
+
+    /// [`Self::find`] with statistics; `begin` is called before the signs are chosen.
+    pub(crate) fn search_on_cpu<R: Runtime>(
+        device: &Device<R>,
+        cloud: &PointCloud<T>,
+        radius: Radius,
+        method: &Method,
+        begin: &mut dyn FnMut() -> ControlFlow<()>,
+    ) -> Result<Search<T>, Error> {
         let (mut near, mut axes) = (Neighborhoods::default(), normals::Residual::default());
         match method {
             Method::Previous => return Err(Error::Orientation),
             Method::Given => isograd::neighbors::forward(cloud.points(), radius, &mut near)?,
             _ => normals::forward_with_neighborhoods(cloud.points(), radius, &mut near, &mut axes)?,
         }
+        if begin().is_break() {
+            return Err(Error::Interrupted(Stage::Orient));
+        }
         let mut found = Orientation::default();
-        let scratch = &mut orient::Scratch::default();
         orient::forward(
             cloud.points(),
             &axes,
             &near,
             cloud,
             method,
-            scratch,
+            &mut orient::Scratch::default(),
             &mut found,
         )?;
-        Ok(Self::of(device, &near, &axes, &found)?)
+        Ok(Search {
+            held: Self::of(device, &near, &axes, &found)?,
+            axes: None,
+            method: found.method.name(),
+            guarded: axes.guarded(),
+            flipped: found.flipped,
+        })
     }
 
     /// What the CPU found already, by its stages or by [`isograd::Orienter`].
@@ -119,22 +141,20 @@ impl<T: Scalar> Held<T> {
         device: &Device<R>,
         points: &Buffer<T>,
         radius: Radius,
-        method: &crate::orient::Method<'_, T>,
+        method: &crate::orient::Method<T>,
     ) -> Result<Self, Error> {
-        let (held, _) = Self::search(device, points, radius, method, &mut || {
-            ControlFlow::Continue(())
-        })?;
-        Ok(held)
+        let begin = &mut || ControlFlow::Continue(());
+        Ok(Self::search_on_device(device, points, radius, method, begin)?.held)
     }
 
-    /// The same, and what else was found; `begin` is called before the sides are looked for.
-    pub(crate) fn search<R: Runtime>(
+    /// [`Self::find_on_device`] with statistics; `begin` is called before the signs are chosen.
+    pub(crate) fn search_on_device<R: Runtime>(
         device: &Device<R>,
         points: &Buffer<T>,
         radius: Radius,
-        method: &crate::orient::Method<'_, T>,
+        method: &crate::orient::Method<T>,
         begin: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Result<(Self, Search<T>), Error> {
+    ) -> Result<Search<T>, Error> {
         let found = radius::forward(device, points, radius)?;
         let (mut axes, mut residual) = crate::normals::forward(device, &found.neighborhoods)?;
         let mut radii = found.each.clone();
@@ -147,12 +167,7 @@ impl<T: Scalar> Held<T> {
         if begin().is_break() {
             return Err(Error::Interrupted(Stage::Orient));
         }
-        let to_turn = Axes {
-            normals: &axes,
-            residual: Some(&residual),
-            spacing: found.spacing,
-        };
-        let oriented = crate::orient::forward(device, &found.neighborhoods, &to_turn, method)?;
+        let oriented = crate::orient::forward(device, &found.neighborhoods, &axes, method)?;
         let flipped = device.download(&oriented.flipped)?[0] as usize;
         let held = Self {
             radii,
@@ -163,25 +178,24 @@ impl<T: Scalar> Held<T> {
             confidence: oriented.confidence,
             has_moved: false,
         };
-        let search = Search {
-            axes: FoundAxes {
-                axes,
-                residual: residual.into(),
-            },
+        let residual = residual.into();
+        Ok(Search {
+            held,
+            axes: Some(FoundAxes { axes, residual }),
+            method: method.name(),
             guarded,
             flipped,
-        };
-        Ok((held, search))
+        })
     }
 
     /// The radii alone, for normals that are given.
-    pub(crate) fn radii<R: Runtime>(
+    pub(crate) fn search_radii<R: Runtime>(
         device: &Device<R>,
         points: &Buffer<T>,
         radius: Radius,
-    ) -> Result<Self, Error> {
+    ) -> Result<Search<T>, Error> {
         let found = radius::forward(device, points, radius)?;
-        Ok(Self {
+        let held = Self {
             radii: found.each.clone(),
             outward: zeros(device, points.len())?,
             confidence: zeros(device, found.each.len())?,
@@ -189,6 +203,13 @@ impl<T: Scalar> Held<T> {
             common_radius: found.common,
             spacing: found.spacing,
             has_moved: false,
+        };
+        Ok(Search {
+            held,
+            axes: None,
+            method: "given",
+            guarded: 0,
+            flipped: 0,
         })
     }
 

@@ -21,8 +21,8 @@ mod pullback;
 
 pub use forward::Observer;
 pub(crate) use forward::Start;
-pub(crate) use held::FoundAxes;
 pub use held::Held;
+pub(crate) use held::{FoundAxes, Search};
 pub use pullback::{CloudCotangent, Cotangent, ExtensionCotangent};
 
 use cubecl::prelude::Runtime;

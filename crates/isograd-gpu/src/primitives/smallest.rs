@@ -16,28 +16,3 @@ pub(crate) fn insert<F: Float>(number: F, smallest: &mut Array<F>, #[comptime] k
         }
     }
 }
-
-/// Of the first `count` values, the one of the given rank, from 1.
-#[cube]
-pub(crate) fn ranked<F: Float>(
-    values: &Array<F>,
-    #[comptime] count: usize,
-    #[comptime] rank: usize,
-) -> F {
-    let mut smallest = Array::<F>::new(rank);
-    #[unroll]
-    for i in 0..rank {
-        smallest[i] = F::max_value();
-    }
-    #[unroll]
-    for i in 0..count {
-        insert::<F>(values[i], &mut smallest, rank);
-    }
-    smallest[rank - 1]
-}
-
-/// The upper median of the first `count` values.
-#[cube]
-pub(crate) fn median<F: Float>(values: &Array<F>, #[comptime] count: usize) -> F {
-    ranked::<F>(values, count, comptime!(count / 2 + 1))
-}

@@ -3,9 +3,7 @@
 use cubecl::prelude::Runtime;
 use isograd::isosurface::{self as cpu, Report};
 use isograd::{Field, Grid, Mesh};
-use isograd_gpu::isosurface::{
-    Error, Plan, Residual, Surface, forward, forward_at, measure, pullback,
-};
+use isograd_gpu::isosurface::{Error, Plan, Residual, Surface, forward, forward_at, pullback};
 use isograd_gpu::{Device, Scalar};
 
 use crate::devices::{Numbers, in_each_number, on_each_device};
@@ -332,61 +330,4 @@ fn check_lengths<R: Runtime>(device: &Device<R>) {
     assert!(refused(&short, &level) && refused(&whole, &short));
     let (_, residual) = forward(device, &plan, &whole, &level, chi.grid()).expect("a surface");
     assert!(pullback(device, &residual, &short).is_err());
-    let none = device.empty::<f32>(0).expect("an array");
-    for (vertices, corners) in [(&short, 3), (&none, 3), (&whole, 4)] {
-        let faces = device.upload(&vec![0u32; corners]).expect("an array");
-        assert!(measure::forward(device, vertices, &faces).is_err());
-    }
-}
-
-#[test]
-fn area_and_volume_are_those_of_the_cpu() {
-    on_each_device!(check_measures);
-}
-
-fn check_measures<R: Runtime>(device: &Device<R>) {
-    in_each_number!(device, compare_measures);
-}
-
-fn compare_measures<R: Runtime, T: Scalar>(device: &Device<R>) {
-    let mut worst = [0.0f64; 2];
-    let mut flat = 0;
-    for (name, chi, level) in fields::<T>() {
-        let (mesh, _) = on_cpu(&chi, T::of(level));
-        let expected = cpu::Measures::of(&mesh);
-        let mut bar = Vec::new();
-        let flat_faces = cpu::measure_pullback(&mesh, 1.3, -0.7, &mut bar);
-        let bar: Vec<f64> = bar.as_flattened().iter().map(|v| v.f64()).collect();
-        let vertices = device.upload(mesh.vertices().as_flattened()).expect("it");
-        let faces = device.upload(mesh.faces().as_flattened()).expect("it");
-        let (found, residual) = measure::forward(device, &vertices, &faces).expect("measures");
-        let bars = device.upload(&[1.3, -0.7].map(T::of)).expect("two numbers");
-        let back = measure::pullback(device, &residual, &bars).expect("a cotangent");
-        let count = device.download(&found.flat_faces).expect("a number")[0] as usize;
-        assert_eq!(count, flat_faces, "{name}");
-        flat += count;
-        let found = device.download(&found.area_and_volume).expect("numbers");
-        // The volume is compared with the area: of an open surface it may be next to nothing.
-        let of_sums = difference(&found, &[expected.area, expected.volume], expected.area);
-        let of_bar = difference(
-            &device.download(&back).expect("an array"),
-            &bar,
-            largest(&bar),
-        );
-        // Narrow faces lose some digits of their normal.
-        let tolerance = if T::EPSILON.f64() < 1e-10 {
-            1e-11
-        } else {
-            1e-5
-        };
-        for (worst, error) in worst.iter_mut().zip([of_sums, of_bar]) {
-            assert!(error < tolerance, "{name}: {of_sums} {of_bar}");
-            *worst = worst.max(error);
-        }
-    }
-    assert!(flat > 0, "no face was without area");
-    println!(
-        "{}: sums and cotangents differ by {worst:?}",
-        <T as isograd::Real>::NAME
-    );
 }

@@ -3,16 +3,12 @@
 mod areas;
 mod clouds;
 mod devices;
-mod differential;
 mod distance;
 mod iso_value;
 mod isosurface;
 mod local_level;
 mod normals;
 mod orient;
-mod orient_auto;
-mod orient_fill;
-mod orient_graph;
 mod orient_known;
 mod pipeline;
 mod poisson;

@@ -4,8 +4,8 @@ use cubecl::prelude::Runtime;
 use isograd::Real;
 use isograd::orient::{self as cpu, Orientation, ParityOptions};
 use isograd_element::vector;
-use isograd_gpu::orient::{self, Axes, Error, Method, given};
-use isograd_gpu::{Buffer, Device, Scalar, neighbors};
+use isograd_gpu::orient::{self, Error, Method, given};
+use isograd_gpu::{Device, Scalar, neighbors};
 
 use crate::clouds::{Cloud, clouds, real, relative};
 use crate::devices::{Numbers, in_each_number, on_each_device, tolerance};
@@ -23,15 +23,6 @@ fn expected<T: Scalar>(
     } = cloud;
     cpu::forward(points, axes, near, known, &method, scratch, &mut found)?;
     Ok(found)
-}
-
-/// Axes of which nothing else is known: parity and given sides need no more.
-fn bare<T: Scalar>(normals: &Buffer<T>) -> Axes<'_, T> {
-    Axes {
-        normals,
-        residual: None,
-        spacing: real(1.0),
-    }
 }
 
 #[test]
@@ -54,7 +45,7 @@ fn check_parity<R: Runtime, T: Scalar>(device: &Device<R>) {
         for options in [ParityOptions::default(), fine] {
             let expected = expected(&cloud, None, cpu::Method::Parity(options)).unwrap();
             let method = Method::Parity(options);
-            let found = orient::forward(device, &near, &bare(&axes), &method).unwrap();
+            let found = orient::forward(device, &near, &axes, &method).unwrap();
             let cpu::MethodUsed::Parity { detection_radius } = expected.method else {
                 panic!("{:?}", expected.method);
             };
@@ -113,7 +104,7 @@ fn check_sphere<R: Runtime>(device: &Device<R>) {
     let axes = device.upload(axes.as_flattened()).unwrap();
     let run = || {
         let method = Method::Parity(ParityOptions::default());
-        let found = orient::forward(device, &near, &bare(&axes), &method).unwrap();
+        let found = orient::forward(device, &near, &axes, &method).unwrap();
         assert!(
             device
                 .download(&found.confidence)
@@ -138,7 +129,7 @@ fn check_refused<R: Runtime>(device: &Device<R>) {
     let refusal = |cloud: &Cloud<f32>, options| {
         let expected = expected(cloud, None, cpu::Method::Parity(options)).unwrap_err();
         let (near, axes) = cloud.upload_sorted(device);
-        match orient::forward(device, &near, &bare(&axes), &Method::Parity(options)) {
+        match orient::forward(device, &near, &axes, &Method::Parity(options)) {
             // NaN is not equal to itself.
             Err(Error::Cloud(found)) => assert_eq!(found.to_string(), expected.to_string()),
             other => panic!("{other:?}, not {expected}"),
@@ -162,8 +153,8 @@ fn check_refused<R: Runtime>(device: &Device<R>) {
     let (near, axes) = cloud.upload_sorted(device);
     let few = device.upload(&[1f32; 9]).unwrap();
     let parity = Method::Parity(ParityOptions::default());
-    assert!(orient::forward(device, &near, &bare(&few), &parity).is_err());
-    assert!(orient::forward(device, &near, &bare(&axes), &Method::Signs(&few)).is_err());
+    assert!(orient::forward(device, &near, &few, &parity).is_err());
+    assert!(orient::forward(device, &near, &axes, &Method::Signs(few.clone())).is_err());
 }
 
 /// Vectors of lengths from 10⁻⁵ to 10⁵.
@@ -187,7 +178,7 @@ fn check_signs<R: Runtime, T: Scalar>(device: &Device<R>) {
     let expected = expected(cloud, Some(&vectors), cpu::Method::Signs).unwrap();
     let (near, axes) = cloud.upload_sorted(device);
     let given = device.upload(vectors.as_flattened()).unwrap();
-    let found = orient::forward(device, &near, &bare(&axes), &Method::Signs(&given)).unwrap();
+    let found = orient::forward(device, &near, &axes, &Method::Signs(given)).unwrap();
     let normals = device.download(&found.normals).unwrap();
     let confidence = device.download(&found.confidence).unwrap();
     for i in 0..vectors.len() {

@@ -1,13 +1,11 @@
-//! Sides that something is known of, from sensors or from the step before, beside those of the CPU.
+//! Signs taken over from the step before, compared with the CPU.
 
 use cubecl::prelude::Runtime;
 use isograd::neighbors::Radius;
-use isograd::orient::{self as cpu, Known, MethodUsed, Orientation, Scratch};
+use isograd::orient::{self as cpu, MethodUsed, Orientation, Scratch};
 use isograd::{PointCloud, Real};
 use isograd_element::vector;
-use isograd_element::vector::{add, scale};
 use isograd_gpu::orient::previous::{self, Before};
-use isograd_gpu::orient::{self, Axes, Error, Method, Sensors};
 use isograd_gpu::pipeline::{Held, Reconstructor};
 use isograd_gpu::{Device, Scalar, neighbors};
 use isograd_shapes::Sampling;
@@ -132,113 +130,4 @@ fn check_turning<R: Runtime>(device: &Device<R>) {
     let result = plan.reconstruct(&points, &held).unwrap();
     let count = device.download(&result.turned).unwrap()[0];
     assert!(count > 400, "{count}");
-}
-
-#[test]
-fn views_from_sensors_are_those_of_the_cpu() {
-    in_each_number!(check_sensors);
-}
-
-fn check_sensors<R: Runtime, T: Scalar>(device: &Device<R>) {
-    let cloud = &clouds::<T>()[0];
-    let n = cloud.points.len();
-    let place = |p: [f64; 3]| p.map(real::<T>);
-    let slant = |i: usize| [(0.3 * i as f64).sin(), (0.7 * i as f64).cos(), 0.4];
-    let each: Vec<[T; 3]> = (0..n)
-        .map(|i| {
-            let axis = vector::to_f64(cloud.axes.normals[i]);
-            let sight = add(axis, scale(slant(i), 0.8));
-            place(add(vector::to_f64(cloud.points[i]), scale(sight, 2.0)))
-        })
-        .collect();
-    let round = vec![
-        place([4.0, 0.0, 0.5]),
-        place([-2.0, 3.4, 0.5]),
-        place([-2.0, -3.4, -0.5]),
-    ];
-    let (near, axes) = cloud.upload_sorted(device);
-    let axes = Axes {
-        normals: &axes,
-        residual: None,
-        spacing: cloud.near.spacing(),
-    };
-    for sensors in [
-        isograd::Sensors::Each(each),
-        isograd::Sensors::Any(vec![place([0.0, 0.0, 6.0])]),
-        isograd::Sensors::Any(round),
-    ] {
-        let scratch = &mut Scratch::default();
-        // Bare axes here and there: no planes.
-        let bare = cpu::Axes::from(&cloud.axes.normals);
-        let mut wanted = Orientation::default();
-        let known = Known {
-            normals: None,
-            sensors: Some(&sensors),
-        };
-        let method = cpu::Method::Sensors;
-        let (points, near_cpu) = (&cloud.points, &cloud.near);
-        cpu::forward(points, bare, near_cpu, known, &method, scratch, &mut wanted).unwrap();
-        let positions = match &sensors {
-            isograd::Sensors::Each(p) | isograd::Sensors::Any(p) => p.as_flattened(),
-        };
-        let positions = device.upload(positions).unwrap();
-        let on_device = match sensors {
-            isograd::Sensors::Each(_) => Sensors::Each(&positions),
-            isograd::Sensors::Any(_) => Sensors::Any(&positions),
-        };
-        let found = orient::forward(device, &near, &axes, &Method::Sensors(on_device)).unwrap();
-        let normals = device.download(&found.normals).unwrap();
-        let confidence = device.download(&found.confidence).unwrap();
-        let differs = |&i: &usize| {
-            normals.as_chunks::<3>().0[i] != wanted.normals[i]
-                || (Real::f64(confidence[i]) - Real::f64(wanted.confidence[i])).abs() > 1e-3
-        };
-        let others = (0..n).filter(differs).count();
-        println!(
-            "{}: {others} of {n} differ; {:?}, on the CPU {:?}",
-            T::NAME,
-            found.decided,
-            wanted.decided
-        );
-        assert!(200 * others <= n, "{others} of {n}");
-        // Three sensors round a ring disagree of every point.
-        let decided = wanted.decided;
-        assert!(
-            decided.given > n / 10 || decided.evidence > n / 2,
-            "{decided:?}"
-        );
-        assert!(found.decided.given.abs_diff(wanted.decided.given) <= n.div_ceil(1000));
-    }
-}
-
-#[test]
-fn sensors_that_cannot_be_used_are_refused() {
-    on_each_device!(check_refused);
-}
-
-fn check_refused<R: Runtime>(device: &Device<R>) {
-    let cloud = &clouds::<f32>()[0];
-    let (near, axes) = cloud.upload_sorted(device);
-    let axes = Axes {
-        normals: &axes,
-        residual: None,
-        spacing: cloud.near.spacing(),
-    };
-    let refused = |sensors: Sensors<'_, f32>| {
-        orient::forward(device, &near, &axes, &Method::Sensors(sensors)).unwrap_err()
-    };
-    let none = device.upload::<f32>(&[]).unwrap();
-    let cpu = |error: Error| match error {
-        Error::Cloud(error) => error,
-        other => panic!("{other}"),
-    };
-    assert_eq!(cpu(refused(Sensors::Any(&none))), cpu::Error::NoSensors);
-    assert!(matches!(refused(Sensors::Each(&none)), Error::Device(_)));
-    for index in [0, 517] {
-        let mut on_point = [[9.0; 3]; 2];
-        on_point[1] = cloud.points[index];
-        let sensors = device.upload(on_point.as_flattened()).unwrap();
-        let wanted = cpu::Error::SensorOnPoint { index };
-        assert_eq!(cpu(refused(Sensors::Any(&sensors))), wanted);
-    }
 }

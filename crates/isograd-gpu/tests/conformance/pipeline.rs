@@ -276,8 +276,7 @@ fn compare_held<R: Runtime, T: Scalar>(device: &Device<R>) {
         .unwrap();
     let parity = ParityOptions::default();
     let methods = [
-        (Method::Auto, orient::Method::Auto),
-        (Method::Signs, orient::Method::Signs(&normals)),
+        (Method::Signs, orient::Method::Signs(normals)),
         (Method::Parity(parity), orient::Method::Parity(parity)),
     ];
     for (on_cpu, on_device) in methods {
@@ -318,7 +317,7 @@ fn compare_held<R: Runtime, T: Scalar>(device: &Device<R>) {
         Held::find_on_device(device, &none, Radius::Auto, &method),
         Err(Error::Neighbors(_))
     ));
-    let short = orient::Method::Signs(&none);
+    let short = orient::Method::Signs(none.clone());
     assert!(matches!(
         Held::find_on_device(device, &points, Radius::Auto, &short),
         Err(Error::Device(_))

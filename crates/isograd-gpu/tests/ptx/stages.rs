@@ -4,12 +4,9 @@ use cubecl::prelude::CubeElement;
 use isograd::Grid;
 use isograd::isosurface::Level;
 use isograd::neighbors::Radius;
-use isograd::orient::decide::Domains;
 use isograd::splat::Weights;
-use isograd_gpu::differential::{self, Differential, LocalCotangent};
-use isograd_gpu::distance::{Band, Mesh, extend, lattice, query};
+use isograd_gpu::distance::{Band, Mesh, extend, lattice};
 use isograd_gpu::iso_value::local;
-use isograd_gpu::orient::auto::fill::{Fill, Lattice, Members};
 use isograd_gpu::orient::previous::{self, Before};
 use isograd_gpu::primitives::{reduce, scan, sort};
 use isograd_gpu::splat::{self, SampleCotangent, Samples};
@@ -33,14 +30,11 @@ pub fn launch_all<T: Scalar>(device: &Device<Recorder>) {
     primitives::<T>(device);
     points::<T>(device);
     held::<T>(device);
-    graphs::<T>(device);
     samples::<T>(device);
     solves::<T>(device);
     surfaces::<T>(device);
     distances::<T>(device);
     extensions::<T>(device);
-    derivatives::<T>(device);
-    fills::<T>(device);
     whole::<T>(device);
     forget_answers();
 }
@@ -107,53 +101,17 @@ fn sides<T: Scalar>(
     near: &neighbors::Neighborhoods<T>,
     points: &Buffer<T>,
 ) {
-    let (normals, residual) = normals::forward(device, near).unwrap();
-    let axes = orient::Axes {
-        normals: &normals,
-        residual: Some(&residual),
-        spacing: <T as isograd::Real>::of(0.01),
-    };
-    for method in [
-        orient::Method::Signs(points),
-        orient::Method::Sensors(orient::Sensors::Each(points)),
-        orient::Method::Sensors(orient::Sensors::Any(points)),
-        orient::Method::Auto,
-    ] {
-        answer(&[&[0, 0]]);
-        orient::forward(device, near, &axes, &method).unwrap();
-        forget_answers();
-    }
-    let graph = orient::auto::graph::forward(device, near, &normals, None, axes.spacing).unwrap();
-    let domains = Domains {
-        domain: &[0; SAMPLES],
-        sign: &[1.0; SAMPLES],
-        count: 1,
-    };
-    let positions = numbers::<f32>(device, 3 * SAMPLES);
-    orient::auto::winding::numbers(device, &graph, &positions, &domains, &[0]).unwrap();
+    let (axes, _) = normals::forward(device, near).unwrap();
+    answer(&[&[0, 0]]);
+    let method = orient::Method::Signs(points.clone());
+    orient::forward(device, near, &axes, &method).unwrap();
+    forget_answers();
     let radii = numbers(device, SAMPLES);
     let before = Before {
         outward: points,
         confidence: &radii,
     };
-    previous::forward(device, near, &radii, &normals, before).unwrap();
-}
-
-/// The neighbor graph of the automatic orientation.
-fn graphs<T: Scalar>(device: &Device<Recorder>) {
-    use orient::auto::graph;
-    let (points, radii) = (
-        numbers::<T>(device, 3 * SAMPLES),
-        numbers::<T>(device, SAMPLES),
-    );
-    let near = neighbors::forward(device, &points, &radii).unwrap();
-    let (axes, planes) = normals::forward(device, &near).unwrap();
-    let spacing = <T as isograd::Real>::of(0.02);
-    let mut graph = graph::forward(device, &near, &axes, Some(&planes), spacing).unwrap();
-    let slab = device.empty(SAMPLES).unwrap();
-    graph::part_slabs(device, &mut graph, &slab).unwrap();
-    let evidence = graph::sheet_evidence(device, &near, &graph, spacing).unwrap();
-    graph::relax(device, &graph, &evidence).unwrap();
+    previous::forward(device, near, &radii, &axes, before).unwrap();
 }
 
 /// Numbers as they are in memory.
@@ -246,9 +204,6 @@ fn surfaces<T: Scalar>(device: &Device<Recorder>) {
     answer(&[&[100, 0, VERTICES as u32, FACES as u32]]);
     let (surface, residual) = isosurface::forward(device, &plan, &chi, &level, &grid()).unwrap();
     isosurface::pullback(device, &residual, &surface.vertices).unwrap();
-    let (measures, residual) =
-        isosurface::measure::forward(device, &surface.vertices, &surface.faces).unwrap();
-    isosurface::measure::pullback(device, &residual, &measures.area_and_volume).unwrap();
 }
 
 fn distances<T: Scalar>(device: &Device<Recorder>) {
@@ -261,10 +216,6 @@ fn distances<T: Scalar>(device: &Device<Recorder>) {
         let (phi, residual) = lattice::forward(device, &mesh, &grid(), &chi, &level, band).unwrap();
         lattice::pullback(device, &residual, &phi).unwrap();
     }
-    let (points, grid) = (&mesh.vertices, grid());
-    let hits = query::signed(device, &mesh, points, Some((&chi, &grid))).unwrap();
-    let bars = (&hits.distances, Some(&hits.points));
-    query::pullback(device, &mesh, points, &hits, bars.0, bars.1).unwrap();
 }
 
 /// An attribute of three components, one of five, and clouds too small for the usual numbers of samples. What is asked
@@ -312,46 +263,6 @@ fn extensions<T: Scalar>(device: &Device<Recorder>) {
         )
         .unwrap();
     }
-    forget_answers();
-}
-
-fn derivatives<T: Scalar>(device: &Device<Recorder>) {
-    let (phi, points) = (
-        numbers::<T>(device, cells()),
-        numbers::<T>(device, 3 * SAMPLES),
-    );
-    let normals = differential::unit_normals(device, &phi, &grid()).unwrap();
-    differential::unit_normals_pullback(device, &phi, &grid(), &normals, &phi).unwrap();
-    let known = Differential::new(device, &phi, &grid(), &Default::default()).unwrap();
-    let local = known.at_points(device, &points).unwrap();
-    known.outside(device, &points).unwrap();
-    let bar = LocalCotangent {
-        gradient: Some(&local.gradient),
-        normal: Some(&local.normal),
-        curvature: Some(&local.curvature),
-    };
-    known
-        .pullback_at_points(device, &phi, &points, bar, &phi, &points)
-        .unwrap();
-}
-
-/// A grid of three regions, which are asked for first.
-fn fills<T: Scalar>(device: &Device<Recorder>) {
-    let (rows, reach) = (device.empty(SAMPLES).unwrap(), numbers(device, SAMPLES));
-    let members = Members {
-        rows: &rows,
-        points: &numbers::<T>(device, 3 * SAMPLES),
-        axes: &numbers(device, 3 * SAMPLES),
-        reach: &reach,
-        growth: 0.1,
-    };
-    answer(&[&[3]]);
-    let lattice = Lattice::new([0.0; 3], [1.0; 3], 0.05, 1 << 20);
-    let fill = Fill::new(device, &lattice, &members).unwrap();
-    assert_eq!(fill.sides, [1, 0, 0]);
-    fill.look(device).unwrap();
-    fill.regions.of_cells(device, &fill.occupied).unwrap();
-    fill.sky.of_cells(device, &fill.occupied).unwrap();
     forget_answers();
 }
 

@@ -127,20 +127,3 @@ pub fn fan<T: Real>(triangles: usize) -> Mesh<T> {
     let faces = (0..n).map(|i| [0, 1 + i, 1 + (i + 1) % n]).collect();
     Mesh::new(vertices, faces).unwrap()
 }
-
-/// Two closed cones on one base, the upper one sharp: at its tip and its rim the normals of single faces would tell the
-/// wrong side.
-pub fn spike<T: Real>(faces: usize) -> Mesh<T> {
-    let n = faces as u32;
-    let on_rim = |i: u32| {
-        let turn = std::f64::consts::TAU * f64::from(i) / f64::from(n);
-        [0.23 * turn.cos() + 0.05, 0.21 * turn.sin(), -0.6].map(T::of)
-    };
-    let mut vertices: Vec<_> = (0..n).map(on_rim).collect();
-    vertices.extend([[0.1, 0.07, 0.83], [-0.04, 0.02, -0.71]].map(|p| p.map(T::of)));
-    let round = (0..n).flat_map(|i| {
-        let next = (i + 1) % n;
-        [[i, next, n], [next, i, n + 1]]
-    });
-    Mesh::new(vertices, round.collect()).unwrap()
-}

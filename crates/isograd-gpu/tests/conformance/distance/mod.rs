@@ -4,8 +4,6 @@ mod extension;
 mod lattice;
 mod meshes;
 mod pullback;
-mod query;
-mod sides;
 
 use cubecl::prelude::Runtime;
 use isograd::distance::lattice::{Band, Scratch};
