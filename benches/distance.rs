@@ -11,11 +11,15 @@ use isograd_benches::{CELLS, torus};
 fn measure<T: Real>(criterion: &mut Criterion) {
     for (name, band) in [
         ("distance", Band::Full),
-        ("distance-band", Band::Cells(3.0)),
+        ("distance-band", Band::Within(3.0)),
     ] {
         let mut group = group(criterion, name);
         for cells in CELLS {
             let chi = torus::field::<T>(cells);
+            let band = match band {
+                Band::Within(cells) => Band::Within(cells * chi.grid().spacing().f64()),
+                Band::Full => band,
+            };
             let mut mesh = Mesh::default();
             isosurface::forward(&chi, T::zero(), &mut Default::default(), &mut mesh)
                 .expect("a surface");

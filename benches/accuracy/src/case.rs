@@ -189,31 +189,29 @@ impl Case {
     }
 
     /// The options of the pipeline.
-    pub fn options(&self) -> Options {
-        Options {
-            orientation: match self.normals {
+    pub fn options(&self, spacing: f64) -> Options {
+        Options::default()
+            .orient(match self.normals {
                 Normals::Exact => orient::Method::Given,
                 Normals::Estimated => orient::Method::default(),
-            },
-            weights: match self.splat {
+            })
+            .splat(match self.splat {
                 Splat::Bspline => splat::Weights::BSpline,
                 Splat::Paper => splat::Weights::Paper,
-            },
-            area_weights: self.area_weights,
-            smoothing: self.smoothing.map_or(Smoothing::Auto, Smoothing::Cells),
-            screening: self.screening,
-            level: match self.level {
+            })
+            .area(self.area_weights)
+            .smoothing(self.smoothing.map_or(Smoothing::Auto, Smoothing::Cells))
+            .screening(self.screening)
+            .level(match self.level {
                 Level::Local => isosurface::Level::Local,
                 Level::Mean => isosurface::Level::Mean,
-            },
-            band: if self.is_default() {
+            })
+            .band(if self.is_default() {
                 distance::Band::Full
             } else {
-                distance::Band::Cells(BAND + 1.0)
-            },
-            checks: false,
-            ..Options::default()
-        }
+                distance::Band::Within((BAND + 1.0) * spacing)
+            })
+            .checks(false)
     }
 }
 
@@ -223,17 +221,8 @@ mod tests {
 
     #[test]
     fn the_defaults_here_are_those_of_the_library() {
-        let (ours, theirs) = (Case::new("torus", 1, 32).options(), Options::default());
-        assert_eq!(
-            format!("{ours:?}"),
-            format!(
-                "{:?}",
-                Options {
-                    checks: false,
-                    ..theirs
-                }
-            )
-        );
+        let (ours, theirs) = (Case::new("torus", 1, 32).options(1.0), Options::default());
+        assert_eq!(format!("{ours:?}"), format!("{:?}", theirs.checks(false)));
         let given = Case {
             normals: Normals::Exact,
             ..Case::new("torus", 1, 32)

@@ -299,7 +299,7 @@ impl Bench {
 
     fn case<T: Real>(&mut self, case: &Case, exact: &Exact, grid: Grid<T>) -> Outcome<Measured> {
         let cloud = convert(self.cloud(case.draw, case.samples)?)?;
-        let mut plan = Reconstructor::new(grid, case.options())?;
+        let mut plan = Reconstructor::new(grid, case.options(grid.spacing().f64()))?;
         measure(case, &self.shape, exact, &mut plan, &cloud)
             .map_err(|e| format!("{case:?}: {e}").into())
     }

@@ -81,10 +81,7 @@ struct Timings {
 /// taken, does not count.
 fn timings<T: Real>(sampled: &Sampled, repeats: usize) -> Outcome<Timings> {
     let cloud = points_alone::<T>(sampled.cloud.points())?;
-    let options = Options {
-        checks: false,
-        ..Options::default()
-    };
+    let options = Options::default().checks(false);
     let mut plan = Reconstructor::new(narrowed(&sampled.grid)?, options)?;
     let mut scratch = PullbackScratch::default();
     let mut out = CloudCotangent::default();

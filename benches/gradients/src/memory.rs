@@ -51,10 +51,7 @@ fn in_type<T: Real>(body: &Body, sampled: &Sampled) -> Outcome<Memory> {
         return Err("memory is not being counted".into());
     }
     let cloud = points_alone::<T>(sampled.cloud.points())?;
-    let options = Options {
-        checks: false,
-        ..Options::default()
-    };
+    let options = Options::default().checks(false);
     let mut plan = Reconstructor::new(narrowed(&sampled.grid)?, options)?;
     let result = plan.reconstruct(&cloud)?;
     let cotangent = Cotangent {

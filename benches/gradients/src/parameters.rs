@@ -190,10 +190,7 @@ struct Pulled {
 
 impl<'a> Bench<'a> {
     fn new(sampled: &'a Sampled, names: &[&'static str]) -> Outcome<Self> {
-        let options = Options {
-            checks: false,
-            ..Options::default()
-        };
+        let options = Options::default().checks(false);
         let mut plan = Reconstructor::new(sampled.grid, options)?;
         let points = sampled.shape.points_at::<f64>(&sampled.coordinates)?;
         let target = plan.reconstruct(&points_alone(&points)?)?.sdf().clone();

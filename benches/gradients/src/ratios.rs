@@ -64,35 +64,33 @@ impl Choice {
         format!("{splat}{area}{normals}")
     }
 
-    fn options(self) -> Options {
-        Options {
-            orientation: if self.exact_normals {
+    fn options(self, spacing: f64) -> Options {
+        Options::default()
+            .orient(if self.exact_normals {
                 orient::Method::Given
             } else {
                 orient::Method::default()
-            },
-            weights: if self.paper_weights {
+            })
+            .splat(if self.paper_weights {
                 splat::Weights::Paper
             } else {
                 splat::Weights::BSpline
-            },
-            area_weights: self.area_weights,
+            })
+            .area(self.area_weights)
             // The paper's weights with all that goes with them there.
-            level: if self.paper_weights {
+            .level(if self.paper_weights {
                 isosurface::Level::Mean
             } else {
                 isosurface::Level::Local
-            },
-            smoothing: if self.paper_weights {
+            })
+            .smoothing(if self.paper_weights {
                 Smoothing::Cells(0.0)
             } else {
                 Smoothing::Auto
-            },
+            })
             // The functionals look no further.
-            band: distance::Band::Cells(LAYER + 1.0),
-            checks: false,
-            ..Options::default()
-        }
+            .band(distance::Band::Within((LAYER + 1.0) * spacing))
+            .checks(false)
     }
 
     /// What the pipeline is given of a cloud with normals.
@@ -146,7 +144,7 @@ pub fn measure(body: &Body, sampled: &Sampled, draw: Draw) -> Outcome<Vec<Ratio>
     let mut ratios = Vec::new();
     for choice in Choice::ALL {
         eprintln!("{}: {} samples, {}", body.name, draw.name(), choice.name());
-        let mut plan = Reconstructor::new(sampled.grid, choice.options())?;
+        let mut plan = Reconstructor::new(sampled.grid, choice.options(sampled.grid.spacing()))?;
         let cloud = choice.given(sampled.cloud.clone())?;
         let local = local(plan.reconstruct(&cloud)?, &cloud, &sampled.cloud, &frame)?;
         for (place, motion) in Motion::ALL.into_iter().enumerate() {
@@ -292,7 +290,9 @@ mod tests {
             let sampled = body.sample(Draw::Random).expect("samples");
             let frame = Frame::of(&sampled.cloud).expect("points");
             let ratios = |choice: Choice, motions: &[Motion]| -> Vec<f64> {
-                let mut plan = Reconstructor::new(sampled.grid, choice.options()).expect("options");
+                let mut plan =
+                    Reconstructor::new(sampled.grid, choice.options(sampled.grid.spacing()))
+                        .expect("options");
                 let cloud = choice.given(sampled.cloud.clone()).expect("points");
                 let base = plan.reconstruct(&cloud).expect("a body");
                 let local = local(base, &cloud, &sampled.cloud, &frame).expect("a pullback");

@@ -40,10 +40,7 @@ pub fn measure(cells: usize, samples: usize, draw: Draw) -> Outcome<Sphere> {
     let sampled = body.sample(draw)?;
     let radius = sampled.shape.get("radius")?;
     let cloud = points_alone(sampled.cloud.points())?;
-    let options = Options {
-        checks: false,
-        ..Options::default()
-    };
+    let options = Options::default().checks(false);
     let mut plan = Reconstructor::new(sampled.grid, options)?;
     let result = plan.reconstruct(&cloud)?;
     let grown = |cotangent: &Cotangent<'_, f64>| -> Outcome<f64> {

@@ -80,10 +80,7 @@ impl Problem {
         let memory = PeakAlloc;
         let before = memory.current_usage();
         memory.reset_peak_usage();
-        let options = Options {
-            checks: false,
-            ..Options::default()
-        };
+        let options = Options::default().checks(false);
         let mut plan = Reconstructor::new(grid, options)?;
         let (mut scratch, mut out) = (PullbackScratch::default(), CloudCotangent::default());
         let mut peaks = [0; 2];

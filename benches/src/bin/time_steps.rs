@@ -100,11 +100,9 @@ fn first_call(points: &[[f32; 3]], grid: Grid<f32>) -> Outcome<(Call, Found)> {
 }
 
 fn steps_after(found: &Found, clouds: &[Vec<[f32; 3]>], grid: Grid<f32>) -> Outcome<Vec<Call>> {
-    let options = Options {
-        radius: Radius::Fixed(found.radius),
-        orientation: Method::Signs,
-        ..unchecked()
-    };
+    let options = unchecked()
+        .radius(Radius::Fixed(found.radius))
+        .orient(Method::Signs);
     let mut plan = Reconstructor::new(grid, options)?;
     let mut normals = found.normals.clone();
     let mut calls = Vec::new();
@@ -122,10 +120,7 @@ fn steps_after(found: &Found, clouds: &[Vec<[f32; 3]>], grid: Grid<f32>) -> Outc
 }
 
 fn unchecked() -> Options {
-    Options {
-        checks: false,
-        ..Options::default()
-    }
+    Options::default().checks(false)
 }
 
 fn show(threads: usize, first: &Call, second: &Call, later: &[Call]) {

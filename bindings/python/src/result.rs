@@ -137,7 +137,7 @@ fn array<'py, T: Number>(
     name: &str,
 ) -> PyResult<Bound<'py, PyAny>> {
     let result = kept.result.view();
-    let (shape, count) = (result.shape(), kept.cloud.len());
+    let (shape, count) = (result.grid().shape(), kept.cloud.len());
     match name {
         "sdf" => arrays::shaped(py, there(result.sdf())?.values().to_vec(), shape),
         "indicator" => arrays::shaped(py, there(result.indicator())?.values().to_vec(), shape),
@@ -296,7 +296,10 @@ fn extended<T: Number>(
             let known = attributes.iter().map(|a| a.name.clone()).collect();
             Failure::Value(extend::Error::Missing { name, known }.to_string())
         })?;
-        let (extension, residual) = kept.result.view().extend(&attribute, band)?;
+        let (extension, residual) = kept
+            .result
+            .view()
+            .extend(&attribute, band * kept.result.view().grid().spacing().f64())?;
         Ok::<_, Failure>(Extended {
             attribute,
             extension,

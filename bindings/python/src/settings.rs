@@ -115,23 +115,24 @@ impl Settings {
 
     /// The options.
     pub fn options(&self) -> Options {
-        Options {
-            radius: self.radius.map_or(Radius::Auto, Radius::Fixed),
-            orientation: self.orient.method(),
-            weights: match self.splat {
+        let band = self.band.map(|cells| Band::Within(cells * self.spacing));
+        let smoothing = self.smoothing.map_or(Smoothing::Auto, Smoothing::Cells);
+        Options::default()
+            .radius(self.radius.map_or(Radius::Auto, Radius::Fixed))
+            .orient(self.orient.method())
+            .splat(match self.splat {
                 Splat::Bspline => splat::Weights::BSpline,
                 Splat::Paper => splat::Weights::Paper,
-            },
-            area_weights: self.area,
-            smoothing: self.smoothing.map_or(Smoothing::Auto, Smoothing::Cells),
-            screening: self.screening,
-            level: match self.level {
+            })
+            .area(self.area)
+            .smoothing(smoothing)
+            .screening(self.screening)
+            .level(match self.level {
                 Level::Local => isosurface::Level::Local,
                 Level::Thin => isosurface::Level::Thin,
                 Level::Mean => isosurface::Level::Mean,
-            },
-            band: self.band.map_or(Band::Full, Band::Cells),
-            checks: self.checks,
-        }
+            })
+            .band(band.unwrap_or(Band::Full))
+            .checks(self.checks)
     }
 }

@@ -2,8 +2,8 @@
 
 use isograd::distance::extend;
 use isograd::{
-    Attribute, CloudCotangent, Cotangent, Field, Mesh, PointCloud, PullbackScratch, Reconstruction,
-    Report,
+    Attribute, CloudCotangent, Cotangent, Field, Grid, Mesh, PointCloud, PullbackScratch,
+    Reconstruction, Report,
 };
 #[cfg(feature = "gpu")]
 use isograd_gpu::host;
@@ -82,12 +82,12 @@ impl<'a, T: Number> View<'a, T> {
         neighbor_counts: &'a [u32];
     }
 
-    /// Cells of the grid along each axis.
-    pub fn shape(self) -> [usize; 3] {
+    /// Grid of φ and of the indicator.
+    pub fn grid(self) -> &'a Grid<T> {
         match self.0 {
-            Of::Cpu(of) => of.sdf().grid().shape(),
+            Of::Cpu(of) => of.sdf().grid(),
             #[cfg(feature = "gpu")]
-            Of::Device(of, _) => of.grid().shape(),
+            Of::Device(of, _) => of.grid(),
         }
     }
 
@@ -122,12 +122,12 @@ impl<'a, T: Number> View<'a, T> {
     pub fn extend(
         self,
         attribute: &Attribute<T>,
-        band_cells: f64,
+        band: f64,
     ) -> Result<(extend::Extension<T>, extend::Residual<T>), Error> {
         match self.0 {
-            Of::Cpu(of) => Ok(of.extend_with_residual(attribute, band_cells)?),
+            Of::Cpu(of) => Ok(of.extend_with_residual(attribute, band)?),
             #[cfg(feature = "gpu")]
-            Of::Device(of, _) => Ok(of.extend_with_residual(attribute, band_cells)?),
+            Of::Device(of, _) => Ok(of.extend_with_residual(attribute, band)?),
         }
     }
 

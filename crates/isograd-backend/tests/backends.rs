@@ -61,7 +61,7 @@ fn check(view: View<'_, f32>, cloud: &PointCloud<f32>, tolerance: f32) {
         let off = off(found, wanted);
         assert!(off <= tolerance, "{what}: {off:e}");
     };
-    assert_eq!(view.shape(), expected.sdf().grid().shape());
+    assert_eq!(view.grid(), expected.sdf().grid());
     let sdf = expected.sdf().values();
     close("φ", view.sdf().unwrap().values(), sdf);
     let chi = view.indicator().unwrap().values();
@@ -88,8 +88,9 @@ fn check(view: View<'_, f32>, cloud: &PointCloud<f32>, tolerance: f32) {
     assert_eq!(report.warnings, expected.report().warnings);
 
     let attribute = attribute(cloud);
-    let (extension, residual) = view.extend(&attribute, 2.0).unwrap();
-    let (of_cpu, residual_of_cpu) = expected.extend_with_residual(&attribute, 2.0).unwrap();
+    let band = 2.0 * f64::from(expected.sdf().grid().spacing());
+    let (extension, residual) = view.extend(&attribute, band).unwrap();
+    let (of_cpu, residual_of_cpu) = expected.extend_with_residual(&attribute, band).unwrap();
     close("extension", &extension.vertices, &of_cpu.vertices);
     let bars = |extension, residual| ExtensionCotangent {
         attribute: &attribute,

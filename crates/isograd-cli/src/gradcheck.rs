@@ -39,7 +39,7 @@ pub fn run(args: &args::Gradcheck) -> Result<(), Error> {
         source,
     })?;
     let options = Options {
-        reconstruction: args.method.options(grid.spacing()),
+        reconstruction: args.method.options(),
         step: args.step,
         seed: args.seed,
         ..Options::default()

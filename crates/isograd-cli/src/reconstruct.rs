@@ -157,7 +157,7 @@ impl Job<'_> {
             grid.shape(),
             grid.spacing()
         ));
-        let options = self.args.method.options(grid.spacing().f64());
+        let options = self.args.method.options();
         let plan = Plan::new(self.args.backend, grid, options);
         let mut plan = plan.map_err(|e| backend::plan_error(self.args.backend, e, &self.file()))?;
         progress.detail(&format!("on {}", plan.name()));

@@ -90,10 +90,7 @@ fn errors(folder: &Path, name: &str, orientation: Method) -> Errors {
     let truth = Query::new(truth.mesh::<f64>().expect("a mesh")).expect("faces");
 
     let grid = Grid::fit(used, Resolution::Cells(CELLS), 0.1).expect("fits");
-    let options = Options {
-        orientation,
-        ..Options::default()
-    };
+    let options = Options::default().orient(orientation);
     let mut plan = Reconstructor::new(grid, options).expect("valid options");
     let result = plan.reconstruct(used).expect("reconstructs");
     let surface = &result.report().surface;

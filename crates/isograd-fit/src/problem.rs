@@ -39,12 +39,11 @@ impl Problem {
     pub fn new(target: &Target, variables: Variables, options: &Options) -> Result<Self, Error> {
         let degrees = Degrees::new(variables, target.grid().spacing())?;
         let of_plan = &options.reconstruction;
-        let of_plan = isograd::Options {
+        let of_plan = of_plan
+            .clone()
             // Nobody reads the report of a reconstruction among hundreds.
-            checks: false,
-            orientation: degrees.orientation(of_plan.orientation),
-            ..of_plan.clone()
-        };
+            .checks(false)
+            .orient(degrees.orientation(of_plan.orient));
         Ok(Self {
             degrees,
             plan: Plan::new(options.backend, *target.grid(), of_plan)?,

@@ -105,10 +105,7 @@ impl Target {
         grid: Grid<f64>,
         options: &isograd::Options,
     ) -> Result<Self, TargetError> {
-        let options = isograd::Options {
-            checks: false,
-            ..options.clone()
-        };
+        let options = options.clone().checks(false);
         let mut plan = Reconstructor::new(grid, options)?;
         plan.reconstruct(cloud)?;
         Self::from_sdf(plan.into_reconstruction().sdf().clone())

@@ -234,13 +234,14 @@ fn attributes_are_extended_and_pulled_back_as_on_the_cpu() {
         let expected = plan.reconstruct(&cloud).unwrap();
         let (mut residual, mut extension) = Default::default();
         let scratch = &mut extend::Scratch::default();
+        let band = 2.0 * Real::f64(grid.spacing());
         expected
-            .extend_into(&attribute, 2.0, scratch, &mut residual, &mut extension)
+            .extend_into(&attribute, band, scratch, &mut residual, &mut extension)
             .unwrap();
         let mut plan = Plan::new(Backend::Vulkan, grid, options()).unwrap();
         let found = plan.reconstruct(&cloud).unwrap();
-        let (made, kept) = found.extend_with_residual(&attribute, 2.0).unwrap();
-        assert_eq!(found.extend(&cloud, "velocity", 2.0).unwrap(), made);
+        let (made, kept) = found.extend_with_residual(&attribute, band).unwrap();
+        assert_eq!(found.extend(&cloud, "velocity", band).unwrap(), made);
         let difference = relative(&made.vertices, &extension.vertices);
         assert!(difference < tolerance, "{}: {difference:e}", T::NAME);
         // φ is a rounding error off, and may end the band a cell later.
@@ -287,7 +288,7 @@ fn attributes_are_extended_and_pulled_back_as_on_the_cpu() {
             println!("{what} {}: {difference:.1e}", T::NAME);
             assert!(difference < 10.0 * tolerance, "{what}: {difference:e}");
         }
-        let missing = found.extend(&cloud, "pressure", 2.0).unwrap_err();
+        let missing = found.extend(&cloud, "pressure", band).unwrap_err();
         assert!(
             missing.to_string().contains("it has: velocity"),
             "{missing}"
@@ -296,7 +297,7 @@ fn attributes_are_extended_and_pulled_back_as_on_the_cpu() {
             values: attribute.values[3..].to_vec(),
             ..attribute.clone()
         };
-        let refused = found.extend_with_residual(&short, 2.0);
+        let refused = found.extend_with_residual(&short, band);
         assert!(matches!(
             refused,
             Err(Error::Extension(extend::Error::Samples { .. }))
@@ -325,10 +326,7 @@ fn previous_takes_the_sides_of_the_call_before() {
         return;
     }
     let cloud = cloud::<f32>(1500);
-    let options = Options {
-        orientation: Method::Previous,
-        ..options()
-    };
+    let options = options().orient(Method::Previous);
     // Room for it to turn.
     let grid = Grid::new([-1.6; 3], 0.1, [32; 3]).unwrap();
     let mut plan = Plan::new(Backend::Vulkan, grid, options).unwrap();
@@ -393,10 +391,7 @@ fn given_normals_are_taken_and_have_cotangents() {
     }
     let cloud = cloud::<f32>(2000);
     let grid = grid(&cloud);
-    let options = Options {
-        orientation: Method::Given,
-        ..options()
-    };
+    let options = options().orient(Method::Given);
     let mut plan = Plan::new(Backend::Vulkan, grid, options.clone()).unwrap();
     let text = plan.reconstruct(&cloud).err().expect("refused").to_string();
     assert!(text.contains("no normals"), "{text}");
@@ -441,10 +436,7 @@ fn a_result_is_found_again_from_its_normals() {
         (&with_normals, Method::Signs),
         (&with_normals, Method::Given),
     ] {
-        let options = Options {
-            orientation,
-            ..options()
-        };
+        let options = options().orient(orientation);
         let grid = grid(cloud);
         let mut plan = Plan::new(Backend::Vulkan, grid, options.clone()).unwrap();
         let first = plan.reconstruct(cloud).unwrap();
@@ -484,10 +476,7 @@ fn what_devices_do_not_have_is_named() {
         let plan = Plan::new(Backend::Vulkan, grid(&cloud), options);
         plan.err().expect("refused").to_string()
     };
-    let text = refused(Options {
-        screening: -1.0,
-        ..options()
-    });
+    let text = refused(options().screening(-1.0));
     assert!(text.contains("0 or more"), "{text}");
     let plan = Plan::new(Backend::Cpu, grid(&cloud), options());
     assert!(matches!(plan.err(), Some(Error::NoDevice(Backend::Cpu))));

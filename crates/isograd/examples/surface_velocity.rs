@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let grid = Grid::fit(&cloud, Resolution::Cells(64), 0.1)?;
     let mut plan = Reconstructor::new(grid, Options::default())?;
     let reconstruction = plan.reconstruct(&cloud)?;
-    let extension = reconstruction.extend(&cloud, "velocity", 3.0)?;
+    let extension = reconstruction.extend(&cloud, "velocity", 3.0 * grid.spacing())?;
 
     let (mut largest, mut sum) = (0.0f64, 0.0);
     for (cell, value) in extension.iter() {

@@ -83,13 +83,11 @@ fn one_two_and_five_threads_give_the_same_bits() {
 
 #[test]
 fn the_papers_choices_give_the_same_bits_too() {
-    let paper = Options {
-        orientation: Method::Parity(ParityOptions::default()),
-        weights: isograd::splat::Weights::Paper,
-        area_weights: false,
-        smoothing: Smoothing::Cells(1.0),
-        band: isograd::distance::Band::Cells(3.0),
-        ..Options::default()
-    };
+    let paper = Options::default()
+        .orient(Method::Parity(ParityOptions::default()))
+        .splat(isograd::splat::Weights::Paper)
+        .area(false)
+        .smoothing(Smoothing::Cells(1.0))
+        .band(isograd::distance::Band::Within(0.1));
     assert_same_bits::<f32>(&paper);
 }

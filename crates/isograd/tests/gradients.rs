@@ -87,7 +87,13 @@ impl<T: Real> Extended<T> {
         let (mut extension, mut residual) = Default::default();
         let scratch = &mut Default::default();
         result
-            .extend_into(&attribute, 3.0, scratch, &mut residual, &mut extension)
+            .extend_into(
+                &attribute,
+                3.0 * result.sdf().grid().spacing().f64(),
+                scratch,
+                &mut residual,
+                &mut extension,
+            )
             .expect("extended");
         Self {
             attribute,
@@ -236,29 +242,16 @@ impl Direction {
 fn all_results_are_pulled_back_to_all_inputs() {
     // So wide that no radius grows, of a sample or round a vertex: those are held constant.
     let radius = Radius::Fixed(0.17);
-    let estimated = Options {
-        radius,
-        ..Options::default()
-    };
-    let given = Options {
-        orientation: Method::Given,
-        ..estimated.clone()
-    };
-    let plain = Options {
-        area_weights: false,
-        weights: Weights::Paper,
-        smoothing: Smoothing::Cells(0.7),
-        level: Level::Mean,
-        ..estimated.clone()
-    };
-    let signs = Options {
-        orientation: Method::Signs,
-        ..estimated.clone()
-    };
-    let screened = Options {
-        screening: 2.0,
-        ..estimated.clone()
-    };
+    let estimated = Options::default().radius(radius);
+    let given = estimated.clone().orient(Method::Given);
+    let plain = estimated
+        .clone()
+        .area(false)
+        .splat(Weights::Paper)
+        .smoothing(Smoothing::Cells(0.7))
+        .level(Level::Mean);
+    let signs = estimated.clone().orient(Method::Signs);
+    let screened = estimated.clone().screening(2.0);
     for options in [estimated, given, signs, plain, screened] {
         let cloud = cloud::<f64>();
         let mut plan = Reconstructor::new(grid(), options.clone()).expect("options");
@@ -267,10 +260,7 @@ fn all_results_are_pulled_back_to_all_inputs() {
         let weighted = Weighted::new(&base, &extended);
         let pulled = weighted.pull(&base, &cloud, &extended);
         assert_eq!(pulled.guarded, 0);
-        assert_eq!(
-            pulled.normals.is_empty(),
-            options.orientation != Method::Given
-        );
+        assert_eq!(pulled.normals.is_empty(), options.orient != Method::Given);
         let direction = Direction::new(&cloud);
         let step = STEP * base.sdf().grid().spacing();
         let [plus, minus] = [step, -step].map(|step| {
@@ -302,10 +292,7 @@ fn assert_same_bits<T: Real>(orientation: Method) {
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         pool.expect("threads").install(|| {
-            let options = Options {
-                orientation,
-                ..Options::default()
-            };
+            let options = Options::default().orient(orientation);
             let mut plan = Reconstructor::new(grid(), options).expect("options");
             let result = plan.reconstruct(&cloud).expect("a torus");
             let extended = Extended::new(result, &cloud);
@@ -439,11 +426,11 @@ fn assert_restored<T: Real>(options: &Options) {
 #[test]
 fn a_restored_result_pulls_back_to_the_same_bits() {
     assert_restored::<f32>(&Options::default());
-    assert_restored::<f64>(&Options {
-        orientation: Method::Given,
-        weights: Weights::Paper,
-        smoothing: Smoothing::Cells(0.7),
-        level: Level::Mean,
-        ..Options::default()
-    });
+    assert_restored::<f64>(
+        &Options::default()
+            .orient(Method::Given)
+            .splat(Weights::Paper)
+            .smoothing(Smoothing::Cells(0.7))
+            .level(Level::Mean),
+    );
 }

@@ -141,7 +141,7 @@ fn ellipsoid(
     (0..n).map(|_| sample(random)).collect()
 }
 
-/// Name, samples and options.
+/// Name, samples and options, with the band in cells.
 type Case = (&'static str, Vec<([f64; 3], [f64; 3])>, Options);
 
 fn cases() -> Vec<Case> {
@@ -151,24 +151,16 @@ fn cases() -> Vec<Case> {
     let mut two = ellipsoid(2500, ([0.5, 0.4, 0.3], [0.0; 3]), 0.01, random);
     two.extend(ellipsoid(1500, ([0.3; 3], [0.95, 0.1, 0.0]), 0.01, random));
     let egg = ellipsoid(3000, ([0.7, 0.5, 0.9], [-0.2, 0.1, 0.3]), 0.003, random);
-    let thin = Options {
-        level: Level::Thin,
-        band: Band::Cells(4.0),
-        ..Options::default()
-    };
-    let paper = Options {
-        orientation: Method::Parity(ParityOptions::default()),
-        weights: Weights::Paper,
-        area_weights: false,
-        smoothing: Smoothing::Cells(1.0),
-        level: Level::Mean,
-        ..Options::default()
-    };
-    let given = Options {
-        orientation: Method::Given,
-        screening: 4.0,
-        ..Options::default()
-    };
+    let thin = Options::default()
+        .level(Level::Thin)
+        .band(Band::Within(4.0));
+    let paper = Options::default()
+        .orient(Method::Parity(ParityOptions::default()))
+        .splat(Weights::Paper)
+        .area(false)
+        .smoothing(Smoothing::Cells(1.0))
+        .level(Level::Mean);
+    let given = Options::default().orient(Method::Given).screening(4.0);
     vec![
         ("torus, default options", torus, Options::default()),
         ("thin plate, level thin, band", plate, thin),
@@ -192,7 +184,11 @@ fn hashes<T: Real>(samples: &[([f64; 3], [f64; 3])], options: &Options) -> [u64;
     let cloud = PointCloud::new(points).expect("finite points");
     let cloud = cloud.with_normals(normals).expect("one normal a point");
     let grid = Grid::fit(&cloud, Resolution::Cells(44), T::of(0.15)).expect("a grid");
-    let mut plan = Reconstructor::new(grid, options.clone()).expect("valid options");
+    let mut options = options.clone();
+    if let Band::Within(cells) = options.band {
+        options.band = Band::Within(cells * grid.spacing().f64());
+    }
+    let mut plan = Reconstructor::new(grid, options).expect("valid options");
     let result = plan.reconstruct(&cloud).expect("reconstructs");
     let mut mesh = Hash::new();
     let vertices = result.mesh().vertices();
@@ -220,7 +216,7 @@ fn gradients<T: Real>(
         (0..n).map(one).collect()
     };
     let (extension, residual) = result
-        .extend_with_residual(attribute, 3.0)
+        .extend_with_residual(attribute, 3.0 * result.sdf().grid().spacing().f64())
         .expect("extends");
     let cells = result.sdf().values().len();
     let (sdf, indicator, areas) = (reals(cells), reals(cells), reals(cloud.len()));

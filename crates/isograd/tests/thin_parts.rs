@@ -42,11 +42,7 @@ fn missed(level: Level) -> f64 {
     // The longest side is some 2, and the grid 1.2 times that: cells of 0.05.
     let cloud = lens_and_ball(30_000, 0.03);
     let grid = Grid::fit(&cloud, Resolution::Cells(cells), 0.1).expect("a grid");
-    let options = Options {
-        orientation: Method::Given,
-        level,
-        ..Options::default()
-    };
+    let options = Options::default().orient(Method::Given).level(level);
     let mut plan = Reconstructor::new(grid, options).expect("options");
     let result = plan.reconstruct(&cloud).expect("a surface");
     let far = cloud.points().iter().step_by(2).filter(|&&x| {

@@ -13,10 +13,7 @@ fn reconstruct(cloud: &PointCloud<f32>, cells: usize, options: Options) -> Recon
 }
 
 fn exact_normals() -> Options {
-    Options {
-        orientation: Method::Given,
-        ..Options::default()
-    }
+    Options::default().orient(Method::Given)
 }
 
 /// Mean and maximum of |distance to the true torus| over the vertices of the surface, in cells.

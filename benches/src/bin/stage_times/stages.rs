@@ -22,8 +22,8 @@ pub trait Stage: Send {
 /// Reads the input of a stage.
 pub fn by_name<T: Real + Number>(name: &str, folder: &Folder) -> Outcome<Box<dyn Stage>> {
     Ok(match name {
-        "distance" => Box::new(Distance::<T>::open(folder, Band::Full)?),
-        "band" => Box::new(Distance::<T>::open(folder, Band::Cells(3.0))?),
+        "distance" => Box::new(Distance::<T>::open(folder, None)?),
+        "band" => Box::new(Distance::<T>::open(folder, Some(3.0))?),
         "whole" => Box::new(Whole::<T>::open(folder)?),
         "normals" => Box::new(Normals::<T>::open(folder)?),
         "orient" => Box::new(Oriented::<T>::open(folder)?),
@@ -109,12 +109,13 @@ struct Distance<T: Real> {
 }
 
 impl<T: Real + Number> Distance<T> {
-    fn open(folder: &Folder, band: Band) -> Outcome<Self> {
+    fn open(folder: &Folder, cells: Option<f64>) -> Outcome<Self> {
         let chi = Field::new(folder.grid()?, folder.read("chi")?)?;
         let mut mesh = Mesh::default();
         isosurface::forward(&chi, T::zero(), &mut Default::default(), &mut mesh)?;
+        let width = |cells| Band::Within(cells * chi.grid().spacing().f64());
         Ok(Self {
-            band,
+            band: cells.map_or(Band::Full, width),
             mesh,
             phi: chi.clone(),
             chi,

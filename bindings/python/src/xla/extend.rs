@@ -27,7 +27,8 @@ impl Target for Forward {
         call.for_each(|k| {
             with_result(settings, &cloud.of(k)?, |result| {
                 let attribute = attribute(values.of(k), points.of(k).len());
-                let (extension, _) = result.extend(&attribute, band)?;
+                let (extension, _) =
+                    result.extend(&attribute, band * result.grid().spacing().f64())?;
                 let out = field.of(k);
                 out.fill(T::zero());
                 extension.scatter(out).map_err(|e| e.to_string())?;
@@ -58,7 +59,9 @@ impl Target for Pullback {
         call.for_each(|k| {
             kept.restore(settings, k, &cloud.of(k)?, |restored| {
                 let attribute = attribute(values.of(k), points.of(k).len());
-                let (extension, residual) = restored.result.extend(&attribute, band)?;
+                let (extension, residual) = restored
+                    .result
+                    .extend(&attribute, band * restored.result.grid().spacing().f64())?;
                 let values_bar = gather(&extension, field_bar.of(k))?;
                 let of_values = ExtensionCotangent {
                     attribute: &attribute,

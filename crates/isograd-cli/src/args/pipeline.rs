@@ -85,31 +85,29 @@ impl GridArgs {
 }
 
 impl MethodArgs {
-    /// The options of a pipeline with cells of `spacing`.
-    pub fn options(&self, spacing: f64) -> Options {
-        Options {
-            radius: self.normals.radius(),
-            orientation: self.normals.method(),
-            weights: match self.splat {
+    /// The options of the pipeline.
+    pub fn options(&self) -> Options {
+        Options::default()
+            .radius(self.normals.radius())
+            .orient(self.normals.method())
+            .splat(match self.splat {
                 Splat::Bspline => splat::Weights::BSpline,
                 Splat::Paper => splat::Weights::Paper,
-            },
-            area_weights: self.area == Switch::On,
-            smoothing: match self.smooth {
+            })
+            .area(self.area == Switch::On)
+            .smoothing(match self.smooth {
                 AutoOrZero::Auto => Smoothing::Auto,
                 AutoOrZero::Value(cells) => Smoothing::Cells(cells),
-            },
-            screening: self.screening,
-            level: match self.level {
+            })
+            .screening(self.screening)
+            .level(match self.level {
                 Level::Local => isosurface::Level::Local,
                 Level::Thin => isosurface::Level::Thin,
                 Level::Mean => isosurface::Level::Mean,
-            },
-            band: match self.band {
+            })
+            .band(match self.band {
                 FullOr::Full => Band::Full,
-                FullOr::Value(h) => Band::Cells(h / spacing),
-            },
-            ..Options::default()
-        }
+                FullOr::Value(h) => Band::Within(h),
+            })
     }
 }

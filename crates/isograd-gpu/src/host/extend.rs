@@ -18,7 +18,7 @@ pub fn forward<R: Runtime, T: Scalar>(
     plan: &Reconstructor<R, T>,
     result: &Reconstruction<T>,
     attribute: &Attribute<T>,
-    band_cells: f64,
+    band: f64,
 ) -> Result<(Extension<T>, Residual<T>), Error> {
     let device = plan.device();
     let values = device.upload(&attribute.values)?;
@@ -26,7 +26,7 @@ pub fn forward<R: Runtime, T: Scalar>(
         values: &values,
         components: attribute.components,
     };
-    let (found, kept) = plan.extend(result, given, band_cells)?;
+    let (found, kept) = plan.extend(result, given, band)?;
     let extension = Extension {
         components: found.components,
         shape: plan.grid().shape(),

@@ -85,7 +85,7 @@ impl<T: Number> Plan<T> {
                 return Ok(result);
             }
         }
-        let method = self.options.orientation;
+        let method = self.options.orient;
         let begun = self.find(cloud, &points, method, observer)?;
         let given = cloud.normals().filter(|_| method == Method::Given);
         let (result, held) = self.run(&points, given, begun, observer)?;
@@ -108,7 +108,7 @@ impl<T: Number> Plan<T> {
         saved.check(self.grid.cells(), cloud.len())?;
         let mut observer = |_| ControlFlow::Continue(());
         let points = self.device.upload(cloud.points())?;
-        if self.options.orientation == Method::Given {
+        if self.options.orient == Method::Given {
             let begun = self.find(cloud, &points, Method::Given, &mut observer)?;
             return Ok(self.run(&points, cloud.normals(), begun, &mut observer)?.0);
         }

@@ -253,7 +253,7 @@ impl<T: Number> Reconstruction<T> {
         Ok(report)
     }
 
-    /// The attribute `name` of the cloud at the vertices of the surface, and at every cell within `band_cells` cells of
+    /// The attribute `name` of the cloud at the vertices of the surface, and at every cell within `band` of
     /// the surface as it is at the closest surface point: [`isograd::Reconstruction::extend`], on the device.
     ///
     /// # Errors
@@ -262,7 +262,7 @@ impl<T: Number> Reconstruction<T> {
         &self,
         cloud: &PointCloud<T>,
         name: &str,
-        band_cells: f64,
+        band: f64,
     ) -> Result<Extension<T>, Error> {
         let attributes = cloud.attributes();
         let attribute = attributes.iter().find(|a| a.name == name);
@@ -270,7 +270,7 @@ impl<T: Number> Reconstruction<T> {
             name: name.into(),
             known: attributes.iter().map(|a| a.name.clone()).collect(),
         })?;
-        Ok(self.extend_with_residual(attribute, band_cells)?.0)
+        Ok(self.extend_with_residual(attribute, band)?.0)
     }
 
     /// The same for one value per sample that was reconstructed, with what the pullback needs.
@@ -280,9 +280,9 @@ impl<T: Number> Reconstruction<T> {
     pub fn extend_with_residual(
         &self,
         attribute: &Attribute<T>,
-        band_cells: f64,
+        band: f64,
     ) -> Result<(Extension<T>, extend::Residual<T>), Error> {
-        self.device.extend(&self.result, attribute, band_cells)
+        self.device.extend(&self.result, attribute, band)
     }
 
     /// Pulls cotangents of any of the results, and of what was extended, back to the points, the attributes and the

@@ -75,7 +75,7 @@ pub trait Work<T: Scalar>: Send + Sync {
         &self,
         result: &Reconstruction<T>,
         attribute: &Attribute<T>,
-        band_cells: f64,
+        band: f64,
     ) -> Result<(Extension<T>, Residual<T>), Error>;
 
     /// A copy of numbers.
@@ -310,9 +310,9 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
         &self,
         result: &Reconstruction<T>,
         attribute: &Attribute<T>,
-        band_cells: f64,
+        band: f64,
     ) -> Result<(Extension<T>, Residual<T>), Error> {
-        extend::forward(self, result, attribute, band_cells)
+        extend::forward(self, result, attribute, band)
     }
 
     fn numbers(&self, buffer: &Buffer<T>) -> Result<Vec<T>, Error> {

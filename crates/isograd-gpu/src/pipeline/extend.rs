@@ -8,7 +8,7 @@ use crate::distance::extend::{self, Attribute, Extension, Residual, Samples, Sur
 
 impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
     /// An attribute of the samples of `result`, which this plan made, at the vertices of the surface, and at every cell
-    /// within `band_cells` cells of the surface as it is at the closest surface point; and what the pullback needs. See
+    /// within `band` of the surface as it is at the closest surface point; and what the pullback needs. See
     /// [`distance::extend`](crate::distance::extend). Cells outside the band that φ was computed in are left out.
     ///
     /// # Errors
@@ -18,13 +18,11 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         &self,
         result: &Reconstruction<T>,
         attribute: Attribute<'_, T>,
-        band_cells: f64,
+        band: f64,
     ) -> Result<(Extension<T>, Residual<T>), Error> {
         let (samples, surface) = (result.extended_samples(), result.extended_surface());
         let device = self.device();
-        Ok(extend::forward(
-            device, samples, attribute, surface, band_cells,
-        )?)
+        Ok(extend::forward(device, samples, attribute, surface, band)?)
     }
 }
 

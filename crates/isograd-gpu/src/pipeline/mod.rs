@@ -144,8 +144,8 @@ impl Default for Options {
 impl From<&isograd::Options> for Options {
     fn from(options: &isograd::Options) -> Self {
         Self {
-            weights: options.weights,
-            area_weights: options.area_weights,
+            weights: options.splat,
+            area_weights: options.area,
             smoothing: options.smoothing,
             screening: options.screening,
             level: options.level,

@@ -53,27 +53,19 @@ fn cases() -> [Case; 4] {
             shape: "fish",
             samples: 3000,
             cells: 48,
-            options: Options {
-                smoothing: Smoothing::Cells(1.0),
-                level: Level::Thin,
-                ..Options::default()
-            },
+            options: Options::default()
+                .smoothing(Smoothing::Cells(1.0))
+                .level(Level::Thin),
         },
         Case {
-            options: Options {
-                weights: Weights::Paper,
-                area_weights: false,
-                band: Band::Cells(3.0),
-                ..Options::default()
-            },
+            options: Options::default()
+                .splat(Weights::Paper)
+                .area(false)
+                .band(Band::Within(0.2)),
             ..small.clone()
         },
         Case {
-            options: Options {
-                screening: 4.0,
-                level: Level::Mean,
-                ..Options::default()
-            },
+            options: Options::default().screening(4.0).level(Level::Mean),
             ..small
         },
     ]

@@ -212,7 +212,7 @@ fn distances<T: Scalar>(device: &Device<Recorder>) {
         faces: device.empty(3 * FACES).unwrap(),
     };
     let (chi, level) = (numbers::<T>(device, cells()), numbers::<T>(device, 1));
-    for band in [Band::Full, Band::Cells(3.0)] {
+    for band in [Band::Full, Band::Within(0.3)] {
         let (phi, residual) = lattice::forward(device, &mesh, &grid(), &chi, &level, band).unwrap();
         lattice::pullback(device, &residual, &phi).unwrap();
     }
@@ -248,7 +248,7 @@ fn extensions<T: Scalar>(device: &Device<Recorder>) {
         };
         answer(&[&[0, 9000, 0]]);
         let (extension, residual) =
-            extend::forward(device, samples, attribute, surface, 3.0).unwrap();
+            extend::forward(device, samples, attribute, surface, 0.3).unwrap();
         let (at_vertices, in_band) = (&extension.vertices, &extension.values);
         answer(&[&[0, 0]]);
         extend::pullback(

@@ -79,10 +79,10 @@ pub enum Error {
     },
     /// The width of the band is not a positive number.
     #[error(
-        "a band of {cells} cells on either side has no width; give a positive number of cells, or ask for the full field"
+        "the band has a width of {width}; give a positive, finite length in the unit of the points, or use the full field"
     )]
     Band {
-        /// The width asked for, in cells.
-        cells: f64,
+        /// Distance from the surface to the end of the band.
+        width: f64,
     },
 }

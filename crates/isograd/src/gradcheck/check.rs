@@ -140,7 +140,7 @@ impl<'a> Check<'a> {
         };
         let (grid, values) = (result.sdf().grid(), result.sdf().values());
         let options = result.options();
-        let faces = options.weights == Weights::Paper || options.level != Level::Mean;
+        let faces = options.splat == Weights::Paper || options.level != Level::Mean;
         let between = |x: f64| match faces {
             true => (2.0 * x).floor() as i64,
             false => (x + 0.5).floor() as i64,

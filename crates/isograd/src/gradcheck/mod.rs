@@ -163,10 +163,7 @@ pub fn gradcheck(
     if !(options.step > 0.0) || !options.step.is_finite() {
         return Err(CheckError::Step { step: options.step });
     }
-    let reconstruction = crate::Options {
-        checks: false,
-        ..options.reconstruction.clone()
-    };
+    let reconstruction = options.reconstruction.clone().checks(false);
     let failed = |source| CheckError::Reconstruct {
         what: "the cloud as it is".into(),
         source,

@@ -39,13 +39,11 @@ fn a_wrong_pullback_would_be_seen() {
     let noise = check.rows[0];
     // The paper's weights have another derivative: the same functional, another number.
     let paper = Options {
-        reconstruction: crate::Options {
-            weights: crate::splat::Weights::Paper,
+        reconstruction: crate::Options::default()
+            .splat(crate::splat::Weights::Paper)
             // It would mend what the weights do.
-            level: crate::isosurface::Level::Mean,
-            smoothing: crate::poisson::Smoothing::Cells(0.0),
-            ..crate::Options::default()
-        },
+            .level(crate::isosurface::Level::Mean)
+            .smoothing(crate::poisson::Smoothing::Cells(0.0)),
         motions: vec![Motion::Growth, Motion::Noise],
         ..options
     };

@@ -7,7 +7,7 @@ use crate::{Real, distance};
 
 impl<T: Real> Reconstruction<T> {
     /// The attribute `name` of the cloud at the vertices of the surface, and at every cell within
-    /// `band_cells` cells of the surface as it is at the closest surface point; see
+    /// a distance of `band` (in the cloud's unit) of the surface as it is at the closest surface point; see
     /// [`distance::extend`](crate::distance::extend). Cells outside the band that φ was computed in are left
     /// out.
     ///
@@ -18,7 +18,7 @@ impl<T: Real> Reconstruction<T> {
         &self,
         cloud: &PointCloud<T>,
         name: &str,
-        band_cells: f64,
+        band: f64,
     ) -> Result<Extension<T>, Error> {
         let attributes = cloud.attributes();
         let attribute =
@@ -29,7 +29,7 @@ impl<T: Real> Reconstruction<T> {
                     name: name.into(),
                     known: attributes.iter().map(|a| a.name.clone()).collect(),
                 })?;
-        Ok(self.extend_with_residual(attribute, band_cells)?.0)
+        Ok(self.extend_with_residual(attribute, band)?.0)
     }
 
     /// The same for one value per sample that was reconstructed, with what the pullback needs.
@@ -39,17 +39,11 @@ impl<T: Real> Reconstruction<T> {
     pub fn extend_with_residual(
         &self,
         attribute: &Attribute<T>,
-        band_cells: f64,
+        band: f64,
     ) -> Result<(Extension<T>, Residual<T>), Error> {
         let (mut residual, mut extension) = (Residual::default(), Extension::default());
         let scratch = &mut Scratch::default();
-        self.extend_into(
-            attribute,
-            band_cells,
-            scratch,
-            &mut residual,
-            &mut extension,
-        )?;
+        self.extend_into(attribute, band, scratch, &mut residual, &mut extension)?;
         Ok((extension, residual))
     }
 
@@ -60,7 +54,7 @@ impl<T: Real> Reconstruction<T> {
     pub fn extend_into(
         &self,
         attribute: &Attribute<T>,
-        band_cells: f64,
+        band: f64,
         scratch: &mut Scratch,
         residual: &mut Residual<T>,
         extension: &mut Extension<T>,
@@ -69,7 +63,7 @@ impl<T: Real> Reconstruction<T> {
             self.samples(),
             attribute,
             self.surface(),
-            band_cells,
+            band,
             scratch,
             residual,
             extension,

@@ -3,52 +3,58 @@
 use crate::report::Stage;
 use crate::{distance, isosurface, neighbors, orient, poisson, splat};
 
-/// What to compute, and how. Nothing here says where or on how many threads.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// Neighborhood radius of the normals and the area weights.
-    pub radius: neighbors::Radius,
-    /// How the sign of each normal is found, or that the cloud's own normals are to be used.
-    pub orientation: orient::Method,
-    /// How a sample is spread over the cells round it.
-    pub weights: splat::Weights,
-    /// Whether each sample counts by the area of surface that it stands for.
-    pub area_weights: bool,
-    /// Width `σ` of the Gaussian smoothing of the indicator.
-    pub smoothing: poisson::Smoothing,
-    /// `α`: how strongly the indicator is drawn to one value at the samples, by the
-    /// [screened](poisson::screened) equation; 0 for the plain one, which is some 20 times faster.
-    pub screening: f64,
-    /// Which value of the indicator the surface is at.
-    pub level: isosurface::Level,
-    /// Where φ is computed.
-    pub band: distance::Band,
-    /// Whether to measure the result and look for reasons not to trust it.
-    pub checks: bool,
+/// Declares [`Options`] with a default and a setter of the same name for each field.
+macro_rules! options {
+    ($($(#[$doc:meta])+ $field:ident: $type:ty = $default:expr,)+) => {
+        /// Parameters of the reconstruction. `Options::default().screening(4.0)` changes one of them.
+        #[derive(Clone, Debug, PartialEq)]
+        #[non_exhaustive]
+        pub struct Options {
+            $($(#[$doc])+ pub $field: $type,)+
+        }
+
+        impl Default for Options {
+            fn default() -> Self {
+                Self { $($field: $default,)+ }
+            }
+        }
+
+        impl Options {
+            $($(#[$doc])+ #[must_use]
+            pub fn $field(self, $field: $type) -> Self {
+                Self { $field, ..self }
+            })+
+        }
+    };
 }
 
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            radius: neighbors::Radius::default(),
-            orientation: orient::Method::default(),
-            weights: splat::Weights::default(),
-            area_weights: true,
-            smoothing: poisson::Smoothing::default(),
-            screening: 0.0,
-            level: isosurface::Level::default(),
-            band: distance::Band::default(),
-            checks: true,
-        }
-    }
+options! {
+    /// Neighborhood radius of the normals and of the area weights.
+    radius: neighbors::Radius = neighbors::Radius::default(),
+    /// Method that finds the sign of each normal, or the use of the cloud's own normals.
+    orient: orient::Method = orient::Method::default(),
+    /// Weights that spread a sample over the cells around it.
+    splat: splat::Weights = splat::Weights::default(),
+    /// Whether each sample is weighted by the area of surface that it stands for.
+    area: bool = true,
+    /// Width `σ` of the Gaussian smoothing of the indicator.
+    smoothing: poisson::Smoothing = poisson::Smoothing::default(),
+    /// `α` of the [screened](poisson::screened) equation: the strength of the pull of the indicator to one value at
+    /// the samples. 0 selects the plain equation, which is about 20 times faster.
+    screening: f64 = 0.0,
+    /// Value of the indicator at the surface.
+    level: isosurface::Level = isosurface::Level::default(),
+    /// Region in which φ is computed.
+    band: distance::Band = distance::Band::default(),
+    /// Whether to measure the result and to check whether it can be trusted.
+    checks: bool = true,
 }
 
 impl Options {
-    /// Whether the smoothing follows the areas of the samples, and has a derivative: of a screened solution, what the
-    /// smoothing was done to is not kept.
+    /// Whether the smoothing is a differentiable function of the areas: it is automatic, and the solution is not
+    /// screened (the pullback of a screened solution does not keep the unsmoothed one).
     pub(super) fn smoothing_follows(&self) -> bool {
-        let automatic = self.smoothing == poisson::Smoothing::Auto;
-        automatic && self.area_weights && self.screening == 0.0
+        self.smoothing == poisson::Smoothing::Auto && self.area && self.screening == 0.0
     }
 }
 

@@ -187,7 +187,7 @@ impl<T: Real> Reconstruction<T> {
             let found = local_level::pullback(
                 chi,
                 given,
-                self.options.area_weights,
+                self.options.area,
                 &residuals.splat,
                 &residuals.local_level,
                 field.values_mut(),
@@ -256,7 +256,7 @@ impl<T: Real> Reconstruction<T> {
             plan: &self.poisson,
             grid: self.indicator.grid(),
             samples,
-            area_weights: self.options.area_weights,
+            area_weights: self.options.area,
             order: &self.residuals.splat,
             screening: self.options.screening,
         }
@@ -281,7 +281,7 @@ impl<T: Real> Reconstruction<T> {
             ..
         } = &mut scratch.samples;
         out.normals.clear();
-        match (self.options.orientation, cloud.normals()) {
+        match (self.options.orient, cloud.normals()) {
             (Method::Given, Some(given)) => {
                 orient::given_pullback(given, normals_bar);
                 out.normals.extend_from_slice(normals_bar);
@@ -292,7 +292,7 @@ impl<T: Real> Reconstruction<T> {
                 out.guarded += normals::pullback(neighborhoods, axes, normals_bar, scratch, points);
             }
         }
-        if self.options.area_weights {
+        if self.options.area {
             splat::area::pullback(
                 neighborhoods,
                 &self.areas,

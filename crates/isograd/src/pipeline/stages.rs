@@ -48,7 +48,7 @@ impl<T: Real> Reconstructor<T> {
             ..
         } = residuals;
         let held = held.map(|held| &held.residuals);
-        let is_given = options.orientation == orient::Method::Given;
+        let is_given = options.orient == orient::Method::Given;
         find_axes(
             cloud,
             options.radius,
@@ -58,7 +58,7 @@ impl<T: Real> Reconstructor<T> {
             normals,
             report,
         )?;
-        if options.area_weights {
+        if options.area {
             splat::area::forward(neighborhoods, areas);
         } else {
             areas.clear();
@@ -79,7 +79,7 @@ impl<T: Real> Reconstructor<T> {
             report,
             ..
         } = &mut self.result;
-        if let Some(held) = held.filter(|_| options.orientation != orient::Method::Given) {
+        if let Some(held) = held.filter(|_| options.orient != orient::Method::Given) {
             let axes = &residuals.normals.normals;
             orient::hold(axes, &held.orientation, orientation);
             return Ok(());
@@ -89,7 +89,7 @@ impl<T: Real> Reconstructor<T> {
             &residuals.normals,
             &residuals.neighborhoods,
             cloud,
-            &options.orientation,
+            &options.orient,
             &mut self.scratch.orient,
             orientation,
         )?;
@@ -114,7 +114,7 @@ impl<T: Real> Reconstructor<T> {
         };
         splat::forward(
             samples,
-            options.weights,
+            options.splat,
             &mut self.scratch.splat,
             &mut residuals.splat,
             indicator,
@@ -144,7 +144,7 @@ impl<T: Real> Reconstructor<T> {
         residuals.smoothing = match held {
             Some(held) => held.residuals.smoothing,
             None => {
-                let apart = match options.area_weights {
+                let apart = match options.area {
                     true => splat::area::mean(areas).0.sqrt(),
                     false => residuals.neighborhoods.spacing().f64(),
                 };
@@ -164,7 +164,7 @@ impl<T: Real> Reconstructor<T> {
                 plan: poisson,
                 grid: &grid,
                 samples,
-                area_weights: options.area_weights,
+                area_weights: options.area,
                 order: &residuals.splat,
                 screening: options.screening,
             };
@@ -178,7 +178,7 @@ impl<T: Real> Reconstructor<T> {
                 indicator,
                 samples,
                 local_level::Choice {
-                    area_weights: options.area_weights,
+                    area_weights: options.area,
                     smoothing: residuals.smoothing,
                     thin: options.level == Level::Thin,
                 },

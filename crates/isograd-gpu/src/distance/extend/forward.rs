@@ -9,7 +9,7 @@ use crate::primitives::flags;
 use crate::{Device, Scalar};
 
 /// Extends an attribute of the samples to the vertices of the surface and to the cells with
-/// `|φ| ≤ band_cells · h` that have a closest face. Values have the unit of the attribute. Waits for the device, once:
+/// `|φ| ≤ band` that have a closest face. Values have the unit of the attribute. Waits for the device, once:
 /// the checks, and how many cells there are.
 ///
 /// # Errors
@@ -19,17 +19,17 @@ pub fn forward<R: Runtime, T: Scalar>(
     samples: Samples<'_, T>,
     attribute: Attribute<'_, T>,
     surface: Surface<'_, T>,
-    band_cells: f64,
+    band: f64,
 ) -> Result<(Extension<T>, Residual<T>), Error> {
     device.check_number::<T>()?;
     checks::samples(samples, attribute)?;
     let numbers = checks::Numbers::new(device, samples, attribute)?;
-    if !(band_cells > 0.0) || !band_cells.is_finite() {
+    if !(band > 0.0) || !band.is_finite() {
         refuse_numbers(device, &numbers)?;
-        return Err(Refused::Band { cells: band_cells }.into());
+        return Err(Refused::Band { width: band }.into());
     }
     checks::surface(surface)?;
-    let reach = T::of(band_cells * surface.grid.spacing().f64());
+    let reach = T::of(band);
     let near = cells::near(device, surface, reach)?;
     let [bad, count, astray] = flags::totals(device, [&numbers.sums, &near.band, &near.astray])?;
     if bad > 0 {

@@ -39,8 +39,8 @@ pub fn forward<T: Scalar, R: Runtime>(
     let spacing = grid.spacing();
     let width = match band {
         Band::Full => None,
-        Band::Cells(cells) if cells > 0.0 && cells.is_finite() => Some(cells * spacing.f64()),
-        Band::Cells(cells) => return Err(Error::Band { cells }),
+        Band::Within(width) if width > 0.0 && width.is_finite() => Some(width),
+        Band::Within(width) => return Err(Error::Band { width }),
     };
     let tree = Tree::new(device, mesh, grid.lower())?;
     let closest = search::cells(device, &tree, grid.shape(), spacing.f64(), width)?;

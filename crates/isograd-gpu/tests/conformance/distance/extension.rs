@@ -192,7 +192,7 @@ fn plate<T: Scalar>() -> Mesh<T> {
 /// φ round a mesh within 4 cells, and the closest faces.
 fn measure<T: Scalar>(mesh: &Mesh<T>) -> (Field<T>, Vec<u32>) {
     let grid = grid::<T>([-1.03, -1.07, -0.41], 0.083, [26, 26, 11]);
-    super::solve_on_cpu(mesh, &super::signs(grid), Band::Cells(4.0))
+    super::solve_on_cpu(mesh, &super::signs(grid), Band::Within(4.0 * 0.083))
 }
 
 /// The same on a device.
@@ -286,6 +286,7 @@ fn check_values_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
     for scene in Scene::<T>::all() {
         for (components, band) in [(1, 0.7), (3, 3.0), (6, 50.0)] {
             let attribute = scene.attribute(components);
+            let band = band * Real::f64(scene.grid().spacing());
             let (expected, kept) = scene.on_cpu(&attribute, band).unwrap();
             let on_device = scene.upload(device, &attribute);
             let shape = scene.grid().shape();

@@ -138,9 +138,10 @@ fn check_band<R: Runtime>(device: &Device<R>) {
     let grid = grid::<f32>([-1.3, -1.2, -1.0], 0.06, [43, 40, 35]);
     let chi = signs(grid);
     for (mesh, cells) in [(meshes::soup(30, 8), 1.5), (meshes::torus(90, 31), 3.0)] {
+        let width = cells * f64::from(0.06f32);
         let (full, ..) = solve(device, &mesh, &chi, Band::Full);
-        let (banded, closest, _) = solve(device, &mesh, &chi, Band::Cells(cells));
-        let width = (cells * f64::from(0.06f32)) as f32;
+        let (banded, closest, _) = solve(device, &mesh, &chi, Band::Within(width));
+        let width = width as f32;
         let mut within = 0;
         for (index, d) in full.into_iter().enumerate() {
             let (found, face) = (banded[index], closest[index]);
@@ -182,11 +183,11 @@ fn check_runs<R: Runtime>(device: &Device<R>) {
     let grid = grid::<f32>([-1.0; 3], 0.0125, [163, 161, 163]);
     assert!(grid.cells().div_ceil(64) > 65_535);
     let chi = signs(grid);
-    let run = || solve(device, &meshes::soup(3, 7), &chi, Band::Cells(9.0));
+    let run = || solve(device, &meshes::soup(3, 7), &chi, Band::Within(0.1125));
     let (phi, closest, _) = run();
     let again = run();
     assert!(phi == again.0 && closest == again.1);
-    let (expected, _) = solve_on_cpu(&meshes::soup(3, 7), &chi, Band::Cells(9.0));
+    let (expected, _) = solve_on_cpu(&meshes::soup(3, 7), &chi, Band::Within(0.1125));
     for (d, e) in phi.into_iter().zip(expected.values()) {
         assert!((d - e).abs() <= 1.25e-6, "{d} for {e}");
     }
@@ -216,8 +217,8 @@ fn check_refusals<R: Runtime>(device: &Device<R>) {
         refused(&mesh, &level, Band::Full),
         Error::Device(_)
     ));
-    for cells in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let error = refused(&mesh, &chi, Band::Cells(cells));
+    for width in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let error = refused(&mesh, &chi, Band::Within(width));
         assert!(matches!(error, Error::Band { .. }), "{error}");
     }
 }

@@ -102,7 +102,7 @@ fn check_meshes_in<R: Runtime, T: Scalar>(device: &Device<R>) {
     let narrow = grid::<T>([-0.2, -0.3, -0.2], 0.025, [56, 24, 16]);
     for (name, mesh, grid, band) in [
         ("torus", meshes::torus::<T>(90, 31), coarse, Band::Full),
-        ("torus", meshes::torus(90, 31), coarse, Band::Cells(2.0)),
+        ("torus", meshes::torus(90, 31), coarse, Band::Within(0.2)),
         ("fish", meshes::fish(12), narrow, Band::Full),
         ("soup", meshes::soup(300, 4), coarse, Band::Full),
         // One face for all cells, and one vertex for all.

@@ -24,7 +24,7 @@ pub struct Scratch {
 }
 
 /// Extends an attribute of the samples to the vertices of the surface and to the cells with
-/// `|φ| ≤ band_cells · h` that have a closest face. Values have the unit of the attribute.
+/// `|φ| ≤ band` that have a closest face. Values have the unit of the attribute.
 ///
 /// # Errors
 /// As [`Error`] lists; the outputs are then not to be used.
@@ -32,15 +32,15 @@ pub fn forward<T: Real>(
     samples: Samples<'_, T>,
     attribute: &Attribute<T>,
     surface: Surface<'_, T>,
-    band_cells: f64,
+    band: f64,
     scratch: &mut Scratch,
     residual: &mut Residual<T>,
     out: &mut Extension<T>,
 ) -> Result<(), Error> {
     check_samples(samples, attribute)?;
     let grid = surface.phi.grid();
-    if !(band_cells > 0.0) || !band_cells.is_finite() {
-        return Err(Error::Band { cells: band_cells });
+    if !(band > 0.0) || !band.is_finite() {
+        return Err(Error::Band { width: band });
     }
     if surface.closest.len() != grid.cells() {
         return Err(Error::Closest {
@@ -48,7 +48,7 @@ pub fn forward<T: Real>(
             cells: grid.cells(),
         });
     }
-    let reach = T::of(band_cells * grid.spacing().f64());
+    let reach = T::of(band);
     find_band(surface, reach, &mut scratch.counts, &mut out.cells);
     check_faces(surface, &out.cells)?;
     out.components = attribute.components;

@@ -165,11 +165,11 @@ pub enum Error {
     },
     /// The width of the band is not a positive number.
     #[error(
-        "a band of {cells} cells on either side has no width; give a positive, finite number of cells"
+        "the band has a width of {width}; give a positive, finite length in the unit of the points"
     )]
     Band {
-        /// The width asked for, in cells.
-        cells: f64,
+        /// Distance from the surface to the end of the band.
+        width: f64,
     },
     /// The closest faces do not match the grid.
     #[error(

@@ -26,15 +26,15 @@ use sites::Sites;
 use task::{NEAR, Output, Task};
 use workspace::Pool;
 
-/// Where the distance is wanted.
+/// Region in which the distance is computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Band {
     /// At every cell.
     #[default]
     Full,
-    /// Within this many cells of the surface. Elsewhere `φ` is this far with the right sign, and there is no
-    /// closest triangle ([`NO_TRIANGLE`]).
-    Cells(f64),
+    /// Up to this distance from the surface, in the cloud's unit. Elsewhere `φ` is plus or minus this distance, with
+    /// the correct sign, and there is no closest triangle ([`NO_TRIANGLE`]).
+    Within(f64),
 }
 
 /// What `closest` holds where the band does not reach.
@@ -87,8 +87,8 @@ pub fn forward<T: Real>(
     let grid = chi.grid();
     let width = match band {
         Band::Full => f64::INFINITY,
-        Band::Cells(cells) if cells > 0.0 && cells.is_finite() => cells * grid.spacing().f64(),
-        Band::Cells(cells) => return Err(Error::Band { cells }),
+        Band::Within(width) if width > 0.0 && width.is_finite() => width,
+        Band::Within(width) => return Err(Error::Band { width }),
     };
     scratch.bvh.rebuild(mesh)?;
     let magnitude = magnitude(grid).max(scratch.bvh.magnitude());

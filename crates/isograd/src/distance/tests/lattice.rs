@@ -147,7 +147,7 @@ fn band_is_exact_within_its_width_and_constant_beyond() {
         let chi = signs(grid, 9);
         let width = cells * grid.spacing();
         let (full, _) = solve(&mesh, &chi, Band::Full);
-        let (band, closest) = solve(&mesh, &chi, Band::Cells(cells));
+        let (band, closest) = solve(&mesh, &chi, Band::Within(width));
         let mut within = 0;
         for (index, &d) in full.values().iter().enumerate() {
             if d.abs() <= width {
@@ -177,7 +177,7 @@ fn bits_do_not_depend_on_the_number_of_threads() {
         pool.install(|| {
             (
                 solve(&mesh, &chi, Band::Full),
-                solve(&mesh, &chi, Band::Cells(2.0)),
+                solve(&mesh, &chi, Band::Within(0.06)),
             )
         })
     };
@@ -309,8 +309,8 @@ fn bad_input_is_refused_with_a_reason() {
         refused(vec![[1e200; 3]], vec![[0, 0, 0]], Band::Full),
         Error::Range { .. }
     ));
-    for cells in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let error = refused(vec![[1.0; 3]], vec![[0, 0, 0]], Band::Cells(cells));
+    for width in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let error = refused(vec![[1.0; 3]], vec![[0, 0, 0]], Band::Within(width));
         assert!(matches!(error, Error::Band { .. }), "{error}");
     }
 }

@@ -47,7 +47,7 @@ impl<T: Real> Scene<T> {
             &mesh,
             &chi,
             T::zero(),
-            distance::Band::Cells(4.0),
+            distance::Band::Within(4.0 * spacing.f64()),
             &mut Default::default(),
             &mut phi,
             &mut closest,
@@ -101,8 +101,9 @@ impl<T: Real> Scene<T> {
     pub fn try_extend(
         &self,
         attribute: &Attribute<T>,
-        band: f64,
+        cells: f64,
     ) -> Result<(Extension<T>, Residual<T>), Error> {
+        let band = cells * self.phi.grid().spacing().f64();
         let (mut extension, mut residual) = (Extension::default(), Residual::default());
         let (samples, surface, scratch) = (self.samples(), self.surface(), &mut Scratch::default());
         forward(

@@ -205,7 +205,7 @@ fn unit_of_length_makes_no_difference() {
             samples,
             &attribute,
             surface,
-            3.0,
+            3.0 * scene.phi.grid().spacing(),
             scratch,
             &mut residual,
             &mut found,
@@ -278,12 +278,13 @@ fn memory_is_used_again() {
         )
     };
     let before = addresses(&extension, &residual);
+    let spacing = f64::from(scene.phi.grid().spacing());
     let (samples, surface, scratch) = (scene.samples(), scene.surface(), &mut Scratch::default());
     forward(
         samples,
         &attribute,
         surface,
-        1.0,
+        spacing,
         scratch,
         &mut residual,
         &mut extension,
@@ -293,7 +294,7 @@ fn memory_is_used_again() {
         samples,
         &attribute,
         surface,
-        3.0,
+        3.0 * spacing,
         scratch,
         &mut residual,
         &mut extension,

@@ -36,7 +36,11 @@ impl<T: Real> Scene<T> {
 
     fn measure_distance(&mut self) {
         let (chi, scratch) = (self.phi.clone(), &mut Default::default());
-        let (band, phi, closest) = (distance::Band::Cells(4.0), &mut self.phi, &mut self.closest);
+        let (band, phi, closest) = (
+            distance::Band::Within(4.0 * chi.grid().spacing().f64()),
+            &mut self.phi,
+            &mut self.closest,
+        );
         distance::lattice::forward(&self.mesh, &chi, T::zero(), band, scratch, phi, closest)
             .expect("distance");
     }
