@@ -5,6 +5,7 @@ mod deny;
 mod environment;
 mod examples;
 mod fit;
+mod kit;
 mod limits;
 mod links;
 mod nvrtc;
@@ -49,7 +50,10 @@ Figures and pages
                    alone meanwhile
   gallery          docs/images/: pictures of the clouds in examples/clouds
   fit              docs/fit.md: a fish found from its signed distance field
-  gpu              docs/gpu.md: time and memory on a GPU; where there is none, memory alone
+  gpu              docs/gpu.md: time and memory on a GPU; without a GPU, memory only
+  gpu --pack       target/isograd-gpu-kit.tar.xz: tests and benchmarks for a machine with an NVIDIA
+                   driver but without Rust and network
+  gpu --page FILE  docs/gpu.md from the results that this kit has written
   bench [ARGS]     the benchmarks, every stage and the whole; --quick for a short run,
                    a stage's name for that stage; other arguments go to criterion
   peers [ARGS]     docs/peers.md: isograd beside other libraries, measured in one
@@ -94,6 +98,8 @@ fn run(command: &str, rest: &[String]) -> Option<Outcome> {
         ("gradients", []) => Some(pages::gradients()),
         ("orientation", []) => Some(pages::orientation()),
         ("gpu", []) => Some(pages::gpu()),
+        ("gpu", [flag]) if flag == "--pack" => Some(kit::pack()),
+        ("gpu", [flag, file]) if flag == "--page" => Some(kit::import(file)),
         ("scaling", []) => Some(pages::scaling()),
         ("gallery", []) => Some(pages::gallery()),
         ("fit", []) => Some(fit::run()),

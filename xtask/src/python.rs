@@ -38,7 +38,7 @@ fn test_package(scope: Scope, tally: &mut Tally) -> Result<Vec<String>, Obstacle
         Scope::All => add_torch(&environment)?,
     };
     let packages = target.join("xtask/python/packages");
-    assemble_package(&environment, &target, &packages)?;
+    assemble_package(&environment, &target.join("debug"), &packages)?;
     let mut pytest = environment.module("pytest", &["-q", "-rs", "--color=no"]);
     pytest.args(["-p", "no:cacheprovider"]).arg(tests_folder());
     pytest.env("PYTHONPATH", packages);
@@ -79,8 +79,8 @@ fn add_torch(environment: &Environment) -> Outcome<Vec<String>> {
     Ok(Vec::new())
 }
 
-/// Assembles the package in a folder as a wheel has it, from the library built with the Rust tests.
-fn assemble_package(environment: &Environment, target: &Path, packages: &Path) -> Outcome {
+/// Assembles the package in a folder as a wheel has it, from the library in the folder `built`.
+pub fn assemble_package(environment: &Environment, built: &Path, packages: &Path) -> Outcome {
     remove_folder(packages)?;
     let mut metadata = environment.module("maturin", &["pep517", "write-dist-info"]);
     metadata.arg("--metadata-directory").arg(packages);
@@ -91,11 +91,11 @@ fn assemble_package(environment: &Environment, target: &Path, packages: &Path) -
         &process::root().join("bindings/python/python/isograd"),
         &package,
     )?;
-    let built = format!("{DLL_PREFIX}_core{DLL_SUFFIX}");
+    let library = format!("{DLL_PREFIX}_core{DLL_SUFFIX}");
     let module = if cfg!(windows) {
         "_core.pyd"
     } else {
         "_core.abi3.so"
     };
-    copy(&target.join("debug").join(built), &package.join(module))
+    copy(&built.join(library), &package.join(module))
 }
