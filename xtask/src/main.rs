@@ -35,6 +35,7 @@ Checks
                    benchmarks, and crates and source distribution as they are published
   lint             the first four of these, for the whole workspace
   python           the tests of the Python package alone
+  package          the packages as they are published: crates, source distribution
   deny             licenses, sources and advisories of every dependency (needs cargo-deny);
                    --offline leaves the advisories out
 
@@ -91,6 +92,7 @@ fn run(command: &str, rest: &[String]) -> Option<Outcome> {
         ("test", [flag]) if flag == "--all" => Some(test::run(Scope::All)),
         ("lint", []) => Some(test::lint()),
         ("python", []) => Some(test::python()),
+        ("package", []) => Some(packages::run()),
         ("deny", []) => Some(deny::run(false)),
         ("deny", [flag]) if flag == "--offline" => Some(deny::run(true)),
         ("docs", []) => Some(pages::all()),

@@ -12,7 +12,15 @@ use crate::workspace::Workspace;
 /// Files that every `.crate` holds besides its sources.
 const REQUIRED: [&str; 4] = ["Cargo.toml", "LICENSE-APACHE", "LICENSE-MIT", "README.md"];
 
-/// Packages every crate that can be published, and checks the unpacked crates as a workspace of their own.
+/// Both tests.
+pub fn run() -> Outcome {
+    for line in [crates()?, source_distribution()?].concat() {
+        println!("{line}");
+    }
+    Ok(())
+}
+
+/// Packages every crate that can be published, and checks the unpacked crates in a copy of the workspace.
 ///
 /// Cargo's own verification builds all dependencies again for each of them.
 pub fn crates() -> Outcome<Vec<String>> {
@@ -24,45 +32,55 @@ pub fn crates() -> Outcome<Vec<String>> {
     }
     process::run(package.env("CARGO_TARGET_DIR", target))?;
 
-    let folder = target.join("xtask").join("crates");
-    environment::remove_folder(&folder)?;
-    fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let copy = target.join("xtask/packages");
+    copy_workspace(&workspace.published, &copy)?;
     for name in &workspace.published {
-        let archive = format!("package/{name}-{}.crate", env!("CARGO_PKG_VERSION"));
-        unpack(&target.join(archive), &folder)?;
-        let unpacked = folder.join(format!("{name}-{}", env!("CARGO_PKG_VERSION")));
-        if let Some(file) = REQUIRED.iter().find(|file| !unpacked.join(file).is_file()) {
-            return Err(format!("the package of {name} lacks {file}"));
-        }
+        unpack(target, name, &copy.join("crates"))?;
     }
-    write(&folder.join("Cargo.toml"), &manifest(&workspace.published)?)?;
-    environment::copy(
-        &process::root().join("Cargo.lock"),
-        &folder.join("Cargo.lock"),
-    )?;
     let mut check = process::cargo(["check", "--workspace", "--all-features", "--all-targets"]);
-    check.current_dir(&folder).env("CARGO_TARGET_DIR", target);
+    check.current_dir(&copy).env("CARGO_TARGET_DIR", target);
     process::run(&mut check)?;
-    println!(
-        "{} crates build from their packages",
-        workspace.published.len()
-    );
+    let count = workspace.published.len();
+    println!("{count} crates build from their packages");
     Ok(Vec::new())
 }
 
-/// A workspace of the unpacked crates, with the profiles of this one, so that dependencies are not built again.
-fn manifest(names: &[String]) -> Outcome<String> {
-    let path = process::root().join("Cargo.toml");
-    let text = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-    let profiles = text.find("\n[profile").map_or("", |start| &text[start..]);
+/// Copies the workspace without its crates, whose packages take their place: the same selection of packages and
+/// features as elsewhere, so that dependencies are not built again.
+fn copy_workspace(published: &[String], copy: &Path) -> Outcome {
+    environment::remove_folder(copy)?;
+    let root = process::root();
+    for folder in ["benches", "bindings", "xtask"] {
+        environment::copy_folder(&root.join(folder), &copy.join(folder))?;
+    }
+    let crates = copy.join("crates");
+    fs::create_dir_all(&crates).map_err(|e| format!("{}: {e}", crates.display()))?;
+    environment::copy(&root.join("Cargo.lock"), &copy.join("Cargo.lock"))?;
+    let path = root.join("Cargo.toml");
+    let mut manifest = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    // A package names its siblings by their versions alone.
+    manifest += "\n[patch.crates-io]\n";
+    for name in published {
+        manifest += &format!("{name} = {{ path = \"crates/{name}\" }}\n");
+    }
+    let path = copy.join("Cargo.toml");
+    fs::write(&path, manifest).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+/// Unpacks the `.crate` of a package into a folder of its name.
+fn unpack(target: &Path, name: &str, crates: &Path) -> Outcome {
     let version = env!("CARGO_PKG_VERSION");
-    let patches: String = names
-        .iter()
-        .map(|name| format!("{name} = {{ path = \"{name}-{version}\" }}\n"))
-        .collect();
-    Ok(format!(
-        "[workspace]\nresolver = \"3\"\nmembers = [\"*-{version}\"]\n\n[patch.crates-io]\n{patches}{profiles}"
-    ))
+    let mut tar = Command::new("tar");
+    tar.arg("-xzf")
+        .arg(target.join(format!("package/{name}-{version}.crate")));
+    process::run(tar.arg("-C").arg(crates))?;
+    let unpacked = crates.join(name);
+    fs::rename(crates.join(format!("{name}-{version}")), &unpacked)
+        .map_err(|e| format!("{}: {e}", unpacked.display()))?;
+    match REQUIRED.iter().find(|file| !unpacked.join(file).is_file()) {
+        Some(file) => Err(format!("the package of {name} lacks {file}")),
+        None => Ok(()),
+    }
 }
 
 /// Installs the Python package from its source distribution into an empty environment, and reconstructs a cloud.
@@ -86,7 +104,6 @@ fn install_source_distribution(target: &Path) -> Result<(), Obstacle> {
         .ok_or("maturin made no source distribution".to_owned())?
         .path();
     let clean = Environment::create(folder.join("environment"))?;
-    // With the dependencies of the tests; from nothing and optimized for release, it would take minutes more.
     let settings = [
         ("CARGO_TARGET_DIR", target.display().to_string()),
         ("MATURIN_PEP517_ARGS", PEP517.to_owned()),
@@ -97,8 +114,8 @@ fn install_source_distribution(target: &Path) -> Result<(), Obstacle> {
     Ok(())
 }
 
-/// Options of the build within pip.
-const PEP517: &str = "--features pyo3/extension-module --profile dev";
+/// Options of the build within pip: a profile that builds in the least time.
+const PEP517: &str = "--features pyo3/extension-module --profile package-test";
 
 /// Runs with the package and NumPy alone.
 const SCRIPT: &str = "\
@@ -108,12 +125,3 @@ points /= numpy.linalg.norm(points, axis=1, keepdims=True)
 result = isograd.reconstruct(points, isograd.Grid.fit(points, 24))
 assert result.sdf.min() < 0 < result.sdf.max()
 assert numpy.isfinite(result.pullback(sdf=result.sdf).points).all()";
-
-fn unpack(archive: &Path, folder: &Path) -> Outcome {
-    let mut tar = Command::new("tar");
-    process::run(tar.arg("-xzf").arg(archive).arg("-C").arg(folder))
-}
-
-fn write(path: &Path, text: &str) -> Outcome {
-    fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()))
-}
