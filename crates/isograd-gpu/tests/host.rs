@@ -370,10 +370,7 @@ fn sensors_tell_the_sides_as_on_the_cpu() {
     }
     let sensors = isograd::Sensors::Any(vec![[0.0, 0.0, 6.0], [0.0, 0.0, -6.0]]);
     let cloud = cloud::<f32>(1500).with_sensors(sensors).unwrap();
-    let options = Options {
-        orientation: Method::Sensors,
-        ..options()
-    };
+    let options = options().orient(Method::Sensors);
     let grid = grid(&cloud);
     let mut plan = Plan::new(Backend::Vulkan, grid, options.clone()).unwrap();
     let found = plan.reconstruct(&cloud).unwrap();

@@ -166,7 +166,7 @@ impl<T: Number> Plan<T> {
         };
         // As the signs of the plan, so that a result that is restored has the radii that it had.
         let on_cpu = matches!(
-            self.options.orientation,
+            self.options.orient,
             Method::Auto | Method::Sensors | Method::Previous
         );
         let method = match method {
