@@ -31,8 +31,9 @@ pub fn run(scope: Scope, tally: &mut Tally) -> Outcome<Vec<String>> {
 
 /// Returns a line for each part that is missing.
 fn test_package(scope: Scope, tally: &mut Tally) -> Result<Vec<String>, Obstacle> {
-    let target = Workspace::load()?.target;
-    let environment = environment(&target)?;
+    let workspace = Workspace::load()?;
+    let target = &workspace.target;
+    let environment = environment(target)?;
     let missing = match scope {
         Scope::Default => Vec::new(),
         Scope::All => add_torch(&environment)?,
@@ -42,6 +43,7 @@ fn test_package(scope: Scope, tally: &mut Tally) -> Result<Vec<String>, Obstacle
     let mut pytest = environment.module("pytest", &["-q", "-rs", "--color=no"]);
     pytest.args(["-p", "no:cacheprovider"]).arg(tests_folder());
     pytest.env("PYTHONPATH", packages);
+    pytest.env("ISOGRAD_PROGRAM", workspace.program());
     // Packages that draw must not look for a screen.
     pytest.env("MPLBACKEND", "Agg").env_remove("DISPLAY");
     process::run_by_line(&mut pytest, |line| {
