@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use isograd::orient::doubt::Doubt;
 use isograd::{Attribute, Orienter, PointCloud, PointCloudError, Real, Stage};
-use isograd_io::{CLOUD_ENDINGS, Dtype, Geometry};
+use isograd_io::{CLOUD_EXTENSIONS, Dtype, Geometry};
 use serde::Serialize;
 
 use crate::args;
@@ -43,7 +43,7 @@ pub fn run(args: &args::OrientCloud) -> Result<(), Error> {
 fn check(args: &args::OrientCloud) -> Result<(), Error> {
     args.normals.check()?;
     let report = args.report.iter().map(|path| (path, &["json"][..]));
-    for (path, endings) in [(&args.output, CLOUD_ENDINGS)].into_iter().chain(report) {
+    for (path, endings) in [(&args.output, CLOUD_EXTENSIONS)].into_iter().chain(report) {
         check_ending(path, endings)?;
         check_not_input(path, &args.cloud)?;
         isograd_io::check_output(path, endings)?;

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use isograd_io::{FIELD_ENDINGS, MESH_ENDINGS, check_output};
+use isograd_io::{FIELD_EXTENSIONS, MESH_EXTENSIONS, check_output};
 use serde::Serialize;
 
 use crate::args;
@@ -57,8 +57,8 @@ impl Outputs {
 
     fn all(&self) -> impl Iterator<Item = (&Path, &'static [&'static str])> {
         let files: [(&Option<PathBuf>, &'static [&'static str]); 6] = [
-            (&self.mesh, MESH_ENDINGS),
-            (&self.sdf, FIELD_ENDINGS),
+            (&self.mesh, MESH_EXTENSIONS),
+            (&self.sdf, FIELD_EXTENSIONS),
             (&self.points, POINTS_ENDINGS),
             (&self.report, &["json"]),
             (&self.plot, &["png"]),

@@ -3,7 +3,7 @@
 use isograd::distance::Query;
 use isograd::isosurface::measure;
 use isograd::{Attribute, PointCloud};
-use isograd_io::{CLOUD_ENDINGS, Content, FieldFile, Geometry};
+use isograd_io::{CLOUD_EXTENSIONS, Content, FieldFile, Geometry};
 
 use crate::args;
 use crate::error::Error;
@@ -15,8 +15,8 @@ use crate::progress::{to_stderr, to_stdout};
 /// # Errors
 /// See [`Error`].
 pub fn run(args: &args::Query) -> Result<(), Error> {
-    check_ending(&args.output, CLOUD_ENDINGS)?;
-    isograd_io::check_output(&args.output, CLOUD_ENDINGS)?;
+    check_ending(&args.output, CLOUD_EXTENSIONS)?;
+    isograd_io::check_output(&args.output, CLOUD_EXTENSIONS)?;
     let source = isograd_io::read(&args.source)?;
     let points = isograd_io::read_geometry(&args.at)?.points;
     let attributes = match source {

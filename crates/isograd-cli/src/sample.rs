@@ -1,7 +1,7 @@
 //! `isograd sample`: a parametric body as a point cloud.
 
 use isograd::Real;
-use isograd_io::CLOUD_ENDINGS;
+use isograd_io::CLOUD_EXTENSIONS;
 use isograd_shapes::{Density, Sampling, Shape, all, by_name};
 
 use crate::args::{self, Layout, Precision};
@@ -39,8 +39,8 @@ fn sample<T: Real>(args: &args::Sample) -> Result<(), Error> {
     let (Some(name), Some(number), Some(output)) = (&args.shape, args.number, &args.output) else {
         return Err(Error::Usage("give SHAPE, -n N and -o CLOUD".into()));
     };
-    check_ending(output, CLOUD_ENDINGS)?;
-    isograd_io::check_output(output, CLOUD_ENDINGS)?;
+    check_ending(output, CLOUD_EXTENSIONS)?;
+    isograd_io::check_output(output, CLOUD_EXTENSIONS)?;
     let shape = shape(name, &args.parameters)?;
     let sampling = Sampling {
         layout: match args.layout {

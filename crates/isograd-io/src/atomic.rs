@@ -1,8 +1,8 @@
-//! Files that appear whole or not at all.
+//! Atomic writing of files.
 //!
-//! A file is written under a temporary name in its own folder and renamed when it is complete. On an
-//! error the temporary file goes; on Ctrl-C the program calls [`remove_unfinished`] before it leaves. A
-//! file that was there before stays as it is until the new one is complete.
+//! A file is written under a temporary name in its own folder and renamed when it is complete; an existing
+//! file is unchanged until then. The temporary file is removed on an error, and by [`remove_unfinished`],
+//! which a program calls before it exits on Ctrl-C.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::Error;
 
-/// The temporary files that exist now; `stopped` forbids new ones.
+/// Existing temporary files; `stopped` forbids new ones.
 struct Unfinished {
     files: Vec<PathBuf>,
     stopped: bool,
@@ -26,29 +26,29 @@ static UNFINISHED: Mutex<Unfinished> = Mutex::new(Unfinished {
 static NEXT: AtomicU64 = AtomicU64::new(0);
 
 fn unfinished() -> std::sync::MutexGuard<'static, Unfinished> {
-    // The list stays valid whatever a thread that held it did.
+    // The list is valid even if a thread panicked while it held the lock.
     UNFINISHED
         .lock()
         .unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
-/// Removes every temporary file of this process and lets no writer finish or begin from now on: the
-/// last thing that a program does before it leaves on Ctrl-C.
+/// Removes every temporary file of this process; from now on every write fails. To be called before the
+/// process exits on Ctrl-C.
 pub fn remove_unfinished() {
     let mut unfinished = unfinished();
     unfinished.stopped = true;
     for file in unfinished.files.drain(..) {
-        // It may be gone already, and there is nobody left to tell.
+        // The file may be gone already; the process exits in any case.
         let _ = fs::remove_file(file);
     }
 }
 
-/// Writes a file by `content`; the file at `path` appears, or is replaced, only when all went well.
+/// Writes the output of `content` to `path`; the file is created or replaced only on success.
 ///
-/// Devices and pipes (`/dev/stdout`) are written to directly; a symbolic link stays one.
+/// Devices and pipes (`/dev/stdout`) are written to directly; a symbolic link is followed.
 ///
 /// # Errors
-/// [`Error::Write`] with what the operating system said.
+/// [`Error::Write`].
 pub fn write(
     path: &Path,
     content: impl FnOnce(&mut Output) -> io::Result<()>,
@@ -66,13 +66,13 @@ pub fn write(
 /// A file that is being written.
 pub struct Output {
     writer: BufWriter<File>,
-    /// The temporary name and the name to be; `None` for a device, which is written to directly.
+    /// The temporary and the final path; `None` for a device, which is written to directly.
     rename: Option<(PathBuf, PathBuf)>,
 }
 
 impl Output {
     fn create(path: &Path) -> io::Result<Self> {
-        // Through links, so that the file they lead to is replaced and the links stay.
+        // Follow links, so that their target is replaced.
         let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
         if let Ok(metadata) = fs::metadata(&target) {
             if metadata.is_dir() {
@@ -102,7 +102,7 @@ impl Output {
         })
     }
 
-    /// Gives the file its name.
+    /// Moves the file to its final path.
     fn commit(mut self) -> io::Result<()> {
         self.writer.flush()?;
         let Some((temporary, target)) = &self.rename else {
@@ -111,7 +111,7 @@ impl Output {
         if let Ok(old) = fs::metadata(target) {
             fs::set_permissions(temporary, old.permissions())?;
         }
-        // Held over the rename, so that a file is either finished or removed, never both.
+        // The lock is held during the rename: a file is either finished or removed.
         let mut unfinished = unfinished();
         if unfinished.stopped {
             return Err(io::ErrorKind::Interrupted.into());
@@ -144,7 +144,7 @@ impl Write for Output {
     }
 }
 
-/// A hidden name in the folder of `target` that no other writer uses.
+/// A unique hidden path in the folder of `target`.
 fn temporary_name(target: &Path) -> io::Result<PathBuf> {
     let name = target
         .file_name()

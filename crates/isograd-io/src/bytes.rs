@@ -1,4 +1,6 @@
-//! Numbers as little-endian bytes, in the type that they have.
+//! Numbers as little-endian bytes, in their own type.
+
+use std::io::{self, Write};
 
 use isograd::Real;
 
@@ -7,8 +9,7 @@ pub(crate) fn scalar_name<T: Real>(names: [&'static str; 2]) -> &'static str {
     names[usize::from(is_double::<T>())]
 }
 
-/// Whether `T` is `f64`.
-pub(crate) fn is_double<T: Real>() -> bool {
+fn is_double<T: Real>() -> bool {
     T::NAME == f64::NAME
 }
 
@@ -27,9 +28,18 @@ pub(crate) fn push_real<T: Real>(out: &mut Vec<u8>, value: T) {
     }
 }
 
-#[inline]
-pub(crate) fn push_vector<T: Real>(out: &mut Vec<u8>, v: [T; 3]) {
-    for value in v {
-        push_real(out, value);
+/// Writes numbers one after another.
+pub(crate) fn write_reals<T: Real>(
+    out: &mut impl Write,
+    values: impl IntoIterator<Item = T>,
+) -> io::Result<()> {
+    let mut buffer = Vec::new();
+    for value in values {
+        push_real(&mut buffer, value);
+        if buffer.len() >= 1 << 16 {
+            out.write_all(&buffer)?;
+            buffer.clear();
+        }
     }
+    out.write_all(&buffer)
 }

@@ -1,90 +1,90 @@
-//! What can go wrong with a file, and where in it.
+//! Errors of readers and writers, with the location in the file.
 
 use std::fmt;
 use std::io;
 
-/// Why a file could not be read or written. The message names the file, the place in it where there is
-/// one, what is wrong, and what to do.
+/// Error of a reader or writer. The message names the file, the location in it if there is one, the
+/// problem, and the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The operating system refused to read it.
+    /// The file cannot be opened or read.
     #[error("{file}: {source}; {}", read_remedy(source))]
     Read {
         /// The file.
         file: String,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// A folder was named where a file is needed.
+    /// The path is a folder.
     #[error("{file} is a folder; name a file")]
     Folder {
         /// The folder.
         file: String,
     },
-    /// There is nothing in it.
+    /// The file has 0 bytes.
     #[error("{file} is empty (0 bytes); write the data again")]
     Empty {
         /// The file.
         file: String,
     },
-    /// The format is unknown, or not one that can hold what is asked for.
+    /// The format is unknown, or does not fit the content or the request.
     #[error("{file}: {problem}")]
     Format {
         /// The file.
         file: String,
-        /// What is wrong and what to do.
+        /// The problem and its remedy.
         problem: String,
     },
-    /// The content is wrong.
-    #[error("{file}{place}: {problem}")]
+    /// The content is invalid.
+    #[error("{file}{location}: {problem}")]
     Content {
         /// The file.
         file: String,
-        /// Where in the file.
-        place: Place,
-        /// What is wrong and what to do.
+        /// Location in the file.
+        location: Location,
+        /// The problem and its remedy.
         problem: String,
     },
-    /// The operating system refused to write it.
+    /// The file cannot be written.
     #[error("cannot write {file}: {source}; {}", write_remedy(source))]
     Write {
         /// The file.
         file: String,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
 
-/// A place in a file.
+/// Location in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum Location {
     /// The file as a whole.
     Whole,
-    /// A line, from 1.
+    /// Line number, from 1.
     Line(usize),
-    /// A byte, from 0.
+    /// Byte offset, from 0.
     Byte(usize),
-    /// An element of a binary file, from 0, and the byte at which it begins.
+    /// Element of a binary file.
     Element {
-        /// What it is: vertex, face, triangle.
+        /// Kind of element: vertex, face, triangle.
         name: String,
-        /// Its index, from 0.
+        /// Index among its kind, from 0.
         index: usize,
-        /// Where it begins, in bytes from the start of the file.
+        /// Byte offset of its start.
         byte: usize,
     },
-    /// An array or a member with a name, and an index in it.
+    /// Row of a named array.
     Row {
-        /// Its name.
+        /// Name of the array.
         name: String,
-        /// The row, from 0.
+        /// Row index, from 0.
         index: usize,
     },
-    /// An array or a member with a name.
-    Member(String),
+    /// A named array.
+    Array(String),
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for Location {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Whole => Ok(()),
@@ -92,7 +92,7 @@ impl fmt::Display for Place {
             Self::Byte(byte) => write!(f, ", byte {byte}"),
             Self::Element { name, index, byte } => write!(f, ", {name} {index} (byte {byte})"),
             Self::Row { name, index } => write!(f, ", array '{name}', row {index}"),
-            Self::Member(name) => write!(f, ", array '{name}'"),
+            Self::Array(name) => write!(f, ", array '{name}'"),
         }
     }
 }
@@ -100,8 +100,8 @@ impl fmt::Display for Place {
 fn read_remedy(source: &io::Error) -> &'static str {
     match source.kind() {
         io::ErrorKind::NotFound => "check the path",
-        io::ErrorKind::PermissionDenied => "check who may read it",
-        io::ErrorKind::OutOfMemory => "it is larger than the memory; thin it",
+        io::ErrorKind::PermissionDenied => "check its permissions",
+        io::ErrorKind::OutOfMemory => "it is larger than the memory; reduce it",
         _ => "check the file and the disk",
     }
 }

@@ -1,4 +1,4 @@
-//! What a file of a field holds.
+//! Content of a file of a field.
 
 use isograd::{Field, Grid, Real};
 
@@ -8,16 +8,16 @@ use crate::number::Dtype;
 /// A field on a grid, in double precision.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FieldFile {
-    /// The values at the cell centers.
+    /// Values at the cell centers.
     pub field: Field<f64>,
-    /// How the file stored the values.
+    /// Number type of the values in the file.
     pub dtype: Dtype,
     /// The file's format.
     pub format: Format,
 }
 
 impl FieldFile {
-    /// The field in type `T`; `None` where the grid can't be told apart in `T`.
+    /// Converts the field to type `T`; `None` if the cell centers of its grid are not distinct in `T`.
     pub fn convert<T: Real>(&self) -> Option<Field<T>> {
         let grid = self.field.grid();
         let lower = grid.lower().map(T::of);
@@ -27,8 +27,8 @@ impl FieldFile {
     }
 }
 
-/// A field from the position of its first sample; or what is wrong with it.
-pub(crate) fn field(
+/// Builds a field from the position of its first sample; the error is the problem.
+pub(crate) fn field_file(
     origin: [f64; 3],
     spacing: f64,
     shape: [usize; 3],
@@ -40,7 +40,9 @@ pub(crate) fn field(
     let grid = Grid::new(lower, spacing, shape).map_err(|e| e.to_string())?;
     if let Some(index) = values.iter().position(|v| !v.is_finite()) {
         let cell = grid.cell(index);
-        return Err(format!("the value of cell {cell:?} is not finite; mend it"));
+        return Err(format!(
+            "the value of cell {cell:?} is not finite; correct it"
+        ));
     }
     let field = Field::new(grid, values).map_err(|e| e.to_string())?;
     Ok(FieldFile {

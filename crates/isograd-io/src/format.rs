@@ -1,10 +1,10 @@
-//! Which format a file is in: by its name, checked against its content.
+//! File formats, detected by the name of the file and checked against its content.
 
 use std::path::Path;
 
 use crate::error::Error;
 
-/// A file format.
+/// File format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// Stanford polygon file: points or a mesh.
@@ -25,25 +25,28 @@ pub enum Format {
     Vti,
 }
 
+/// Name and file extensions of each format.
+const FORMATS: [(Format, &str, &[&str]); 8] = [
+    (Format::Ply, "PLY", &["ply"]),
+    (Format::Text, "text", &["xyz", "csv", "txt"]),
+    (Format::Obj, "OBJ", &["obj"]),
+    (Format::Stl, "STL", &["stl"]),
+    (Format::Npy, "NPY", &["npy"]),
+    (Format::Npz, "NPZ", &["npz"]),
+    (Format::Vtp, "VTP", &["vtp"]),
+    (Format::Vti, "VTI", &["vti"]),
+];
+
 impl Format {
-    /// The format that a file name stands for.
-    pub fn of_name(path: &Path) -> Option<Self> {
+    /// Format of a file extension.
+    pub fn from_path(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
-        Some(match extension.as_str() {
-            "ply" => Self::Ply,
-            "xyz" | "csv" | "txt" => Self::Text,
-            "obj" => Self::Obj,
-            "stl" => Self::Stl,
-            "npy" => Self::Npy,
-            "npz" => Self::Npz,
-            "vtp" => Self::Vtp,
-            "vti" => Self::Vti,
-            _ => return None,
-        })
+        let has_extension = |f: &&(_, _, &[&str])| f.2.contains(&extension.as_str());
+        FORMATS.iter().find(has_extension).map(|f| f.0)
     }
 
-    /// The format that the first bytes betray, where they do.
-    pub fn of_content(bytes: &[u8]) -> Option<Self> {
+    /// Format of the first bytes, if they are distinctive.
+    pub fn from_content(bytes: &[u8]) -> Option<Self> {
         let head = &bytes[..bytes.len().min(512)];
         let holds = |word: &[u8]| memchr::memmem::find(head, word).is_some();
         if head.starts_with(b"ply\n") || head.starts_with(b"ply\r") {
@@ -61,60 +64,42 @@ impl Format {
         }
     }
 
-    /// Its usual name.
+    /// Usual name.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Ply => "PLY",
-            Self::Text => "text",
-            Self::Obj => "OBJ",
-            Self::Stl => "STL",
-            Self::Npy => "NPY",
-            Self::Npz => "NPZ",
-            Self::Vtp => "VTP",
-            Self::Vti => "VTI",
-        }
+        FORMATS[self as usize].1
     }
 
     fn extension(self) -> &'static str {
-        match self {
-            Self::Ply => "ply",
-            Self::Text => "xyz",
-            Self::Obj => "obj",
-            Self::Stl => "stl",
-            Self::Npy => "npy",
-            Self::Npz => "npz",
-            Self::Vtp => "vtp",
-            Self::Vti => "vti",
-        }
+        FORMATS[self as usize].2[0]
     }
 }
 
-/// The format to read a file in. A name that the content contradicts is refused: guessing either way
-/// would read garbage from somebody's file.
-pub(crate) fn choose(path: &Path, name: &str, bytes: &[u8]) -> Result<Format, Error> {
+/// Determines the format of a file. A name that contradicts the content is refused: a guess could read
+/// wrong data without an error.
+pub(crate) fn detect(path: &Path, name: &str, bytes: &[u8]) -> Result<Format, Error> {
     let refuse = |problem: String| Error::Format {
         file: name.to_string(),
         problem,
     };
-    let betrayed = Format::of_content(bytes);
+    let content = Format::from_content(bytes);
     if path == Path::new("-") {
-        return Ok(betrayed.unwrap_or(Format::Text));
+        return Ok(content.unwrap_or(Format::Text));
     }
-    match (Format::of_name(path), betrayed) {
+    match (Format::from_path(path), content) {
         (Some(named), Some(content)) if named != content => Err(refuse(format!(
             "the name says {}, but the content is {}; rename it to end in .{}",
             named.name(),
             content.name(),
             content.extension()
         ))),
-        // STL and OBJ have no sure mark: only formats that always have one can miss it.
+        // STL, OBJ and text have no signature, and XML may begin with long comments.
         (Some(named @ (Format::Ply | Format::Npy | Format::Npz)), None) => Err(refuse(format!(
-            "the content does not begin as {} does; check the file, or rename it after its real format",
+            "the content does not begin as {} does; check the file, or rename it to its real format",
             named.name()
         ))),
         (Some(named), _) => Ok(named),
         (None, Some(content)) => Err(refuse(format!(
-            "the name has no known ending, and the content is {}; rename it to end in .{}",
+            "the extension is unknown, and the content is {}; rename it to end in .{}",
             content.name(),
             content.extension()
         ))),
@@ -122,6 +107,6 @@ pub(crate) fn choose(path: &Path, name: &str, bytes: &[u8]) -> Result<Format, Er
     }
 }
 
-/// The formats that can be read, for messages.
+/// Readable formats, for messages.
 pub(crate) const KNOWN: &str =
     "the name must end in .ply, .xyz, .csv, .txt, .obj, .stl, .npy, .npz, .vtp or .vti";

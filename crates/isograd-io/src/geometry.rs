@@ -1,8 +1,7 @@
-//! What a file of points or of a mesh holds.
+//! Content of a file of points or of a mesh.
 
 use isograd::data::Attribute;
 use isograd::{Mesh, MeshError, PointCloud, PointCloudError, Real, Sensors};
-use isograd_element::vector;
 
 use crate::format::Format;
 use crate::number::Dtype;
@@ -13,24 +12,36 @@ use crate::number::Dtype;
 pub struct Geometry {
     /// `(N, 3)` points or vertices, in the file's order and unit.
     pub points: Vec<[f64; 3]>,
-    /// `(N, 3)` normals, as they stand in the file (any length).
+    /// `(N, 3)` normals, not normalized.
     pub normals: Option<Vec<[f64; 3]>>,
-    /// What else the file says of each point.
+    /// Further values per point.
     pub attributes: Vec<Attribute<f64>>,
-    /// `(F, 3)` triangles; polygons are cut into fans. Empty where the file has none.
+    /// `(F, 3)` triangles; polygons are cut into fans. Empty if the file has none.
     pub faces: Vec<[u32; 3]>,
-    /// How the file stored the coordinates.
+    /// Number type of the coordinates in the file.
     pub dtype: Dtype,
     /// The file's format.
     pub format: Format,
 }
 
 impl Geometry {
-    /// The points as a cloud of type `T`. Attributes that say where each point was seen from (`sensor_x`,
-    /// `sensor_y` and `sensor_z`, or `sensor` of three components) become its sensors, and stay attributes.
+    /// Points alone.
+    pub(crate) fn from_points(points: Vec<[f64; 3]>, dtype: Dtype, format: Format) -> Self {
+        Self {
+            points,
+            normals: None,
+            attributes: Vec::new(),
+            faces: Vec::new(),
+            dtype,
+            format,
+        }
+    }
+
+    /// Converts the points to a cloud of type `T`. Attributes with sensor positions (`sensor_x`,
+    /// `sensor_y` and `sensor_z`, or `sensor` of three components) become its sensors and stay attributes.
     ///
     /// # Errors
-    /// A coordinate or sensor beyond the range of `f32` or not finite, or more points than a cloud may hold.
+    /// A coordinate or sensor that is not finite in `T`, or more points than a cloud may hold.
     pub fn cloud<T: Real>(&self) -> Result<PointCloud<T>, PointCloudError> {
         let cloud = PointCloud::new(convert(&self.points))?;
         let cloud = match &self.normals {
@@ -50,16 +61,16 @@ impl Geometry {
         })
     }
 
-    /// `(N, 3)` where each point was seen from, if attributes say so.
+    /// `(N, 3)` sensor positions, if the attributes hold them.
     fn sensors(&self) -> Option<Vec<[f64; 3]>> {
         let find = |name: &str, components: usize| {
-            let mut found = self.attributes.iter();
-            found.find(|a| a.name == name && a.components == components)
+            let mut attributes = self.attributes.iter();
+            attributes.find(|a| a.name == name && a.components == components)
         };
         if let Some(whole) = find("sensor", 3) {
             return Some(whole.values.as_chunks().0.to_vec());
         }
-        // As a writer splits an attribute of three components.
+        // The second form is how the writers split an attribute of three components.
         [
             ["sensor_x", "sensor_y", "sensor_z"],
             ["sensor_0", "sensor_1", "sensor_2"],
@@ -72,34 +83,33 @@ impl Geometry {
         })
     }
 
-    /// The triangles as a mesh of type `T`; without faces, a mesh without faces.
+    /// Converts vertices and faces to a mesh of type `T`.
     ///
     /// # Errors
-    /// A coordinate beyond the range of `f32`, or more vertices than 32-bit indices can name.
+    /// A coordinate that is not finite in `T`, or more vertices than 32-bit indices can address.
     pub fn mesh<T: Real>(&self) -> Result<Mesh<T>, MeshError> {
         Mesh::new(convert(&self.points), self.faces.clone())
     }
 }
 
 fn convert<T: Real>(points: &[[f64; 3]]) -> Vec<[T; 3]> {
-    points.iter().map(|&p| vector::of_f64(p)).collect()
+    points.iter().map(|p| p.map(T::of)).collect()
 }
 
-/// The triangles of a polygon, as a fan round its first corner; the same winding.
+/// Appends the triangles of a polygon: a fan around its first corner, with the polygon's winding.
 pub(crate) fn triangulate(corners: &[u32], faces: &mut Vec<[u32; 3]>) {
     if let Some((&first, rest)) = corners.split_first() {
         faces.extend(rest.windows(2).map(|pair| [first, pair[0], pair[1]]));
     }
 }
 
-/// What is wrong with a coordinate or normal, if it is not finite.
-pub(crate) fn refuse_not_finite(what: &str, v: [f64; 3]) -> Result<(), String> {
-    if vector::is_finite(v) {
+/// Refuses a point or normal (`what`) that is not finite.
+pub(crate) fn check_finite(what: &str, [x, y, z]: [f64; 3]) -> Result<(), String> {
+    if x.is_finite() && y.is_finite() && z.is_finite() {
         return Ok(());
     }
     Err(format!(
-        "the {what} ({}, {}, {}) is not finite; remove the point or mend it",
-        v[0], v[1], v[2]
+        "the {what} ({x}, {y}, {z}) is not finite; remove or correct the point"
     ))
 }
 
@@ -108,23 +118,19 @@ mod tests {
     use super::*;
 
     fn geometry(attributes: &[(&str, usize)]) -> Geometry {
-        let of = |&(name, components): &(&str, usize)| Attribute {
+        let attribute = |&(name, components): &(&str, usize)| Attribute {
             name: name.into(),
             components,
             values: (0..2 * components).map(|v| v as f64).collect(),
         };
         Geometry {
-            points: vec![[0.0; 3], [1.0; 3]],
-            normals: None,
-            attributes: attributes.iter().map(of).collect(),
-            faces: Vec::new(),
-            dtype: Dtype::F64,
-            format: Format::Npz,
+            attributes: attributes.iter().map(attribute).collect(),
+            ..Geometry::from_points(vec![[0.0; 3], [1.0; 3]], Dtype::F64, Format::Npz)
         }
     }
 
     #[test]
-    fn attributes_that_say_where_a_point_was_seen_from_are_its_sensors() {
+    fn attributes_with_sensor_positions_become_the_sensors_of_a_cloud() {
         let whole = geometry(&[("sensor", 3)]).cloud::<f64>().expect("a cloud");
         let rows = vec![[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]];
         assert_eq!(whole.sensors(), Some(&Sensors::Each(rows)));

@@ -19,20 +19,20 @@
 //! | VTP | points, mesh | mesh |
 //! | VTI | field | field |
 //!
-//! Columns or properties `sensor_x`, `sensor_y` and `sensor_z`, or an array `sensor` of three components, say where
-//! each point was seen from.
+//! Columns or properties `sensor_x`, `sensor_y` and `sensor_z`, or an array `sensor` of three components, hold the
+//! sensor position of each point.
 //!
-//! What it guarantees:
-//! - No input makes it panic, and what it allocates is bounded by the size of the file, not by what a
-//!   header says.
-//! - Every error names the file, the line or the byte or the index, what is wrong, and what to do.
-//! - A file appears whole or not at all ([`atomic`]).
-//! - Numbers are read in double precision, exactly, and written in the type that they have; what is
-//!   written and read back has the same bits (STL aside, which is single precision).
+//! Guarantees:
+//! - No input causes a panic, and memory is bounded by the size of the file, not by the counts in its header.
+//! - Every error names the file, the location (line, byte, element or row), the problem, and the remedy.
+//! - Writing is atomic: a file is complete or absent ([`atomic`]).
+//! - Numbers are read in double precision, exactly, and written in their own type; numbers that are
+//!   written and read back have the same bits (except STL, which is single precision).
 #![warn(missing_docs)]
 
 pub mod atomic;
 mod bytes;
+mod columns;
 mod error;
 mod field;
 mod format;
@@ -48,7 +48,7 @@ mod text;
 mod vtk;
 mod write;
 
-pub use error::{Error, Place};
+pub use error::{Error, Location};
 pub use field::FieldFile;
 pub use format::Format;
 pub use geometry::Geometry;
@@ -56,5 +56,6 @@ pub use number::Dtype;
 pub use read::{Content, parse_field, parse_geometry, read, read_field, read_geometry, read_mesh};
 pub use source::Source;
 pub use write::{
-    CLOUD_ENDINGS, FIELD_ENDINGS, MESH_ENDINGS, check_output, write_cloud, write_field, write_mesh,
+    CLOUD_EXTENSIONS, FIELD_EXTENSIONS, MESH_EXTENSIONS, check_output, write_cloud, write_field,
+    write_mesh,
 };

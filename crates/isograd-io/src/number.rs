@@ -22,7 +22,7 @@ pub(crate) enum Endian {
     Big,
 }
 
-/// How a file stored the coordinates (all are handed out as `f64`).
+/// Number type of the coordinates or values in a file (they are read as `f64`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dtype {
     /// Single precision.
@@ -36,7 +36,7 @@ pub enum Dtype {
 }
 
 impl Dtype {
-    /// Its name as reports show it.
+    /// Name for reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::F32 => "f32",
@@ -47,7 +47,43 @@ impl Dtype {
     }
 }
 
+/// Names of the number types in NumPy arrays, in VTK files, and (two each) in PLY files.
+const NAMES: [(Number, [&str; 4]); 10] = [
+    (Number::I8, ["i1", "Int8", "char", "int8"]),
+    (Number::U8, ["u1", "UInt8", "uchar", "uint8"]),
+    (Number::I16, ["i2", "Int16", "short", "int16"]),
+    (Number::U16, ["u2", "UInt16", "ushort", "uint16"]),
+    (Number::I32, ["i4", "Int32", "int", "int32"]),
+    (Number::U32, ["u4", "UInt32", "uint", "uint32"]),
+    (Number::I64, ["i8", "Int64", "int64", "int64"]),
+    (Number::U64, ["u8", "UInt64", "uint64", "uint64"]),
+    (Number::F32, ["f4", "Float32", "float", "float32"]),
+    (Number::F64, ["f8", "Float64", "double", "float64"]),
+];
+
 impl Number {
+    /// The type that a NumPy array calls `name`, without its byte order.
+    pub fn from_numpy(name: &str) -> Option<Self> {
+        Self::find(|names| names[0] == name || name == "b1" && names[0] == "u1")
+    }
+
+    /// The type that a VTK file calls `name`.
+    pub fn from_vtk(name: &str) -> Option<Self> {
+        Self::find(|names| names[1] == name)
+    }
+
+    /// The type that a PLY file calls `name`.
+    pub fn from_ply(name: &[u8]) -> Option<Self> {
+        Self::find(|names| names[2..].iter().any(|n| n.as_bytes() == name))
+    }
+
+    fn find(is_named: impl Fn(&[&str; 4]) -> bool) -> Option<Self> {
+        let mut types = NAMES.iter();
+        types
+            .find(|(_, names)| is_named(names))
+            .map(|(number, _)| *number)
+    }
+
     /// Size in bytes.
     pub fn size(self) -> usize {
         match self {
@@ -94,7 +130,7 @@ impl Number {
     }
 }
 
-/// The first `N` bytes, turned to little-endian order.
+/// The first `N` bytes, in little-endian order.
 #[inline(always)]
 fn take<const N: usize>(bytes: &[u8], endian: Endian) -> Option<[u8; N]> {
     let mut taken = *bytes.first_chunk::<N>()?;
@@ -104,7 +140,7 @@ fn take<const N: usize>(bytes: &[u8], endian: Endian) -> Option<[u8; N]> {
     Some(taken)
 }
 
-/// `value` as a whole number in `0..limit`, or `None`.
+/// `value` as an integer in `0..limit`; `None` if it is not one.
 pub(crate) fn as_index(value: f64, limit: usize) -> Option<usize> {
     (value >= 0.0 && value < limit as f64 && value.fract() == 0.0).then_some(value as usize)
 }

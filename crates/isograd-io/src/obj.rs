@@ -1,25 +1,25 @@
-//! Wavefront OBJ: vertices, per-vertex normals and polygons; everything else is passed over.
+//! Wavefront OBJ: vertices, per-vertex normals and polygons; everything else is ignored.
 //!
-//! `tobj` was tried first: its errors name no line, and it drops vertices that no face uses.
+//! The reader is our own: the crate `tobj` gives no line in its errors and drops vertices without faces.
 
 use std::io::{self, Write};
 
 use isograd::{Mesh, Real};
 
-use crate::error::{Error, Place};
+use crate::error::{Error, Location};
 use crate::format::Format;
-use crate::geometry::{Geometry, refuse_not_finite, triangulate};
+use crate::geometry::{Geometry, check_finite, triangulate};
 use crate::number::Dtype;
-use crate::source::{Lines, Source, number, shown, words};
+use crate::source::{Lines, Source, quoted, three_numbers, words};
 
-/// Reads an OBJ file. Normals are kept where there is one per vertex and no face says otherwise.
+/// Reads an OBJ file. Normals are kept if there is one per vertex and every face pairs them by index.
 pub(crate) fn read(source: &Source) -> Result<Geometry, Error> {
     let mut reader = Reader::default();
     let mut lines = Lines::new(&source.bytes);
     let mut joined = Vec::new();
     while let Some((line_number, line)) = lines.next() {
         let mut line = line;
-        // A backslash at the end joins a line to the next.
+        // A backslash at the end continues the line on the next one.
         if line.ends_with(b"\\") {
             joined.clear();
             while let Some(part) = line.strip_suffix(b"\\") {
@@ -32,7 +32,7 @@ pub(crate) fn read(source: &Source) -> Result<Geometry, Error> {
         }
         reader
             .line(line, line_number)
-            .map_err(|problem| source.error(Place::Line(line_number), problem))?;
+            .map_err(|problem| source.error(Location::Line(line_number), problem))?;
     }
     reader.finish(source)
 }
@@ -43,9 +43,9 @@ struct Reader {
     normals: Vec<[f64; 3]>,
     faces: Vec<[u32; 3]>,
     corners: Vec<u32>,
-    /// Some corner has a normal of another index than its vertex.
+    /// Whether a corner has a normal of another index than its vertex.
     normals_differ: bool,
-    /// The highest vertex named, and the line that names it.
+    /// Highest vertex index of a face, and the line of the face.
     highest: Option<(u32, usize)>,
 }
 
@@ -54,13 +54,13 @@ impl Reader {
         let mut fields = words(line);
         match fields.next() {
             Some(b"v") => {
-                let point = three(fields)?;
-                refuse_not_finite("vertex", point)?;
+                let point = three_numbers(fields)?;
+                check_finite("vertex", point)?;
                 self.points.push(point);
             }
             Some(b"vn") => {
-                let normal = three(fields)?;
-                refuse_not_finite("normal", normal)?;
+                let normal = three_numbers(fields)?;
+                check_finite("normal", normal)?;
                 self.normals.push(normal);
             }
             Some(b"f") => self.face(fields, line_number)?,
@@ -77,11 +77,8 @@ impl Reader {
         self.corners.clear();
         for field in fields.take_while(|field| !field.starts_with(b"#")) {
             let mut parts = field.split(|&b| b == b'/');
-            let vertex = resolve(
-                parts.next().unwrap_or_default(),
-                self.points.len(),
-                "vertex",
-            )?;
+            let index = parts.next().unwrap_or_default();
+            let vertex = resolve(index, self.points.len(), "vertex")?;
             if let Some(part) = parts.nth(1).filter(|part| !part.is_empty()) {
                 self.normals_differ |= resolve(part, self.normals.len(), "normal")? != vertex;
             }
@@ -90,11 +87,9 @@ impl Reader {
             }
             self.corners.push(vertex);
         }
-        if self.corners.len() < 3 {
-            return Err(format!(
-                "the face has {} corners; remove it",
-                self.corners.len()
-            ));
+        let count = self.corners.len();
+        if count < 3 {
+            return Err(format!("the face has {count} corners; remove it"));
         }
         triangulate(&self.corners, &mut self.faces);
         Ok(())
@@ -103,7 +98,7 @@ impl Reader {
     fn finish(self, source: &Source) -> Result<Geometry, Error> {
         if self.points.is_empty() {
             let problem = "no line begins with 'v'; check that it is an OBJ file with vertices";
-            return Err(source.error(Place::Whole, problem));
+            return Err(source.error(Location::Whole, problem));
         }
         if let Some((highest, line)) = self.highest
             && highest as usize >= self.points.len()
@@ -113,36 +108,24 @@ impl Reader {
                 u64::from(highest) + 1,
                 self.points.len()
             );
-            return Err(source.error(Place::Line(line), problem));
+            return Err(source.error(Location::Line(line), problem));
         }
         let per_vertex = self.normals.len() == self.points.len() && !self.normals_differ;
         Ok(Geometry {
-            points: self.points,
             normals: per_vertex.then_some(self.normals),
-            attributes: Vec::new(),
             faces: self.faces,
-            dtype: Dtype::Text,
-            format: Format::Obj,
+            ..Geometry::from_points(self.points, Dtype::Text, Format::Obj)
         })
     }
 }
 
-/// The first three numbers of a line; what follows (weights, colors) is passed over.
-fn three<'a>(mut fields: impl Iterator<Item = &'a [u8]>) -> Result<[f64; 3], String> {
-    let mut v = [0.0; 3];
-    for value in &mut v {
-        let word = fields.next().ok_or("the line has fewer than 3 numbers")?;
-        *value = number(word).ok_or_else(|| format!("{} is not a number", shown(word)))?;
-    }
-    Ok(v)
-}
-
-/// An index of the file as one from 0: positive ones count from 1, negative ones back from the last.
+/// Converts an index of the file to one from 0: positive ones count from 1, negative ones backwards
+/// from the last of the `so_far` before it.
 fn resolve(word: &[u8], so_far: usize, what: &str) -> Result<u32, String> {
     let index: i64 = std::str::from_utf8(word)
         .ok()
         .and_then(|text| text.parse().ok())
-        .ok_or_else(|| format!("{} is not an index", shown(word)))?;
+        .ok_or_else(|| format!("{} is not an index", quoted(word)))?;
     let resolved = match index {
         0 => return Err(format!("{what} index 0; OBJ counts from 1")),
         1.. => index - 1,
@@ -151,13 +134,14 @@ fn resolve(word: &[u8], so_far: usize, what: &str) -> Result<u32, String> {
     u32::try_from(resolved)
         .ok()
         .filter(|&i| i < u32::MAX)
-        .ok_or_else(|| format!("{what} index {index} is out of range; {so_far} come before it"))
+        .ok_or_else(|| {
+            format!("{what} index {index} is out of range; {so_far} are defined before it")
+        })
 }
 
 /// Writes a mesh with the fewest digits that give back the same numbers.
 pub(crate) fn write_mesh<T: Real>(out: &mut impl Write, mesh: &Mesh<T>) -> io::Result<()> {
-    for &vertex in mesh.vertices() {
-        let [x, y, z] = vertex;
+    for [x, y, z] in mesh.vertices() {
         writeln!(out, "v {x:?} {y:?} {z:?}")?;
     }
     for face in mesh.faces() {

@@ -1,15 +1,15 @@
-//! Reading a file by its name.
+//! Readers, chosen by the format of the file.
 
 use std::path::Path;
 
 use crate::error::Error;
 use crate::field::FieldFile;
-use crate::format::{Format, choose};
+use crate::format::{Format, detect};
 use crate::geometry::Geometry;
 use crate::source::Source;
 use crate::{numpy, obj, ply, stl, text, vtk};
 
-/// What a file turned out to hold.
+/// Content of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Content {
     /// Points, or a mesh.
@@ -18,26 +18,31 @@ pub enum Content {
     Field(FieldFile),
 }
 
+fn open(path: &Path) -> Result<(Source, Format), Error> {
+    let source = Source::open(path)?;
+    let format = detect(path, &source.name, &source.bytes)?;
+    Ok((source, format))
+}
+
 /// Reads a file of points or of a mesh; `-` is standard input (PLY or text).
 ///
 /// # Errors
 /// See [`Error`].
 pub fn read_geometry(path: &Path) -> Result<Geometry, Error> {
-    let source = Source::open(path)?;
-    let format = choose(path, &source.name, &source.bytes)?;
+    let (source, format) = open(path)?;
     parse_geometry(&source, format)
 }
 
 /// Reads a mesh: a file with faces.
 ///
 /// # Errors
-/// As [`read_geometry`], and where the file has no face.
+/// As [`read_geometry`], and if the file has no face.
 pub fn read_mesh(path: &Path) -> Result<Geometry, Error> {
     let geometry = read_geometry(path)?;
     if geometry.faces.is_empty() {
         return Err(Error::Format {
             file: path.display().to_string(),
-            problem: "it has points but no faces; a mesh is needed here".into(),
+            problem: "the file has points but no faces; a mesh is required".into(),
         });
     }
     Ok(geometry)
@@ -48,22 +53,20 @@ pub fn read_mesh(path: &Path) -> Result<Geometry, Error> {
 /// # Errors
 /// See [`Error`].
 pub fn read_field(path: &Path) -> Result<FieldFile, Error> {
-    let source = Source::open(path)?;
-    let format = choose(path, &source.name, &source.bytes)?;
+    let (source, format) = open(path)?;
     parse_field(&source, format)
 }
 
-/// Reads whatever a file holds: a field from `.vti`, and from `.npz` with an array `sdf`; else points or
+/// Reads a file of any kind: a field from `.vti`, or from `.npz` with an array `sdf`; otherwise points or
 /// a mesh.
 ///
 /// # Errors
 /// See [`Error`].
 pub fn read(path: &Path) -> Result<Content, Error> {
-    let source = Source::open(path)?;
-    let format = choose(path, &source.name, &source.bytes)?;
+    let (source, format) = open(path)?;
     let is_field = match format {
         Format::Vti => true,
-        // Member names stand in the archive as they are.
+        // Names of members are not compressed.
         Format::Npz => memchr::memmem::find(&source.bytes, b"sdf.npy").is_some(),
         _ => false,
     };
@@ -89,7 +92,7 @@ pub fn parse_geometry(source: &Source, format: Format) -> Result<Geometry, Error
         Format::Vtp => vtk::read_geometry(source),
         Format::Vti => Err(Error::Format {
             file: source.name.clone(),
-            problem: "VTI holds a field; points or a mesh are needed here".into(),
+            problem: "a VTI file has a field; points or a mesh are required".into(),
         }),
     }
 }
@@ -104,7 +107,10 @@ pub fn parse_field(source: &Source, format: Format) -> Result<FieldFile, Error> 
         Format::Vti => vtk::read_field(source),
         other => Err(Error::Format {
             file: source.name.clone(),
-            problem: format!("{} holds no field; give a .vti or .npz", other.name()),
+            problem: format!(
+                "a field is required, in a .vti or .npz file; this is {}",
+                other.name()
+            ),
         }),
     }
 }

@@ -1,17 +1,18 @@
-//! The bytes of a file with its name, and the lines in them.
+//! The bytes and the name of a file; lines, words and numbers of text.
 
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-use crate::error::{Error, Place};
+use crate::error::{Error, Location};
+use crate::geometry::check_finite;
 
-/// The whole content of a file, and the name that errors show.
+/// The whole content of a file, and its name in errors.
 ///
-/// What a reader allocates is bounded by a small multiple of `bytes.len()`, whatever a header says.
+/// Readers allocate at most a small multiple of `bytes.len()`, whatever a header declares.
 #[derive(Clone, Debug)]
 pub struct Source {
-    /// The name that errors show.
+    /// Name in errors.
     pub name: String,
     /// The whole content.
     pub bytes: Vec<u8>,
@@ -21,7 +22,7 @@ impl Source {
     /// Reads a whole file; `-` is standard input.
     ///
     /// # Errors
-    /// A file that can't be read, a folder, and a file without a byte in it.
+    /// A file that cannot be read, a folder, or an empty file.
     pub fn open(path: &Path) -> Result<Self, Error> {
         if path == Path::new("-") {
             return Self::read("standard input".into(), io::stdin().lock());
@@ -45,32 +46,42 @@ impl Source {
         }
     }
 
-    /// An error at a place in this file.
-    pub(crate) fn error(&self, place: Place, problem: impl Into<String>) -> Error {
+    /// An error at a location in this file.
+    pub(crate) fn error(&self, location: Location, problem: impl Into<String>) -> Error {
         Error::Content {
             file: self.name.clone(),
-            place,
+            location,
             problem: problem.into(),
         }
     }
+
+    /// Refuses rows of the array `name` that are not finite.
+    pub(crate) fn check_rows(
+        &self,
+        name: &str,
+        what: &str,
+        rows: &[[f64; 3]],
+    ) -> Result<(), Error> {
+        rows.iter().enumerate().try_for_each(|(index, &row)| {
+            let name = name.to_string();
+            check_finite(what, row)
+                .map_err(|problem| self.error(Location::Row { name, index }, problem))
+        })
+    }
 }
 
-/// The lines of a text, numbered from 1, without their ends and outer white space.
+/// Lines of a text, numbered from 1, without line ends and surrounding white space.
 pub(crate) struct Lines<'a> {
     text: &'a [u8],
-    /// Where the next line begins.
+    /// Byte offset of the next line.
     pub offset: usize,
-    /// Number of the line given last.
+    /// Number of the last line returned.
     pub number: usize,
 }
 
 impl<'a> Lines<'a> {
     pub fn new(text: &'a [u8]) -> Self {
-        Self {
-            text,
-            offset: 0,
-            number: 0,
-        }
+        Self::from(text, 0, 0)
     }
 
     /// Lines from byte `offset` on, the first of which follows line `number`.
@@ -103,19 +114,32 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
-/// The words of a line, parted by white space.
+/// Words of a line, separated by white space.
 pub(crate) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.split(u8::is_ascii_whitespace)
         .filter(|word| !word.is_empty())
 }
 
-/// A number in decimal text; `nan` and `inf` count as numbers.
-pub(crate) fn number(word: &[u8]) -> Option<f64> {
-    std::str::from_utf8(word).ok()?.parse().ok()
+/// Parses a decimal number; `nan` and `inf` count as numbers.
+pub(crate) fn number(word: &[u8]) -> Result<f64, String> {
+    let text = std::str::from_utf8(word).ok();
+    text.and_then(|text| text.parse().ok())
+        .ok_or_else(|| format!("{} is not a number", quoted(word)))
 }
 
-/// A word as it can be shown in a message: cut short, without control characters.
-pub(crate) fn shown(word: &[u8]) -> String {
+/// The first three numbers of a line.
+pub(crate) fn three_numbers<'a>(
+    mut words: impl Iterator<Item = &'a [u8]>,
+) -> Result<[f64; 3], String> {
+    let mut v = [0.0; 3];
+    for value in &mut v {
+        *value = number(words.next().ok_or("the line has fewer than 3 numbers")?)?;
+    }
+    Ok(v)
+}
+
+/// A word in quotes for a message: shortened, without control characters.
+pub(crate) fn quoted(word: &[u8]) -> String {
     const LONGEST: usize = 40;
     let text: String = String::from_utf8_lossy(&word[..word.len().min(4 * LONGEST)])
         .chars()

@@ -1,114 +1,74 @@
-//! Writing a file by its name.
+//! Writers, chosen by the extension of the file.
 
-use std::io::{self, Write};
+use std::io;
 use std::path::Path;
 
 use isograd::{Field, Mesh, PointCloud, Real};
 
 use crate::error::Error;
 use crate::format::Format;
-use crate::{atomic, numpy, obj, ply, stl, vtk};
+use crate::{atomic, numpy, obj, ply, stl, text, vtk};
 
-/// What a mesh file may be called.
-pub const MESH_ENDINGS: &[&str] = &["ply", "obj", "stl", "vtp"];
-/// What a file of a field may be called.
-pub const FIELD_ENDINGS: &[&str] = &["vti", "npz"];
-/// What a file of points may be called.
-pub const CLOUD_ENDINGS: &[&str] = &["ply", "npz", "xyz", "csv", "txt"];
+/// Extensions of mesh files.
+pub const MESH_EXTENSIONS: &[&str] = &["ply", "obj", "stl", "vtp"];
+/// Extensions of files with a field.
+pub const FIELD_EXTENSIONS: &[&str] = &["vti", "npz"];
+/// Extensions of point cloud files.
+pub const CLOUD_EXTENSIONS: &[&str] = &["ply", "npz", "xyz", "csv", "txt"];
 
-/// Writes a mesh in the format that the name ends in ([`MESH_ENDINGS`]), in type `T` (STL: `f32`).
+/// Writes a mesh in the format of the extension ([`MESH_EXTENSIONS`]) and in type `T` (STL: `f32`).
 ///
 /// # Errors
-/// A name with another ending, or what the operating system said; then the file at `path` is as before.
+/// Another extension, or a failed write, which leaves the file at `path` unchanged.
 pub fn write_mesh<T: Real>(path: &Path, mesh: &Mesh<T>) -> Result<(), Error> {
-    match Format::of_name(path) {
+    match Format::from_path(path) {
         Some(Format::Ply) => atomic::write(path, |out| ply::write_mesh(out, mesh)),
         Some(Format::Obj) => atomic::write(path, |out| obj::write_mesh(out, mesh)),
         Some(Format::Stl) => atomic::write(path, |out| stl::write_mesh(out, mesh)),
         Some(Format::Vtp) => atomic::write(path, |out| vtk::write_mesh(out, mesh)),
-        _ => Err(wrong_ending(path, MESH_ENDINGS)),
+        _ => Err(wrong_extension(path, MESH_EXTENSIONS)),
     }
 }
 
-/// Writes a field in the format that the name ends in ([`FIELD_ENDINGS`]), in type `T`.
+/// Writes a field in the format of the extension ([`FIELD_EXTENSIONS`]) and in type `T`.
 ///
 /// # Errors
 /// As [`write_mesh`].
 pub fn write_field<T: Real>(path: &Path, field: &Field<T>) -> Result<(), Error> {
-    match Format::of_name(path) {
+    match Format::from_path(path) {
         Some(Format::Vti) => atomic::write(path, |out| vtk::write_field(out, field)),
         Some(Format::Npz) => atomic::write(path, |out| numpy::write_field(out, field)),
-        _ => Err(wrong_ending(path, FIELD_ENDINGS)),
+        _ => Err(wrong_extension(path, FIELD_EXTENSIONS)),
     }
 }
 
-/// Writes a cloud in the format that the name ends in ([`CLOUD_ENDINGS`]), in its own order and in type
-/// `T`, with its normals and attributes.
+/// Writes a cloud with its normals and attributes in the format of the extension ([`CLOUD_EXTENSIONS`]),
+/// in its own order and in type `T`.
 ///
 /// # Errors
 /// As [`write_mesh`].
 pub fn write_cloud<T: Real>(path: &Path, cloud: &PointCloud<T>) -> Result<(), Error> {
-    match Format::of_name(path) {
+    match Format::from_path(path) {
         Some(Format::Ply) => atomic::write(path, |out| ply::write_cloud(out, cloud)),
         Some(Format::Npz) => atomic::write(path, |out| numpy::write_cloud(out, cloud)),
         Some(Format::Text) => {
-            let is_csv = path
-                .extension()
-                .is_some_and(|e| e.eq_ignore_ascii_case("csv"));
-            atomic::write(path, |out| {
-                write_text(out, cloud, if is_csv { ',' } else { ' ' })
-            })
+            let extension = path.extension().unwrap_or_default();
+            let is_csv = extension.eq_ignore_ascii_case("csv");
+            let delimiter = if is_csv { "," } else { " " };
+            atomic::write(path, |out| text::write_cloud(out, cloud, delimiter))
         }
-        _ => Err(wrong_ending(path, CLOUD_ENDINGS)),
+        _ => Err(wrong_extension(path, CLOUD_EXTENSIONS)),
     }
 }
 
-/// Columns of text under a line of names, with the fewest digits that give back the same numbers.
-fn write_text<T: Real>(
-    out: &mut impl Write,
-    cloud: &PointCloud<T>,
-    delimiter: char,
-) -> io::Result<()> {
-    let mut names: Vec<String> = ["x", "y", "z"].map(String::from).to_vec();
-    if cloud.normals().is_some() {
-        names.extend(["nx", "ny", "nz"].map(String::from));
-    }
-    for attribute in cloud.attributes() {
-        let plain = attribute
-            .name
-            .replace(|c: char| !c.is_ascii_alphanumeric(), "_");
-        for component in 0..attribute.components {
-            names.push(match attribute.components {
-                1 => plain.clone(),
-                _ => format!("{plain}_{component}"),
-            });
-        }
-    }
-    let separator = delimiter.to_string();
-    let comment = if delimiter == ',' { "" } else { "# " };
-    writeln!(out, "{comment}{}", names.join(&separator))?;
-    for (i, point) in cloud.points().iter().enumerate() {
-        let mut row = point.to_vec();
-        row.extend(cloud.normals().into_iter().flat_map(|normals| normals[i]));
-        for attribute in cloud.attributes() {
-            let n = attribute.components;
-            row.extend(&attribute.values[i * n..(i + 1) * n]);
-        }
-        let row: Vec<String> = row.iter().map(|value| format!("{value:?}")).collect();
-        writeln!(out, "{}", row.join(&separator))?;
-    }
-    Ok(())
-}
-
-/// Refuses an output that could not be written at the end of a long computation: an ending that is not
-/// among `endings`, a folder that is not there, a folder in the file's place.
+/// Checks before a long computation that its output can be written.
 ///
 /// # Errors
-/// What is wrong with the path.
-pub fn check_output(path: &Path, endings: &[&str]) -> Result<(), Error> {
-    let known = |e: &str| endings.iter().any(|ending| e.eq_ignore_ascii_case(ending));
+/// An extension that is not among `extensions`, a missing folder, or a folder with the file's name.
+pub fn check_output(path: &Path, extensions: &[&str]) -> Result<(), Error> {
+    let known = |e: &str| extensions.iter().any(|known| e.eq_ignore_ascii_case(known));
     if !path.extension().and_then(|e| e.to_str()).is_some_and(known) {
-        return Err(wrong_ending(path, endings));
+        return Err(wrong_extension(path, extensions));
     }
     let file = path.display().to_string();
     if path.is_dir() {
@@ -128,9 +88,9 @@ pub fn check_output(path: &Path, endings: &[&str]) -> Result<(), Error> {
     }
 }
 
-fn wrong_ending(path: &Path, endings: &[&str]) -> Error {
+fn wrong_extension(path: &Path, extensions: &[&str]) -> Error {
     Error::Format {
         file: path.display().to_string(),
-        problem: format!("the name must end in .{}", endings.join(" or .")),
+        problem: format!("the name must end in .{}", extensions.join(" or .")),
     }
 }

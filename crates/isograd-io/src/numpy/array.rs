@@ -4,10 +4,16 @@ use std::io::{self, Write};
 
 use isograd::Real;
 
-use crate::bytes::{push_real, scalar_name};
+use crate::bytes::{scalar_name, write_reals};
 use crate::number::{Dtype, Endian, Number};
 
-/// An array of numbers, in C order whatever order the file had.
+/// First bytes of an array file.
+pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
+
+/// End of the message for a number type that is not supported.
+pub(super) const UNSUPPORTED: &str = "is not supported; save it as float32 or float64";
+
+/// An array of numbers in C order.
 #[derive(Debug)]
 pub(super) struct Array {
     pub shape: Vec<usize>,
@@ -15,9 +21,9 @@ pub(super) struct Array {
     pub dtype: Dtype,
 }
 
-/// What is wrong, and at which byte of the array's file.
+/// An error and its byte offset in the array's file.
 #[derive(Debug)]
-pub(super) struct Bad {
+pub(super) struct ArrayError {
     pub byte: usize,
     pub problem: String,
 }
@@ -30,51 +36,39 @@ struct Header {
 }
 
 impl Array {
-    /// Reads the array that fills `bytes`.
-    pub fn parse(bytes: &[u8]) -> Result<Self, Bad> {
-        let bad = |byte, problem: &str| Bad {
+    /// Parses an array file.
+    pub fn parse(bytes: &[u8]) -> Result<Self, ArrayError> {
+        let error = |byte, problem: &str| ArrayError {
             byte,
             problem: problem.into(),
         };
-        let cut = || bad(bytes.len(), "the header is cut short");
-        if !bytes.starts_with(b"\x93NUMPY") {
-            return Err(bad(0, "no NumPy array: the first bytes are not its mark"));
+        let cut_short = || error(bytes.len(), "the header is cut short");
+        if !bytes.starts_with(MAGIC) {
+            return Err(error(0, "not a NumPy array: the first bytes are wrong"));
         }
-        let (start, length) = match bytes.get(6) {
-            Some(1) => (
-                10,
-                bytes
-                    .get(8..10)
-                    .map(|b| usize::from(b[0]) | usize::from(b[1]) << 8),
-            ),
-            Some(2 | 3) => {
-                let word = bytes.get(8..).and_then(|b| b.first_chunk::<4>());
-                (12, word.map(|b| u32::from_le_bytes(*b) as usize))
-            }
-            _ => return Err(bad(6, "a version of the array format that is not known")),
+        // The length of the header takes 2 bytes in version 1, 4 bytes later.
+        let start = match bytes.get(6) {
+            Some(1) => 10,
+            Some(2 | 3) => 12,
+            _ => return Err(error(6, "unknown version of the array format")),
         };
-        let end = start + length.ok_or_else(cut)?;
-        let text = bytes.get(start..end).ok_or_else(cut)?;
-        let header = Header::parse(text).map_err(|problem| Bad {
-            byte: start,
-            problem,
-        })?;
-        header
-            .read(&bytes[end..])
-            .map_err(|problem| Bad { byte: end, problem })
+        let length = bytes.get(8..start).ok_or_else(cut_short)?;
+        let length = length.iter().rev().fold(0, |n, &b| n << 8 | usize::from(b));
+        let end = start + length;
+        let text = bytes.get(start..end).ok_or_else(cut_short)?;
+        let header = Header::parse(text).map_err(|problem| error(start, &problem))?;
+        let array = header.read(&bytes[end..]);
+        array.map_err(|problem| error(end, &problem))
     }
 
     /// The rows of an `(N, 3)` array.
     pub fn rows_of_three(&self) -> Option<Vec<[f64; 3]>> {
-        (self.shape.len() == 2 && self.shape[1] == 3).then(|| {
-            let rows = self.values.chunks_exact(3);
-            rows.map(|row| [row[0], row[1], row[2]]).collect()
-        })
+        matches!(self.shape[..], [_, 3]).then(|| self.values.as_chunks().0.to_vec())
     }
 }
 
 impl Header {
-    /// The header is a Python dictionary such as
+    /// Parses a Python dictionary such as
     /// `{'descr': '<f4', 'fortran_order': False, 'shape': (3, 4), }`.
     fn parse(text: &[u8]) -> Result<Self, String> {
         let text = String::from_utf8_lossy(text);
@@ -84,14 +78,12 @@ impl Header {
         };
         let damaged = || "the header is damaged".to_string();
         let descr = value("descr").ok_or_else(damaged)?;
-        let (number, endian) = if descr.starts_with('[') {
+        if descr.starts_with('[') {
             return Err("an array of records; save the columns as plain numbers".into());
-        } else {
-            let name = descr.split('\'').nth(1).ok_or_else(damaged)?;
-            parse_type(name).ok_or_else(|| {
-                format!("the type '{name}' is not read; save it as float32 or float64")
-            })?
-        };
+        }
+        let name = descr.split('\'').nth(1).ok_or_else(damaged)?;
+        let (number, endian) =
+            parse_type(name).ok_or_else(|| format!("the type '{name}' {UNSUPPORTED}"))?;
         let order = value("fortran_order").ok_or_else(damaged)?;
         let shape = value("shape")
             .and_then(|s| s.strip_prefix('(')?.split_once(')'))
@@ -114,13 +106,13 @@ impl Header {
         })
     }
 
-    /// The values, after the shape has been checked against the bytes that are there.
+    /// Reads the values; the shape is checked against the size of `data` first.
     fn read(self, data: &[u8]) -> Result<Array, String> {
         let count = self.shape.iter().try_fold(1usize, |n, &s| n.checked_mul(s));
         let needed = count.and_then(|n| n.checked_mul(self.number.size()));
         let needed = needed.filter(|&n| n <= data.len()).ok_or_else(|| {
             format!(
-                "the header promises the shape {:?} of {} bytes each, but only {} bytes follow; the file is cut short or the header is wrong",
+                "the header declares the shape {:?} with {} bytes per value, but only {} bytes follow; the file is cut short or the header is wrong",
                 self.shape,
                 self.number.size(),
                 data.len()
@@ -145,31 +137,18 @@ fn parse_type(name: &str) -> Option<(Number, Endian)> {
         ("<" | "|" | "=", kind) => (Endian::Little, kind),
         _ => return None,
     };
-    let number = match kind {
-        "f4" => Number::F32,
-        "f8" => Number::F64,
-        "i1" => Number::I8,
-        "u1" | "b1" => Number::U8,
-        "i2" => Number::I16,
-        "u2" => Number::U16,
-        "i4" => Number::I32,
-        "u4" => Number::U32,
-        "i8" => Number::I64,
-        "u8" => Number::U64,
-        _ => return None,
-    };
-    Some((number, endian))
+    Some((Number::from_numpy(kind)?, endian))
 }
 
-/// Values with the first axis fastest, turned to the last axis fastest.
+/// Reorders values from Fortran order (first axis fastest) to C order (last axis fastest).
 fn to_c_order(values: &[f64], shape: &[usize]) -> Vec<f64> {
     let mut index = vec![0; shape.len()];
-    let mut turned = Vec::with_capacity(values.len());
+    let mut ordered = Vec::with_capacity(values.len());
     for _ in 0..values.len() {
-        let place = (0..shape.len())
+        let from = (0..shape.len())
             .rev()
-            .fold(0, |place, axis| place * shape[axis] + index[axis]);
-        turned.push(values[place]);
+            .fold(0, |from, axis| from * shape[axis] + index[axis]);
+        ordered.push(values[from]);
         for axis in (0..shape.len()).rev() {
             index[axis] += 1;
             if index[axis] < shape[axis] {
@@ -178,11 +157,15 @@ fn to_c_order(values: &[f64], shape: &[usize]) -> Vec<f64> {
             index[axis] = 0;
         }
     }
-    turned
+    ordered
 }
 
-/// Writes an array of `shape` with the type of its values.
-pub(super) fn write<T: Real>(out: &mut dyn Write, shape: &[usize], values: &[T]) -> io::Result<()> {
+/// Writes an array of `shape` in the type of its values.
+pub(super) fn write<T: Real>(
+    out: &mut impl Write,
+    shape: &[usize],
+    values: &[T],
+) -> io::Result<()> {
     let descr = scalar_name::<T>(["<f4", "<f8"]);
     let shape: String = shape.iter().map(|n| format!("{n}, ")).collect();
     let mut header = format!(
@@ -193,16 +176,9 @@ pub(super) fn write<T: Real>(out: &mut dyn Write, shape: &[usize], values: &[T])
     let padding = (64 - (10 + header.len() + 1) % 64) % 64;
     header.push_str(&" ".repeat(padding));
     header.push('\n');
-    out.write_all(b"\x93NUMPY\x01\x00")?;
+    out.write_all(MAGIC)?;
+    out.write_all(&[1, 0])?;
     out.write_all(&(header.len() as u16).to_le_bytes())?;
     out.write_all(header.as_bytes())?;
-    let mut buffer = Vec::new();
-    for chunk in values.chunks(1 << 13) {
-        buffer.clear();
-        for &value in chunk {
-            push_real(&mut buffer, value);
-        }
-        out.write_all(&buffer)?;
-    }
-    Ok(())
+    write_reals(out, values.iter().copied())
 }

@@ -1,8 +1,8 @@
 //! The header of a PLY file, checked against the file's size.
 
-use crate::error::{Error, Place};
+use crate::error::{Error, Location};
 use crate::number::{Endian, Number};
-use crate::source::{Lines, Source, shown, words};
+use crate::source::{Lines, Source, quoted, words};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Encoding {
@@ -34,15 +34,15 @@ pub(super) struct Element {
 pub(super) struct Header {
     pub encoding: Encoding,
     pub elements: Vec<Element>,
-    /// Where the data begin, in bytes.
+    /// Byte offset of the data.
     pub body: usize,
-    /// Number of the header's last line.
+    /// Number of lines of the header.
     pub lines: usize,
 }
 
 impl Element {
-    /// The fewest bytes that one element can take.
-    fn least_bytes(&self, encoding: Encoding) -> usize {
+    /// Smallest number of bytes of one element.
+    fn min_bytes(&self, encoding: Encoding) -> usize {
         let bytes = |p: &Property| match (encoding, p.kind) {
             // A digit, and a space or the end of the line.
             (Encoding::Ascii, _) => 2,
@@ -52,7 +52,7 @@ impl Element {
         self.properties.iter().map(bytes).sum()
     }
 
-    /// The bytes that every element takes, unless there is a list.
+    /// Number of bytes of each element; `None` if it has a list.
     pub fn fixed_bytes(&self) -> Option<usize> {
         self.properties
             .iter()
@@ -72,13 +72,13 @@ impl Header {
         loop {
             let Some((number, line)) = lines.next() else {
                 return Err(source.error(
-                    Place::Line(lines.number),
+                    Location::Line(lines.number),
                     "the header has no 'end_header' line; the file is cut short",
                 ));
             };
             let bad = |problem: &str| {
-                let text = format!("{} {problem}", shown(line));
-                source.error(Place::Line(number), text)
+                let text = format!("{} {problem}", quoted(line));
+                source.error(Location::Line(number), text)
             };
             let mut fields = words(line);
             match fields.next() {
@@ -86,7 +86,7 @@ impl Header {
                 None | Some(b"ply" | b"comment" | b"obj_info") => {}
                 Some(b"format") => {
                     encoding = Some(parse_format(fields.next()).ok_or_else(|| {
-                        bad("is no PLY format; it must be ascii, binary_little_endian or binary_big_endian")
+                        bad("is not a PLY format; it must be ascii, binary_little_endian or binary_big_endian")
                     })?);
                 }
                 Some(b"element") => {
@@ -109,11 +109,14 @@ impl Header {
                     }
                     element.properties.push(property);
                 }
-                Some(_) => return Err(bad("is no line of a PLY header")),
+                Some(_) => return Err(bad("is not a line of a PLY header")),
             }
         }
         let encoding = encoding.ok_or_else(|| {
-            source.error(Place::Line(lines.number), "the header has no 'format' line")
+            source.error(
+                Location::Line(lines.number),
+                "the header has no 'format' line",
+            )
         })?;
         let header = Self {
             encoding,
@@ -125,25 +128,25 @@ impl Header {
         Ok(header)
     }
 
-    /// Refuses counts that the rest of the file can't hold, before anything is allocated.
+    /// Refuses counts that exceed the rest of the file, before anything is allocated.
     fn check_size(&self, source: &Source) -> Result<(), Error> {
         // The last line of a text may lack its end.
         let slack = usize::from(self.encoding == Encoding::Ascii);
         let mut left = source.bytes.len() - self.body + slack;
         for element in &self.elements {
-            let least = element.least_bytes(self.encoding);
-            if least == 0 && element.count > 0 {
+            let min_bytes = element.min_bytes(self.encoding);
+            if min_bytes == 0 && element.count > 0 {
                 let problem = format!("element '{}' has no property; remove it", element.name);
-                return Err(source.error(Place::Line(element.line), problem));
+                return Err(source.error(Location::Line(element.line), problem));
             }
-            match element.count.checked_mul(least) {
+            match element.count.checked_mul(min_bytes) {
                 Some(needed) if needed <= left => left -= needed,
                 _ => {
                     let problem = format!(
-                        "the header promises {} of element '{}' (at least {least} bytes each), but only {left} bytes are left for them; the file is cut short or the count is wrong",
+                        "the header declares {} of element '{}' (at least {min_bytes} bytes each), but only {left} bytes are left; the file is cut short or the count is wrong",
                         element.count, element.name
                     );
-                    return Err(source.error(Place::Line(element.line), problem));
+                    return Err(source.error(Location::Line(element.line), problem));
                 }
             }
         }
@@ -172,36 +175,20 @@ fn parse_element<'a>(mut fields: impl Iterator<Item = &'a [u8]>, line: usize) ->
 fn parse_property<'a>(mut fields: impl Iterator<Item = &'a [u8]>) -> Option<Property> {
     let first = fields.next()?;
     let kind = if first == b"list" {
-        let count = parse_type(fields.next()?)?;
+        let count = Number::from_ply(fields.next()?)?;
         if matches!(count, Number::F32 | Number::F64) {
             return None;
         }
         Kind::List {
             count,
-            item: parse_type(fields.next()?)?,
+            item: Number::from_ply(fields.next()?)?,
         }
     } else {
-        Kind::Scalar(parse_type(first)?)
+        Kind::Scalar(Number::from_ply(first)?)
     };
     Some(Property {
         name: text(fields.next()?),
         kind,
-    })
-}
-
-fn parse_type(word: &[u8]) -> Option<Number> {
-    Some(match word {
-        b"char" | b"int8" => Number::I8,
-        b"uchar" | b"uint8" => Number::U8,
-        b"short" | b"int16" => Number::I16,
-        b"ushort" | b"uint16" => Number::U16,
-        b"int" | b"int32" => Number::I32,
-        b"uint" | b"uint32" => Number::U32,
-        b"int64" => Number::I64,
-        b"uint64" => Number::U64,
-        b"float" | b"float32" => Number::F32,
-        b"double" | b"float64" => Number::F64,
-        _ => return None,
     })
 }
 

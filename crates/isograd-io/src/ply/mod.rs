@@ -1,7 +1,7 @@
 //! Stanford polygon files: ascii, and binary in both byte orders.
 //!
-//! Existing crates were tried first: `ply-rs-bw` keeps each element as a map of names to values (some
-//! hundred bytes a vertex) and can't name the line of an error, so the reader is our own.
+//! The reader is our own: crates such as `ply-rs-bw` keep each element as a map of names to values
+//! (some hundred bytes per vertex) and cannot give the line of an error.
 
 mod header;
 mod read;

@@ -1,15 +1,14 @@
 //! The data of a PLY file.
 
-use isograd::data::Attribute;
-
-use super::header::{Element, Encoding, Header, Kind};
-use crate::error::{Error, Place};
+use super::header::{Element, Encoding, Header, Kind, Property};
+use crate::columns::{PointTable, find_columns};
+use crate::error::{Error, Location};
 use crate::format::Format;
-use crate::geometry::{Geometry, refuse_not_finite, triangulate};
+use crate::geometry::{Geometry, triangulate};
 use crate::number::{Dtype, Endian, Number, as_index};
-use crate::source::{Lines, Source, number, shown, words};
+use crate::source::{Lines, Source, number, quoted, words};
 
-/// Where the reader stands in the data, in either encoding.
+/// Position of the reader in the data.
 enum Cursor<'a> {
     Ascii {
         lines: Lines<'a>,
@@ -24,7 +23,7 @@ enum Cursor<'a> {
 }
 
 impl Cursor<'_> {
-    /// Goes to the next element. `false` at the end of the file.
+    /// Advances to the next element; `false` at the end of the file.
     fn begin_row(&mut self) -> bool {
         match self {
             Self::Ascii { lines, rest, line } => match lines.next_filled() {
@@ -49,7 +48,7 @@ impl Cursor<'_> {
                 // The word is a slice of the rest: its end is where the next search begins.
                 let end = word.as_ptr() as usize - rest.as_ptr() as usize + word.len();
                 *rest = &rest[end..];
-                number(word).ok_or_else(|| format!("{} is not a number", shown(word)))
+                number(word)
             }
             Self::Binary { bytes, at, endian } => {
                 let value = kind.read(bytes.get(*at..).unwrap_or_default(), *endian);
@@ -59,18 +58,18 @@ impl Cursor<'_> {
         }
     }
 
-    /// Ends the element: a line may hold nothing more.
+    /// Ends the element: nothing may follow it on its line.
     fn end_row(&self) -> Result<(), String> {
         match self {
             Self::Ascii { rest, .. } if !rest.trim_ascii().is_empty() => Err(format!(
                 "the line has more numbers than the header lists: {}",
-                shown(rest.trim_ascii())
+                quoted(rest.trim_ascii())
             )),
             _ => Ok(()),
         }
     }
 
-    /// The most items that a list of `item` can still have.
+    /// Upper bound for the length of a list of `item` in the rest of the file.
     fn room_for(&self, item: Number) -> usize {
         match self {
             Self::Ascii { rest, .. } => rest.len(),
@@ -78,10 +77,10 @@ impl Cursor<'_> {
         }
     }
 
-    fn place(&self, element: &Element, index: usize, began: usize) -> Place {
+    fn location(&self, element: &Element, index: usize, began: usize) -> Location {
         match self {
-            Self::Ascii { line, .. } => Place::Line(*line),
-            Self::Binary { .. } => Place::Element {
+            Self::Ascii { line, .. } => Location::Line(*line),
+            Self::Binary { .. } => Location::Element {
                 name: element.name.clone(),
                 index,
                 byte: began,
@@ -97,7 +96,7 @@ impl Cursor<'_> {
     }
 }
 
-/// Reads every element of the file, so that a damaged one is found wherever the damage is.
+/// Reads a PLY file. Elements other than `vertex` and `face` are read as well, to detect damage.
 pub(crate) fn read(source: &Source) -> Result<Geometry, Error> {
     let header = Header::parse(source)?;
     let mut cursor = match header.encoding {
@@ -114,9 +113,12 @@ pub(crate) fn read(source: &Source) -> Result<Geometry, Error> {
     };
     let vertex = header.elements.iter().find(|e| e.name == "vertex");
     let Some(vertex) = vertex else {
-        return Err(source.error(Place::Whole, "the header has no element 'vertex'"));
+        return Err(source.error(Location::Whole, "the header has no element 'vertex'"));
     };
-    let mut vertices = Vertices::new(source, vertex)?;
+    let (mut vertices, mut dtype) = point_table(source, vertex)?;
+    if header.encoding == Encoding::Ascii {
+        dtype = Dtype::Text;
+    }
     let mut faces = Faces::new(vertex.count);
     for element in &header.elements {
         match element.name.as_str() {
@@ -128,10 +130,13 @@ pub(crate) fn read(source: &Source) -> Result<Geometry, Error> {
             _ => skip(source, &mut cursor, element)?,
         }
     }
-    Ok(vertices.finish(faces.triangles, header.encoding))
+    Ok(Geometry {
+        faces: faces.triangles,
+        ..vertices.into_geometry(dtype, Format::Ply)
+    })
 }
 
-/// Reads all rows of an element. `take` gets the numbers of a row (a list counts as a zero) and the
+/// Reads all rows of an element. `take` receives the numbers of a row (0 in place of a list) and the
 /// items of the list `vertex_indices`.
 fn read_rows(
     source: &Source,
@@ -149,7 +154,7 @@ fn read_rows(
         let began = cursor.byte();
         read_row(cursor, element, wanted, &mut row, &mut list)
             .and_then(|()| take(&row, &list))
-            .map_err(|problem| source.error(cursor.place(element, index, began), problem))?;
+            .map_err(|problem| source.error(cursor.location(element, index, began), problem))?;
     }
     Ok(())
 }
@@ -170,7 +175,7 @@ fn read_row(
                 let room = cursor.room_for(item);
                 let length = as_index(length, room.saturating_add(1)).ok_or_else(|| {
                     format!(
-                        "list '{}' is said to have {length} items, but there is room for at most {room}; the file is damaged",
+                        "list '{}' declares {length} items, but the file has room for at most {room}; it is damaged",
                         property.name
                     )
                 })?;
@@ -186,10 +191,10 @@ fn read_row(
     cursor.end_row()
 }
 
-/// Passes over an element that nobody asked for.
+/// Skips an element.
 fn skip(source: &Source, cursor: &mut Cursor, element: &Element) -> Result<(), Error> {
     if let (Cursor::Binary { at, .. }, Some(size)) = (&mut *cursor, element.fixed_bytes()) {
-        // The product was checked against the file's size with the header.
+        // The header's counts were checked against the size of the file.
         let end = at.saturating_add(size.saturating_mul(element.count));
         if end > source.bytes.len() {
             return Err(cut_short(source, cursor, element, 0));
@@ -205,7 +210,7 @@ fn cut_short(source: &Source, cursor: &Cursor, element: &Element, index: usize) 
         "the file ends after {index} of {} of element '{}'; it is cut short",
         element.count, element.name
     );
-    source.error(cursor.place(element, index, cursor.byte()), problem)
+    source.error(cursor.location(element, index, cursor.byte()), problem)
 }
 
 fn face_list(element: &Element) -> Option<usize> {
@@ -213,91 +218,27 @@ fn face_list(element: &Element) -> Option<usize> {
     element.properties.iter().position(|p| named(&p.name))
 }
 
-/// The columns of element `vertex` and what was read from them.
-struct Vertices {
-    xyz: [usize; 3],
-    normal: Option<[usize; 3]>,
-    extra: Vec<usize>,
-    dtype: Dtype,
-    points: Vec<[f64; 3]>,
-    normals: Vec<[f64; 3]>,
-    attributes: Vec<Attribute<f64>>,
+/// The table for element `vertex`, and the number type of `x`.
+fn point_table(source: &Source, element: &Element) -> Result<(PointTable, Dtype), Error> {
+    let scalar = |p: &Property| match p.kind {
+        Kind::Scalar(number) => Some(number),
+        Kind::List { .. } => None,
+    };
+    let properties = element.properties.iter();
+    let names: Vec<Option<&str>> = properties
+        .map(|p| scalar(p).map(|_| p.name.as_str()))
+        .collect();
+    let Some(xyz) = find_columns(&names, ["x", "y", "z"]) else {
+        let problem = "element 'vertex' lacks one of the properties x, y, z";
+        return Err(source.error(Location::Whole, problem));
+    };
+    let normal = find_columns(&names, ["nx", "ny", "nz"]);
+    let dtype = scalar(&element.properties[xyz[0]]).map_or(Dtype::Integer, Number::dtype);
+    let table = PointTable::new(&names, xyz, normal, element.count);
+    Ok((table, dtype))
 }
 
-impl Vertices {
-    fn new(source: &Source, element: &Element) -> Result<Self, Error> {
-        let scalar = |name: &str| {
-            element
-                .properties
-                .iter()
-                .position(|p| p.name == name && matches!(p.kind, Kind::Scalar(_)))
-        };
-        let three =
-            |names: [&str; 3]| Some([scalar(names[0])?, scalar(names[1])?, scalar(names[2])?]);
-        let Some(xyz) = three(["x", "y", "z"]) else {
-            let problem = "element 'vertex' lacks one of the properties x, y, z";
-            return Err(source.error(Place::Whole, problem));
-        };
-        let normal = three(["nx", "ny", "nz"]);
-        let used = |p: &usize| xyz.contains(p) || normal.is_some_and(|n| n.contains(p));
-        let is_scalar = |p: &usize| matches!(element.properties[*p].kind, Kind::Scalar(_));
-        let extra: Vec<usize> = (0..element.properties.len())
-            .filter(|p| is_scalar(p) && !used(p))
-            .collect();
-        let dtype = match element.properties[xyz[0]].kind {
-            Kind::Scalar(number) => number.dtype(),
-            Kind::List { .. } => Dtype::Integer,
-        };
-        let attributes = extra
-            .iter()
-            .map(|&p| Attribute {
-                name: element.properties[p].name.clone(),
-                components: 1,
-                values: Vec::with_capacity(element.count),
-            })
-            .collect();
-        Ok(Self {
-            xyz,
-            normal,
-            extra,
-            dtype,
-            points: Vec::with_capacity(element.count),
-            normals: Vec::with_capacity(if normal.is_some() { element.count } else { 0 }),
-            attributes,
-        })
-    }
-
-    fn push(&mut self, row: &[f64]) -> Result<(), String> {
-        let point = self.xyz.map(|p| row[p]);
-        refuse_not_finite("point", point)?;
-        self.points.push(point);
-        if let Some(columns) = self.normal {
-            let normal = columns.map(|p| row[p]);
-            refuse_not_finite("normal", normal)?;
-            self.normals.push(normal);
-        }
-        for (attribute, &p) in self.attributes.iter_mut().zip(&self.extra) {
-            attribute.values.push(row[p]);
-        }
-        Ok(())
-    }
-
-    fn finish(self, faces: Vec<[u32; 3]>, encoding: Encoding) -> Geometry {
-        Geometry {
-            points: self.points,
-            normals: self.normal.map(|_| self.normals),
-            attributes: self.attributes,
-            faces,
-            dtype: match encoding {
-                Encoding::Ascii => Dtype::Text,
-                Encoding::Binary(_) => self.dtype,
-            },
-            format: Format::Ply,
-        }
-    }
-}
-
-/// The polygons, cut into triangles.
+/// Polygons, cut into triangles.
 struct Faces {
     list: Option<usize>,
     vertices: usize,

@@ -4,86 +4,45 @@ use std::io::{self, Write};
 
 use isograd::{Mesh, PointCloud, Real};
 
-use crate::bytes::{push_real, push_vector, scalar_name};
+use crate::bytes::{scalar_name, write_reals};
+use crate::columns::{column_names, row};
 
-/// A mesh: vertices of type `T`, faces as lists of `int`.
+/// Writes a mesh: vertices of type `T`, faces as lists of `int`.
 pub(crate) fn write_mesh<T: Real>(out: &mut impl Write, mesh: &Mesh<T>) -> io::Result<()> {
-    let real = scalar_name::<T>(["float", "double"]);
-    writeln!(out, "ply\nformat binary_little_endian 1.0")?;
-    writeln!(out, "element vertex {}", mesh.vertices().len())?;
-    for name in ["x", "y", "z"] {
-        writeln!(out, "property {real} {name}")?;
-    }
+    write_header::<T>(out, mesh.vertices().len(), &["x", "y", "z"])?;
     writeln!(out, "element face {}", mesh.faces().len())?;
     writeln!(out, "property list uchar int vertex_indices\nend_header")?;
-    let mut row = Vec::new();
-    for &vertex in mesh.vertices() {
-        row.clear();
-        push_vector(&mut row, vertex);
-        out.write_all(&row)?;
-    }
+    write_reals(out, mesh.vertices().iter().flatten().copied())?;
     for face in mesh.faces() {
-        row.clear();
-        row.push(3);
-        for corner in face {
-            row.extend(corner.to_le_bytes());
+        let mut row = [3; 13];
+        for (corner, bytes) in face.iter().zip(row[1..].chunks_exact_mut(4)) {
+            bytes.copy_from_slice(&corner.to_le_bytes());
         }
         out.write_all(&row)?;
     }
     Ok(())
 }
 
-/// A cloud in its own order: points, normals and attributes of type `T`. An attribute of several
+/// Writes a cloud in its own order: points, normals and attributes of type `T`. An attribute of several
 /// components becomes the properties `name_0`, `name_1` and so on.
 pub(crate) fn write_cloud<T: Real>(out: &mut impl Write, cloud: &PointCloud<T>) -> io::Result<()> {
-    let real = scalar_name::<T>(["float", "double"]);
-    writeln!(out, "ply\nformat binary_little_endian 1.0")?;
-    writeln!(out, "element vertex {}", cloud.len())?;
-    for name in property_names(cloud) {
-        writeln!(out, "property {real} {name}")?;
-    }
+    let names = column_names(cloud, char::is_ascii_graphic);
+    write_header::<T>(out, cloud.len(), &names)?;
     writeln!(out, "end_header")?;
-    let mut row = Vec::new();
-    for (i, &point) in cloud.points().iter().enumerate() {
-        row.clear();
-        push_vector(&mut row, point);
-        if let Some(normals) = cloud.normals() {
-            push_vector(&mut row, normals[i]);
-        }
-        for attribute in cloud.attributes() {
-            let n = attribute.components;
-            for &value in &attribute.values[i * n..(i + 1) * n] {
-                push_real(&mut row, value);
-            }
-        }
-        out.write_all(&row)?;
-    }
-    Ok(())
+    write_reals(out, (0..cloud.len()).flat_map(|i| row(cloud, i)))
 }
 
-/// Names without white space, none of them twice.
-fn property_names<T: Real>(cloud: &PointCloud<T>) -> Vec<String> {
-    let mut names: Vec<String> = ["x", "y", "z"].map(String::from).to_vec();
-    if cloud.normals().is_some() {
-        names.extend(["nx", "ny", "nz"].map(String::from));
+/// The header up to the properties of the vertices.
+fn write_header<T: Real>(
+    out: &mut impl Write,
+    vertices: usize,
+    properties: &[impl std::fmt::Display],
+) -> io::Result<()> {
+    let real = scalar_name::<T>(["float", "double"]);
+    writeln!(out, "ply\nformat binary_little_endian 1.0")?;
+    writeln!(out, "element vertex {vertices}")?;
+    for name in properties {
+        writeln!(out, "property {real} {name}")?;
     }
-    for attribute in cloud.attributes() {
-        let plain: String = attribute
-            .name
-            .chars()
-            .map(|c| if c.is_ascii_graphic() { c } else { '_' })
-            .collect();
-        for component in 0..attribute.components {
-            let mut name = match (plain.as_str(), attribute.components) {
-                ("", _) => format!("attribute_{component}"),
-                (plain, 1) => plain.to_string(),
-                (plain, _) => format!("{plain}_{component}"),
-            };
-            while names.contains(&name) {
-                name.push('_');
-            }
-            names.push(name);
-        }
-    }
-    names
+    Ok(())
 }

@@ -1,4 +1,4 @@
-//! The arrays of a VTK file: ascii, inline base64, appended raw or base64; zlib or nothing.
+//! Arrays of a VTK file: ascii, inline base64, appended raw or base64; compressed by zlib or not.
 
 use std::borrow::Cow;
 use std::io::Read;
@@ -8,11 +8,11 @@ use base64::engine::general_purpose::STANDARD;
 use flate2::read::ZlibDecoder;
 
 use super::xml::{Appended, Node, parse};
-use crate::error::{Error, Place};
+use crate::error::{Error, Location};
 use crate::number::{Dtype, Endian, Number, as_index};
-use crate::source::{Source, number, shown, words};
+use crate::source::{Source, number, words};
 
-/// A VTK file: its tree and how its arrays are stored.
+/// A VTK file: its XML tree and the storage format of its arrays.
 pub(super) struct VtkFile<'a> {
     source: &'a Source,
     root: Node,
@@ -22,7 +22,7 @@ pub(super) struct VtkFile<'a> {
     compressed: bool,
 }
 
-/// The numbers of one `DataArray`.
+/// Content of a `DataArray`.
 #[derive(Debug)]
 pub(super) struct DataArray {
     pub name: String,
@@ -32,22 +32,22 @@ pub(super) struct DataArray {
 }
 
 impl<'a> VtkFile<'a> {
-    /// Parses the tree of a file of `kind` (`PolyData` or `ImageData`).
+    /// Parses the XML of a data set of type `kind` (`PolyData` or `ImageData`).
     pub fn open(source: &'a Source, kind: &str) -> Result<Self, Error> {
         let (root, appended) = parse(source)?;
-        let refuse = |problem: String| Err(source.error(Place::Whole, problem));
+        let refuse = |problem: String| Err(source.error(Location::Whole, problem));
         let Some(file) = root.child("VTKFile") else {
-            return refuse("no element <VTKFile>; it is no VTK XML file".into());
+            return refuse("no element <VTKFile>; the file is not VTK XML".into());
         };
         if file.attribute("type") != Some(kind) || file.child(kind).is_none() {
-            return refuse(format!("no {kind} in it; save the data set as {kind}"));
+            return refuse(format!("the data set is not {kind}; save it as {kind}"));
         }
         let compressed = match file.attribute("compressor") {
             None => false,
             Some("vtkZLibDataCompressor") => true,
             Some(other) => {
                 return refuse(format!(
-                    "compressed with '{other}', which is not read; save it with zlib or none"
+                    "the compressor '{other}' is not supported; save it with zlib or uncompressed"
                 ));
             }
         };
@@ -67,34 +67,48 @@ impl<'a> VtkFile<'a> {
         })
     }
 
-    /// The element `kind` that [`Self::open`] asked for.
+    /// The data set: the element `kind` of [`Self::open`].
     pub fn data_set(&self, kind: &str) -> Result<&Node, Error> {
-        let found = self.root.child("VTKFile").and_then(|file| file.child(kind));
-        found.ok_or_else(|| self.source.error(Place::Whole, format!("no {kind} in it")))
+        let node = self.root.child("VTKFile").and_then(|file| file.child(kind));
+        node.ok_or_else(|| {
+            self.source
+                .error(Location::Whole, format!("no element <{kind}>"))
+        })
+    }
+
+    /// Refuses rows of an array that are not finite.
+    pub fn check_rows(&self, node: &Node, what: &str, rows: &[[f64; 3]]) -> Result<(), Error> {
+        let name = node.attribute("Name").unwrap_or(&node.name);
+        self.source.check_rows(name, what, rows)
     }
 
     /// An error at an element.
     pub fn error(&self, node: &Node, problem: impl Into<String>) -> Error {
         let name = node.attribute("Name").unwrap_or(&node.name);
-        let place = Place::Element {
+        let location = Location::Element {
             name: format!("<{}> '{name}'", node.name),
             index: 0,
             byte: node.byte,
         };
         match node.name.as_str() {
-            "DataArray" => self.source.error(Place::Member(name.into()), problem),
-            _ => self.source.error(place, problem),
+            "DataArray" => self.source.error(Location::Array(name.into()), problem),
+            _ => self.source.error(location, problem),
         }
     }
 
-    /// A whole number that an element must state.
+    /// A required count in an attribute.
     pub fn count(&self, node: &Node, name: &str) -> Result<usize, Error> {
         node.attribute(name)
             .and_then(|text| text.trim().parse().ok())
-            .ok_or_else(|| self.error(node, format!("the attribute {name} is missing or no count")))
+            .ok_or_else(|| {
+                self.error(
+                    node,
+                    format!("the attribute {name} is missing or not a count"),
+                )
+            })
     }
 
-    /// Numbers in an attribute, or `default` where it is absent.
+    /// Numbers in an attribute, or `default` if it is absent.
     pub fn numbers<const N: usize>(
         &self,
         node: &Node,
@@ -104,7 +118,9 @@ impl<'a> VtkFile<'a> {
         let Some(text) = node.attribute(name) else {
             return default.ok_or_else(|| self.error(node, format!("no attribute {name}")));
         };
-        let values: Option<Vec<f64>> = words(text.as_bytes()).map(number).collect();
+        let values: Option<Vec<f64>> = words(text.as_bytes())
+            .map(|word| number(word).ok())
+            .collect();
         values
             .and_then(|values| <[f64; N]>::try_from(values).ok())
             .ok_or_else(|| self.error(node, format!("{name}=\"{text}\" is not {N} numbers")))
@@ -135,13 +151,16 @@ impl<'a> VtkFile<'a> {
     fn values(&self, node: &Node) -> Result<(Vec<f64>, Dtype), String> {
         let kind = node.attribute("type").unwrap_or_default();
         let number_type =
-            parse_type(kind).ok_or_else(|| format!("the type '{kind}' is not read"))?;
+            Number::from_vtk(kind).ok_or_else(|| format!("the type '{kind}' is not supported"))?;
         let text = self.source.bytes.get(node.text.clone()).unwrap_or_default();
         let stream = match node.attribute("format").unwrap_or("ascii") {
-            "ascii" => return Ok((ascii(text)?, Dtype::Text)),
+            "ascii" => {
+                let values: Result<_, _> = words(text).map(number).collect();
+                return Ok((values?, Dtype::Text));
+            }
             "binary" => Stream::base64(text),
             "appended" => self.appended_stream(node)?,
-            other => return Err(format!("the format '{other}' is not known")),
+            other => return Err(format!("the format '{other}' is not supported")),
         };
         let bytes = if self.compressed {
             self.compressed_bytes(stream)?
@@ -173,7 +192,7 @@ impl<'a> VtkFile<'a> {
         Ok(Stream::base64(&bytes[..end]))
     }
 
-    /// `length, data`, in one stream.
+    /// Reads `length, data`.
     fn plain_bytes(&self, mut stream: Stream) -> Result<Vec<u8>, String> {
         let header = self.header.size();
         let length = self.word(&stream.peek(header)?)?;
@@ -185,7 +204,7 @@ impl<'a> VtkFile<'a> {
         Ok(stream.take(total)?[header..].to_vec())
     }
 
-    /// `blocks, block size, last block size, compressed sizes…` and then the blocks.
+    /// Reads `blocks, block size, last block size, compressed sizes…`, then the blocks.
     fn compressed_bytes(&self, mut stream: Stream) -> Result<Vec<u8>, String> {
         let word = self.header.size();
         let blocks = self.word(&stream.peek(word)?)?;
@@ -212,19 +231,18 @@ impl<'a> VtkFile<'a> {
         Ok(bytes)
     }
 
-    /// A word of a binary header.
+    /// Parses a word of a binary header: a count that does not exceed the size of the file.
     fn word(&self, bytes: &[u8]) -> Result<usize, String> {
-        // A count beyond the file's bytes is one that the file can't hold.
         let value = self.header.read(bytes, self.endian).ok_or(CUT)?;
-        as_index(value, self.source.bytes.len()).ok_or_else(|| {
-            format!("a length of {value} bytes is more than the file has; it is damaged")
-        })
+        as_index(value, self.source.bytes.len())
+            .ok_or_else(|| format!("a length of {value} bytes exceeds the file; it is damaged"))
     }
 }
 
+/// Error of truncated data.
 const CUT: &str = "the data are cut short";
 
-/// Bytes as they are, or as base64 without white space.
+/// Encoded bytes: raw, or base64 without white space.
 enum Stream<'a> {
     Raw(&'a [u8]),
     Base64 { text: Cow<'a, [u8]>, at: usize },
@@ -246,7 +264,7 @@ impl<'a> Stream<'a> {
         Self::Base64 { text, at: 0 }
     }
 
-    /// The next `n` bytes, encoded on their own.
+    /// Reads the next `n` bytes, which are encoded on their own.
     fn take(&mut self, n: usize) -> Result<Cow<'a, [u8]>, String> {
         let bytes = self.peek(n)?;
         match self {
@@ -285,26 +303,4 @@ impl<'a> Stream<'a> {
 /// Letters of base64 for `n` bytes, padding included.
 fn encoded_length(n: usize) -> usize {
     n.div_ceil(3).saturating_mul(4)
-}
-
-fn ascii(text: &[u8]) -> Result<Vec<f64>, String> {
-    words(text)
-        .map(|word| number(word).ok_or_else(|| format!("{} is not a number", shown(word))))
-        .collect()
-}
-
-fn parse_type(name: &str) -> Option<Number> {
-    Some(match name {
-        "Int8" => Number::I8,
-        "UInt8" => Number::U8,
-        "Int16" => Number::I16,
-        "UInt16" => Number::U16,
-        "Int32" => Number::I32,
-        "UInt32" => Number::U32,
-        "Int64" => Number::I64,
-        "UInt64" => Number::U64,
-        "Float32" => Number::F32,
-        "Float64" => Number::F64,
-        _ => return None,
-    })
 }

@@ -1,7 +1,7 @@
 //! ImageData: a field on a grid.
 //!
-//! VTK's first axis is the fastest, ours is the last; `Origin` is the position of the first point, which
-//! is the center of our first cell.
+//! In VTK the first axis is fastest, in [`Field`] the last; `Origin` is the position of the first point,
+//! the center of the first cell of a [`Field`].
 
 use std::io::{self, Write};
 
@@ -11,12 +11,12 @@ use super::data::{DataArray, VtkFile};
 use super::xml::Node;
 use crate::bytes::{push_real, scalar_name, size};
 use crate::error::Error;
-use crate::field::{FieldFile, field};
+use crate::field::{FieldFile, field_file};
 use crate::format::Format;
 use crate::source::Source;
 
-/// Reads a field: the scalar array `sdf`, or the only one; point data (values at the points) or, without
-/// any, cell data (values at the cells' centers). Cells must be cubes along the axes.
+/// Reads a field: the scalar array `sdf`, or the only one, of the point data or, if there are none, of
+/// the cell data (values at the cell centers). Cells must be cubes aligned with the axes.
 pub(crate) fn read(source: &Source) -> Result<FieldFile, Error> {
     let file = VtkFile::open(source, "ImageData")?;
     let image = file.data_set("ImageData")?;
@@ -27,26 +27,29 @@ pub(crate) fn read(source: &Source) -> Result<FieldFile, Error> {
     let identity = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
     if file.numbers(image, "Direction", Some(identity))? != identity {
         return Err(bad(
-            "the axes are turned (Direction); resample along x, y and z".into(),
+            "the axes are rotated (Direction); resample along x, y and z".into(),
         ));
     }
     let h = spacing[0];
     // Spacings that went through decimal text may differ in their last digits.
     if spacing.iter().any(|s| !((s - h).abs() <= 1e-6 * h.abs())) {
         return Err(bad(format!(
-            "Spacing {spacing:?} is not that of cubes; resample it"
+            "the cells are not cubes (Spacing {spacing:?}); resample the image"
         )));
     }
     let mut pieces = image.children_named("Piece");
     let (Some(piece), None) = (pieces.next(), pieces.next()) else {
-        return Err(bad("not one piece alone; save it in one piece".into()));
+        return Err(bad(
+            "the image has several pieces or none; save it in one piece".into(),
+        ));
     };
     if file.numbers(piece, "Extent", Some(extent))? != extent {
         return Err(bad(
-            "the piece is only a part of the whole; save it in one piece".into(),
+            "the piece does not cover WholeExtent; save it in one piece".into(),
         ));
     }
-    let points = shape(extent).ok_or_else(|| bad(format!("WholeExtent {extent:?} is no box")))?;
+    let points =
+        shape(extent).ok_or_else(|| bad(format!("WholeExtent {extent:?} is not a box")))?;
     let (array, node, is_cells) = scalar_array(&file, piece)?;
     let half = if is_cells { 0.5 } else { 0.0 };
     let shape = points.map(|n| n - usize::from(is_cells));
@@ -60,7 +63,7 @@ pub(crate) fn read(source: &Source) -> Result<FieldFile, Error> {
         return Err(file.error(node, problem));
     }
     let values = last_axis_fastest(&array.values, shape);
-    field(origin, h, shape, values, array.dtype, Format::Vti)
+    field_file(origin, h, shape, values, array.dtype, Format::Vti)
         .map_err(|problem| file.error(node, problem))
 }
 
@@ -77,7 +80,7 @@ fn shape(extent: [f64; 6]) -> Option<[usize; 3]> {
     Some(shape)
 }
 
-/// The array to read, and whether it belongs to the cells.
+/// Selects the array to read; the flag says whether it is cell data.
 fn scalar_array<'a>(file: &VtkFile, piece: &'a Node) -> Result<(DataArray, &'a Node, bool), Error> {
     for (section, is_cells) in [("PointData", false), ("CellData", true)] {
         let Some(data) = piece.child(section) else {
@@ -85,37 +88,37 @@ fn scalar_array<'a>(file: &VtkFile, piece: &'a Node) -> Result<(DataArray, &'a N
         };
         let arrays: Vec<&Node> = data.children_named("DataArray").collect();
         let named = |name: &str| {
-            let found = arrays
-                .iter()
-                .find(|node| node.attribute("Name") == Some(name));
-            found.copied()
+            let mut nodes = arrays.iter().copied();
+            nodes.find(|node| node.attribute("Name") == Some(name))
         };
         let only = (arrays.len() == 1).then(|| arrays[0]);
         let active = data.attribute("Scalars").and_then(named);
         if let Some(node) = named("sdf").or(only).or(active) {
             let array = file.array(node)?;
             if array.components != 1 {
-                return Err(file.error(node, "it has several components; a distance has one"));
+                return Err(
+                    file.error(node, "the array has several components; a distance has one")
+                );
             }
             return Ok((array, node, is_cells));
         }
     }
     Err(file.error(
         piece,
-        "no scalar array called 'sdf', and not one array alone",
+        "no scalar array is called 'sdf', and there is not exactly one array",
     ))
 }
 
 fn last_axis_fastest(values: &[f64], [nx, ny, nz]: [usize; 3]) -> Vec<f64> {
-    let mut turned = vec![0.0; values.len()];
+    let mut ordered = vec![0.0; values.len()];
     for (index, &value) in values.iter().enumerate() {
         let (i, j, k) = (index % nx, index / nx % ny, index / nx / ny);
-        turned[(i * ny + j) * nz + k] = value;
+        ordered[(i * ny + j) * nz + k] = value;
     }
-    turned
+    ordered
 }
 
-/// Writes a field as point data `sdf`: one raw appended array of type `T`.
+/// Writes a field as point data `sdf`, a raw appended array of type `T`.
 pub(crate) fn write<T: Real>(out: &mut impl Write, field: &Field<T>) -> io::Result<()> {
     let grid = field.grid();
     let [nx, ny, nz] = grid.shape();
@@ -142,7 +145,7 @@ _"#
     out.write_all(b"\n  </AppendedData>\n</VTKFile>\n")
 }
 
-/// Several planes at once, so that a cache line of the field is fetched once.
+/// Writes the values with the first axis fastest, several planes at once to use each cache line fully.
 fn write_first_axis_fastest<T: Real>(out: &mut impl Write, field: &Field<T>) -> io::Result<()> {
     const PLANES: usize = 16;
     let [nx, ny, nz] = field.grid().shape();

@@ -1,7 +1,7 @@
 //! VTK's XML files: PolyData (`.vtp`) and ImageData (`.vti`).
 //!
-//! `vtkio` was tried first: its last release dates from years ago and it allocates what a header asks
-//! for. XML, base64 and zlib come from crates; the layout of the arrays is read here.
+//! The layout of the arrays is read here, XML, base64 and zlib by crates: `vtkio` is no longer maintained
+//! and allocates as much as a header declares.
 
 mod data;
 mod image;

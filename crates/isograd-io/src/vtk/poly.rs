@@ -7,30 +7,20 @@ use isograd::{Mesh, Real};
 
 use super::data::{DataArray, VtkFile};
 use super::xml::Node;
-use crate::bytes::{push_vector, scalar_name, size};
+use crate::bytes::{scalar_name, size, write_reals};
 use crate::error::Error;
 use crate::format::Format;
-use crate::geometry::{Geometry, refuse_not_finite, triangulate};
+use crate::geometry::{Geometry, triangulate};
 use crate::number::{Dtype, as_index};
 use crate::source::Source;
 
-/// Reads all pieces as one. Point data are kept where every piece has them; normals are the point
-/// data's active normals, or the array called `Normals`.
+/// Reads all pieces as one. Point data are kept if every piece has them; normals are the active normals
+/// of the point data, or the array `Normals`.
 pub(crate) fn read(source: &Source) -> Result<Geometry, Error> {
     let file = VtkFile::open(source, "PolyData")?;
-    let mut geometry = Geometry {
-        points: Vec::new(),
-        normals: None,
-        attributes: Vec::new(),
-        faces: Vec::new(),
-        dtype: Dtype::Text,
-        format: Format::Vtp,
-    };
-    for (index, piece) in file
-        .data_set("PolyData")?
-        .children_named("Piece")
-        .enumerate()
-    {
+    let mut geometry = Geometry::from_points(Vec::new(), Dtype::Text, Format::Vtp);
+    let pieces = file.data_set("PolyData")?.children_named("Piece");
+    for (index, piece) in pieces.enumerate() {
         let offset = geometry.points.len();
         read_points(&file, piece, &mut geometry)?;
         read_point_data(&file, piece, index == 0, offset, &mut geometry)?;
@@ -56,12 +46,9 @@ fn read_points(file: &VtkFile, piece: &Node, geometry: &mut Geometry) -> Result<
         };
     };
     let array = file.array(node)?;
-    let rows = rows_of_three(file, node, &array, count)?;
-    for (index, &point) in rows.iter().enumerate() {
-        refuse_not_finite("point", point)
-            .map_err(|problem| file.error(node, format!("row {index}: {problem}")))?;
-    }
-    geometry.points.extend(rows);
+    let points = rows_of_three(file, node, &array, count)?;
+    file.check_rows(node, "point", &points)?;
+    geometry.points.extend(points);
     geometry.dtype = array.dtype;
     Ok(())
 }
@@ -79,8 +66,7 @@ fn rows_of_three(
         );
         return Err(file.error(node, problem));
     }
-    let rows = array.values.chunks_exact(3);
-    Ok(rows.map(|row| [row[0], row[1], row[2]]).collect())
+    Ok(array.values.as_chunks().0.to_vec())
 }
 
 fn read_point_data(
@@ -102,7 +88,9 @@ fn read_point_data(
                 return Err(file.error(node, problem));
             }
             if array.name == active && array.components == 3 {
-                normals = Some(checked_normals(file, node, &array, count)?);
+                let rows = rows_of_three(file, node, &array, count)?;
+                file.check_rows(node, "normal", &rows)?;
+                normals = Some(rows);
             } else {
                 attributes.push(Attribute {
                     name: array.name,
@@ -121,32 +109,16 @@ fn read_point_data(
         all.extend(new);
         all
     });
-    geometry.attributes.retain_mut(|kept| {
-        let same = |a: &&Attribute<f64>| a.name == kept.name && a.components == kept.components;
-        let Some(new) = attributes.iter().find(same) else {
-            return false;
-        };
-        kept.values.extend(&new.values);
-        true
+    geometry.attributes.retain_mut(|old| {
+        let mut new = attributes.iter();
+        let new = new.find(|a| a.name == old.name && a.components == old.components);
+        old.values.extend(new.iter().flat_map(|new| &new.values));
+        new.is_some()
     });
     Ok(())
 }
 
-fn checked_normals(
-    file: &VtkFile,
-    node: &Node,
-    array: &DataArray,
-    count: usize,
-) -> Result<Vec<[f64; 3]>, Error> {
-    let rows = rows_of_three(file, node, array, count)?;
-    for (index, &normal) in rows.iter().enumerate() {
-        refuse_not_finite("normal", normal)
-            .map_err(|problem| file.error(node, format!("row {index}: {problem}")))?;
-    }
-    Ok(rows)
-}
-
-/// Reads polygons, or strips, of which every second triangle is wound the other way.
+/// Reads polygons, or strips, in which every second triangle has the opposite winding.
 fn read_cells(
     file: &VtkFile,
     section: &Node,
@@ -172,7 +144,7 @@ fn read_cells(
             .filter(|&end| end >= begin + 3)
             .ok_or_else(|| {
                 cell_error(format!(
-                    "its end {end} is out of range, or it has fewer than 3 corners"
+                    "its offset {end} is out of range, or it has fewer than 3 corners"
                 ))
             })?;
         corners.clear();
@@ -195,11 +167,11 @@ fn read_cells(
     Ok(())
 }
 
-/// Writes a mesh: raw appended arrays, vertices of type `T`.
+/// Writes a mesh as raw appended arrays, vertices of type `T`.
 pub(crate) fn write<T: Real>(out: &mut impl Write, mesh: &Mesh<T>) -> io::Result<()> {
     let (vertices, faces) = (mesh.vertices().len(), mesh.faces().len());
     let lengths = [vertices * 3 * size::<T>(), faces * 3 * 8, faces * 8];
-    // Each array is led by its length in 8 bytes.
+    // Each array is preceded by its length in 8 bytes.
     let offsets = [0, lengths[0] + 8, lengths[0] + lengths[1] + 16];
     let real = scalar_name::<T>(["Float32", "Float64"]);
     write!(
@@ -221,13 +193,8 @@ pub(crate) fn write<T: Real>(out: &mut impl Write, mesh: &Mesh<T>) -> io::Result
 _"#,
         offsets[0], offsets[1], offsets[2]
     )?;
-    let mut row = Vec::new();
     out.write_all(&(lengths[0] as u64).to_le_bytes())?;
-    for &vertex in mesh.vertices() {
-        row.clear();
-        push_vector(&mut row, vertex);
-        out.write_all(&row)?;
-    }
+    write_reals(out, mesh.vertices().iter().flatten().copied())?;
     out.write_all(&(lengths[1] as u64).to_le_bytes())?;
     for corner in mesh.faces().iter().flatten() {
         out.write_all(&i64::from(*corner).to_le_bytes())?;

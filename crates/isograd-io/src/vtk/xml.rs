@@ -1,29 +1,29 @@
-//! The elements of a VTK file as a small tree; array text stays where it is.
+//! XML tree of a VTK file; the text of arrays stays in the file's bytes.
 
 use std::ops::Range;
 
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
-use crate::error::{Error, Place};
+use crate::error::{Error, Location};
 use crate::source::Source;
 
-/// VTK nests six deep; a tree much deeper is no VTK file.
-const DEEPEST: usize = 32;
+/// Limit of the nesting; VTK nests six deep.
+const MAX_DEPTH: usize = 32;
 
-/// An element, its attributes and what is inside.
+/// An XML element.
 #[derive(Debug, Default)]
 pub(super) struct Node {
     pub name: String,
     attributes: Vec<(String, String)>,
     pub children: Vec<Node>,
-    /// The text from the opening tag to the first child or the closing tag, as bytes of the file.
+    /// Byte range of the text from the opening tag to the first child or the closing tag.
     pub text: Range<usize>,
-    /// Where the element begins.
+    /// Byte offset of the element.
     pub byte: usize,
 }
 
-/// What stands in `<AppendedData>`: the bytes after the underscore.
+/// Content of `<AppendedData>`: the bytes after the underscore.
 #[derive(Debug)]
 pub(super) struct Appended {
     pub start: usize,
@@ -32,8 +32,10 @@ pub(super) struct Appended {
 
 impl Node {
     pub fn attribute(&self, name: &str) -> Option<&str> {
-        let found = self.attributes.iter().find(|(key, _)| key == name);
-        found.map(|(_, value)| value.as_str())
+        let mut attributes = self.attributes.iter();
+        attributes
+            .find(|(key, _)| key == name)
+            .map(|(_, value)| value.as_str())
     }
 
     pub fn child(&self, name: &str) -> Option<&Node> {
@@ -45,7 +47,7 @@ impl Node {
     }
 }
 
-/// The tree of a file. Parsing stops at `<AppendedData>`, behind which raw bytes may stand.
+/// Parses the tree of a file. Parsing stops at `<AppendedData>`, which may hold raw bytes.
 pub(super) fn parse(source: &Source) -> Result<(Node, Option<Appended>), Error> {
     let mut reader = Reader::from_reader(source.bytes.as_slice());
     reader.config_mut().check_end_names = true;
@@ -53,7 +55,7 @@ pub(super) fn parse(source: &Source) -> Result<(Node, Option<Appended>), Error> 
     let mut appended = None;
     loop {
         let byte = reader.buffer_position() as usize;
-        let bad = |problem: String| source.error(Place::Byte(byte), problem);
+        let bad = |problem: String| source.error(Location::Byte(byte), problem);
         let event = reader
             .read_event()
             .map_err(|e| bad(format!("broken XML: {e}; write the file again")))?;
@@ -64,8 +66,8 @@ pub(super) fn parse(source: &Source) -> Result<(Node, Option<Appended>), Error> 
                 break;
             }
             Event::Start(tag) => {
-                if stack.len() > DEEPEST {
-                    return Err(bad("the XML is nested too deep for a VTK file".into()));
+                if stack.len() > MAX_DEPTH {
+                    return Err(bad("the XML is nested too deeply for a VTK file".into()));
                 }
                 let mut node = element(&tag, byte).map_err(bad)?;
                 node.text = after..after;
@@ -94,7 +96,7 @@ pub(super) fn parse(source: &Source) -> Result<(Node, Option<Appended>), Error> 
             _ => {}
         }
     }
-    // What <AppendedData> left open.
+    // Elements left open at <AppendedData>.
     while stack.len() > 1 {
         let node = stack.pop().unwrap_or_default();
         attach(&mut stack, node);
@@ -136,7 +138,7 @@ fn find_appended(source: &Source, tag: &BytesStart, after: usize) -> Result<Appe
     let rest = source.bytes.get(after..).unwrap_or_default();
     let underscore = memchr::memchr(b'_', rest)
         .filter(|&at| rest[..at].iter().all(u8::is_ascii_whitespace))
-        .ok_or("the appended data do not begin with an underscore")?;
+        .ok_or("the appended data do not begin with '_'")?;
     Ok(Appended {
         start: after + underscore + 1,
         base64: node.attribute("encoding") == Some("base64"),

@@ -1,24 +1,16 @@
-//! Valid files give what stands in them.
+//! Content of valid files.
 
-mod common;
-
-use common::{npy, npz, source};
 use isograd_io::{Content, Dtype, Error, Format, Geometry, parse_field, parse_geometry};
+
+use crate::files::{self, SQUARE, npy, npz, source};
 
 fn geometry(format: Format, bytes: impl Into<Vec<u8>>) -> Geometry {
     parse_geometry(&source("file", bytes), format).expect("valid")
 }
 
-const SQUARE: [[f64; 3]; 4] = [
-    [0.0, 0.0, 0.0],
-    [1.0, 0.0, 0.0],
-    [1.0, 1.0, 0.0],
-    [0.0, 1.0, 0.0],
-];
-
 #[test]
 fn every_valid_file_is_read() {
-    for (name, format, bytes) in common::valid_files() {
+    for (name, format, bytes) in files::valid_files() {
         let source = source(name, bytes);
         if name.starts_with("sdf") {
             let file = parse_field(&source, format).unwrap_or_else(|e| panic!("{e}"));
@@ -32,7 +24,7 @@ fn every_valid_file_is_read() {
 
 #[test]
 fn ascii_ply_keeps_attributes_skips_lists_and_cuts_polygons() {
-    let file = geometry(Format::Ply, common::ASCII_PLY);
+    let file = geometry(Format::Ply, files::ASCII_PLY);
     assert_eq!(file.points[3], [0.0, 1.5, 0.0]);
     assert_eq!(file.attributes.len(), 1);
     assert_eq!(file.attributes[0].name, "red");
@@ -40,12 +32,12 @@ fn ascii_ply_keeps_attributes_skips_lists_and_cuts_polygons() {
     assert_eq!(file.faces, [[0, 1, 2], [0, 2, 3], [0, 2, 3]]);
     assert_eq!(file.dtype, Dtype::Text);
     // The last line may lack its end.
-    assert_eq!(geometry(Format::Ply, common::ASCII_PLY.trim_end()), file);
+    assert_eq!(geometry(Format::Ply, files::ASCII_PLY.trim_end()), file);
 }
 
 #[test]
 fn big_endian_ply_with_carriage_returns_is_read() {
-    let file = geometry(Format::Ply, common::big_endian_ply());
+    let file = geometry(Format::Ply, files::big_endian_ply());
     assert_eq!(file.points, SQUARE);
     assert_eq!(file.faces, [[0, 1, 2], [0, 2, 3]]);
     assert_eq!(file.dtype, Dtype::F64);
@@ -87,32 +79,31 @@ fn six_columns_are_normals_unless_they_are_colors() {
     assert_eq!(file.normals, None);
     assert_eq!(file.attributes[0].name, "red");
     assert_eq!(file.attributes[2].values, [1.0, 8.0]);
-    let file = geometry(Format::Text, common::CSV);
+    let file = geometry(Format::Text, files::CSV);
     assert_eq!(file.normals, Some(vec![[0.0, 0.0, 1.0]; 3]));
     assert_eq!(file.attributes[0].name, "temperature");
 }
 
 #[test]
 fn obj_counts_from_one_and_back_from_the_last() {
-    let file = geometry(Format::Obj, common::OBJ);
+    let file = geometry(Format::Obj, files::OBJ);
     assert_eq!(file.points, SQUARE);
     assert_eq!(file.faces, [[0, 1, 2], [0, 2, 3], [0, 1, 2]]);
     assert_eq!(file.normals, Some(vec![[0.0, 0.0, 1.0]; 4]));
-    let other = common::OBJ.replace("2//2", "2//1");
+    let other = files::OBJ.replace("2//2", "2//1");
     assert_eq!(geometry(Format::Obj, other).normals, None);
 }
 
 #[test]
 fn stl_corners_are_merged_where_they_are_equal() {
-    let file = geometry(Format::Stl, common::ASCII_STL);
+    let file = geometry(Format::Stl, files::ASCII_STL);
     assert_eq!(file.points, [SQUARE[0], SQUARE[1], SQUARE[3], SQUARE[2]]);
     assert_eq!(file.faces, [[0, 1, 2], [1, 3, 2]]);
 }
 
 #[test]
 fn binary_stl_may_begin_with_solid() {
-    let mesh = common::tetrahedron::<f32>();
-    let mut bytes = common::written("m.stl", |p| isograd_io::write_mesh(p, &mesh));
+    let mut bytes = files::mesh_file::<f32>("m.stl");
     let header = b"solid facet vertex";
     bytes[..header.len()].copy_from_slice(header);
     let file = geometry(Format::Stl, bytes.clone());
@@ -126,43 +117,27 @@ fn binary_stl_may_begin_with_solid() {
 
 #[test]
 fn arrays_are_read_in_either_order_and_of_any_number_type() {
+    let rows = [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]];
     let c: Vec<u8> = (0..6).flat_map(|i: i16| i.to_le_bytes()).collect();
-    let file = geometry(
-        Format::Npy,
-        npy(
-            "{'descr': '<i2', 'fortran_order': False, 'shape': (2, 3), }\n",
-            &c,
-        ),
+    let file = geometry(Format::Npy, npy("<i2", false, "(2, 3)", &c));
+    assert_eq!(file.points, rows);
+    let fortran = [0.0, 3.0, 1.0, 4.0, 2.0, 5.0];
+    let fortran: Vec<u8> = fortran.iter().flat_map(|x: &f64| x.to_be_bytes()).collect();
+    let file = geometry(Format::Npy, npy(">f8", true, "(2, 3)", &fortran));
+    assert_eq!(
+        (file.points.as_slice(), file.dtype),
+        (&rows[..], Dtype::F64)
     );
-    assert_eq!(file.points, [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]);
-    let fortran: Vec<u8> = [0.0, 3.0, 1.0, 4.0, 2.0, 5.0]
-        .iter()
-        .flat_map(|x: &f64| x.to_be_bytes())
-        .collect();
     let file = geometry(
         Format::Npy,
-        npy(
-            "{'descr': '>f8', 'fortran_order': True, 'shape': (2, 3), }\n",
-            &fortran,
-        ),
-    );
-    assert_eq!(file.points, [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]);
-    assert_eq!(file.dtype, Dtype::F64);
-    let file = geometry(
-        Format::Npy,
-        npy(
-            "{'descr': '|u1', 'fortran_order': False, 'shape': (1, 6), }\n",
-            &[1, 2, 3, 0, 0, 1],
-        ),
+        npy("|u1", false, "(1, 6)", &[1, 2, 3, 0, 0, 1]),
     );
     assert_eq!(file.normals, Some(vec![[0.0, 0.0, 1.0]]));
 }
 
 #[test]
 fn an_archive_gives_points_normals_and_attributes() {
-    let header =
-        |shape: &str| format!("{{'descr': '|u1', 'fortran_order': False, 'shape': {shape}, }}\n");
-    let array = |shape: &str, data: &[u8]| npy(&header(shape), data);
+    let array = |shape: &str, data: &[u8]| npy("|u1", false, shape, data);
     let members = [
         ("points.npy", array("(2, 3)", &[0, 0, 0, 1, 0, 0])),
         ("normals.npy", array("(2, 3)", &[0, 0, 1, 0, 0, 1])),
@@ -175,17 +150,17 @@ fn an_archive_gives_points_normals_and_attributes() {
     assert_eq!(file.normals, Some(vec![[0.0, 0.0, 1.0]; 2]));
     assert_eq!(file.attributes.len(), 1);
     assert_eq!(file.attributes[0].values, [7.0, 9.0]);
-    // One array alone needs no name.
-    let file = geometry(
-        Format::Npz,
-        npz(&[("xyz.npy", array("(1, 3)", &[1, 2, 3]))], false),
+    // A single array may have any name.
+    let single = [("xyz.npy", array("(1, 3)", &[1, 2, 3]))];
+    assert_eq!(
+        geometry(Format::Npz, npz(&single, false)).points,
+        [[1.0, 2.0, 3.0]]
     );
-    assert_eq!(file.points, [[1.0, 2.0, 3.0]]);
 }
 
 #[test]
 fn vtp_strips_turn_every_second_triangle() {
-    let file = geometry(Format::Vtp, common::ASCII_VTP);
+    let file = geometry(Format::Vtp, files::ASCII_VTP);
     assert_eq!(file.faces, [[0, 1, 2], [0, 1, 2], [2, 1, 3]]);
     assert_eq!(file.normals, Some(vec![[0.0, 0.0, 1.0]; 4]));
     assert_eq!(file.attributes[0].name, "heat");
@@ -194,7 +169,7 @@ fn vtp_strips_turn_every_second_triangle() {
 #[test]
 fn vtp_written_by_vtk_is_read_packed_or_not() {
     let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.25]];
-    for text in [common::BINARY_VTP, common::ZLIB_VTP] {
+    for text in [files::BINARY_VTP, files::ZLIB_VTP] {
         let file = geometry(Format::Vtp, text);
         assert_eq!(file.points, points);
         assert_eq!(file.faces, [[0, 1, 2]]);
@@ -213,35 +188,36 @@ fn cell_data_of_an_image_sit_half_a_cell_in() {
     assert_eq!(file.field.at([0, 0, 1]), 4.0);
 }
 
-#[test]
-fn the_kind_of_content_is_found() {
+/// Writes a file to a temporary folder and reads it.
+fn read_file<R>(name: &str, bytes: &[u8], read: impl FnOnce(&std::path::Path) -> R) -> R {
     let folder = tempfile::tempdir().expect("temporary folder");
-    for (name, _, bytes) in common::valid_files() {
-        let path = folder.path().join(name);
-        std::fs::write(&path, bytes).expect("writes");
-        let content = isograd_io::read(&path).unwrap_or_else(|e| panic!("{e}"));
-        assert_eq!(
-            matches!(content, Content::Field(_)),
-            name.starts_with("sdf"),
-            "{name}"
-        );
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes).expect("writes");
+    read(&path)
+}
+
+#[test]
+fn the_kind_of_content_is_detected() {
+    for (name, _, bytes) in files::valid_files() {
+        let content = read_file(name, &bytes, isograd_io::read).unwrap_or_else(|e| panic!("{e}"));
+        let is_field = matches!(content, Content::Field(_));
+        assert_eq!(is_field, name.starts_with("sdf"), "{name}");
     }
 }
 
 #[test]
-fn a_name_that_the_content_contradicts_is_refused() {
-    let folder = tempfile::tempdir().expect("temporary folder");
-    let refused = |name: &str, bytes: &[u8]| {
-        let path = folder.path().join(name);
-        std::fs::write(&path, bytes).expect("writes");
-        let error = isograd_io::read_geometry(&path).expect_err("refused");
+fn a_name_that_contradicts_the_content_is_refused() {
+    for (name, bytes, part) in [
+        ("a.xyz", files::ASCII_PLY, "rename it to end in .ply"),
+        ("a.npy", "1 2 3\n", "does not begin as NPY does"),
+        ("a.dat", files::ASCII_PLY, "content is PLY"),
+        ("a.dat", "1 2 3\n", ".ply, .xyz"),
+        ("a", "1 2 3\n", "format is unknown"),
+        ("a.vti", files::ASCII_VTP, "content is VTP"),
+    ] {
+        let error = read_file(name, bytes.as_bytes(), isograd_io::read_geometry);
+        let error = error.expect_err("refused");
         assert!(matches!(error, Error::Format { .. }), "{error:?}");
-        error.to_string()
-    };
-    assert!(refused("a.xyz", common::ASCII_PLY.as_bytes()).contains("rename it to end in .ply"));
-    assert!(refused("a.npy", b"1 2 3\n").contains("does not begin as NPY does"));
-    assert!(refused("a.dat", common::ASCII_PLY.as_bytes()).contains("content is PLY"));
-    assert!(refused("a.dat", b"1 2 3\n").contains(".ply, .xyz"));
-    assert!(refused("a", b"1 2 3\n").contains("format is unknown"));
-    assert!(refused("a.vti", common::ASCII_VTP.as_bytes()).contains("content is VTP"));
+        assert!(error.to_string().contains(part), "{error}");
+    }
 }

@@ -1,10 +1,27 @@
-//! What happens to a file that is being written when the program is told to stop. One test alone: it
-//! ends all writing in this process.
+//! A program that is stopped while it writes a file.
 
 use std::io::Write;
+use std::process::Command;
+
+/// Set in the process that is stopped: stopping ends all writing in a process.
+const STOPPED: &str = "ISOGRAD_IO_TEST_STOPPED";
 
 #[test]
-fn stopping_removes_what_is_unfinished_and_keeps_what_was_there() {
+fn stopping_removes_unfinished_files_and_keeps_existing_ones() {
+    if std::env::var_os(STOPPED).is_none() {
+        let mut program = Command::new(std::env::current_exe().expect("path of this program"));
+        program.args([
+            "--exact",
+            "stopping::stopping_removes_unfinished_files_and_keeps_existing_ones",
+        ]);
+        let output = program.env(STOPPED, "1").output().expect("starts");
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(
+            output.status.success() && text.contains("1 passed"),
+            "{text}"
+        );
+        return;
+    }
     let folder = tempfile::tempdir().expect("temporary folder");
     let names = || {
         let entries = std::fs::read_dir(folder.path()).expect("folder");
@@ -16,11 +33,7 @@ fn stopping_removes_what_is_unfinished_and_keeps_what_was_there() {
     std::fs::write(&path, b"old").expect("writes");
     let result = isograd_io::atomic::write(&path, |out| {
         out.write_all(b"new")?;
-        assert_eq!(
-            names().len(),
-            2,
-            "the temporary file stands beside the old one"
-        );
+        assert_eq!(names().len(), 2, "the temporary file and the old one");
         isograd_io::atomic::remove_unfinished();
         assert_eq!(names(), ["a.ply"]);
         Ok(())

@@ -1,12 +1,12 @@
-//! What is written and read back in its own type has the same bits.
-
-mod common;
+//! Data written and read back in their own type have the same bits.
 
 use std::path::Path;
 
 use isograd::data::Attribute;
 use isograd::{Field, Grid, Mesh, PointCloud, Real};
 use proptest::prelude::*;
+
+use crate::files;
 
 /// Numbers of every size, also tiny, huge and negative zero.
 fn number() -> impl Strategy<Value = f64> {
@@ -34,10 +34,8 @@ fn to<T: Real>(rows: &[[f64; 3]]) -> Vec<[T; 3]> {
 }
 
 fn bits<'a, T: Real>(values: impl IntoIterator<Item = &'a [T; 3]>) -> Vec<[u64; 3]> {
-    values
-        .into_iter()
-        .map(|v| v.map(|x| x.f64().to_bits()))
-        .collect()
+    let values = values.into_iter();
+    values.map(|v| v.map(|x| x.f64().to_bits())).collect()
 }
 
 fn with_file<R>(name: &str, use_it: impl FnOnce(&Path) -> R) -> R {
@@ -51,11 +49,8 @@ fn mesh_comes_back<T: Real>(name: &str, vertices: &[[f64; 3]], faces: &[[u32; 3]
         isograd_io::write_mesh(path, &mesh).expect("writes");
         isograd_io::read_mesh(path).expect("reads")
     });
-    assert_eq!(
-        bits(&to::<T>(&file.points)),
-        bits(mesh.vertices()),
-        "{name}"
-    );
+    let vertices = to::<T>(&file.points);
+    assert_eq!(bits(&vertices), bits(mesh.vertices()), "{name}");
     assert_eq!(file.faces, mesh.faces(), "{name}");
 }
 
@@ -64,11 +59,9 @@ fn triangles_come_back(vertices: &[[f64; 3]], faces: &[[u32; 3]]) {
     let mesh = Mesh::<f32>::new(to(vertices), faces.to_vec()).expect("valid");
     let back = with_file("m.stl", |path| {
         isograd_io::write_mesh(path, &mesh).expect("writes");
-        isograd_io::read_mesh(path)
-            .expect("reads")
-            .mesh::<f32>()
-            .expect("valid")
+        isograd_io::read_mesh(path).expect("reads")
     });
+    let back = back.mesh::<f32>().expect("valid");
     assert_eq!(back.faces().len(), faces.len());
     for face in 0..faces.len() {
         assert_eq!(back.corners(face), mesh.corners(face));
@@ -91,16 +84,15 @@ fn cloud_comes_back<T: Real>(name: &str, points: &[[f64; 3]], normals: &[[f64; 3
         isograd_io::read_geometry(path).expect("reads")
     });
     assert_eq!(bits(&to::<T>(&file.points)), bits(cloud.points()), "{name}");
-    assert_eq!(
-        bits(&to::<T>(&file.normals.expect("normals"))),
-        bits(cloud.normals().expect("normals"))
-    );
-    assert_eq!(file.attributes.len(), 1, "{name}");
-    let back = file.attributes[0].values.iter();
-    let same = back
-        .zip(&cloud.attributes()[0].values)
-        .all(|(a, b)| T::of(*a).f64().to_bits() == b.f64().to_bits());
-    assert!(same && file.attributes[0].name == "confidence", "{name}");
+    let normals = to::<T>(&file.normals.expect("normals"));
+    assert_eq!(bits(&normals), bits(cloud.normals().expect("normals")));
+    let [attribute] = &file.attributes[..] else {
+        panic!("{name}: {} attributes", file.attributes.len());
+    };
+    assert_eq!(attribute.name, "confidence", "{name}");
+    let values = attribute.values.iter().map(|&v| T::of(v).f64().to_bits());
+    let expected = cloud.attributes()[0].values.iter();
+    assert!(values.eq(expected.map(|v| v.f64().to_bits())), "{name}");
 }
 
 fn field_comes_back<T: Real>(name: &str, shape: [usize; 3], lower: [f64; 3], values: &[f64]) {
@@ -117,18 +109,16 @@ fn field_comes_back<T: Real>(name: &str, shape: [usize; 3], lower: [f64; 3], val
     let back = &file.field;
     assert_eq!(back.grid().shape(), shape);
     assert_eq!(back.grid().spacing(), grid.spacing().f64());
-    let same = back.values().iter().zip(field.values());
+    let values = back.values().iter().map(|v| v.to_bits());
     assert!(
-        same.clone().all(|(a, b)| a.to_bits() == b.f64().to_bits()),
+        values.eq(field.values().iter().map(|v| v.f64().to_bits())),
         "{name}"
     );
     for axis in 0..3 {
-        // Half a cell is taken off and added again: two roundings at this size.
+        // Half a cell is subtracted and added again: two roundings at this size.
         let error = back.grid().origin()[axis] - grid.center_f64([0; 3])[axis];
-        assert!(
-            error.abs() <= 4.0 * f64::EPSILON * (lower[axis].abs() + 0.1),
-            "{name}: {error}"
-        );
+        let tolerance = 4.0 * f64::EPSILON * (lower[axis].abs() + 0.1);
+        assert!(error.abs() <= tolerance, "{name}: {error}");
     }
 }
 
@@ -168,7 +158,7 @@ proptest! {
 
 #[test]
 fn attributes_of_several_components_stay_together_in_npz() {
-    let cloud = common::cloud::<f32>();
+    let cloud = files::cloud::<f32>();
     let file = with_file("c.npz", |path| {
         isograd_io::write_cloud(path, &cloud).expect("writes");
         isograd_io::read_geometry(path).expect("reads")
@@ -178,15 +168,8 @@ fn attributes_of_several_components_stay_together_in_npz() {
 
 #[test]
 fn points_a_million_away_with_extent_one_keep_every_bit() {
-    let points: Vec<[f64; 3]> = (0..50)
-        .map(|i| {
-            [
-                1e6 + (i as f64 * 0.37).sin(),
-                -1e6 + i as f64 / 50.0,
-                1e6 + 1e-9 * i as f64,
-            ]
-        })
-        .collect();
+    let point = |i: f64| [1e6 + (i * 0.37).sin(), -1e6 + i / 50.0, 1e6 + 1e-9 * i];
+    let points: Vec<[f64; 3]> = (0..50).map(|i| point(f64::from(i))).collect();
     for name in ["c.ply", "c.npz", "c.xyz"] {
         cloud_comes_back::<f64>(name, &points, &points);
     }
@@ -195,8 +178,8 @@ fn points_a_million_away_with_extent_one_keep_every_bit() {
 #[test]
 fn the_same_data_give_the_same_bytes() {
     for name in ["a.npz", "a.ply"] {
-        let cloud = common::cloud::<f32>();
-        let bytes = || common::written(name, |path| isograd_io::write_cloud(path, &cloud));
+        let cloud = files::cloud::<f32>();
+        let bytes = || files::written(name, |path| isograd_io::write_cloud(path, &cloud));
         assert_eq!(bytes(), bytes());
     }
 }

@@ -1,12 +1,38 @@
-//! Small files of every format, made by hand or by the writers.
-#![allow(dead_code)] // each test takes what it needs
+//! Small files of every format, written by hand or by the writers.
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::Path;
 
 use isograd::data::Attribute;
 use isograd::{Field, Grid, Mesh, PointCloud, Real};
-use isograd_io::{Error, Format, Source};
+use isograd_io::{Error, Format, Source, parse_field, parse_geometry, write_cloud, write_field};
+
+/// Parses a file as a field (VTI) or as points and faces, and checks the memory that it takes.
+pub fn parse_in_bounds(source: &Source, format: Format) -> Result<(), Error> {
+    let mut result = Ok(());
+    let memory = allocation_counter::measure(|| {
+        result = match format {
+            Format::Vti => parse_field(source, format).map(drop),
+            _ => parse_geometry(source, format).map(drop),
+        };
+    });
+    // One byte may become a number of 8 bytes, held twice; the constant is for the unpacker's buffers.
+    let allowed = 64 * source.bytes.len() as u64 + (1 << 20);
+    let used = memory.bytes_max;
+    assert!(
+        used <= allowed,
+        "{}: {used} bytes were allocated",
+        source.name
+    );
+    result
+}
+
+pub const SQUARE: [[f64; 3]; 4] = [
+    [0.0, 0.0, 0.0],
+    [1.0, 0.0, 0.0],
+    [1.0, 1.0, 0.0],
+    [0.0, 1.0, 0.0],
+];
 
 /// A tetrahedron with outward faces.
 pub fn tetrahedron<T: Real>() -> Mesh<T> {
@@ -37,24 +63,27 @@ pub fn cloud<T: Real>() -> PointCloud<T> {
         .expect("right length")
 }
 
-/// A field of unlike axes.
+/// A field whose axes differ in length.
 pub fn field<T: Real>() -> Field<T> {
-    let grid = Grid::new(
-        [T::of(-1.0), T::of(2.0), T::of(0.5)],
-        T::of(0.25),
-        [3, 4, 5],
-    );
-    let grid = grid.expect("valid grid");
+    let lower = [-1.0, 2.0, 0.5].map(T::of);
+    let grid = Grid::new(lower, T::of(0.25), [3, 4, 5]).expect("valid grid");
     let values = (0..grid.cells()).map(|i| T::of((i as f64).cos())).collect();
     Field::new(grid, values).expect("right length")
 }
 
-/// What `write` puts into a file called `name`.
-pub fn written(name: &str, write: impl FnOnce(&PathBuf) -> Result<(), Error>) -> Vec<u8> {
+/// Bytes of the file `name` as written by `write`.
+pub fn written(name: &str, write: impl FnOnce(&Path) -> Result<(), Error>) -> Vec<u8> {
     let folder = tempfile::tempdir().expect("temporary folder");
     let path = folder.path().join(name);
     write(&path).expect("writes");
     std::fs::read(&path).expect("is there")
+}
+
+/// Bytes of the tetrahedron in a file `name`.
+pub fn mesh_file<T: Real>(name: &str) -> Vec<u8> {
+    written(name, |path| {
+        isograd_io::write_mesh(path, &tetrahedron::<T>())
+    })
 }
 
 pub fn source(name: &str, bytes: impl Into<Vec<u8>>) -> Source {
@@ -64,8 +93,10 @@ pub fn source(name: &str, bytes: impl Into<Vec<u8>>) -> Source {
     }
 }
 
-/// A NumPy array file with a header of one's own.
-pub fn npy(header: &str, data: &[u8]) -> Vec<u8> {
+/// A NumPy array file.
+pub fn npy(descr: &str, fortran_order: bool, shape: &str, data: &[u8]) -> Vec<u8> {
+    let order = if fortran_order { "True" } else { "False" };
+    let header = format!("{{'descr': '{descr}', 'fortran_order': {order}, 'shape': {shape}, }}\n");
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
     bytes.extend((header.len() as u16).to_le_bytes());
     bytes.extend(header.as_bytes());
@@ -160,31 +191,23 @@ pub const ASCII_VTP: &str = r#"<?xml version="1.0"?>
 </Piece></PolyData></VTKFile>
 "#;
 
-/// The two base64 forms are of VTK's own making (vtk 9, `SetDataModeToBinary`), with zlib and without.
+/// Written by VTK 9 (`SetDataModeToBinary`), with zlib and without.
 pub const BINARY_VTP: &str = include_str!("triangle_base64.vtp");
 pub const ZLIB_VTP: &str = include_str!("triangle_zlib.vtp");
 
-/// One valid file of every kind that can be read, as `(name, format, bytes)`.
+/// One valid file of every readable kind, as `(name, format, bytes)`.
 pub fn valid_files() -> Vec<(&'static str, Format, Vec<u8>)> {
     let points: Vec<u8> = (0..12).flat_map(|i| (i as f32).to_be_bytes()).collect();
-    let npy_bytes = npy(
-        "{'descr': '>f4', 'fortran_order': True, 'shape': (4, 3), }\n",
-        &points,
-    );
+    let array = npy(">f4", true, "(4, 3)", &points);
+    let packed = npz(&[("points.npy", array.clone())], true);
+    let cloud_ply = written("c.ply", |path| write_cloud(path, &cloud::<f64>()));
+    let cloud_npz = written("c.npz", |path| write_cloud(path, &cloud::<f32>()));
+    let sdf_npz = written("f.npz", |path| write_field(path, &field::<f32>()));
+    let sdf_vti = written("f.vti", |path| write_field(path, &field::<f64>()));
     vec![
         ("ascii.ply", Format::Ply, ASCII_PLY.into()),
-        (
-            "mesh.ply",
-            Format::Ply,
-            written("m.ply", |p| {
-                isograd_io::write_mesh(p, &tetrahedron::<f32>())
-            }),
-        ),
-        (
-            "cloud.ply",
-            Format::Ply,
-            written("c.ply", |p| isograd_io::write_cloud(p, &cloud::<f64>())),
-        ),
+        ("mesh.ply", Format::Ply, mesh_file::<f32>("m.ply")),
+        ("cloud.ply", Format::Ply, cloud_ply),
         ("big.ply", Format::Ply, big_endian_ply()),
         ("points.csv", Format::Text, CSV.into()),
         (
@@ -194,58 +217,23 @@ pub fn valid_files() -> Vec<(&'static str, Format, Vec<u8>)> {
         ),
         ("mesh.obj", Format::Obj, OBJ.into()),
         ("ascii.stl", Format::Stl, ASCII_STL.into()),
-        (
-            "mesh.stl",
-            Format::Stl,
-            written("m.stl", |p| {
-                isograd_io::write_mesh(p, &tetrahedron::<f32>())
-            }),
-        ),
-        ("points.npy", Format::Npy, npy_bytes.clone()),
-        (
-            "cloud.npz",
-            Format::Npz,
-            written("c.npz", |p| isograd_io::write_cloud(p, &cloud::<f32>())),
-        ),
-        (
-            "packed.npz",
-            Format::Npz,
-            npz(&[("points.npy", npy_bytes)], true),
-        ),
-        (
-            "sdf.npz",
-            Format::Npz,
-            written("f.npz", |p| isograd_io::write_field(p, &field::<f32>())),
-        ),
+        ("mesh.stl", Format::Stl, mesh_file::<f32>("m.stl")),
+        ("points.npy", Format::Npy, array),
+        ("cloud.npz", Format::Npz, cloud_npz),
+        ("packed.npz", Format::Npz, packed),
+        ("sdf.npz", Format::Npz, sdf_npz),
         ("ascii.vtp", Format::Vtp, ASCII_VTP.into()),
         ("base64.vtp", Format::Vtp, BINARY_VTP.into()),
         ("zlib.vtp", Format::Vtp, ZLIB_VTP.into()),
-        (
-            "mesh.vtp",
-            Format::Vtp,
-            written("m.vtp", |p| {
-                isograd_io::write_mesh(p, &tetrahedron::<f64>())
-            }),
-        ),
-        (
-            "sdf.vti",
-            Format::Vti,
-            written("f.vti", |p| isograd_io::write_field(p, &field::<f64>())),
-        ),
+        ("mesh.vtp", Format::Vtp, mesh_file::<f64>("m.vtp")),
+        ("sdf.vti", Format::Vti, sdf_vti),
     ]
 }
 
-/// Vertices of `double` and a quad, most significant byte first.
+/// A quad with vertices of `double`, big-endian.
 pub fn big_endian_ply() -> Vec<u8> {
     let mut bytes = b"ply\r\nformat binary_big_endian 1.0\r\nelement vertex 4\r\nproperty double x\r\nproperty double y\r\nproperty double z\r\nelement face 1\r\nproperty list int uint vertex_index\r\nend_header\r\n".to_vec();
-    for v in [
-        [0.0, 0.0, 0.0],
-        [1.0, 0.0, 0.0],
-        [1.0, 1.0, 0.0],
-        [0.0, 1.0, 0.0],
-    ] {
-        bytes.extend(v.iter().flat_map(|x: &f64| x.to_be_bytes()));
-    }
+    bytes.extend(SQUARE.iter().flatten().flat_map(|x| x.to_be_bytes()));
     bytes.extend(4i32.to_be_bytes());
     bytes.extend([0u32, 1, 2, 3].iter().flat_map(|i| i.to_be_bytes()));
     bytes

@@ -1,0 +1,144 @@
+//! Point clouds as tables with named columns, shared by the PLY and text readers and writers.
+
+use isograd::data::Attribute;
+use isograd::{PointCloud, Real};
+
+use crate::format::Format;
+use crate::geometry::{Geometry, check_finite};
+use crate::number::Dtype;
+
+/// Points, normals and attributes collected row by row.
+pub(crate) struct PointTable {
+    xyz: [usize; 3],
+    normal: Option<[usize; 3]>,
+    /// Column of each attribute.
+    extra: Vec<usize>,
+    points: Vec<[f64; 3]>,
+    normals: Vec<[f64; 3]>,
+    attributes: Vec<Attribute<f64>>,
+}
+
+impl PointTable {
+    /// `names` holds the name of every column, `None` for a column that is skipped; the columns of
+    /// `xyz` and `normal` are those of the coordinates. Memory is reserved for `rows` rows.
+    pub fn new(
+        names: &[Option<&str>],
+        xyz: [usize; 3],
+        normal: Option<[usize; 3]>,
+        rows: usize,
+    ) -> Self {
+        let is_vector = |c: usize| xyz.contains(&c) || normal.is_some_and(|n| n.contains(&c));
+        let (extra, attributes) = names
+            .iter()
+            .enumerate()
+            .filter(|(c, _)| !is_vector(*c))
+            .filter_map(|(c, name)| Some((c, (*name)?)))
+            .map(|(c, name)| (c, attribute(name, Vec::with_capacity(rows))))
+            .unzip();
+        Self {
+            xyz,
+            normal,
+            extra,
+            points: Vec::with_capacity(rows),
+            normals: Vec::with_capacity(normal.map_or(0, |_| rows)),
+            attributes,
+        }
+    }
+
+    /// Appends a row, which has a value for every column.
+    pub fn push(&mut self, row: &[f64]) -> Result<(), String> {
+        let point = self.xyz.map(|column| row[column]);
+        check_finite("point", point)?;
+        self.points.push(point);
+        if let Some(columns) = self.normal {
+            let normal = columns.map(|column| row[column]);
+            check_finite("normal", normal)?;
+            self.normals.push(normal);
+        }
+        for (attribute, &column) in self.attributes.iter_mut().zip(&self.extra) {
+            attribute.values.push(row[column]);
+        }
+        Ok(())
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Makes the attributes `red`, `green` and `blue` of normals that are colors: whole numbers from 0
+    /// to 255, some of them above 1.
+    pub fn reinterpret_normals_as_colors(&mut self) {
+        let is_byte = |v: &f64| v.fract() == 0.0 && (0.0..=255.0).contains(v);
+        let mut values = self.normals.iter().flatten();
+        if values.clone().all(is_byte) && values.any(|v| *v > 1.0) {
+            self.normal = None;
+            for (axis, name) in ["red", "green", "blue"].into_iter().enumerate() {
+                let values = self.normals.iter().map(|normal| normal[axis]).collect();
+                self.attributes.push(attribute(name, values));
+            }
+        }
+    }
+
+    pub fn into_geometry(self, dtype: Dtype, format: Format) -> Geometry {
+        Geometry {
+            normals: self.normal.map(|_| self.normals),
+            attributes: self.attributes,
+            ..Geometry::from_points(self.points, dtype, format)
+        }
+    }
+}
+
+fn attribute(name: &str, values: Vec<f64>) -> Attribute<f64> {
+    Attribute {
+        name: name.into(),
+        components: 1,
+        values,
+    }
+}
+
+/// Columns of three names, if all are there.
+pub(crate) fn find_columns(names: &[Option<&str>], wanted: [&str; 3]) -> Option<[usize; 3]> {
+    let [x, y, z] = wanted.map(|name| names.iter().position(|n| *n == Some(name)));
+    Some([x?, y?, z?])
+}
+
+/// Names of a cloud's columns in a file: unique, with `_` in place of characters that are not
+/// `allowed`. An attribute of several components has the columns `name_0`, `name_1` and so on.
+pub(crate) fn column_names<T: Real>(
+    cloud: &PointCloud<T>,
+    allowed: fn(&char) -> bool,
+) -> Vec<String> {
+    let mut names: Vec<String> = ["x", "y", "z"].map(String::from).to_vec();
+    if cloud.normals().is_some() {
+        names.extend(["nx", "ny", "nz"].map(String::from));
+    }
+    for attribute in cloud.attributes() {
+        let plain = attribute.name.replace(|c| !allowed(&c), "_");
+        for component in 0..attribute.components {
+            let mut name = match (plain.as_str(), attribute.components) {
+                ("", _) => format!("attribute_{component}"),
+                (plain, 1) => plain.to_string(),
+                (plain, _) => format!("{plain}_{component}"),
+            };
+            while names.contains(&name) {
+                name.push('_');
+            }
+            names.push(name);
+        }
+    }
+    names
+}
+
+/// Values of point `i`, in the order of [`column_names`].
+pub(crate) fn row<T: Real>(cloud: &PointCloud<T>, i: usize) -> impl Iterator<Item = T> {
+    let normal = cloud.normals().map(|normals| normals[i]);
+    let attributes = cloud.attributes().iter().flat_map(move |attribute| {
+        let n = attribute.components;
+        attribute.values[i * n..(i + 1) * n].iter().copied()
+    });
+    let vectors = cloud.points()[i]
+        .into_iter()
+        .chain(normal.into_iter().flatten());
+    vectors.chain(attributes)
+}
