@@ -34,8 +34,9 @@ if reason=$(grep -m 1 "SKIPPED on CUDA" "$work/conformance"); then
     no_device "$reason"
 fi
 grep -E "FAILED|panicked|^test result" "$work/conformance"
-count() { grep "^test result" "$work/conformance" | grep -oE "[0-9]+ $1" | cut -d ' ' -f 1; }
-conformance="{\"passed\": $(count passed || echo 0), \"failed\": $(count failed || echo null)}"
+# Null if the tests ended early.
+count() { grep "^test result" "$work/conformance" | grep -oE "[0-9]+ $1" | grep -oE "[0-9]+" || echo null; }
+conformance="{\"passed\": $(count passed), \"failed\": $(count failed)}"
 [ $status = 0 ] || cp "$work/conformance" "$result.conformance.log"
 
 echo "── compute-sanitizer"
