@@ -1,14 +1,14 @@
-//! `cargo xtask deny`: licenses, bans, sources and advisories of the dependencies, by `deny.toml`.
+//! `cargo xtask deny`: licenses, bans, sources and advisories of the dependencies, as `deny.toml` sets them.
 
 use std::process::Stdio;
 
 use crate::process::{self, Outcome};
 
-/// Runs cargo-deny where it is installed, and says so where it is not. Advisories are fetched.
+/// Runs cargo-deny, if it is installed. Advisories are fetched.
 pub fn run(offline: bool) -> Outcome {
     if !installed() {
         println!(
-            "SKIPPED deny: no cargo-deny here; install it by `cargo install --locked cargo-deny`"
+            "SKIPPED deny: cargo-deny is not installed; run `cargo install --locked cargo-deny`"
         );
         return Ok(());
     }

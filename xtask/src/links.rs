@@ -1,11 +1,11 @@
-//! The links between the pages of the repository: every file that a page links to is there.
+//! Links between the pages of the repository: every linked file exists.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::process::{self, Outcome};
 
-/// Looks for the target of every relative link in the Markdown pages.
+/// Checks the target of every relative link in the Markdown pages.
 pub fn run() -> Outcome<Vec<String>> {
     let mut broken = Vec::new();
     for page in pages()? {
@@ -13,7 +13,7 @@ pub fn run() -> Outcome<Vec<String>> {
         let folder = page.parent().unwrap_or(process::root());
         for target in targets(&text) {
             if !folder.join(target).exists() {
-                broken.push(format!("{}: there is no {target}", page.display()));
+                broken.push(format!("{}: no file {target}", page.display()));
             }
         }
     }
@@ -63,7 +63,7 @@ fn targets(text: &str) -> Vec<&str> {
     found
 }
 
-/// What stands between each `open` and the next `close`, up to a `#`.
+/// The text between each `open` and the next `close`, up to a `#`.
 fn after<'a>(line: &'a str, open: &'a str, close: char) -> impl Iterator<Item = &'a str> {
     line.split(open)
         .skip(1)

@@ -1,4 +1,4 @@
-//! The habits of the project as commands: `cargo xtask --help` lists them.
+//! Commands for everyday work on the project: `cargo xtask --help` lists them.
 
 mod bench;
 mod deny;
@@ -79,13 +79,13 @@ fn main() -> ExitCode {
         }
         None => {
             let given = [&[command], rest.as_slice()].concat().join(" ");
-            eprintln!("error: there is no command '{given}'\n\n{HELP}");
+            eprintln!("error: unknown command '{given}'\n\n{HELP}");
             ExitCode::from(2)
         }
     }
 }
 
-/// Runs a command, or returns `None` where there is none of that form.
+/// Runs a command; `None` if there is no such command.
 fn run(command: &str, rest: &[String]) -> Option<Outcome> {
     match (command, rest) {
         ("test", []) => Some(test::run(Scope::Default)),

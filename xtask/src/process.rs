@@ -4,10 +4,10 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// Nothing, or why a command failed.
+/// A result whose error is a message for the user.
 pub type Outcome<T = ()> = Result<T, String>;
 
-/// `cargo ARGUMENTS`: the cargo that runs this program.
+/// `cargo ARGUMENTS`, with the cargo that runs this program.
 pub fn cargo<'a>(arguments: impl IntoIterator<Item = &'a str>) -> Command {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
@@ -18,11 +18,10 @@ pub fn cargo<'a>(arguments: impl IntoIterator<Item = &'a str>) -> Command {
     command
 }
 
-/// Whether nobody has built the library here step by step, as in a fresh clone. What makes later builds quick costs the
-/// first one a sixth more.
+/// Whether there are no incremental builds of the library here, as in a fresh clone. What makes later builds quick costs
+/// the first one a sixth more.
 fn is_first_build() -> bool {
     let chosen = std::env::var_os("CARGO_INCREMENTAL").is_some();
-    // Beside this program, which cargo has built before.
     let program = std::env::current_exe().ok();
     let folder = program.and_then(|program| Some(program.parent()?.join("incremental")));
     let entries = folder.and_then(|folder| std::fs::read_dir(folder).ok());
@@ -38,7 +37,7 @@ pub fn root() -> &'static Path {
     here.parent().unwrap_or(here)
 }
 
-/// Runs a command to its end.
+/// Runs a command and waits for its end.
 pub fn run(command: &mut Command) -> Outcome {
     let status = command
         .status()
@@ -49,14 +48,14 @@ pub fn run(command: &mut Command) -> Outcome {
     Err(format!("`{}` ended with {status}", shown(command)))
 }
 
-/// Runs a command and hands on each line of its standard output as it comes.
+/// Runs a command and passes on each line of its standard output as it arrives.
 pub fn run_by_line(command: &mut Command, mut line: impl FnMut(&str)) -> Outcome {
     let mut child = command
         .stdout(Stdio::piped())
         .spawn()
         .map_err(|error| could_not_start(command, &error))?;
     if let Some(output) = child.stdout.take() {
-        // A test may print bytes that are no UTF-8: read bytes, not text.
+        // Tests may print bytes that are not UTF-8.
         for bytes in BufReader::new(output).split(b'\n') {
             let bytes = bytes.map_err(|error| format!("`{}`: {error}", shown(command)))?;
             line(String::from_utf8_lossy(&bytes).trim_end_matches('\r'));
@@ -71,7 +70,7 @@ pub fn run_by_line(command: &mut Command, mut line: impl FnMut(&str)) -> Outcome
     Err(format!("`{}` ended with {status}", shown(command)))
 }
 
-/// The command as a person would type it.
+/// The command as typed in a shell.
 fn shown(command: &Command) -> String {
     let program = Path::new(command.get_program());
     let name = program.file_name().unwrap_or(command.get_program());

@@ -1,10 +1,10 @@
-//! Steps in order: each prints its name, its time and its result, and the first failure ends the run.
+//! Steps in order: each prints its name, time and result, and the first failure ends the run.
 
 use std::time::{Duration, Instant};
 
 use crate::process::Outcome;
 
-/// The steps done so far, and what they left out.
+/// Completed steps and their `SKIPPED` lines.
 #[derive(Default)]
 pub struct Steps {
     done: Vec<(&'static str, Duration)>,
@@ -12,7 +12,7 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// Runs a step, which returns a line for each thing it had to leave out.
+    /// Runs a step, which returns its `SKIPPED` lines.
     pub fn step(
         &mut self,
         name: &'static str,
@@ -36,7 +36,7 @@ impl Steps {
         }
     }
 
-    /// Prints the time of every step, then every line of what was left out.
+    /// Prints the time of every step, then all `SKIPPED` lines.
     pub fn summarize(&self) {
         println!("\n── summary");
         for (name, time) in &self.done {

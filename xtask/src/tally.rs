@@ -1,18 +1,17 @@
-//! Reads what the test runners print: how many tests passed, failed, and were left out.
+//! Counts passed, failed and skipped tests in the output of test runners.
 //!
-//! A test that cannot do its work here (data that is not there, say) prints a line that begins with
-//! `SKIPPED` and returns. The runner counts it as passed; here it counts as skipped. pytest has its own words
-//! for the same, and counts them itself.
+//! A test that cannot run on a machine (because data is missing, for example) prints a line that begins with `SKIPPED`
+//! and returns. The runner counts it as passed; here it counts as skipped. pytest counts its skipped tests itself.
 
 use std::collections::BTreeSet;
 
-/// The sum over all test programs.
+/// Counts over all test programs.
 #[derive(Debug, Default, PartialEq)]
 pub struct Tally {
     passed: usize,
     failed: usize,
     ignored: usize,
-    /// Tests that printed a `SKIPPED` line, of the test program being read.
+    /// Tests of the current program that printed a `SKIPPED` line.
     skipping: BTreeSet<String>,
     skipped: usize,
     lines: Vec<String>,
@@ -22,8 +21,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Takes in a line and says whether a person should see it: the output of tests that passed is
-    /// left out, but for its `SKIPPED` lines.
+    /// Reads a line. Returns whether to print it: of tests that passed, only `SKIPPED` lines are printed.
     pub fn read(&mut self, line: &str) -> bool {
         if let Some(counts) = line.strip_prefix("test result: ") {
             self.end_program(counts);
@@ -44,7 +42,7 @@ impl Tally {
         !self.inside_successes
     }
 
-    /// Takes in a line of pytest: a `SKIPPED` line of its list, or its last line with the counts.
+    /// Reads a line of pytest: a `SKIPPED` line, or the last line with the counts.
     pub fn read_pytest(&mut self, line: &str) {
         if line.starts_with("SKIPPED") {
             self.lines.push(format!("{line}  [pytest]"));
@@ -65,7 +63,7 @@ impl Tally {
         }
     }
 
-    /// Number of tests read, whatever became of them.
+    /// Number of tests, whatever their result.
     pub fn counted(&self) -> usize {
         self.passed + self.failed + self.ignored
     }
@@ -130,7 +128,7 @@ test shapes::cow ... ok
 successes:
 
 ---- io::reads stdout ----
-a table that nobody asked for
+a table
 
 ---- shapes::cow stdout ----
 SKIPPED cow: no shared data here
@@ -170,7 +168,7 @@ test result: FAILED. 1 passed; 1 failed; 0 ignored; 0 measured; 0 filtered out; 
     }
 
     #[test]
-    fn a_test_that_says_skipped_is_not_counted_as_passed() {
+    fn a_test_with_a_skipped_line_is_not_counted_as_passed() {
         let (tally, _) = read(TWO_PROGRAMS);
         // Six tests: reads, fish and good passed; bad failed; slow and cow were left out.
         assert_eq!(tally.summary(), "3 passed, 1 failed, 2 skipped");
@@ -190,7 +188,7 @@ test result: FAILED. 1 passed; 1 failed; 0 ignored; 0 measured; 0 filtered out; 
         let (_, shown) = read(TWO_PROGRAMS);
         assert!(shown.contains("panicked at 1 + 1"));
         assert!(shown.contains("SKIPPED wing"));
-        assert!(!shown.contains("nobody asked for"));
+        assert!(!shown.contains("a table"));
     }
 
     #[test]
