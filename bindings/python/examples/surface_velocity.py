@@ -16,7 +16,7 @@ def main():
         samples.points, grid, attributes={"velocity": samples.velocity}
     )
 
-    velocity = result.extend("velocity", band=3.0)
+    velocity = result.extend("velocity", band=3 * grid.spacing)
     field = velocity.dense()
     fastest = np.abs(samples.velocity).max()
     print(f"{len(velocity.cells)} cells of {grid.shape}; the fastest sample moves at {fastest:.3f}")

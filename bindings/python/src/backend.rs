@@ -18,11 +18,11 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// With what it is of before it.
-    pub fn of(self, what: &str) -> Self {
+    /// The same kind of failure, with `context` before its text.
+    pub fn with_context(self, context: &str) -> Self {
         match self {
-            Self::Value(text) => Self::Value(format!("{what}: {text}")),
-            Self::Device(text) => Self::Device(format!("{what}: {text}")),
+            Self::Value(text) => Self::Value(format!("{context}: {text}")),
+            Self::Device(text) => Self::Device(format!("{context}: {text}")),
         }
     }
 }
@@ -82,7 +82,7 @@ impl From<isograd_fit::Error> for Failure {
 pub fn plan<T: Number>(settings: &Settings) -> Result<Plan<T>, Failure> {
     let grid = settings.grid::<T>();
     let grid = grid.map_err(|error| Failure::Value(error.to_string()))?;
-    Ok(Plan::new(settings.backend()?, grid, settings.options())?)
+    Ok(Plan::new(settings.backend, grid, settings.options.clone())?)
 }
 
 fn not_built(backend: Backend) -> Failure {

@@ -1,4 +1,4 @@
-//! Long work on a thread of its own, so that the interpreter is free meanwhile and Ctrl-C is heard at once.
+//! Long work on its own thread, so that the interpreter stays free and Ctrl-C interrupts at once.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -11,28 +11,28 @@ use std::time::Duration;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
-/// How often Ctrl-C is looked for.
-const LISTEN: Duration = Duration::from_millis(50);
+/// Interval at which signals are checked.
+const POLL: Duration = Duration::from_millis(50);
 
 /// The process in which threads were first started; 0 for none yet.
 static PROCESS: AtomicU32 = AtomicU32::new(0);
 
-/// Whether the work is no longer wanted.
+/// A request to stop, shared with the work.
 #[derive(Clone, Default)]
 pub struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// Whether to stop.
-    pub fn asked(&self) -> bool {
+    /// Whether a stop was requested.
+    pub fn is_requested(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 }
 
-/// Does `work` without the interpreter. Where Ctrl-C is pressed, or a signal's handler raises, that is raised
-/// at once; the work is told to stop, and ends by itself.
+/// Runs `work` with the interpreter released. An exception raised by a signal handler, such as that of Ctrl-C, is
+/// raised at once; the work gets a request to stop, and ends on its own thread.
 ///
 /// # Errors
-/// What a signal's handler raises; a panic of the work as `RuntimeError`; a forked process.
+/// The exception of a signal handler; a panic of the work as `RuntimeError`; a forked process.
 pub fn run<R: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(&Stop) -> R + Send + 'static,
@@ -40,25 +40,25 @@ pub fn run<R: Send + 'static>(
     check_process()?;
     let stop = Stop::default();
     let (sender, receiver) = mpsc::channel();
-    let heard = stop.clone();
+    let observed = stop.clone();
     let spawned = thread::Builder::new()
         .name("isograd".into())
         .spawn(move || {
-            let result = catch_unwind(AssertUnwindSafe(|| work(&heard)));
-            // Nobody listens after an interrupt.
+            let result = guard(|| work(&observed));
+            // After an interrupt there is no receiver.
             let _ = sender.send(result);
         });
     spawned.map_err(|e| PyRuntimeError::new_err(format!("no thread could be started: {e}")))?;
     let mut receiver = receiver;
     loop {
         let (back, received) = py.detach(move || {
-            let received = receiver.recv_timeout(LISTEN);
+            let received = receiver.recv_timeout(POLL);
             (receiver, received)
         });
         receiver = back;
         match received {
             Ok(Ok(result)) => return Ok(result),
-            Ok(Err(panic)) => return Err(defect(&*panic)),
+            Ok(Err(panic)) => return Err(PyRuntimeError::new_err(panic)),
             Err(RecvTimeoutError::Disconnected) => {
                 return Err(PyRuntimeError::new_err("the work ended without a result"));
             }
@@ -72,8 +72,12 @@ pub fn run<R: Send + 'static>(
     }
 }
 
-/// Threads do not survive a fork: work would wait for them for ever.
-fn check_process() -> PyResult<()> {
+/// Checks that the process was not forked after threads were started: they do not survive a fork, and work would wait
+/// for them forever.
+///
+/// # Errors
+/// A forked process.
+pub fn check_process() -> PyResult<()> {
     let here = std::process::id();
     let first = PROCESS.compare_exchange(0, here, Ordering::Relaxed, Ordering::Relaxed);
     match first {
@@ -84,11 +88,15 @@ fn check_process() -> PyResult<()> {
     }
 }
 
-fn defect(panic: &(dyn Any + Send)) -> PyErr {
-    let text = panic.downcast_ref::<&str>().map(|s| s.to_string());
-    let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
-    PyRuntimeError::new_err(format!(
-        "a defect of isograd, please report it: {}",
-        text.unwrap_or_default()
-    ))
+/// The result of `work`, or the message of its panic.
+///
+/// # Errors
+/// A panic: a defect of isograd.
+pub fn guard<R>(work: impl FnOnce() -> R) -> Result<R, String> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|panic: Box<dyn Any + Send>| {
+        let text = panic.downcast_ref::<&str>().map(|s| s.to_string());
+        let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
+        let text = text.unwrap_or_default();
+        format!("a defect of isograd, please report it: {text}")
+    })
 }

@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 
 use isograd::{Field, Grid, Mesh, PointCloud};
 use isograd_fit::{
-    Adam, Decay, Error, Fit, Lbfgs, Optimizer, Options, Outcome, Points, Region, ShapeParameters,
-    Start, Target, Variables,
+    Decay, Error, Fit, Optimizer, Options, Outcome, Points, ShapeParameters, Start, Target,
+    Variables,
 };
 use pyo3::prelude::*;
 use serde::Deserialize;
@@ -25,7 +25,8 @@ struct FitSettings {
     rate: Option<f64>,
     epochs: usize,
     tolerance: f64,
-    band: Option<f64>,
+    /// Text of a [`Band`](isograd_fit::Band).
+    band: String,
     only: Option<Vec<String>>,
     samples: usize,
     seed: u64,
@@ -80,7 +81,6 @@ pub fn run_fit<'py>(
     let how: FitSettings =
         serde_json::from_str(how).map_err(|error| value(format!("fit: {error}")))?;
     let grid = settings.grid::<f64>().map_err(value)?;
-    let backend = settings.backend()?;
     let wanted = match (kind, target.as_slice()) {
         ("sdf", [sdf]) => Wanted::Sdf(arrays::values(sdf, "the target")?),
         ("mesh", [vertices, faces]) => Wanted::Mesh(arrays::mesh(vertices, faces)?),
@@ -98,10 +98,10 @@ pub fn run_fit<'py>(
         (None, None) => return Err(value("give a shape or points to fit")),
     };
     let done = background::run(py, move |stop| {
-        let target = wanted.target(grid, &settings.options())?;
+        let target = wanted.target(grid, &settings.options)?;
         let options = Options {
-            backend,
-            ..how.options(settings.options())
+            backend: settings.backend,
+            ..how.options(settings.options.clone()).map_err(value)?
         };
         let mut fit = Fit::new(&target, variables, options).map_err(Failure::from)?;
         let outcome = descend(&mut fit, callback.as_ref(), stop)?;
@@ -127,32 +127,19 @@ impl FitSettings {
         }
     }
 
-    fn options(&self, reconstruction: isograd::Options) -> Options {
+    fn options(&self, reconstruction: isograd::Options) -> Result<Options, String> {
         let optimizer = match self.optimizer {
-            Method::Lbfgs => {
-                let default = Lbfgs::default();
-                Optimizer::Lbfgs(Lbfgs {
-                    first_step: self.rate.unwrap_or(default.first_step),
-                    ..default
-                })
-            }
-            Method::Adam => {
-                let default = Adam::default();
-                Optimizer::Adam(Adam {
-                    rate: self.rate.unwrap_or(default.rate),
-                    decay: Decay::Cosine { steps: self.epochs },
-                    ..default
-                })
-            }
+            Method::Lbfgs => Optimizer::lbfgs(self.rate),
+            Method::Adam => Optimizer::adam(self.rate, Decay::Cosine { steps: self.epochs }),
         };
-        Options {
-            region: self.band.map_or(Region::Full, Region::Band),
+        Ok(Options {
+            band: self.band.parse()?,
             optimizer,
             epochs: self.epochs,
             tolerance: self.tolerance,
             reconstruction,
             ..Options::default()
-        }
+        })
     }
 }
 
@@ -176,7 +163,7 @@ impl Wanted {
 fn descend(fit: &mut Fit, callback: Option<&Py<PyAny>>, stop: &Stop) -> PyResult<Outcome> {
     let mut raised = None;
     let outcome = fit.run(&mut |fit| {
-        if stop.asked() {
+        if stop.is_requested() {
             return ControlFlow::Break(());
         }
         let Some(callback) = callback else {

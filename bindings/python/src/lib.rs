@@ -3,6 +3,7 @@
 mod arrays;
 mod backend;
 mod background;
+mod command;
 mod errors;
 mod files;
 mod fit;
@@ -10,11 +11,8 @@ mod grid;
 mod orient;
 mod plan;
 mod pool;
-mod pure;
 mod query;
-mod report;
 mod result;
-mod saved;
 mod settings;
 mod shape;
 mod xla;
@@ -26,6 +24,8 @@ mod _core {
     use super::*;
 
     #[pymodule_export]
+    use command::run_command;
+    #[pymodule_export]
     use files::{read_field, read_geometry, write_field, write_mesh, write_points};
     #[pymodule_export]
     use fit::run_fit;
@@ -36,7 +36,7 @@ mod _core {
     #[pymodule_export]
     use plan::Plan;
     #[pymodule_export]
-    use pure::{forward_saved, open_backend, pullback_saved};
+    use pool::open_backend;
     #[pymodule_export]
     use query::{query_mesh, query_mesh_pullback};
     #[pymodule_export]

@@ -1,65 +1,51 @@
 //! Outward normals alone, behind `isograd.orient`.
 
-use isograd::Orienter;
-use isograd::neighbors::Radius;
+use isograd::{JsonReport, Options, Orienter};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
 use crate::arrays::{self, Dtype, Number};
 use crate::background;
 use crate::errors::value;
 use crate::plan::{cloud, seen};
-use crate::report;
-use crate::settings::Orient;
 
-/// Normals, confidence and report.
-type Oriented<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyDict>);
+/// Normals, confidence, and the report as JSON.
+type Oriented<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, String);
 
-/// Outward normals of a cloud; `points`, `normals` and `sensors` are of one type.
+/// Outward normals of a cloud. `points`, `normals` and `sensors` are of one type; `options` is a JSON text, of which
+/// `radius` and `orient` are used.
 #[pyfunction]
-#[pyo3(signature = (points, normals, sensors, radius, method))]
+#[pyo3(signature = (points, normals, sensors, options))]
 pub fn orient<'py>(
     points: &Bound<'py, PyAny>,
     normals: Option<&Bound<'py, PyAny>>,
     sensors: Option<&Bound<'py, PyAny>>,
-    radius: Option<f64>,
-    method: &str,
+    options: &str,
 ) -> PyResult<Oriented<'py>> {
-    let method = Orient::parse(method).map_err(value)?.method();
-    let radius = radius.map_or(Radius::Auto, Radius::Fixed);
+    let options: Options = serde_json::from_str(options).map_err(value)?;
     match arrays::dtype(points, "points")? {
-        Dtype::F32 => run(
-            Orienter::<f32>::new(radius, method),
-            points,
-            normals,
-            sensors,
-        ),
-        Dtype::F64 => run(
-            Orienter::<f64>::new(radius, method),
-            points,
-            normals,
-            sensors,
-        ),
+        Dtype::F32 => run::<f32>(&options, points, normals, sensors),
+        Dtype::F64 => run::<f64>(&options, points, normals, sensors),
     }
 }
 
 fn run<'py, T: Number>(
-    mut plan: Orienter<T>,
+    options: &Options,
     points: &Bound<'py, PyAny>,
     normals: Option<&Bound<'py, PyAny>>,
     sensors: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Oriented<'py>> {
     let py = points.py();
     let cloud = seen(cloud::<T>(points, normals, Vec::new())?, sensors)?;
+    let mut plan = Orienter::<T>::new(options.radius, options.orient);
     let result = background::run(py, move |_| {
         plan.orient(&cloud).map_err(|e| e.to_string())?;
         Ok::<_, String>(plan.into_parts())
     })?;
-    let (found, report) = result.map_err(value)?;
-    let count = found.confidence.len();
+    let (orientation, report) = result.map_err(value)?;
+    let count = orientation.confidence.len();
     Ok((
-        arrays::of_vectors(py, &found.normals),
-        arrays::shaped(py, found.confidence, count)?,
-        report::of_samples(py, &report)?,
+        arrays::of_vectors(py, &orientation.normals),
+        arrays::shaped(py, orientation.confidence, count)?,
+        serde_json::to_string(&JsonReport::samples(&report)).map_err(value)?,
     ))
 }

@@ -39,8 +39,8 @@ impl Plan {
             note: Mutex::default(),
             settings,
         };
-        if plan.settings.backend()? != Backend::Cpu {
-            // A device that can't be had is said now.
+        if plan.settings.backend != Backend::Cpu {
+            // An unavailable device is an error now.
             let settings = plan.settings.clone();
             let single = background::run(py, move |_| backend::plan(&settings))??;
             plan.keep(&plan.single, single);
@@ -93,7 +93,7 @@ impl Plan {
                 Some(plan) => plan,
                 None => backend::plan(&settings)?,
             };
-            let mut observer = |_| match stop.asked() {
+            let mut observer = |_| match stop.is_requested() {
                 true => ControlFlow::Break(()),
                 false => ControlFlow::Continue(()),
             };

@@ -1,42 +1,44 @@
-//! Plans that wait for their next call. A plan holds Fourier tables and all memory of a reconstruction: making
-//! one costs more than a call needs, and functional interfaces have no place to keep it.
+//! A pool of idle plans. A plan holds Fourier tables and all memory of a reconstruction: making one costs more than a
+//! call, and functional interfaces have no place to store it.
 
 use std::any::Any;
 use std::sync::{Mutex, PoisonError};
 
 use isograd::{CloudCotangent, PullbackScratch};
+use pyo3::prelude::*;
 
 use crate::arrays::Number;
 use crate::backend::{self, Failure};
+use crate::background;
 use crate::settings::Settings;
 
-/// Plans that are kept at most; the one that has waited longest goes first.
-const KEPT: usize = 4;
+/// Capacity of the pool; the plan that has been idle longest is dropped first.
+const CAPACITY: usize = 4;
 
-/// A plan and the memory of its pullbacks.
+/// A plan and the buffers of its pullbacks.
 pub struct Plan<T: Number> {
     /// The plan.
     pub plan: isograd_backend::Plan<T>,
-    /// For [`isograd_backend::View::pullback_into`].
+    /// Scratch buffers of the pullback.
     pub scratch: PullbackScratch<T>,
-    /// What that writes.
+    /// Output of the pullback.
     pub bar: CloudCotangent<T>,
 }
 
-/// A plan, what it is for, and in which number type.
-struct Waiting {
+/// An idle plan, its settings and its number type.
+struct Idle {
     settings: String,
     type_name: &'static str,
     plan: Box<dyn Any + Send>,
 }
 
-static POOL: Mutex<Vec<Waiting>> = Mutex::new(Vec::new());
+static POOL: Mutex<Vec<Idle>> = Mutex::new(Vec::new());
 
-/// Does `work` with a plan for `settings`, one that waits or a new one, which then waits for the next call. No
-/// lock is held meanwhile. A panic drops the plan.
+/// Passes a plan for `settings`, from the pool or new, to `work`, and returns it to the pool. No lock is held during
+/// the work. A panic drops the plan.
 ///
 /// # Errors
-/// Settings that make no plan, and devices that can't be had.
+/// Invalid settings; an unavailable device.
 pub fn with_plan<T: Number, R>(
     settings: &str,
     work: impl FnOnce(&mut Plan<T>) -> R,
@@ -61,21 +63,32 @@ fn create<T: Number>(settings: &str) -> Result<Plan<T>, Failure> {
 
 fn take<T: Number>(settings: &str) -> Option<Box<Plan<T>>> {
     let mut pool = POOL.lock().unwrap_or_else(PoisonError::into_inner);
-    let fits = |waiting: &Waiting| waiting.settings == settings && waiting.type_name == T::NAME;
+    let fits = |idle: &Idle| idle.settings == settings && idle.type_name == T::NAME;
     let place = pool.iter().rposition(fits)?;
     pool.remove(place).plan.downcast().ok()
 }
 
 fn put_back<T: Number>(settings: &str, plan: Box<Plan<T>>) {
-    let waiting = Waiting {
+    let idle = Idle {
         settings: settings.into(),
         type_name: T::NAME,
         plan,
     };
     let mut pool = POOL.lock().unwrap_or_else(PoisonError::into_inner);
-    pool.push(waiting);
+    pool.push(idle);
     // Dropped after the lock: a plan is large.
-    let first = (pool.len() > KEPT).then(|| pool.remove(0));
+    let oldest = (pool.len() > CAPACITY).then(|| pool.remove(0));
     drop(pool);
-    drop(first);
+    drop(oldest);
+}
+
+/// Makes the plan of these settings, in either number type, and adds it to the pool, so that an unavailable device is
+/// an error now. Returns why the CPU computes, where `backend` is `auto`.
+#[pyfunction]
+pub fn open_backend(py: Python<'_>, settings: String, double: bool) -> PyResult<Option<String>> {
+    let opened = background::run(py, move |_| match double {
+        true => with_plan::<f64, _>(&settings, |plan| plan.plan.take_note()),
+        false => with_plan::<f32, _>(&settings, |plan| plan.plan.take_note()),
+    })?;
+    Ok(opened?)
 }

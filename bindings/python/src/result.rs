@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use isograd::distance::extend;
-use isograd::{CloudCotangent, Cotangent, ExtensionCotangent, PointCloud, Real};
+use isograd::{CloudCotangent, Cotangent, ExtensionCotangent, JsonReport, PointCloud, Real};
 use isograd_backend::Made;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
@@ -13,7 +13,6 @@ use crate::arrays::{self, Either, Number};
 use crate::backend::Failure;
 use crate::background;
 use crate::errors::value;
-use crate::report;
 
 /// A cloud and what was made of it.
 pub struct Kept<T: Number> {
@@ -65,14 +64,15 @@ impl Outcome {
         each!(&self.0, kept => kept.result.view().backend())
     }
 
-    /// The numbers of the report.
-    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    /// The report as JSON.
+    fn report(&self, py: Python<'_>) -> PyResult<String> {
         each!(&self.0, kept => {
-            let of = kept.clone();
-            let made = background::run(py, move |_| of.result.view().report(&of.cloud).map(|_| ()))?;
-            there(made)?;
-            let view = kept.result.view();
-            report::dict(py, view.backend(), there(view.report(&kept.cloud))?)
+            let kept = kept.clone();
+            let text = background::run(py, move |_| {
+                let report = JsonReport::new(kept.result.view().report(&kept.cloud)?);
+                serde_json::to_string(&report).map_err(|e| Failure::Value(e.to_string()))
+            })?;
+            Ok(text?)
         })
     }
 
@@ -91,7 +91,7 @@ impl Outcome {
         }
     }
 
-    /// The attribute `name` of the cloud within `band` cells of the surface.
+    /// The attribute `name` of the cloud up to the distance `band` from the surface.
     fn extend(&self, py: Python<'_>, name: String, band: f64) -> PyResult<Extension> {
         let extension = match &self.0 {
             Either::F32(kept) => Either::F32(extended(py, kept, name, band)?),
@@ -299,7 +299,7 @@ fn extended<T: Number>(
         let (extension, residual) = kept
             .result
             .view()
-            .extend(&attribute, band * kept.result.view().grid().spacing().f64())?;
+            .extend(&attribute, band)?;
         Ok::<_, Failure>(Extended {
             attribute,
             extension,

@@ -75,14 +75,14 @@ def test_attributes_are_extended_on_a_device_and_have_gradients():
     velocity = np.cross([0.4, -0.7, 1.1], POINTS) + [0.3, -0.2, 0.5]
     attributes = {"velocity": velocity.astype(np.float32), "one": np.ones(len(POINTS), np.float32)}
     found, expected = (plan(b)(POINTS, attributes=attributes) for b in ("vulkan", "cpu"))
-    a, b = found.extend("velocity", band=2.0), expected.extend("velocity", band=2.0)
+    a, b = found.extend("velocity", band=2 * GRID.spacing), expected.extend("velocity", band=2 * GRID.spacing)
     assert off(a.vertices, b.vertices) < 2e-4
     # Where φ is a rounding error from the end of the band, one may have a cell that the other has not.
     both = np.intersect1d(a.cells, b.cells)
     assert len(both) > 0.999 * max(len(a.cells), len(b.cells)) and np.all(np.diff(a.cells) > 0)
     in_both = [e.values[np.isin(e.cells, both)] for e in (a, b)]
     assert off(*in_both) < 2e-4
-    assert np.all(found.extend("one", band=2.0).values == 1)
+    assert np.all(found.extend("one", band=2 * GRID.spacing).values == 1)
     bars = np.cos(5 * b.vertices)
     pulled = [r.pullback(extensions=[(e, bars, None)]) for r, e in ((found, a), (expected, b))]
     assert off(*(p.attributes["velocity"] for p in pulled)) < 2e-3
@@ -92,7 +92,7 @@ def test_attributes_are_extended_on_a_device_and_have_gradients():
     loss = np.sum(bars * a.vertices, dtype=float) + np.sum(a.values * a.values, dtype=float)
     assert abs(np.sum(through * velocity, dtype=float) - loss) < 1e-4 * abs(loss)
     with pytest.raises(ValueError, match="no attribute 'pressure'"):
-        found.extend("pressure", band=2.0)
+        found.extend("pressure", band=2 * GRID.spacing)
     with pytest.raises(ValueError, match="no width"):
         found.extend("one", band=0.0)
 
@@ -142,7 +142,7 @@ def scene(jax, functions, points, backend):
     a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
     volume = (a * jax.numpy.cross(b, c)).sum() / 6
     far = functions.query(points, GRID, 1.3 * POINTS[:50], **how).sum()
-    extended = functions.extend(points, points[:, 0] ** 2, GRID, band=2.0, **how)
+    extended = functions.extend(points, points[:, 0] ** 2, GRID, band=2 * GRID.spacing, **how)
     # Smooth, and 0 before the band ends: no cell comes or goes by rounding.
     window = jax.numpy.maximum(0, 1 - (extended.sdf / (1.5 * GRID.spacing)) ** 2) ** 2
     return volume + far + (extended.values * window).sum()

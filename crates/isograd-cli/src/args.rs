@@ -1,4 +1,4 @@
-//! What the command line says.
+//! Arguments of the command line.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -11,7 +11,7 @@ mod gradcheck;
 mod orient;
 mod pipeline;
 
-pub use fit::{Decay, Fit, Method, OffOr, TargetKind};
+pub use fit::{Decay, Fit, Method, TargetKind};
 pub use gradcheck::Gradcheck;
 pub use orient::{OrientArgs, OrientCloud};
 pub use pipeline::{GridArgs, MethodArgs};
@@ -20,7 +20,7 @@ pub use pipeline::{GridArgs, MethodArgs};
 #[derive(Debug, Parser)]
 #[command(name = "isograd", version, about, after_help = STATUS)]
 pub struct Cli {
-    /// What to do.
+    /// Command.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -28,22 +28,22 @@ pub struct Cli {
 const STATUS: &str = "Exit status: 0 done, 1 the work failed, 2 the command line is wrong, \
 130 stopped by Ctrl-C.";
 
-/// What to do.
+/// Commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Make the signed distance field and the surface of a point cloud
+    /// Reconstruct the signed distance field and the surface of a point cloud
     Reconstruct(Box<Reconstruct>),
-    /// Give the points of a cloud their outward normals
+    /// Compute the outward normals of a point cloud
     Orient(Box<OrientCloud>),
-    /// Sample a parametric body as a point cloud
+    /// Sample a parametric shape as a point cloud
     Sample(Sample),
-    /// Signed distances at points, from a mesh or a field
+    /// Compute signed distances of points to a mesh or in a field
     Query(Query),
-    /// Change a body, or points, until their field matches a target
+    /// Optimize a shape, or points, until their field matches a target
     Fit(Box<Fit>),
     /// Compare the gradients of a cloud's field with finite differences
     Gradcheck(Gradcheck),
-    /// Say what a file holds
+    /// Describe the content of a file
     Info(Info),
 }
 
@@ -62,27 +62,27 @@ pub struct Reconstruct {
     /// The signed distance field: .vti or .npz
     #[arg(long, value_name = "FILE", help_heading = "Outputs")]
     pub sdf: Option<PathBuf>,
-    /// The samples with normals and confidence: .ply or .npz
+    /// The points with normals and confidence: .ply or .npz
     #[arg(long, value_name = "FILE", help_heading = "Outputs")]
     pub points: Option<PathBuf>,
-    /// Numbers, times and warnings: .json
+    /// Settings, measurements, times and warnings: .json
     #[arg(long, value_name = "FILE", help_heading = "Outputs")]
     pub report: Option<PathBuf>,
-    /// Three slices of the field and the spread of its slope: .png
+    /// Three slices of the field and histograms of |∇φ|: .png
     #[arg(long, value_name = "FILE", help_heading = "Outputs")]
     pub plot: Option<PathBuf>,
     /// Cloud, surface and slice side by side: .png
     #[arg(long, value_name = "FILE", help_heading = "Outputs")]
     pub picture: Option<PathBuf>,
-    /// Turn and height of the viewer of --picture, in degrees
+    /// Azimuth and elevation of the camera of --picture, in degrees
     #[arg(long, value_name = "DEGREES", num_args = 2, allow_negative_numbers = true,
         value_parser = finite, requires = "picture", help_heading = "Outputs")]
     pub view: Option<Vec<f64>>,
 
-    /// Where to compute.
+    /// Arguments of the grid.
     #[command(flatten)]
     pub grid: GridArgs,
-    /// How to compute.
+    /// Arguments of the method.
     #[command(flatten)]
     pub method: MethodArgs,
     /// Take N samples of the surface of a mesh file instead of its vertices
@@ -93,11 +93,11 @@ pub struct Reconstruct {
     /// Number type of the computation and of the outputs
     #[arg(long, default_value = "f32", help_heading = "Running")]
     pub precision: Precision,
-    /// Where to compute: cpu, cuda (or cuda:1, the second device), vulkan, or auto: a GPU where there is one, else the
-    /// CPU. A program is built with --features vulkan,cuda for these
+    /// Device: cpu, cuda (or cuda:1, the second device), vulkan, or auto (a GPU if available, else the CPU). GPUs need a
+    /// program built with --features vulkan,cuda
     #[arg(long, default_value = "cpu", help_heading = "Running")]
     pub backend: Backend,
-    /// How to run.
+    /// Arguments of the run.
     #[command(flatten)]
     pub running: Running,
 }
@@ -106,36 +106,36 @@ pub struct Reconstruct {
 #[derive(Debug, Args)]
 #[command(after_help = STATUS)]
 pub struct Sample {
-    /// Name of the body
+    /// Name of the shape
     #[arg(required_unless_present = "list")]
     pub shape: Option<String>,
-    /// List the bodies and their parameters
+    /// List the shapes and their parameters
     #[arg(long, exclusive = true)]
     pub list: bool,
     /// Number of samples
     #[arg(short = 'n', value_name = "N", required_unless_present = "list",
         value_parser = clap::value_parser!(u32).range(1..))]
     pub number: Option<u32>,
-    /// Where to write the cloud: .ply, .npz, .xyz, .csv or .txt
+    /// Output: .ply, .npz, .xyz, .csv or .txt
     #[arg(short, long, value_name = "CLOUD", required_unless_present = "list")]
     pub output: Option<PathBuf>,
-    /// A parameter of the body
+    /// Value of a parameter of the shape
     #[arg(long = "param", value_name = "NAME=VALUE", value_parser = name_and_value,
         allow_hyphen_values = true)]
     pub parameters: Vec<(String, f64)>,
     /// Seed of the random numbers
     #[arg(long, value_name = "S", default_value = "1")]
     pub seed: u64,
-    /// Even spacing, or independent samples
+    /// Distribution of the samples
     #[arg(long, default_value = "even")]
     pub layout: Layout,
-    /// How many times as dense at the high end of an axis as at its low end, as `x:10`
+    /// Ratio of the densities at the high and the low end of an axis, such as `x:10`
     #[arg(long, value_name = "AXIS:RATIO")]
     pub density: Option<AxisRatio>,
     /// Number type of the coordinates
     #[arg(long, default_value = "f32")]
     pub precision: Precision,
-    /// How to run.
+    /// Arguments of the run.
     #[command(flatten)]
     pub running: Running,
 }
@@ -150,10 +150,10 @@ pub struct Query {
     /// The points; `-` is standard input
     #[arg(long, value_name = "POINTS")]
     pub at: PathBuf,
-    /// Where to write the points and what is known there: .ply, .npz, .xyz, .csv or .txt
+    /// Output, the points with the results: .ply, .npz, .xyz, .csv or .txt
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
-    /// How to run.
+    /// Arguments of the run.
     #[command(flatten)]
     pub running: Running,
 }
@@ -166,63 +166,19 @@ pub struct Info {
     pub file: PathBuf,
 }
 
-/// How to run: the results do not depend on it.
+/// Arguments of the run, which have no influence on the results.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct Running {
     /// Number of threads [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024),
         help_heading = "Running")]
     pub threads: Option<u32>,
-    /// Say nothing but warnings and errors
+    /// Print only warnings and errors
     #[arg(short, long, conflicts_with = "verbose", help_heading = "Running")]
     pub quiet: bool,
-    /// Say what each stage does and takes
+    /// Print the stages and their times
     #[arg(short, long, help_heading = "Running")]
     pub verbose: bool,
-}
-
-/// See [`isograd::orient::Method`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Orient {
-    /// From enclosure and neighbors
-    Auto,
-    /// By counting crossings, as the paper prints it
-    Parity,
-    /// The cloud's own normals
-    Given,
-    /// The directions found, each on the side of the cloud's own normal
-    Signs,
-    /// The directions found, each on the side that was seen
-    Sensors,
-}
-
-/// See [`isograd::splat::Weights`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Splat {
-    /// Quadratic B-spline
-    Bspline,
-    /// The paper's weights
-    Paper,
-}
-
-/// See [`isograd::isosurface::Level`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Level {
-    /// What it is at the samples near by
-    Local,
-    /// The same, also where the body is thinner than a cell, and made a cell thick; gradients go up and down there
-    Thin,
-    /// The mean at all samples
-    Mean,
-}
-
-/// On or off.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Switch {
-    /// On
-    On,
-    /// Off
-    Off,
 }
 
 /// Number type.
@@ -243,33 +199,6 @@ pub enum Layout {
     Random,
 }
 
-/// A positive number, or `auto`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum AutoOr {
-    /// Chosen by the program.
-    Auto,
-    /// This.
-    Value(f64),
-}
-
-/// A number that is 0 or more, or `auto`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum AutoOrZero {
-    /// Chosen by the program.
-    Auto,
-    /// This.
-    Value(f64),
-}
-
-/// A positive number, or `full`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum FullOr {
-    /// Everywhere.
-    Full,
-    /// This.
-    Value(f64),
-}
-
 /// An axis and a ratio.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisRatio {
@@ -277,39 +206,6 @@ pub struct AxisRatio {
     pub axis: usize,
     /// Positive.
     pub ratio: f64,
-}
-
-impl FromStr for AutoOr {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "auto" => Ok(Self::Auto),
-            _ => positive(text).map(Self::Value),
-        }
-    }
-}
-
-impl FromStr for AutoOrZero {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "auto" => Ok(Self::Auto),
-            _ => not_negative(text).map(Self::Value),
-        }
-    }
-}
-
-impl FromStr for FullOr {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "full" => Ok(Self::Full),
-            _ => positive(text).map(Self::Value),
-        }
-    }
 }
 
 impl FromStr for AxisRatio {
@@ -381,7 +277,7 @@ mod tests {
             args.grid.bounds,
             Some(vec![-1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
         );
-        assert_eq!(args.method.normals.radius, AutoOr::Value(0.2));
+        assert_eq!(args.method.normals.radius, isograd::neighbors::Radius::Fixed(0.2));
         let cli = parse("isograd orient a.ply -o b.ply --sensor -1,0,2e1 --sensor 3,-4,5");
         let Ok(Cli {
             command: Command::Orient(args),
@@ -409,7 +305,7 @@ mod tests {
             "isograd reconstruct a.ply --resolution 64 --spacing 0.1",
             "isograd reconstruct a.ply --spacing -1",
             "isograd reconstruct a.ply --radius wide",
-            "isograd reconstruct a.ply --smooth -1",
+            "isograd reconstruct a.ply --smoothing -1",
             "isograd reconstruct a.ply --screening -0.5",
             "isograd reconstruct a.ply --level global",
             "isograd reconstruct a.ply --padding nan",

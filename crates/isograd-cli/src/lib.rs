@@ -1,4 +1,4 @@
-//! The command line of isograd, as a library: `main.rs` only calls [`run`].
+//! The command line of isograd as a library: the program and the Python package call [`run`].
 #![warn(missing_docs)]
 
 pub mod args;
@@ -14,78 +14,70 @@ pub mod plot;
 pub mod progress;
 pub mod query;
 pub mod reconstruct;
-pub mod report;
+mod report;
 mod resample;
 pub mod sample;
 
 use std::ffi::OsString;
-use std::process::ExitCode;
 
 use clap::Parser;
 use peak_alloc::PeakAlloc;
 
-use args::{Cli, Command, Running};
+use args::{Cli, Command};
 use error::Error;
 use progress::to_stderr;
 
-/// Counts, so that the report can say how much memory was held at most.
+/// Counts allocated bytes for the peak memory in reports.
 #[global_allocator]
 static ALLOCATOR: PeakAlloc = PeakAlloc;
 
-/// Runs the program on its arguments, the first of which is its own name.
-pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+/// Runs a command line, the first argument of which is the name of the program, and returns the exit status.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version come this way too, with status 0.
             let _ = error.print();
-            return ExitCode::from(error.exit_code().clamp(0, 255) as u8);
+            return error.exit_code().clamp(0, 255) as u8;
         }
     };
     interrupt::handle();
     match dispatch(&cli.command) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(error) => {
             to_stderr(&format!("error: {error}"));
-            ExitCode::from(error.status())
+            error.status()
         }
     }
 }
 
 fn dispatch(command: &Command) -> Result<(), Error> {
+    start_threads(command)?;
     match command {
-        Command::Reconstruct(args) => {
-            start_threads(args.running)?;
-            reconstruct::run(args)
-        }
-        Command::Orient(args) => {
-            start_threads(args.running)?;
-            orient::run(args)
-        }
-        Command::Sample(args) => {
-            start_threads(args.running)?;
-            sample::run(args)
-        }
-        Command::Query(args) => {
-            start_threads(args.running)?;
-            query::run(args)
-        }
-        Command::Fit(args) => {
-            start_threads(args.running)?;
-            fit::run(args)
-        }
-        Command::Gradcheck(args) => {
-            start_threads(args.running)?;
-            gradcheck::run(args)
-        }
+        Command::Reconstruct(args) => reconstruct::run(args),
+        Command::Orient(args) => orient::run(args),
+        Command::Sample(args) => sample::run(args),
+        Command::Query(args) => query::run(args),
+        Command::Fit(args) => fit::run(args),
+        Command::Gradcheck(args) => gradcheck::run(args),
         Command::Info(args) => info::run(args),
     }
 }
 
-fn start_threads(running: Running) -> Result<(), Error> {
-    let Some(threads) = running.threads else {
-        return Ok(());
+/// Starts the threads of `--threads`.
+fn start_threads(command: &Command) -> Result<(), Error> {
+    let running = match command {
+        Command::Reconstruct(args) => &args.running,
+        Command::Orient(args) => &args.running,
+        Command::Sample(args) => &args.running,
+        Command::Query(args) => &args.running,
+        Command::Fit(args) => &args.running,
+        Command::Gradcheck(args) => &args.running,
+        Command::Info(_) => return Ok(()),
     };
-    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads as usize);
-    Ok(builder.build_global()?)
+    if let Some(threads) = running.threads {
+        let builder = rayon::ThreadPoolBuilder::new().num_threads(threads as usize);
+        builder.build_global()?;
+    }
+    Ok(())
 }

@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    isograd_cli::run(std::env::args_os())
+    isograd_cli::run(std::env::args_os()).into()
 }

@@ -1,20 +1,19 @@
-//! `isograd orient`: points in, the same points with outward normals and confidence out.
+//! `isograd orient`: adds outward normals and their confidence to a cloud.
 
 use std::path::Path;
 use std::time::Instant;
 
 use isograd::orient::doubt::Doubt;
-use isograd::{Attribute, Orienter, PointCloud, PointCloudError, Real, Stage};
+use isograd::{Attribute, JsonReport, Orienter, PointCloud, PointCloudError, Real};
 use isograd_io::{CLOUD_EXTENSIONS, Dtype, Geometry};
-use serde::Serialize;
 
 use crate::args;
 use crate::error::Error;
 use crate::outputs::{check_ending, check_not_input, write_report};
 use crate::progress::Progress;
-use crate::report::{Input, Normals, Orientation};
+use crate::report::{Report, Times};
 
-/// Runs the command, in the number type that the file has, if that holds all its numbers.
+/// Runs the command in the number type of the file, or in double precision where single does not hold all its numbers.
 ///
 /// # Errors
 /// See [`Error`]; then no file has been left incomplete.
@@ -58,7 +57,7 @@ fn is_single(geometry: &Geometry) -> bool {
     geometry.dtype == Dtype::F32 && attributes.all(|attribute| attribute.values.iter().all(fits))
 }
 
-/// A file as messages name it.
+/// Name of a file in messages.
 pub(crate) fn file_name(path: &Path) -> String {
     match path {
         path if path == Path::new("-") => "standard input".into(),
@@ -66,7 +65,7 @@ pub(crate) fn file_name(path: &Path) -> String {
     }
 }
 
-/// A cloud with the normals that were found, the confidence of each, and all attributes that it had.
+/// A cloud with estimated normals, their confidence, and the attributes of `cloud`.
 pub(crate) fn oriented<T: Real>(
     cloud: &PointCloud<T>,
     normals: &[[T; 3]],
@@ -77,40 +76,18 @@ pub(crate) fn oriented<T: Real>(
         components: 1,
         values: confidence.to_vec(),
     };
-    let kept = cloud.attributes().iter();
-    let kept = kept.filter(|attribute| attribute.name != confidence.name);
+    let attributes = cloud.attributes().iter();
+    let attributes = attributes.filter(|attribute| attribute.name != confidence.name);
     let with_normals = PointCloud::new(cloud.points().to_vec())
         .and_then(|cloud| cloud.with_normals(normals.to_vec()));
     std::iter::once(&confidence)
-        .chain(kept)
+        .chain(attributes)
         .fold(with_normals, |cloud, attribute| {
             cloud?.with_attribute(attribute.clone())
         })
 }
 
-/// `report.json`. Scripts depend on these names, which are those of a reconstruction's report.
-#[derive(Debug, Serialize)]
-struct Report {
-    version: &'static str,
-    input: Input,
-    normals: Normals,
-    orientation: Orientation,
-    seconds: Seconds,
-    peak_memory_bytes: usize,
-    warnings: Vec<String>,
-}
-
-#[derive(Debug, Serialize)]
-struct Seconds {
-    read: f64,
-    normals: f64,
-    orient: f64,
-    checks: f64,
-    write: f64,
-    total: f64,
-}
-
-/// One run, apart from its number type.
+/// A run, independent of its number type.
 struct Job<'a> {
     args: &'a args::OrientCloud,
     start: Instant,
@@ -127,51 +104,37 @@ impl Job<'_> {
         let cloud = cloud.and_then(|cloud| self.args.normals.with_sensors(cloud));
         let cloud = cloud.map_err(refused)?;
         progress.step("orient");
-        let mut plan = Orienter::new(self.args.normals.radius(), self.args.normals.method());
+        let mut plan = Orienter::new(self.args.normals.radius, self.args.normals.method());
         plan.orient(&cloud).map_err(|source| Error::Reconstruct {
             file: file_name(&self.args.cloud),
             source,
         })?;
-        let (found, report) = plan.into_parts();
+        let (orientation, report) = plan.into_parts();
         for warning in &report.warnings {
             progress.warn(&warning.to_string());
         }
         progress.step("write");
         let begin = Instant::now();
-        let out = oriented(&cloud, &found.normals, &found.confidence).map_err(refused)?;
+        let out = oriented(&cloud, &orientation.normals, &orientation.confidence).map_err(refused)?;
         isograd_io::write_cloud(&self.args.output, &out)?;
         progress.say(&format!("wrote {}", self.args.output.display()));
         if let Some(path) = &self.args.report {
-            write_report(path, &self.report(&report, begin))?;
+            let times = Times {
+                read: self.read_seconds,
+                write: begin.elapsed().as_secs_f64(),
+                total: self.start.elapsed().as_secs_f64(),
+            };
+            let report = JsonReport::samples(&report);
+            write_report(path, &Report::new(&self.args.cloud, report, times))?;
             progress.say(&format!("wrote {}", path.display()));
         }
         progress.finish();
-        self.say(progress, &report);
+        self.summarize(progress, &report);
         Ok(())
     }
 
-    fn report(&self, report: &isograd::Report, begin: Instant) -> Report {
-        let of = |stage| report.seconds.of(stage);
-        Report {
-            version: env!("CARGO_PKG_VERSION"),
-            input: Input::new(&self.args.cloud, report.points),
-            normals: Normals::new(report),
-            orientation: Orientation::new(report),
-            seconds: Seconds {
-                read: self.read_seconds,
-                normals: of(Stage::Normals),
-                orient: of(Stage::Orient),
-                checks: of(Stage::Checks),
-                write: begin.elapsed().as_secs_f64(),
-                total: self.start.elapsed().as_secs_f64(),
-            },
-            peak_memory_bytes: crate::ALLOCATOR.peak_usage(),
-            warnings: report.warnings.iter().map(ToString::to_string).collect(),
-        }
-    }
-
-    /// The result in a few lines.
-    fn say(&self, progress: &Progress, report: &isograd::Report) {
+    /// Prints a summary.
+    fn summarize(&self, progress: &Progress, report: &isograd::Report) {
         progress.say(&format!(
             "{} points, radius {:.4e} with {} neighbors at the median, {:.2} s",
             report.points,
@@ -180,23 +143,23 @@ impl Job<'_> {
             self.start.elapsed().as_secs_f64()
         ));
         progress.say(&format!(
-            "orientation: {}, {} axes turned, confidence {:.2} at the median and {:.2} at 5 %",
+            "orientation: {}, {} axes flipped, confidence {:.2} at the median and {:.2} at 5 %",
             report.orientation, report.flipped, report.confidence_median, report.confidence_p05
         ));
         progress.say(&doubtful(&report.doubt));
     }
 }
 
-/// The doubtful share, and its reasons.
+/// The share of points with a doubtful side, by reason.
 fn doubtful(doubt: &Doubt) -> String {
     let percent = |share: f64| format!("{:.2} %", 100.0 * share);
     let reasons = doubt.by_frequency().into_iter();
     let reasons: Vec<String> = reasons
         .map(|reason| format!("{} {}", reason.name(), percent(doubt.share_of(reason))))
         .collect();
-    let of = match reasons.is_empty() {
+    let reasons = match reasons.is_empty() {
         true => String::new(),
         false => format!(" ({})", reasons.join(", ")),
     };
-    format!("doubtful: {} of the points{of}", percent(doubt.share()))
+    format!("doubtful: {} of the points{reasons}", percent(doubt.share()))
 }

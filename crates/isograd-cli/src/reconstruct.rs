@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
-use isograd::{Field, Grid, Mesh, PointCloud, Real, Stage};
+use isograd::{Field, Grid, JsonReport, Mesh, PointCloud, Real, Stage};
 use isograd_backend::{Number, Plan, View};
 use isograd_io::Geometry;
 
@@ -14,7 +14,7 @@ use crate::error::Error;
 use crate::outputs::{Outputs, write_report};
 use crate::plot;
 use crate::progress::Progress;
-use crate::report::Report;
+use crate::report::{Report, Times};
 use crate::{orient, resample};
 
 /// Rounding of the coordinates, in cells, that single precision may add: above it the computation runs in
@@ -178,8 +178,7 @@ impl Job<'_> {
                 Results::of(view, &cloud)
             })
             .map_err(|e| backend::run_error(e, &self.file()))?;
-        let backend = result.backend.to_string();
-        let mut report = Report::new(&self.args.cloud, backend, &grid, result.report);
+        let mut report = JsonReport::new(result.report);
         for warning in &report.warnings {
             progress.warn(warning);
         }
@@ -195,7 +194,7 @@ impl Job<'_> {
         &self,
         cloud: &PointCloud<T>,
         result: &Results<'_, T>,
-        mut report: Report,
+        report: JsonReport,
         progress: &Progress,
     ) -> Result<(), Error> {
         let begin = Instant::now();
@@ -223,10 +222,13 @@ impl Job<'_> {
             wrote(path);
         }
         if let Some(path) = &outputs.report {
-            report.seconds.read = self.read_seconds;
-            report.seconds.write = begin.elapsed().as_secs_f64();
-            report.seconds.total = self.start.elapsed().as_secs_f64();
-            report.peak_memory_bytes = crate::ALLOCATOR.peak_usage();
+            let times = Times {
+                read: self.read_seconds,
+                write: begin.elapsed().as_secs_f64(),
+                total: self.start.elapsed().as_secs_f64(),
+            };
+            let report = Report::new(&self.args.cloud, report, times);
+            let report = report.on_grid(result.sdf.grid(), result.backend);
             write_report(path, &report)?;
             wrote(path);
         }

@@ -35,7 +35,7 @@ fn the_radius_of_a_sphere_is_found_from_a_cloud_a_mesh_and_a_field() {
         ),
         (
             "mesh.ply",
-            "--resolution 28 --band 3 --pictures-at 0 --epochs 6",
+            "--resolution 28 --band 0.15 --pictures-at 0 --epochs 6",
         ),
         (
             "sdf.vti",

@@ -8,44 +8,43 @@ use isograd_shapes::Shape;
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
-use crate::loss::Region;
+use crate::loss::Band;
 use crate::optimize::{self, Optimizer, Step};
 use crate::problem::{Fingerprints, Parts, Problem};
 use crate::target::Target;
 use crate::variables::{Degrees, Variables};
 
-/// Sets of samples before a fit that draws them anew may be done: by chance the loss of one is lower than that
-/// of those after it, and parameters that hardly change the field take their time.
+/// Minimum number of sets of samples where they are redrawn: by chance the loss of one set is lower than that of the
+/// next ones, and parameters that hardly change the field converge slowly.
 const FEWEST_SETS: usize = 10;
 
-/// How a fit is done.
+/// Options of a fit.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Where the fields are compared.
-    pub region: Region,
-    /// The method of descent.
+    /// Cells on which the fields are compared.
+    pub band: Band,
+    /// Optimizer.
     pub optimizer: Optimizer,
-    /// The most epochs, which are steps of the optimizer.
+    /// Maximum number of epochs: steps of the optimizer.
     pub epochs: usize,
-    /// The fit is done when the mean `|Δφ|`, in cells, is below this.
+    /// The fit ends when the mean `|Δφ|`, in cells, is below this.
     pub tolerance: f64,
-    /// With L-BFGS the fit is done when the lowest loss has not fallen by a thousandth of itself for this many
-    /// epochs, and ten sets of samples where they are drawn anew; 0 for never. Adam is not held to it: its
-    /// rate has to fall first.
+    /// With L-BFGS the fit ends when the lowest loss has not fallen by a thousandth for this many epochs, and for ten
+    /// sets of samples where they are redrawn; 0 for never. It does not apply to Adam, whose rate has to fall first.
     pub patience: usize,
     /// Options of the reconstruction; its checks are left out. A shape knows its outside: with it the automatic
     /// orientation becomes [`orient::Method::Signs`](isograd::orient::Method::Signs). Sensors are not passed on; and
     /// with the signs of the call before the loss is no function of the variables alone.
     pub reconstruction: isograd::Options,
-    /// Where reconstructions and pullbacks are computed, in `f64`. The shape, the loss and the descent stay on the CPU:
-    /// φ and its cotangent are copied for every evaluation.
+    /// Backend of reconstructions and pullbacks, in `f64`. The shape, the loss and the optimizer stay on the CPU: φ and
+    /// its cotangent are copied for every evaluation.
     pub backend: isograd::Backend,
 }
 
 impl Default for Options {
     fn default() -> Self {
         Self {
-            region: Region::default(),
+            band: Band::default(),
             optimizer: Optimizer::default(),
             epochs: 500,
             tolerance: 1e-6,
@@ -62,31 +61,30 @@ impl Default for Options {
 pub enum Outcome {
     /// The mean difference fell below the tolerance.
     Met,
-    /// No lower point was found, or none that is worth the way: a minimum, as far as rounding and kinks let
-    /// one see.
+    /// No lower point was found, or the loss has stopped falling: a minimum, up to rounding and kinks.
     Minimum,
-    /// All epochs are done.
+    /// The maximum number of epochs was reached.
     Epochs,
-    /// The observer asked to stop.
+    /// The observer stopped the run.
     Stopped,
 }
 
-/// One line of the history.
+/// Entry of the history: one epoch.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Epoch {
     /// Its number; 0 is the start.
     pub epoch: usize,
     /// Reconstructions so far, and as many pullbacks.
     pub evaluations: usize,
-    /// What is made small: the sum of the next three.
+    /// Loss: the sum of the next three.
     pub loss: f64,
     /// Mean squared difference of φ, in cells².
     pub data_loss: f64,
     /// The smoothness term of raw points.
     pub smoothness_loss: f64,
-    /// What parameters beyond their bounds cost.
+    /// Penalty of parameters beyond their bounds.
     pub bounds_loss: f64,
-    /// Norm of the gradient of the loss, in the descent's own variables.
+    /// Norm of the gradient of the loss in the optimizer's variables.
     pub gradient_norm: f64,
     /// Mean absolute difference of φ, in cells.
     pub mean_error: f64,
@@ -94,24 +92,24 @@ pub struct Epoch {
     pub parameters: Vec<f64>,
 }
 
-/// All that a run needs to go on as if it had never stopped.
+/// State of a fit, from which it can be resumed.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Checkpoint {
     fingerprints: Fingerprints,
     state: optimize::State<Parts>,
-    /// The samples in use: their number, and where the shape was when they were drawn.
+    /// The samples in use: their number, and the variables when they were drawn.
     sampled: Option<(u64, Vec<f64>)>,
     history: Vec<Epoch>,
 }
 
 impl Checkpoint {
-    /// The last epoch that was done.
+    /// The last completed epoch.
     pub fn epoch(&self) -> usize {
         self.history.len().saturating_sub(1)
     }
 }
 
-/// A fit that is under way.
+/// A fit in progress.
 pub struct Fit {
     options: Options,
     problem: Problem,
@@ -125,7 +123,7 @@ impl Fit {
     /// A fit of `variables` to `target`, at its start: epoch 0.
     ///
     /// # Errors
-    /// Options that make no sense; a start whose loss can't be taken.
+    /// Invalid options; a start whose loss can't be computed.
     pub fn new(target: &Target, variables: Variables, options: Options) -> Result<Self, Error> {
         let (mut problem, fingerprints) = prepare(target, variables, &options)?;
         let x = problem.degrees.start();
@@ -143,8 +141,8 @@ impl Fit {
         Ok(fit)
     }
 
-    /// A fit that goes on from where another one of the same target, variables and options was: to the last
-    /// bit as that one would have. The number of epochs and the tolerance may be others.
+    /// Resumes a fit of the same target, variables and options from a checkpoint, with the bits of an uninterrupted
+    /// run. The number of epochs and the tolerance may differ.
     ///
     /// # Errors
     /// A checkpoint of another fit.
@@ -185,7 +183,7 @@ impl Fit {
         }
     }
 
-    /// One epoch, unless the fit is done.
+    /// Runs one epoch, unless the fit is finished.
     ///
     /// # Errors
     /// [`Error::Stuck`]; the state is then that of the epoch before.
@@ -220,7 +218,7 @@ impl Fit {
         Ok(self.done())
     }
 
-    /// Epochs until the fit is done, or `observer`, which is called after each one, breaks.
+    /// Runs epochs until the fit is finished or `observer`, called after each one, breaks.
     ///
     /// # Errors
     /// As [`step`](Self::step).
@@ -254,7 +252,7 @@ impl Fit {
         }
     }
 
-    /// Whether the loss has not fallen for so long that it hardly will.
+    /// Whether the loss has stopped falling.
     fn is_flat(&self) -> bool {
         let sets = FEWEST_SETS * self.problem.resample().unwrap_or(0);
         let patience = self.options.patience.max(sets);
@@ -268,8 +266,8 @@ impl Fit {
         lowest(since) > 0.999 * lowest(before)
     }
 
-    /// New samples where the shape is now. What the method remembers holds for these too, as far as both
-    /// stand for the same shape.
+    /// Draws new samples of the current shape. The memory of the optimizer stays valid as far as both sets of samples
+    /// represent the same shape.
     fn resample(&mut self, turn: u64) -> Result<(), Error> {
         let x = self.state.x.clone();
         self.problem.sample(&x, turn)?;
@@ -297,7 +295,7 @@ impl Fit {
         });
     }
 
-    /// The last epoch that was done; 0 is the start.
+    /// The last completed epoch; 0 is the start.
     pub fn epoch(&self) -> usize {
         self.history.len().saturating_sub(1)
     }
@@ -315,7 +313,7 @@ impl Fit {
         }
     }
 
-    /// The shape as it is now; `None` for raw points.
+    /// The current shape; `None` for raw points.
     pub fn shape(&self) -> Option<Shape> {
         match &self.problem.degrees {
             Degrees::Shape(shape) => shape.at(&self.state.x).ok(),
@@ -323,7 +321,7 @@ impl Fit {
         }
     }
 
-    /// The points as they are now.
+    /// The current points.
     ///
     /// # Errors
     /// None, once a step was taken there.
@@ -331,7 +329,7 @@ impl Fit {
         self.problem.degrees.cloud(&self.state.x)
     }
 
-    /// The field and the surface as they are now.
+    /// The current field and surface.
     ///
     /// # Errors
     /// Those of a device; on the CPU none, once a step was taken there.
@@ -339,12 +337,12 @@ impl Fit {
         self.problem.reconstruction(&self.state.x)
     }
 
-    /// Who computes: `cpu`, or a backend and its device, such as `cuda: NVIDIA H100`.
+    /// Name of the backend: `cpu`, or a backend and its device, such as `cuda: NVIDIA H100`.
     pub fn backend(&self) -> &str {
         self.problem.plan.name()
     }
 
-    /// Why it is the CPU, where that was left to the program.
+    /// Why `auto` selected the CPU.
     pub fn backend_note(&self) -> Option<&str> {
         self.problem.plan.note()
     }
@@ -363,7 +361,7 @@ fn prepare(
         });
     }
     let problem = Problem::new(target, variables, options)?;
-    let mut others = format!("{:?} {:?}", options.region, options.optimizer);
+    let mut others = format!("{:?} {:?}", options.band, options.optimizer);
     // Every device rounds in its own way.
     others += match problem.plan.name() {
         "cpu" => "",

@@ -32,16 +32,15 @@
 //!
 //! - [`Target`]: a field, a closed mesh, or a cloud.
 //! - [`Variables`]: the parameters of a shape ([`ShapeParameters`]), or raw points ([`Points`]).
-//! - [`Options`]: where the fields are compared ([`Region`]), the method ([`Optimizer`]), when to end, and who computes
-//!   (a device needs the features of [`isograd_backend`]).
-//! - [`Fit`]: a step, a run with an observer, the state to go on from ([`Checkpoint`]).
+//! - [`Options`]: where the fields are compared ([`Band`]), the method ([`Optimizer`]), when to end, and the
+//!   backend (a device needs the features of [`isograd_backend`]).
+//! - [`Fit`]: a step, a run with an observer, the state for resuming ([`Checkpoint`]).
 //!
-//! What it guarantees: the same bits for any number of threads; a run that was stopped and resumed ends in the
-//! same bits as one that was not; a body that can't be made, or reconstructed, on the way shortens the step and
-//! does not end the run.
+//! Guaranteed: the same bits for any number of threads; a run that was stopped and resumed ends in the same bits as an
+//! uninterrupted one; invalid parameters, or a failing reconstruction, shorten the step and do not end the run.
 //!
-//! What it does not: that the minimum is the target. Parameters that do not change the field (the wavelength of
-//! a fish that does not swim) stay where they are, and what the grid does not resolve is not found.
+//! Not guaranteed: that the minimum is the target. Parameters that do not change the field (the wavelength of a fish
+//! that does not swim) keep their values, and details that the grid does not resolve are not found.
 #![warn(missing_docs)]
 
 mod error;
@@ -55,7 +54,7 @@ mod variables;
 
 pub use error::Error;
 pub use fit::{Checkpoint, Epoch, Fit, Options, Outcome};
-pub use loss::{Matching, Mismatch, Region};
+pub use loss::{Band, Matching, Mismatch};
 pub use optimize::{Adam, Decay, Lbfgs, Optimizer};
 pub use problem::Parts;
 pub use target::{Target, TargetError};

@@ -1,8 +1,10 @@
-//! How far a field is from its target, and the cotangent of that.
+//! Mean squared difference between a field and its target, and its cotangent.
 //!
-//! `L = (1/n) Σ_o ((φ_o − φ̃_o)/h)²` over the `n` cells of a region: the paper's Eq. `sdf_matching_loss`,
+//! `L = (1/n) Σ_o ((φ_o − φ̃_o)/h)²` over the `n` cells of a band: the paper's Eq. `sdf_matching_loss`,
 //! `‖φ̃ − φ‖²`, in cells² and as a mean, so that its size depends neither on the grid nor on the unit.
 //! `φ̄_o = 2 (φ_o − φ̃_o)/(n h²)`.
+
+use std::str::FromStr;
 
 use isograd::Field;
 use rayon::prelude::*;
@@ -12,54 +14,75 @@ use crate::target::TargetError;
 /// Cells in one task: a fixed number, so that the sum has the same bits for any number of threads.
 const CHUNK: usize = 8192;
 
-/// Which cells are compared.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Region {
-    /// All: parts of a body that are closest to no cell near the target count too.
+/// Cells on which a field is compared with its target.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Band {
+    /// Up to 8 cells from the target's surface. There every part of the surface counts by its area; far away one corner
+    /// is closest to most cells, and a parameter that has no influence on that corner is hard to find.
+    #[default]
+    Auto,
+    /// Everywhere: parts of the fitted surface that are closest to no cell near the target count as well.
     Full,
-    /// Those within this many cells of the target's surface; 8 by default. There every part of the surface
-    /// counts by its area. Far away one corner is closest to most cells, and a parameter that has nothing
-    /// to do with it is hard to find.
-    Band(f64),
+    /// Up to this distance from the target's surface, in the unit of the target.
+    Within(f64),
 }
 
-impl Default for Region {
-    fn default() -> Self {
-        Self::Band(8.0)
+impl Band {
+    /// Half the width, in cells of size `spacing`.
+    fn cells(self, spacing: f64) -> f64 {
+        match self {
+            Self::Auto => 8.0,
+            Self::Full => f64::INFINITY,
+            Self::Within(distance) => distance / spacing,
+        }
     }
 }
 
-/// A target and the cells on which it is to be met.
+impl FromStr for Band {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match (text, text.trim().parse()) {
+            ("auto", _) => Ok(Self::Auto),
+            ("full", _) => Ok(Self::Full),
+            (_, Ok(distance)) if distance > 0.0 && distance < f64::INFINITY => {
+                Ok(Self::Within(distance))
+            }
+            _ => Err(format!(
+                "band is '{text}'; give a finite length above 0, 'auto' or 'full'"
+            )),
+        }
+    }
+}
+
+/// A target and the cells on which a field is compared with it.
 #[derive(Clone, Debug)]
 pub struct Matching {
     target: Vec<f64>,
     /// `1/h`.
     per_cell: f64,
-    /// Half the width of the region, in cells.
+    /// Half the width of the band, in cells.
     width: f64,
     cells: usize,
 }
 
-/// How far a field is from the target.
+/// Difference between a field and the target.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mismatch {
     /// Mean of the squared difference, in cells².
     pub loss: f64,
-    /// Mean of the difference without its sign, in cells.
+    /// Mean absolute difference, in cells.
     pub mean_error: f64,
 }
 
 impl Matching {
-    /// Compares with `target` in `region`.
+    /// A comparison with `target` in `band`.
     ///
     /// # Errors
-    /// A band that holds no cell, or is not a positive number of cells.
-    pub fn new(target: &Field<f64>, region: Region) -> Result<Self, TargetError> {
+    /// A band without cells or of invalid width.
+    pub fn new(target: &Field<f64>, band: Band) -> Result<Self, TargetError> {
         let per_cell = 1.0 / target.grid().spacing();
-        let width = match region {
-            Region::Full => f64::INFINITY,
-            Region::Band(cells) => cells,
-        };
+        let width = band.cells(target.grid().spacing());
         let near = |v: &&f64| (*v * per_cell).abs() <= width;
         let cells = target.values().iter().filter(near).count();
         if cells == 0 || !(width > 0.0) {
@@ -73,7 +96,7 @@ impl Matching {
         })
     }
 
-    /// How far `phi` is from the target; writes the cotangent of the loss, per unit of φ, into `phi_bar`.
+    /// The difference of `phi` from the target; writes the cotangent of the loss, per unit of φ, into `phi_bar`.
     /// Both have one entry for each cell of the target.
     pub fn evaluate(&self, phi: &[f64], phi_bar: &mut [f64]) -> Mismatch {
         debug_assert!(phi.len() == self.target.len() && phi_bar.len() == phi.len());
@@ -126,9 +149,9 @@ mod tests {
 
     #[test]
     fn the_loss_has_no_unit_and_its_cotangent_is_its_derivative() {
-        for region in [Region::Full, Region::Band(1.5)] {
-            for h in [1.0, 1e-3] {
-                let matching = Matching::new(&sphere(h, 4.0), region).expect("a target");
+        for h in [1.0, 1e-3] {
+            for band in [Band::Full, Band::Within(1.5 * h)] {
+                let matching = Matching::new(&sphere(h, 4.0), band).expect("a target");
                 let mut phi = sphere(h, 4.3).into_values();
                 let mut bar = vec![0.0; phi.len()];
                 let here = matching.evaluate(&phi, &mut bar);
@@ -156,7 +179,7 @@ mod tests {
 
     #[test]
     fn cells_outside_the_band_do_not_count() {
-        let matching = Matching::new(&sphere(1.0, 4.0), Region::Band(1.0)).expect("a target");
+        let matching = Matching::new(&sphere(1.0, 4.0), Band::Within(1.0)).expect("a target");
         let mut phi = sphere(1.0, 4.0).into_values();
         phi[0] += 100.0;
         let mut bar = vec![1.0; phi.len()];
@@ -168,7 +191,7 @@ mod tests {
     #[test]
     fn a_band_without_cells_is_refused() {
         for cells in [0.0, -1.0, f64::NAN] {
-            let refused = Matching::new(&sphere(1.0, 4.0), Region::Band(cells));
+            let refused = Matching::new(&sphere(1.0, 4.0), Band::Within(cells));
             assert!(refused.expect_err("refused").to_string().contains("wider"));
         }
     }

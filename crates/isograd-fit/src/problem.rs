@@ -47,7 +47,7 @@ impl Problem {
         Ok(Self {
             degrees,
             plan: Plan::new(options.backend, *target.grid(), of_plan)?,
-            matching: Matching::new(target.sdf(), options.region)?,
+            matching: Matching::new(target.sdf(), options.band)?,
             phi_bar: vec![0.0; target.grid().cells()],
             scratch: PullbackScratch::default(),
             bar: CloudCotangent::default(),

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use isograd::{Grid, PointCloud, Resolution};
 use isograd_fit::{
-    Adam, Checkpoint, Decay, Error, Fit, Optimizer, Options, Outcome, Points, Region,
+    Adam, Band, Checkpoint, Decay, Error, Fit, Optimizer, Options, Outcome, Points,
     ShapeParameters, Start, Target, Variables,
 };
 use isograd_shapes::{Sampling, Shape, by_name};
@@ -54,14 +54,14 @@ fn the_radius_of_a_sphere_is_found_with_both_methods_and_in_a_band() {
         decay: Decay::Exponential { half_life: 15.0 },
         ..Adam::default()
     });
-    for (optimizer, region, epochs) in [
-        (Optimizer::default(), Region::Full, 12),
-        (Optimizer::default(), Region::Band(3.0), 12),
-        (adam, Region::Full, 60),
+    for (optimizer, band, epochs) in [
+        (Optimizer::default(), Band::Full, 12),
+        (Optimizer::default(), Band::Within(3.0 * target.grid().spacing()), 12),
+        (adam, Band::Full, 60),
     ] {
         let options = Options {
             optimizer,
-            region,
+            band,
             epochs,
             tolerance: 1e-3,
             ..Options::default()

@@ -36,12 +36,12 @@ pub use data::{
     PointCloud, PointCloudError, Resolution, Sensors,
 };
 pub use pipeline::{
-    CloudCotangent, Cotangent, Error, ExtensionCotangent, Options, Orienter, PullbackError,
+    CloudCotangent, Cotangent, Error, ExtensionCotangent, Options, Orienter, ParseOptionError, PullbackError,
     PullbackScratch, Reconstruction, Reconstructor, RestoreError, Saved, available_memory,
     check_memory,
 };
 pub use real::Real;
-pub use report::{Report, Seconds, Stage, Warning};
+pub use report::{JsonReport, Report, Seconds, Stage, Warning};
 
 /// The README's code, compiled and run with the doc tests.
 #[cfg(doctest)]

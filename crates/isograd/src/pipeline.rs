@@ -8,6 +8,7 @@ mod orienter;
 mod pullback;
 mod restore;
 mod stages;
+mod text;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -24,6 +25,7 @@ pub use options::{Error, Options};
 pub use orienter::Orienter;
 pub use pullback::PullbackScratch;
 pub use restore::{RestoreError, Saved};
+pub use text::ParseOptionError;
 
 /// A plan for one grid and one set of options: Fourier tables and all memory, used again by every call.
 ///

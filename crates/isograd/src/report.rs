@@ -1,5 +1,7 @@
 //! What a reconstruction says about itself: numbers, times and warnings.
 
+mod json;
+
 use std::fmt;
 
 use rayon::prelude::*;
@@ -8,6 +10,8 @@ use crate::differential::{Eikonal, EikonalOptions, eikonal};
 use crate::isosurface::measure::Measures;
 use crate::orient::doubt::{Doubt, Reason};
 use crate::{Field, Real};
+
+pub use json::JsonReport;
 
 /// A reason is named where it stands for one in this many of the doubtful samples.
 const SMALLEST_REASON: usize = 10;

@@ -25,14 +25,13 @@ __all__ = [
     "call_target",
     "check_grid",
     "fit_grid",
-    "forward_saved",
     "open_backend",
     "orient",
-    "pullback_saved",
     "query_mesh",
     "query_mesh_pullback",
     "read_field",
     "read_geometry",
+    "run_command",
     "run_fit",
     "shapes",
     "write_field",
@@ -83,8 +82,8 @@ class Result:
     def backend(self) -> str:
         """Who computed."""
 
-    def report(self) -> dict[str, Any]:
-        """The numbers of the report."""
+    def report(self) -> str:
+        """The report as JSON."""
 
     def pullback(
         self,
@@ -95,7 +94,7 @@ class Result:
         """Cotangents of the inputs, by name, from those of the results, by name."""
 
     def extend(self, name: str, band: float) -> Extension:
-        """The attribute ``name`` of the cloud within ``band`` cells of the surface."""
+        """The attribute ``name`` of the cloud up to the distance ``band`` from the surface."""
 
 @final
 class Plan:
@@ -118,30 +117,14 @@ def orient(
     points: _Floats,
     normals: _Floats | None,
     sensors: _Floats | None,
-    radius: float | None,
-    method: str,
-) -> tuple[_Floats, _Floats, dict[str, Any]]:
-    """Outward normals, confidence and report of a cloud: ``points``, ``normals`` and ``sensors`` of one type."""
+    options: str,
+) -> tuple[_Floats, _Floats, str]:
+    """Outward normals, confidence and report (JSON) of a cloud: ``points``, ``normals`` and ``sensors`` of one type.
+    ``options`` is the JSON text of options, of which ``radius`` and ``orient`` are used."""
 
 def open_backend(settings: str, double: bool) -> str | None:
-    """Makes the plan of these settings, in either number type; why the CPU computes, where that was left to the
-    package."""
-
-def forward_saved(
-    settings: str, points: _Floats, normals: _Floats | None = None
-) -> tuple[_Floats, _Indices, _Floats]:
-    """φ, closest faces and normals of a cloud."""
-
-def pullback_saved(
-    settings: str,
-    points: _Floats,
-    given: _Floats | None,
-    sdf: _Floats,
-    closest: _Indices,
-    normals: _Floats,
-    sdf_bar: _Floats,
-) -> tuple[_Floats, _Floats | None]:
-    """Cotangents of the points, and of the given normals where there are any, from that of φ."""
+    """Makes the plan of these settings, in either number type. Returns why the CPU computes, where ``backend`` is
+    ``"auto"``."""
 
 # Meshes.
 
@@ -217,6 +200,11 @@ def call_target(
 ) -> None:
     """Calls a target with NumPy arrays, and writes its results into ``outputs``: float32, float64 or uint32, in C
     order."""
+
+# Command line.
+
+def run_command(arguments: Sequence[str]) -> int:
+    """Runs a command line, the first argument of which is the name of the program, and returns the exit status."""
 
 # Files.
 

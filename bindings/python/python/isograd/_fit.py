@@ -1,4 +1,4 @@
-"""Inverse shape optimization: a body, or points, changed until their field is that of a target."""
+"""Inverse shape optimization: the parameters of a shape, or points, are fitted to a target field."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from ._arrays import floats
 from ._grid import Grid
 from ._mesh import Mesh
 from ._numbers import number, whole
-from ._options import Options
-from ._settings import check_backend, check_pure, encode, say_note
+from ._options import Options, length
+from ._settings import check_backend, check_pure, encode, warn_note
 from ._shapes import Shape
 
 if TYPE_CHECKING:
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """What a fit ended in.
+    """Result of a fit.
 
     Attributes:
-        outcome: ``"met"`` (the tolerance), ``"minimum"`` (nothing lower was found), ``"epochs"`` (all are done) or
+        outcome: ``"met"`` (the tolerance), ``"minimum"`` (no lower point was found), ``"epochs"`` (the maximum) or
             ``"stopped"`` (by the callback).
-        backend: who computed: ``"cpu"``, or a backend and its device.
-        shape: the shape as it is at the end; ``None`` for points.
+        backend: name of the backend: ``"cpu"``, or a backend and its device.
+        shape: shape at the end; ``None`` for points.
         points: ``(N, 3)`` points at the end.
         sdf: ``(nx, ny, nz)`` field at the end, negative inside.
         mesh: surface at the end.
@@ -64,34 +64,33 @@ def fit(
     rate: float | None = None,
     epochs: int = 500,
     tolerance: float = 1e-6,
-    band: float | None = 8.0,
+    band: float | Literal["auto", "full"] = "auto",
     options: Options | None = None,
     backend: str = "cpu",
     callback: Callable[[dict[str, Any]], bool | None] | None = None,
 ) -> Fit:
-    """Changes the parameters of ``shape``, or every one of ``points``, until the field is that of ``target``.
-
-    In double precision throughout.
+    """Fits the parameters of ``shape``, or each of ``points``, so that the field matches ``target``, in double precision.
 
     Args:
         target: a field ``(nx, ny, nz)`` on ``grid``, a closed :class:`Mesh`, or a cloud ``(N, 3)``.
         grid: where the fields are compared; it must have room for start and target.
-        kind: says what an array is where its shape leaves that open.
-        only: names of the parameters that are fitted; all but time and whole numbers unless given.
+        kind: kind of the target array, where its shape is ambiguous.
+        only: names of the fitted parameters; by default all but time and whole numbers.
         samples: number of samples of the shape.
         seed: of the samples, and of the random start.
-        resample: draws new samples every so many epochs.
-        random_start: each value times up to ``1 + random_start``, or divided by it.
+        resample: number of epochs after which new samples are drawn.
+        random_start: each initial value is multiplied or divided by up to ``1 + random_start``.
         smoothness: weight of the smoothness of the displacement of points; 0 for none.
-        rate: length of the first steps, as a share of the parameters, or in cells for points.
-        tolerance: mean difference of φ, in cells, below which the fit is done.
-        band: compares within so many cells of the target's surface; ``None`` for everywhere.
-        backend: where to reconstruct, as for :func:`reconstruct`; the device must have float64.
+        rate: length of the first steps, relative to the parameters, or in cells for points.
+        tolerance: mean difference of φ, in cells, at which the fit ends.
+        band: compare up to this distance from the target's surface, in the unit of the points; ``"auto"`` for 8 cells,
+            ``"full"`` for everywhere.
+        backend: backend, as for :func:`reconstruct`; the device must support float64.
         callback: called with each epoch; the fit stops where it returns ``False``.
 
     Raises:
-        TypeError, ValueError: a target or a start that makes no field, with the reason and the remedy.
-        RuntimeError: a backend that can't be had, with the reason and the remedy.
+        TypeError, ValueError: an invalid target or start; the message says what is wrong and what to do.
+        RuntimeError: an unavailable backend.
     """
     if (shape is None) == (points is None):
         raise ValueError("give a shape or points to fit, and not both")
@@ -104,7 +103,7 @@ def fit(
         "rate": None if rate is None else number(rate, "rate"),
         "epochs": _count(epochs, "epochs"),
         "tolerance": number(tolerance, "tolerance"),
-        "band": None if band is None else number(band, "band"),
+        "band": str(length(band, "band", "auto", "full")),
         "only": None if only is None else [str(name) for name in only],
         "samples": _count(samples, "samples"),
         "seed": _count(seed, "seed"),
@@ -124,7 +123,7 @@ def fit(
         start,
         None if callback is None else (lambda epoch: callback(json.loads(epoch))),
     )
-    say_note(note)
+    warn_note(note)
     fitted = None if shape is None else Shape(shape.name, **dict(values))
     return Fit(outcome, who, fitted, found, sdf, Mesh(vertices, faces), json.loads(history))
 

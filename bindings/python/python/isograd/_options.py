@@ -1,8 +1,9 @@
-"""What to compute, and how."""
+"""Options of the reconstruction."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from difflib import get_close_matches
 from enum import Enum
 from typing import Literal
 
@@ -10,24 +11,24 @@ from ._numbers import number
 
 
 class Orient(str, Enum):
-    """How the side of each normal is found."""
+    """Methods that find the side of each normal."""
 
     AUTO = "auto"
     """From enclosure, sky, sheets and neighbors."""
     PARITY = "parity"
-    """By counting crossings along the normal, as the paper prints it."""
+    """By counting crossings along the normal, as in the paper."""
     GIVEN = "given"
-    """The normals that are given, as they are."""
+    """The given normals, unchanged."""
     SIGNS = "signs"
-    """The directions found, each on the side of the normal that is given."""
+    """Estimated directions, each on the side of the given normal."""
     SENSORS = "sensors"
-    """The directions found, each on the side from which its point was seen."""
+    """Estimated directions, each on the side of the sensor that saw its point."""
     PREVIOUS = "previous"
-    """In a plan: the directions found, each on the side of the normal that the same point had in the call before."""
+    """In a plan: estimated directions, each on the side of the normal of the same point in the previous call."""
 
 
 class Splat(str, Enum):
-    """How a sample is spread over the cells round it."""
+    """Weights that spread a sample over the cells around it."""
 
     BSPLINE = "bspline"
     """Quadratic B-spline."""
@@ -36,12 +37,12 @@ class Splat(str, Enum):
 
 
 class Level(str, Enum):
-    """Which value of the indicator the surface is at."""
+    """Value of the indicator at the surface."""
 
     LOCAL = "local"
-    """What it is at the samples near by."""
+    """The value at the samples nearby."""
     THIN = "thin"
-    """The same, also where the body is thinner than a cell, and made a cell thick; gradients go up and down there."""
+    """Like ``LOCAL``, and parts thinner than a cell are made a cell thick; gradients oscillate there."""
     MEAN = "mean"
     """The mean at all samples, as in the paper."""
 
@@ -53,22 +54,22 @@ LevelLike = Level | Literal["local", "thin", "mean"]
 
 @dataclass(frozen=True)
 class Options:
-    """What to compute, and how.
+    """Parameters of the reconstruction. The command line has the same names and units.
 
     Attributes:
         radius: neighborhood radius of the normals, in the unit of the points, or ``"auto"``.
-        orient: see :class:`Orient`.
-        splat: see :class:`Splat`.
-        area: whether a sample counts by the area that it stands for.
+        orient: method that finds the side of each normal; see :class:`Orient`.
+        splat: weights that spread a sample over the cells around it; see :class:`Splat`.
+        area: whether a sample is weighted by the area that it stands for.
         smoothing: width of the smoothing of the indicator, in cells; 0 for none, ``"auto"`` for 0.8 of the
             typical distance between samples.
-        screening: how strongly the indicator is drawn to one value at the samples; 1 to 4 are usual, 0 is off.
-        level: see :class:`Level`.
-        band: how far from the surface φ is computed, in cells; ``None`` for everywhere.
-        checks: whether to measure the result and look for reasons not to trust it.
+        screening: strength of the pull of the indicator to one value at the samples; 1 to 4 are usual, 0 is off.
+        level: value of the indicator at the surface; see :class:`Level`.
+        band: distance from the surface up to which φ is computed, in the unit of the points, or ``"full"``.
+        checks: whether to measure the result and to check whether it can be trusted.
 
     Raises:
-        ValueError: for a value that makes no sense.
+        ValueError: a value outside its range.
     """
 
     radius: float | Literal["auto"] = "auto"
@@ -78,45 +79,49 @@ class Options:
     smoothing: float | Literal["auto"] = "auto"
     screening: float = 0.0
     level: LevelLike = Level.LOCAL
-    band: float | None = None
+    band: float | Literal["full"] = "full"
     checks: bool = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "orient", _choice(Orient, self.orient, "orient"))
-        object.__setattr__(self, "splat", _choice(Splat, self.splat, "splat"))
-        if not isinstance(self.radius, str) or self.radius != "auto":
-            object.__setattr__(self, "radius", _above_zero(self.radius, "radius", '"auto"'))
-        if self.band is not None:
-            object.__setattr__(self, "band", _above_zero(self.band, "band", "None"))
-        object.__setattr__(self, "level", _choice(Level, self.level, "level"))
-        if not isinstance(self.smoothing, str) or self.smoothing != "auto":
-            object.__setattr__(self, "smoothing", _not_negative(self.smoothing, "smoothing", '0 or more cells, or "auto"'))
-        object.__setattr__(self, "screening", _not_negative(self.screening, "screening", "0 or more"))
-        object.__setattr__(self, "area", bool(self.area))
-        object.__setattr__(self, "checks", bool(self.checks))
+        checked = {
+            "radius": length(self.radius, "radius", "auto"),
+            "orient": _choice(Orient, self.orient, "orient"),
+            "splat": _choice(Splat, self.splat, "splat"),
+            "area": bool(self.area),
+            "smoothing": self.smoothing,
+            "screening": _not_negative(self.screening, "screening", "0 or more"),
+            "level": _choice(Level, self.level, "level"),
+            "band": length(self.band, "band", "full"),
+            "checks": bool(self.checks),
+        }
+        if not (isinstance(self.smoothing, str) and self.smoothing == "auto"):
+            checked["smoothing"] = _not_negative(self.smoothing, "smoothing", '0 or more cells, or "auto"')
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
 
 
 def resolve(options: Options | None, changes: dict[str, object]) -> Options:
     """``options``, or the defaults, with some fields changed.
 
     Raises:
-        TypeError: for a name that is no option.
+        TypeError: an unknown option, or ``options`` of another type.
     """
     if options is not None and not isinstance(options, Options):
         raise TypeError(f"options is a {type(options).__name__}; give an isograd.Options")
     names = [field.name for field in fields(Options)]
     for name in changes:
         if name not in names:
-            raise TypeError(f"{name!r} is no option; the options are {', '.join(names)}")
-    values = {name: getattr(options or Options(), name) for name in names}
-    return Options(**{**values, **changes})
+            similar = get_close_matches(name, names, 1)
+            hint = f"did you mean {similar[0]!r}?" if similar else f"the options are {', '.join(names)}"
+            raise TypeError(f"unknown option {name!r}; {hint}")
+    return replace(options or Options(), **changes)
 
 
 def check_known(orient: OrientLike, normals: bool, sensors: bool = False) -> None:
-    """Whether normals and sensors are there where they are used, and only there.
+    """Checks that normals and sensors are given exactly where they are used.
 
     Raises:
-        ValueError: where not.
+        ValueError: they are missing, or not used.
     """
     orient = Orient(orient)
     users = {"normals": (Orient.GIVEN, Orient.SIGNS), "sensors": (Orient.SENSORS,)}
@@ -147,8 +152,17 @@ def _not_negative(value: object, name: str, wanted: str) -> float:
     return found
 
 
-def _above_zero(value: object, name: str, other: str) -> float:
-    found = number(value, name)
-    if not 0.0 < found < float("inf"):
-        raise ValueError(f"{name} is {value!r}; give a finite number above 0, or {other}")
-    return found
+def length(value: object, name: str, *words: str) -> float | str:
+    """A finite number above 0, or one of ``words``.
+
+    Raises:
+        ValueError: it is neither.
+    """
+    if isinstance(value, str) and value in words:
+        return value
+    if not isinstance(value, str):
+        found = number(value, name)
+        if 0.0 < found < float("inf"):
+            return found
+    others = " or ".join(f'"{word}"' for word in words)
+    raise ValueError(f"{name} is {value!r}; give a finite number above 0, or {others}")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -21,7 +22,7 @@ class Oriented:
 
     Attributes:
         normals: ``(N, 3)`` unit vectors.
-        confidence: ``(N,)`` how sure the side of each is, 0 to 1.
+        confidence: ``(N,)`` confidence in the side of each, 0 to 1.
         report: numbers, with the names of :attr:`Reconstruction.report`; ``report["orientation"]["doubtful"]`` has
             the shares of the points whose side is doubtful, by reason.
     """
@@ -32,7 +33,7 @@ class Oriented:
 
     @property
     def warnings(self) -> list[str]:
-        """What to know before trusting the normals."""
+        """Reasons not to trust the normals."""
         return self.report["warnings"]
 
 
@@ -44,23 +45,22 @@ def orient(
     radius: float | Literal["auto"] = "auto",
     orient: OrientLike = Orient.AUTO,
 ) -> Oriented:
-    """Outward unit normals of a cloud, and how sure the side of each is.
+    """Outward unit normals of a cloud, and the confidence in the side of each.
 
     Args:
         points: ``(N, 3)`` samples of a surface; float32 or float64 decides the type of the result.
         normals: as :func:`reconstruct` takes them.
         sensors: as :func:`reconstruct` takes them.
         radius: of the neighborhoods, in the unit of the points, or ``"auto"``.
-        orient: how the sides are found; ``"previous"`` needs a plan, and is ``"auto"`` here.
+        orient: method that finds the sides; ``"previous"`` needs a plan, and is ``"auto"`` here.
 
     Raises:
-        TypeError, ValueError: points that are no samples of a surface, with the reason and the remedy.
+        TypeError, ValueError: invalid points; the message says what is wrong and what to do.
         KeyboardInterrupt: at once, where Ctrl-C is pressed.
     """
     cloud = floats(points, "points", (None, 3))
     options = Options(radius=radius, orient=orient)
     normals, sensors = known(cloud, normals, sensors)
     check_known(options.orient, normals is not None, sensors is not None)
-    chosen = None if options.radius == "auto" else options.radius
-    method = Orient(options.orient).value
-    return Oriented(*_core.orient(cloud, normals, sensors, chosen, method))
+    normals, confidence, report = _core.orient(cloud, normals, sensors, json.dumps(asdict(options)))
+    return Oriented(normals, confidence, json.loads(report))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,7 +16,7 @@ from ._grid import Grid
 from ._mesh import Mesh
 from ._numbers import number
 from ._options import Options, check_known, resolve
-from ._settings import check_backend, encode, say_note
+from ._settings import check_backend, encode, warn_note
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -141,7 +142,7 @@ class Reconstruction:
     @cached_property
     def report(self) -> dict[str, Any]:
         """Numbers, times and warnings, with the names of the command line's ``report.json``."""
-        return self._core.report()
+        return {"backend": self.backend, **json.loads(self._core.report())}
 
     @property
     def backend(self) -> str:
@@ -154,11 +155,15 @@ class Reconstruction:
         return list(self.report["warnings"])
 
     def extend(self, name: str, band: float) -> Extension:
-        """The attribute ``name`` of the cloud at the vertices, and within ``band`` cells of the surface at the
-        value that it has at the closest surface point.
+        """The attribute ``name`` of the cloud at the vertices of the mesh, and at the cells of a band around it.
+
+        Args:
+            name: name of the attribute.
+            band: distance from the surface, in the unit of the points, up to which cells get the value at the closest
+                surface point.
 
         Raises:
-            ValueError: no such attribute, or a band without width.
+            ValueError: an unknown attribute, or a band without width.
         """
         return Extension(self._core.extend(str(name), number(band, "band")), str(name), self.grid)
 
@@ -250,7 +255,7 @@ class Reconstructor:
         self.backend = check_backend(backend)
         """Where to compute, as it was asked for."""
         self._plan = _core.Plan(encode(grid, self.options, self.backend))
-        say_note(self._plan.take_note())
+        warn_note(self._plan.take_note())
 
     def __call__(
         self,
@@ -265,7 +270,7 @@ class Reconstructor:
         normals, sensors = known(cloud, normals, sensors)
         check_known(self.options.orient, normals is not None, sensors is not None)
         core = self._plan.reconstruct(cloud, normals, sensors, _attributes(attributes, cloud))
-        say_note(self._plan.take_note())
+        warn_note(self._plan.take_note())
         return Reconstruction(core, self.grid, self.options, len(cloud), cloud.dtype)
 
     reconstruct = __call__

@@ -1,57 +1,41 @@
-"""Grid and options as one text, the only form that every interface can pass."""
+"""Grid, options and backend as one text, the only form that every interface can pass."""
 
 from __future__ import annotations
 
 import json
 import sys
 import warnings
+from dataclasses import asdict
 
 from . import _core
 from ._grid import Grid
-from ._options import Level, Options, Orient, Splat, check_known, resolve
+from ._options import Options, Orient, check_known, resolve
 
 
-def encode(grid: Grid, options: Options | None = None, backend: str | None = None) -> str:
-    """The JSON text that the Rust side reads; numbers read back to the same bits.
+def encode(grid: Grid, options: Options | None = None, backend: str = "cpu") -> str:
+    """The JSON text that the extension module reads; numbers read back to the same bits.
 
     Raises:
-        TypeError: for what is no grid or no options.
+        TypeError: ``grid`` or ``options`` is of another type.
     """
     if not isinstance(grid, Grid):
         raise TypeError(f"grid is a {type(grid).__name__}; give an isograd.Grid, such as Grid.fit(points)")
     options = Options() if options is None else options
     if not isinstance(options, Options):
         raise TypeError(f"options is a {type(options).__name__}; give an isograd.Options")
-    return json.dumps(
-        {
-            "lower": grid.lower,
-            "spacing": grid.spacing,
-            "shape": grid.shape,
-            "radius": None if options.radius == "auto" else options.radius,
-            "orient": Orient(options.orient).value,
-            "splat": Splat(options.splat).value,
-            "area": options.area,
-            "smoothing": None if options.smoothing == "auto" else options.smoothing,
-            "screening": options.screening,
-            "level": Level(options.level).value,
-            "band": options.band,
-            "checks": options.checks,
-            "backend": backend,
-        }
-    )
+    return json.dumps({"grid": asdict(grid), "options": asdict(options), "backend": backend})
 
 
 def encode_pure(
     grid: Grid, options: Options | None, normals_are_given: bool, backend: str, double: bool
 ) -> str:
-    """The text for a function that returns arrays alone, in double precision or single: nobody sees a report, so
-    nothing is checked for one.
+    """The text for a function that returns arrays only, in double or single precision: there is no report, so checks
+    are off.
 
     Raises:
-        TypeError: for what is no grid, no options or no text.
-        ValueError: for normals that are missing or not used, and for ways to orient that are no function of the
-            points and normals alone.
-        RuntimeError: for a backend that can't be had.
+        TypeError: an argument of another type.
+        ValueError: normals that are missing or not used; an orientation that depends on more than points and normals.
+        RuntimeError: an unavailable backend.
     """
     options = resolve(options, {"checks": False})
     check_pure(options)
@@ -59,23 +43,23 @@ def encode_pure(
     if check_backend(backend) == "cpu":
         return encode(grid, options)
     settings = encode(grid, options, backend)
-    say_note(_core.open_backend(settings, double))
+    warn_note(_core.open_backend(settings, double))
     return settings
 
 
 def check_backend(backend: object) -> str:
-    """The text.
+    """The backend as a plain ``str``.
 
     Raises:
-        TypeError: for what is none.
+        TypeError: it is no ``str``.
     """
     if not isinstance(backend, str):
         raise TypeError(f"backend is a {type(backend).__name__}; give a text such as \"cpu\" or \"cuda\"")
     return str(backend)
 
 
-def say_note(note: str | None) -> None:
-    """Warns the first caller outside the package that the CPU computes, where that was left to it."""
+def warn_note(note: str | None) -> None:
+    """Warns the first caller outside the package that ``backend="auto"`` selected the CPU."""
     if note is None:
         return
     level, frame = 2, sys._getframe(1)
@@ -85,10 +69,10 @@ def say_note(note: str | None) -> None:
 
 
 def check_pure(options: Options) -> None:
-    """Whether the sides of the normals are a function of points and normals alone.
+    """Checks that the orientation is a function of points and normals only.
 
     Raises:
-        ValueError: where not.
+        ValueError: it is not.
     """
     if options.orient is Orient.PREVIOUS:
         raise ValueError(

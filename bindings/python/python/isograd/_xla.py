@@ -28,7 +28,7 @@ class Plan:
     settings: str
     shape: tuple[int, int, int]
     band: float | None = None
-    """How far an attribute is extended, in cells."""
+    """Distance up to which an attribute is extended, in the unit of the points."""
 
     def kept(self, points: jax.Array) -> tuple[jax.ShapeDtypeStruct, ...]:
         """φ, closest faces and normals: what a pullback needs besides its inputs."""
@@ -53,7 +53,6 @@ def prepare(
     normals: ArrayLike | None,
     options: Options | None,
     backend: str,
-    band: float | None = None,
 ) -> tuple[Plan, jax.Array, jax.Array | None]:
     """Checks what can be checked while tracing.
 
@@ -67,7 +66,7 @@ def prepare(
         normals = floats(normals, "normals", points.shape, points.dtype)
     double = points.dtype == jnp.float64
     settings = _settings.encode_pure(grid, options, normals is not None, backend, double)
-    return Plan(settings, grid.shape, band), points, normals
+    return Plan(settings, grid.shape), points, normals
 
 
 def floats(

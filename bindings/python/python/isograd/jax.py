@@ -22,12 +22,14 @@ worked through one cloud after the other, each on all cores. Under ``jax.shard_m
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ._options import length
 from ._xla import Plan, call, floats, like, pair, prepare
 
 if TYPE_CHECKING:
@@ -263,7 +265,7 @@ def extend(
     values: ArrayLike,
     grid: Grid,
     *,
-    band: float = 3.0,
+    band: float | Literal["auto"] = "auto",
     normals: ArrayLike | None = None,
     options: Options | None = None,
     backend: str = "cpu",
@@ -278,7 +280,8 @@ def extend(
         points: ``(N, 3)``, as for :func:`signed_distance`.
         values: ``(N, C)`` or ``(N,)``.
         grid: static.
-        band: static; how far from the surface the values reach, in cells. No further than ``options.band``.
+        band: static; distance from the surface up to which values are extended, in the unit of the points, at most
+            ``options.band``; ``"auto"`` for 3 cells.
         normals: as for :func:`signed_distance`.
         options: as for :func:`signed_distance`.
         backend: as for :func:`signed_distance`.
@@ -286,9 +289,9 @@ def extend(
     Raises:
         TypeError, ValueError, RuntimeError, jax.errors.JaxRuntimeError: as for :func:`signed_distance`.
     """
-    if not isinstance(band, (int, float)) or not 0 < band < float("inf"):
-        raise ValueError(f"band is {band!r}; give a finite number of cells above 0")
-    plan, points, normals = prepare(points, grid, normals, options, backend, float(band))
+    distance = length(band, "band", "auto")
+    plan, points, normals = prepare(points, grid, normals, options, backend)
+    plan = replace(plan, band=3.0 * grid.spacing if distance == "auto" else distance)
     values = jnp.asarray(values)
     one = values.ndim == 1
     shape = (points.shape[0],) if one else (points.shape[0], None)

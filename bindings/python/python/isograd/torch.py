@@ -8,12 +8,11 @@ refuses every operator of that kind: call ``torch.autograd.grad``. Needs PyTorch
 
 from __future__ import annotations
 
-import json
 from typing import Any, Optional
 
 import numpy as np
 
-from . import _core, _settings
+from . import _pure, _settings
 from ._grid import Grid
 from ._options import Options
 
@@ -93,15 +92,15 @@ def _signed_distance(
     points: Tensor, given: Optional[Tensor], settings: str
 ) -> tuple[Tensor, Tensor, Tensor]:
     """φ, and what its pullback needs: closest faces and normals."""
-    sdf, closest, normals = _core.forward_saved(settings, _array(points), _array(given))
-    # PyTorch can do little with uint32: the same bits as int32.
+    sdf, closest, normals = _pure.forward(settings, _array(points), _array(given))
+    # PyTorch hardly supports uint32: the same bits as int32.
     arrays = (sdf, closest.view(np.int32), normals)
     return tuple(torch.from_numpy(array) for array in arrays)  # type: ignore[return-value]
 
 
 @_signed_distance.register_fake
 def _(points: Tensor, given: Optional[Tensor], settings: str) -> tuple[Tensor, Tensor, Tensor]:
-    shape = json.loads(settings)["shape"]
+    shape = _pure.grid_shape(settings)
     closest = points.new_empty(shape, dtype=torch.int32)
     return points.new_empty(shape), closest, points.new_empty(points.shape)
 
@@ -117,18 +116,10 @@ def _pullback(
     settings: str,
 ) -> tuple[Tensor, Tensor]:
     """Cotangents of the points and of the given normals; the latter has no rows where none were given."""
-    points_bar, given_bar = _core.pullback_saved(
-        settings,
-        _array(points),
-        _array(given),
-        _array(sdf),
-        _array(closest).view(np.uint32),
-        _array(normals),
-        _array(sdf_bar),
-    )
-    if given_bar is None:
-        return torch.from_numpy(points_bar), points.new_empty((0, 3))
-    return torch.from_numpy(points_bar), torch.from_numpy(given_bar)
+    saved = (_array(sdf), _array(closest).view(np.uint32), _array(normals))
+    bars = _pure.pullback(settings, _array(points), _array(given), saved, _array(sdf_bar))
+    given_bar = torch.from_numpy(bars[1]) if len(bars) > 1 else points.new_empty((0, 3))
+    return torch.from_numpy(bars[0]), given_bar
 
 
 @_pullback.register_fake

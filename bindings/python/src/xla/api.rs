@@ -14,8 +14,9 @@ use std::ptr;
 use pyo3::prelude::*;
 
 use super::Target;
-use super::buffers::{Call, Data, DataMut, Input, Output};
+use super::buffers::{Array, Batch, Data, DataMut};
 use crate::backend::Failure;
+use crate::background::guard;
 
 /// The oldest version with everything used here; a newer runtime takes it, too.
 const MAJOR: c_int = 0;
@@ -32,7 +33,7 @@ const F64: c_int = 12;
 const INVALID_ARGUMENT: c_int = 3;
 const INTERNAL: c_int = 13;
 
-/// What a handler returns: null, or an error that belongs to XLA.
+/// Return value of a handler: null, or an error that belongs to XLA.
 pub type Status = *mut c_void;
 
 /// A function that XLA calls.
@@ -108,7 +109,7 @@ struct Attributes {
     values: *const *const c_void,
 }
 
-/// What XLA hands to a handler.
+/// Argument of a handler.
 #[repr(C)]
 pub struct CallFrame {
     struct_size: usize,
@@ -129,7 +130,7 @@ struct ErrorCreate {
     code: c_int,
 }
 
-/// XLA's own functions, as far as the one that is called.
+/// Table of XLA's functions, up to the one that is called here.
 #[repr(C)]
 struct Api {
     struct_size: usize,
@@ -139,7 +140,7 @@ struct Api {
     error_create: unsafe extern "C" fn(*mut ErrorCreate) -> Status,
 }
 
-/// Answers a call of XLA: its question for the version, or a call of the target. A panic ends here.
+/// Handles a call of XLA: a query for the version, or a call of the target. A panic becomes an error.
 ///
 /// # Safety
 /// `frame` is what XLA passes to a handler.
@@ -148,13 +149,13 @@ pub unsafe extern "C" fn handler<W: Target>(frame: *mut CallFrame) -> Status {
     let frame = unsafe { &*frame };
     // SAFETY: as above.
     if let Some(metadata) = unsafe { frame.metadata() } {
-        return unsafe { frame.tell_version(metadata) };
+        return unsafe { frame.write_version(metadata) };
     }
     if frame.stage != STAGE_EXECUTE {
         return frame.error(INTERNAL, "isograd's handlers can only be executed");
     }
     // SAFETY: as above.
-    let guarded = super::guard(|| W::call(unsafe { frame.call() }?));
+    let guarded = guard(|| W::run_batch(unsafe { frame.batch() }?));
     match guarded {
         Ok(Ok(())) => ptr::null_mut(),
         Ok(Err(Failure::Value(text))) => frame.error(INVALID_ARGUMENT, &text),
@@ -164,7 +165,7 @@ pub unsafe extern "C" fn handler<W: Target>(frame: *mut CallFrame) -> Status {
 }
 
 impl CallFrame {
-    /// Where to write the version, if that is what XLA asks for.
+    /// The structure for the version, if XLA queries it.
     unsafe fn metadata(&self) -> Option<*mut Metadata> {
         let mut extension = self.extension;
         // SAFETY: a list that XLA made, each entry with the header of `Extension`.
@@ -178,7 +179,7 @@ impl CallFrame {
         None
     }
 
-    unsafe fn tell_version(&self, metadata: *mut Metadata) -> Status {
+    unsafe fn write_version(&self, metadata: *mut Metadata) -> Status {
         // SAFETY: XLA's own structure, of at least these fields; the runtime's version may be left out.
         unsafe {
             let theirs = self.api.as_ref().map_or(MINOR, |api| api.version.minor);
@@ -201,12 +202,12 @@ impl CallFrame {
         unsafe { ((*self.api).error_create)(&mut args) }
     }
 
-    unsafe fn call(&self) -> Result<Call<'_>, String> {
+    unsafe fn batch(&self) -> Result<Batch<'_>, String> {
         // SAFETY: the frame's arrays are as long as it says, and its results are borrowed nowhere else.
         unsafe {
-            let inputs = self.arguments.each().map(|buffer| (*buffer?).input());
+            let inputs = self.arguments.iter().map(|buffer| (*buffer?).input());
             let inputs = inputs.collect::<Result<Vec<_>, _>>()?;
-            let outputs = self.results.each().map(|buffer| (*buffer?).output());
+            let outputs = self.results.iter().map(|buffer| (*buffer?).output());
             let outputs = outputs.collect::<Result<Vec<_>, _>>()?;
             let settings = self.attributes.find("settings", STRING);
             let settings = settings.ok_or("the attribute 'settings' is missing")?;
@@ -215,13 +216,18 @@ impl CallFrame {
                 None => None,
             };
             let settings = (*settings.cast::<ByteSpan>()).text()?;
-            Ok(Call::new(settings, band, inputs, outputs))
+            Ok(Batch {
+                settings,
+                band,
+                inputs,
+                outputs,
+            })
         }
     }
 }
 
 impl Buffers {
-    unsafe fn each(&self) -> impl Iterator<Item = Result<*const Buffer, String>> {
+    unsafe fn iter(&self) -> impl Iterator<Item = Result<*const Buffer, String>> {
         // SAFETY: both arrays have `size` entries.
         (0..self.size.max(0) as usize).map(|i| unsafe {
             match *self.types.add(i) {
@@ -233,7 +239,7 @@ impl Buffers {
 }
 
 impl Buffer {
-    unsafe fn input<'a>(&self) -> Result<Input<'a>, String> {
+    unsafe fn input<'a>(&self) -> Result<Array<Data<'a>>, String> {
         // SAFETY: `data` has as many entries as the dimensions say.
         let data = unsafe {
             match self.dtype {
@@ -243,13 +249,13 @@ impl Buffer {
                 other => return Err(unknown(other)),
             }
         };
-        Ok(Input {
+        Ok(Array {
             dims: unsafe { self.dims() },
             data,
         })
     }
 
-    unsafe fn output<'a>(&self) -> Result<Output<'a>, String> {
+    unsafe fn output<'a>(&self) -> Result<Array<DataMut<'a>>, String> {
         // SAFETY: as for the inputs, and a result is given to nobody else during the call.
         let data = unsafe {
             match self.dtype {
@@ -259,7 +265,7 @@ impl Buffer {
                 other => return Err(unknown(other)),
             }
         };
-        Ok(Output {
+        Ok(Array {
             dims: unsafe { self.dims() },
             data,
         })

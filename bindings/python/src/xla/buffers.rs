@@ -1,9 +1,10 @@
-//! The arrays of a call, as slices with their dimensions. Leading dimensions that all arrays share are a batch.
+//! Arrays of a call, as slices with their dimensions. Leading dimensions that all arrays share are a batch.
 
-use crate::backend::Failure;
 use std::vec::IntoIter;
 
-/// Values of one of the three types in use.
+use crate::backend::Failure;
+
+/// Values of an input.
 pub enum Data<'a> {
     /// `float32`
     F32(&'a [f32]),
@@ -13,7 +14,7 @@ pub enum Data<'a> {
     U32(&'a [u32]),
 }
 
-/// The same, to be written.
+/// Values of an output.
 pub enum DataMut<'a> {
     /// `float32`
     F32(&'a mut [f32]),
@@ -23,43 +24,65 @@ pub enum DataMut<'a> {
     U32(&'a mut [u32]),
 }
 
-/// An array in C order.
-pub struct Input<'a> {
-    /// Its dimensions.
+/// An array in C order: its dimensions, and as many values as their product.
+pub struct Array<D> {
+    /// Dimensions, those of the batch first.
     pub dims: Vec<usize>,
-    /// As many values as these say.
-    pub data: Data<'a>,
+    /// Values.
+    pub data: D,
 }
 
-/// The same, to be written.
-pub struct Output<'a> {
-    /// Its dimensions.
-    pub dims: Vec<usize>,
-    /// As many values as these say.
-    pub data: DataMut<'a>,
+impl<'a> Data<'a> {
+    /// Part `k` of `count` equal parts.
+    fn part(&self, k: usize, count: usize) -> Data<'a> {
+        fn part<E>(all: &[E], k: usize, count: usize) -> &[E] {
+            let size = all.len() / count;
+            &all[k * size..][..size]
+        }
+        match self {
+            Self::F32(all) => Data::F32(part(all, k, count)),
+            Self::F64(all) => Data::F64(part(all, k, count)),
+            Self::U32(all) => Data::U32(part(all, k, count)),
+        }
+    }
 }
 
-/// A type of array.
+impl DataMut<'_> {
+    /// Part `k` of `count` equal parts.
+    fn part(&mut self, k: usize, count: usize) -> DataMut<'_> {
+        fn part<E>(all: &mut [E], k: usize, count: usize) -> &mut [E] {
+            let size = all.len() / count;
+            &mut all[k * size..][..size]
+        }
+        match self {
+            Self::F32(all) => DataMut::F32(part(all, k, count)),
+            Self::F64(all) => DataMut::F64(part(all, k, count)),
+            Self::U32(all) => DataMut::U32(part(all, k, count)),
+        }
+    }
+}
+
+/// Type of the values of an array.
 pub trait Element: Copy {
-    /// Its name in errors.
+    /// Name in error messages.
     const NAME: &'static str;
-    /// The values, where they are of this type.
-    fn of<'a>(data: &Data<'a>) -> Option<&'a [Self]>;
-    /// The same, to be written.
-    fn of_mut(data: DataMut<'_>) -> Option<&mut [Self]>;
+    /// The values of an input of this type.
+    fn slice<'a>(data: Data<'a>) -> Option<&'a [Self]>;
+    /// The values of an output of this type.
+    fn slice_mut<'a>(data: DataMut<'a>) -> Option<&'a mut [Self]>;
 }
 
 macro_rules! element {
     ($type:ty, $variant:ident, $name:literal) => {
         impl Element for $type {
             const NAME: &'static str = $name;
-            fn of<'a>(data: &Data<'a>) -> Option<&'a [Self]> {
+            fn slice<'a>(data: Data<'a>) -> Option<&'a [Self]> {
                 match data {
                     Data::$variant(values) => Some(values),
                     _ => None,
                 }
             }
-            fn of_mut(data: DataMut<'_>) -> Option<&mut [Self]> {
+            fn slice_mut<'a>(data: DataMut<'a>) -> Option<&'a mut [Self]> {
                 match data {
                     DataMut::$variant(values) => Some(values),
                     _ => None,
@@ -72,190 +95,169 @@ element!(f32, F32, "float32");
 element!(f64, F64, "float64");
 element!(u32, U32, "uint32");
 
-/// One call: what a handler takes its arrays from, in order.
-pub struct Call<'a> {
-    /// Grid and options: see [`Settings`](crate::settings::Settings).
+/// Arrays and attributes of a call, for all clouds of a batch.
+pub struct Batch<'a> {
+    /// Grid, options and backend: see [`Settings`](crate::settings::Settings).
     pub settings: &'a str,
-    /// Half the width of the band that an attribute is extended to, in cells.
+    /// Half the width of the band that an attribute is extended to, in the unit of the points.
     pub band: Option<f64>,
-    inputs: IntoIter<Input<'a>>,
-    outputs: IntoIter<Output<'a>>,
-    /// Leading dimensions of the first input, which all others must have.
-    batch: Option<Vec<usize>>,
+    /// Inputs, the points first.
+    pub inputs: Vec<Array<Data<'a>>>,
+    /// Outputs.
+    pub outputs: Vec<Array<DataMut<'a>>>,
+}
+
+impl Batch<'_> {
+    /// Whether the first input, the points, is `float64`.
+    pub fn is_double(&self) -> bool {
+        matches!(self.inputs.first(), Some(input) if matches!(input.data, Data::F64(_)))
+    }
+
+    /// Calls `work` for each cloud of the batch, in order.
+    ///
+    /// # Errors
+    /// Arrays that differ in their leading dimensions; errors of `work`, with the index of the cloud where there are
+    /// several.
+    pub fn for_each(
+        mut self,
+        work: impl Fn(Call<'_>) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let points = self.inputs.first().map_or(&[][..], |points| &points.dims);
+        let Some(rank) = points.len().checked_sub(2) else {
+            return Err(format!("the points have the shape {points:?}; give (N, 3)").into());
+        };
+        let leading = points[..rank].to_vec();
+        let inputs = self.inputs.iter().map(|input| &input.dims);
+        let mut all = inputs.chain(self.outputs.iter().map(|output| &output.dims));
+        if let Some(dims) = all.find(|dims| !dims.starts_with(&leading)) {
+            return Err(format!(
+                "an array has the shape {dims:?}; its leading dimensions must be {leading:?}"
+            )
+            .into());
+        }
+        let count = leading.iter().product::<usize>();
+        (0..count).try_for_each(|k| {
+            let inputs = self.inputs.iter().map(|array| Array {
+                dims: array.dims[rank..].to_vec(),
+                data: array.data.part(k, count),
+            });
+            let outputs = self.outputs.iter_mut().map(|array| Array {
+                dims: array.dims[rank..].to_vec(),
+                data: array.data.part(k, count),
+            });
+            let call = Call {
+                settings: self.settings,
+                band: self.band,
+                inputs: inputs.collect::<Vec<_>>().into_iter(),
+                outputs: outputs.collect::<Vec<_>>().into_iter(),
+            };
+            work(call).map_err(|failure| match count {
+                1 => failure,
+                _ => failure.with_context(&format!("cloud {k} of the batch")),
+            })
+        })
+    }
+}
+
+/// A call for one cloud: a target takes its arrays in order.
+pub struct Call<'a> {
+    /// See [`Batch::settings`].
+    pub settings: &'a str,
+    /// See [`Batch::band`].
+    pub band: Option<f64>,
+    inputs: IntoIter<Array<Data<'a>>>,
+    outputs: IntoIter<Array<DataMut<'a>>>,
 }
 
 impl<'a> Call<'a> {
-    /// A call with these arrays.
-    pub fn new(
-        settings: &'a str,
-        band: Option<f64>,
-        inputs: Vec<Input<'a>>,
-        outputs: Vec<Output<'a>>,
-    ) -> Self {
-        Self {
-            settings,
-            band,
-            inputs: inputs.into_iter(),
-            outputs: outputs.into_iter(),
-            batch: None,
-        }
-    }
-
-    /// Whether the first input, the points, is of double precision.
-    pub fn is_double(&self) -> bool {
-        let first = self.inputs.as_slice().first();
-        matches!(first, Some(input) if matches!(input.data, Data::F64(_)))
-    }
-
-    /// Whether inputs are left.
-    pub fn has_input(&self) -> bool {
-        self.inputs.len() > 0
-    }
-
-    /// How many outputs are left.
-    pub fn outputs(&self) -> usize {
+    /// Number of outputs that have not been taken.
+    pub fn outputs_left(&self) -> usize {
         self.outputs.len()
     }
 
-    /// The next input, of so many dimensions besides those of the batch.
+    /// The next input, of `rank` dimensions.
     ///
     /// # Errors
-    /// It is missing, or of another type or shape.
-    pub fn input<E: Element>(&mut self, what: &str, rank: usize) -> Result<Batch<'a, E>, String> {
-        let input = self.inputs.next();
-        let input = input.ok_or_else(|| format!("there is no array for {what}"))?;
-        let each = self.size_of_item(what, &input.dims, rank)?;
-        let values = E::of(&input.data).ok_or_else(|| wrong_type::<E>(what))?;
-        Ok(Batch { values, each })
+    /// A missing array, or one of another type or rank.
+    pub fn input<E: Element>(&mut self, name: &str, rank: usize) -> Result<&'a [E], String> {
+        let input = self.inputs.next().ok_or_else(|| missing(name))?;
+        check_rank(name, &input.dims, rank)?;
+        E::slice(input.data).ok_or_else(|| wrong_type::<E>(name))
     }
 
-    /// The next output, likewise.
+    /// The next output, of `rank` dimensions.
     ///
     /// # Errors
     /// As [`Self::input`].
-    pub fn output<E: Element>(
-        &mut self,
-        what: &str,
-        rank: usize,
-    ) -> Result<BatchMut<'a, E>, String> {
-        let output = self.outputs.next();
-        let output = output.ok_or_else(|| format!("there is no array for {what}"))?;
-        let each = self.size_of_item(what, &output.dims, rank)?;
-        let values = E::of_mut(output.data).ok_or_else(|| wrong_type::<E>(what))?;
-        Ok(BatchMut { values, each })
-    }
-
-    /// The next input, if one is left, as `(N, 3)` vectors.
-    ///
-    /// # Errors
-    /// Another type or shape.
-    pub fn given<E: Element>(&mut self) -> Result<Option<Batch<'a, [E; 3]>>, String> {
-        match self.has_input() {
-            true => self.vectors("the given normals").map(Some),
-            false => Ok(None),
-        }
+    pub fn output<E: Element>(&mut self, name: &str, rank: usize) -> Result<&'a mut [E], String> {
+        let output = self.outputs.next().ok_or_else(|| missing(name))?;
+        check_rank(name, &output.dims, rank)?;
+        E::slice_mut(output.data).ok_or_else(|| wrong_type::<E>(name))
     }
 
     /// The next input as `(N, 3)` vectors.
     ///
     /// # Errors
-    /// As [`Self::input`].
-    pub fn vectors<E: Element>(&mut self, what: &str) -> Result<Batch<'a, [E; 3]>, String> {
-        let three = self.inputs.as_slice().first();
-        check_three(what, three.map(|input| &input.dims))?;
-        let Batch { values, each } = self.input::<E>(what, 2)?;
-        Ok(Batch {
-            values: values.as_chunks().0,
-            each: each / 3,
-        })
+    /// As [`Self::input`], and another last dimension.
+    pub fn vectors<E: Element>(&mut self, name: &str) -> Result<&'a [[E; 3]], String> {
+        check_three(name, self.inputs.as_slice().first())?;
+        Ok(self.input::<E>(name, 2)?.as_chunks().0)
     }
 
     /// The next output as `(N, 3)` vectors.
     ///
     /// # Errors
-    /// As [`Self::output`].
-    pub fn vectors_out<E: Element>(&mut self, what: &str) -> Result<BatchMut<'a, [E; 3]>, String> {
-        let three = self.outputs.as_slice().first();
-        check_three(what, three.map(|output| &output.dims))?;
-        let BatchMut { values, each } = self.output::<E>(what, 2)?;
-        Ok(BatchMut {
-            values: values.as_chunks_mut().0,
-            each: each / 3,
-        })
+    /// As [`Self::vectors`].
+    pub fn vectors_out<E: Element>(&mut self, name: &str) -> Result<&'a mut [[E; 3]], String> {
+        check_three(name, self.outputs.as_slice().first())?;
+        Ok(self.output::<E>(name, 2)?.as_chunks_mut().0)
     }
 
-    /// Does `work` for each member of the batch, by its index.
+    /// The normals of the cloud: the last input, where one is left.
     ///
     /// # Errors
-    /// Arrays that nobody took, and what `work` says, with the index where there are several.
-    pub fn for_each(
-        &self,
-        mut work: impl FnMut(usize) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
-        if self.has_input() || self.outputs() > 0 {
-            return Err("more arrays were passed than are used".into());
+    /// As [`Self::vectors`].
+    pub fn normals<E: Element>(&mut self) -> Result<Option<&'a [[E; 3]]>, String> {
+        match self.inputs.len() {
+            0 => Ok(None),
+            _ => self.vectors("the given normals").map(Some),
         }
-        let count = self.batch.iter().flatten().product::<usize>();
-        (0..count).try_for_each(|k| {
-            work(k).map_err(|failure| match count {
-                1 => failure,
-                _ => failure.of(&format!("cloud {k} of the batch")),
-            })
-        })
     }
 
-    fn size_of_item(&mut self, what: &str, dims: &[usize], rank: usize) -> Result<usize, String> {
-        let leading = dims.len().checked_sub(rank);
-        let leading = leading.ok_or_else(|| {
-            format!("the array for {what} has the shape {dims:?} and needs {rank} dimensions")
-        })?;
-        let (of_batch, of_item) = dims.split_at(leading);
-        let batch = self.batch.get_or_insert_with(|| of_batch.to_vec());
-        if batch != of_batch {
-            return Err(format!(
-                "the array for {what} has the shape {dims:?}; its leading dimensions must be {batch:?}"
-            ));
+    /// Checks that every array has been taken.
+    ///
+    /// # Errors
+    /// Arrays that are left.
+    pub fn check_all_taken(&self) -> Result<(), Failure> {
+        match self.inputs.len() + self.outputs.len() {
+            0 => Ok(()),
+            _ => Err("more arrays were passed than are used".into()),
         }
-        Ok(of_item.iter().product())
     }
 }
 
-fn wrong_type<E: Element>(what: &str) -> String {
-    format!("the array for {what} must be of {}", E::NAME)
+fn missing(name: &str) -> String {
+    format!("there is no array for {name}")
 }
 
-fn check_three(what: &str, dims: Option<&Vec<usize>>) -> Result<(), String> {
-    match dims {
-        Some(dims) if dims.last() != Some(&3) => Err(format!(
-            "the array for {what} has the shape {dims:?} and must end in 3"
+fn wrong_type<E: Element>(name: &str) -> String {
+    format!("the array for {name} must be of {}", E::NAME)
+}
+
+fn check_rank(name: &str, dims: &[usize], rank: usize) -> Result<(), String> {
+    match dims.len() == rank {
+        true => Ok(()),
+        false => Err(format!(
+            "the array for {name} has the shape {dims:?} and must have {rank} dimensions"
+        )),
+    }
+}
+
+fn check_three<D>(name: &str, array: Option<&Array<D>>) -> Result<(), String> {
+    match array {
+        Some(Array { dims, .. }) if dims.last() != Some(&3) => Err(format!(
+            "the array for {name} has the shape {dims:?} and must end in 3"
         )),
         _ => Ok(()),
-    }
-}
-
-/// The values of one array for all members of a batch.
-#[derive(Clone, Copy)]
-pub struct Batch<'a, E> {
-    values: &'a [E],
-    each: usize,
-}
-
-impl<'a, E> Batch<'a, E> {
-    /// Those of member `k`.
-    pub fn of(&self, k: usize) -> &'a [E] {
-        &self.values[k * self.each..][..self.each]
-    }
-}
-
-/// The same, to be written.
-pub struct BatchMut<'a, E> {
-    values: &'a mut [E],
-    each: usize,
-}
-
-impl<E> BatchMut<'_, E> {
-    /// Those of member `k`.
-    pub fn of(&mut self, k: usize) -> &mut [E] {
-        &mut self.values[k * self.each..][..self.each]
     }
 }

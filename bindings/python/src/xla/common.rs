@@ -1,138 +1,98 @@
-//! What all targets do: run a plan on the points of one member of a batch, keep what a pullback needs, and find the
-//! reconstruction again from that.
+//! Steps shared by the targets: run a plan on a cloud, save what a pullback needs, and restore the reconstruction
+//! from it.
 
-use isograd::{Cotangent, PointCloud, Real, Saved};
+use isograd::{CloudCotangent, Cotangent, PointCloud, PullbackScratch, Real, Saved};
 use isograd_backend::View;
 
-use super::buffers::{Batch, BatchMut, Call, Element};
+use super::buffers::{Call, Element};
 use crate::arrays::Number;
 use crate::backend::Failure;
 use crate::pool::{self, Plan};
-use crate::saved;
 
-/// A number type of the library, of NumPy and of XLA.
+/// Number type of the library, of NumPy and of XLA.
 pub trait Float: Number + Element {}
 impl Float for f32 {}
 impl Float for f64 {}
 
-/// Points, and the normals that come with them.
-#[derive(Clone, Copy)]
-pub struct Cloud<'a, T> {
-    /// `(N, 3)`.
-    pub points: Batch<'a, [T; 3]>,
-    /// `(N, 3)`.
-    pub given: Option<Batch<'a, [T; 3]>>,
-}
-
-impl<T: Real> Cloud<'_, T> {
-    /// That of member `k`.
-    ///
-    /// # Errors
-    /// See [`isograd::PointCloudError`].
-    pub fn of(&self, k: usize) -> Result<PointCloud<T>, Failure> {
-        saved::cloud(self.points.of(k), self.given.map(|given| given.of(k)))
-    }
-}
-
-/// Does `work` with the reconstruction of a cloud.
+/// A copy of `(N, 3)` points and, where the caller passes them, normals.
 ///
 /// # Errors
-/// What the settings, a stage or `work` say.
-pub fn with_result<T: Number, R>(
-    settings: &str,
-    cloud: &PointCloud<T>,
-    work: impl FnOnce(View<'_, T>) -> Result<R, Failure>,
-) -> Result<R, Failure> {
-    pool::with_plan::<T, _>(settings, |plan| work(plan.plan.reconstruct(cloud)?))?
+/// See [`isograd::PointCloudError`].
+pub fn cloud<T: Real>(
+    points: &[[T; 3]],
+    normals: Option<&[[T; 3]]>,
+) -> Result<PointCloud<T>, Failure> {
+    let cloud = PointCloud::new(points.to_vec());
+    let cloud = match normals {
+        None => cloud,
+        Some(normals) => cloud.and_then(|cloud| cloud.with_normals(normals.to_vec())),
+    };
+    Ok(cloud.map_err(|error| error.to_string())?)
 }
 
-/// Where a forward map keeps what its pullback needs, in the order of [`Saved`].
-pub struct Keep<'a, T> {
-    sdf: BatchMut<'a, T>,
-    closest: BatchMut<'a, u32>,
-    normals: BatchMut<'a, [T; 3]>,
-}
-
-impl<'a, T: Float> Keep<'a, T> {
-    /// The next three outputs.
-    ///
-    /// # Errors
-    /// Outputs of another type or shape.
-    pub fn take(call: &mut Call<'a>) -> Result<Self, Failure> {
-        Ok(Self {
-            sdf: call.output("φ", 3)?,
-            closest: call.output("the closest faces", 3)?,
-            normals: call.vectors_out("the normals")?,
-        })
+/// Copies an array into one of the same length.
+///
+/// # Errors
+/// Arrays of different lengths.
+pub fn copy<E: Copy>(name: &str, from: &[E], to: &mut [E]) -> Result<(), Failure> {
+    if from.len() != to.len() {
+        let (found, expected) = (to.len(), from.len());
+        return Err(Failure::Value(format!(
+            "the array for {name} has {found} entries and must have {expected}"
+        )));
     }
-
-    /// Fills those of member `k`.
-    ///
-    /// # Errors
-    /// Another length.
-    pub fn fill(&mut self, k: usize, result: View<'_, T>) -> Result<(), Failure> {
-        saved::copy("φ", result.sdf()?.values(), self.sdf.of(k))?;
-        saved::copy("the closest faces", result.closest()?, self.closest.of(k))?;
-        saved::copy("the normals", result.normals()?, self.normals.of(k))
-    }
+    to.copy_from_slice(from);
+    Ok(())
 }
 
-/// What a forward map kept.
-pub struct Kept<'a, T> {
-    sdf: Batch<'a, T>,
-    closest: Batch<'a, u32>,
-    normals: Batch<'a, [T; 3]>,
+/// Outputs for φ, closest faces and normals: what a pullback needs, in the order of [`Saved`].
+pub struct SavedOutputs<'a, T> {
+    sdf: &'a mut [T],
+    closest: &'a mut [u32],
+    normals: &'a mut [[T; 3]],
 }
 
-impl<'a, T: Float> Kept<'a, T> {
-    /// The next three inputs.
+impl<T: Float> SavedOutputs<'_, T> {
+    /// Fills the outputs.
     ///
     /// # Errors
-    /// Inputs of another type or shape.
-    pub fn take(call: &mut Call<'a>) -> Result<Self, Failure> {
-        Ok(Self {
-            sdf: call.input("φ", 3)?,
-            closest: call.input("the closest faces", 3)?,
-            normals: call.vectors("the normals")?,
-        })
-    }
-
-    /// Does `work` with the plan and the reconstruction of member `k`.
-    ///
-    /// # Errors
-    /// What the settings, a stage or `work` say.
-    pub fn restore(
-        &self,
-        settings: &str,
-        k: usize,
-        cloud: &PointCloud<T>,
-        work: impl FnOnce(Restored<'_, T>) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
-        let saved = Saved {
-            sdf: self.sdf.of(k),
-            closest: self.closest.of(k),
-            normals: self.normals.of(k),
-        };
-        pool::with_plan::<T, _>(settings, |plan| {
-            let Plan { plan, scratch, bar } = plan;
-            work(Restored {
-                result: plan.restore(cloud, &saved)?,
-                cloud,
-                scratch,
-                bar,
-            })
-        })?
+    /// Outputs of another length; errors of the device.
+    pub fn fill(self, result: View<'_, T>) -> Result<(), Failure> {
+        copy("φ", result.sdf()?.values(), self.sdf)?;
+        copy("the closest faces", result.closest()?, self.closest)?;
+        copy("the normals", result.normals()?, self.normals)
     }
 }
 
-/// A reconstruction found again, and the memory of its pullback.
+/// Outputs for the cotangents of a cloud.
+pub struct CloudOutputs<'a, T> {
+    points: &'a mut [[T; 3]],
+    normals: Option<&'a mut [[T; 3]]>,
+}
+
+impl<T: Float> CloudOutputs<'_, T> {
+    /// Fills the outputs; the cotangent of normals that have no influence is zero.
+    ///
+    /// # Errors
+    /// Outputs of another length.
+    pub fn fill(self, bar: &CloudCotangent<T>) -> Result<(), Failure> {
+        copy("the points' cotangent", &bar.points, self.points)?;
+        match self.normals {
+            Some(normals) if bar.normals.is_empty() => normals.fill([T::zero(); 3]),
+            Some(normals) => copy("the normals' cotangent", &bar.normals, normals)?,
+            None => {}
+        }
+        Ok(())
+    }
+}
+
+/// A restored reconstruction and the buffers of its pullback.
 pub struct Restored<'a, T: Number> {
     /// The reconstruction.
     pub result: View<'a, T>,
-    /// What it is of.
-    pub cloud: &'a PointCloud<T>,
-    scratch: &'a mut isograd::PullbackScratch<T>,
-    bar: &'a mut isograd::CloudCotangent<T>,
+    cloud: &'a PointCloud<T>,
+    scratch: &'a mut PullbackScratch<T>,
+    bar: &'a mut CloudCotangent<T>,
 }
 
 impl<'a, T: Number> Restored<'a, T> {
@@ -140,43 +100,89 @@ impl<'a, T: Number> Restored<'a, T> {
     ///
     /// # Errors
     /// See [`isograd::PullbackError`].
-    pub fn pull(
+    pub fn pullback(
         self,
         cotangent: &Cotangent<'_, T>,
-    ) -> Result<&'a isograd::CloudCotangent<T>, Failure> {
+    ) -> Result<&'a CloudCotangent<T>, Failure> {
         self.result
             .pullback_into(self.cloud, cotangent, self.scratch, self.bar)?;
         Ok(self.bar)
     }
 }
 
-/// Where the cotangents of a cloud go.
-pub struct CloudBar<'a, T> {
-    points: BatchMut<'a, [T; 3]>,
-    given: Option<BatchMut<'a, [T; 3]>>,
-}
-
-impl<'a, T: Float> CloudBar<'a, T> {
-    /// The next one or two outputs.
+impl<'a> Call<'a> {
+    /// The next three outputs.
     ///
     /// # Errors
-    /// Outputs of another type or shape.
-    pub fn take(call: &mut Call<'a>, given: bool) -> Result<Self, Failure> {
-        let points = call.vectors_out("the cotangent of the points")?;
-        let normals = || call.vectors_out("the cotangent of the normals");
-        Ok(Self {
-            points,
-            given: given.then(normals).transpose()?,
+    /// See [`Call::output`].
+    pub fn saved_outputs<T: Float>(&mut self) -> Result<SavedOutputs<'a, T>, Failure> {
+        Ok(SavedOutputs {
+            sdf: self.output("φ", 3)?,
+            closest: self.output("the closest faces", 3)?,
+            normals: self.vectors_out("the normals")?,
         })
     }
 
-    /// Fills those of member `k`.
+    /// The next three inputs, as [`SavedOutputs::fill`] wrote them.
     ///
     /// # Errors
-    /// Another length.
-    pub fn fill(&mut self, k: usize, bar: &isograd::CloudCotangent<T>) -> Result<(), Failure> {
-        saved::copy("the points' cotangent", &bar.points, self.points.of(k))?;
-        let given = self.given.as_mut().map(|given| given.of(k));
-        saved::copy_given(&bar.normals, given)
+    /// See [`Call::input`].
+    pub fn saved<T: Float>(&mut self) -> Result<Saved<'a, T>, Failure> {
+        Ok(Saved {
+            sdf: self.input("φ", 3)?,
+            closest: self.input("the closest faces", 3)?,
+            normals: self.vectors("the normals")?,
+        })
+    }
+
+    /// The next output, for the points, and one more for the normals where they are inputs.
+    ///
+    /// # Errors
+    /// See [`Call::output`].
+    pub fn cloud_outputs<T: Float>(
+        &mut self,
+        has_normals: bool,
+    ) -> Result<CloudOutputs<'a, T>, Failure> {
+        let points = self.vectors_out("the cotangent of the points")?;
+        let normals = has_normals.then(|| self.vectors_out("the cotangent of the normals"));
+        Ok(CloudOutputs {
+            points,
+            normals: normals.transpose()?,
+        })
+    }
+
+    /// Passes the reconstruction of a cloud to `work`; all arrays must have been taken.
+    ///
+    /// # Errors
+    /// Errors of the settings, of a stage and of `work`.
+    pub fn reconstruct<T: Number>(
+        self,
+        cloud: &PointCloud<T>,
+        work: impl FnOnce(View<'_, T>) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        self.check_all_taken()?;
+        pool::with_plan::<T, _>(self.settings, |plan| work(plan.plan.reconstruct(cloud)?))?
+    }
+
+    /// Passes the reconstruction that was saved to `work`; all arrays must have been taken.
+    ///
+    /// # Errors
+    /// Errors of the settings, of a stage and of `work`; arrays saved from another result.
+    pub fn restore<T: Number>(
+        self,
+        cloud: &PointCloud<T>,
+        saved: &Saved<'_, T>,
+        work: impl FnOnce(Restored<'_, T>) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        self.check_all_taken()?;
+        pool::with_plan::<T, _>(self.settings, |plan| {
+            let Plan { plan, scratch, bar } = plan;
+            work(Restored {
+                result: plan.restore(cloud, saved)?,
+                cloud,
+                scratch,
+                bar,
+            })
+        })?
     }
 }

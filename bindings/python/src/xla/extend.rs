@@ -1,16 +1,15 @@
-//! φ and an attribute of the samples at the cells round the surface, and their pullback.
+//! φ and an attribute of the samples at the cells around the surface, and their pullback.
 
 use isograd::distance::extend::Extension;
 use isograd::{Attribute, Cotangent, ExtensionCotangent, Real};
 
 use super::Target;
 use super::buffers::Call;
-use super::common::{Cloud, CloudBar, Float, Keep, Kept, with_result};
+use super::common::{Float, cloud, copy};
 use crate::backend::Failure;
-use crate::saved;
 
-/// Points, `(N, C)` values, perhaps normals → values at the cells of a band and zeros elsewhere, φ, and what else the
-/// pullback needs.
+/// Inputs: points, `(N, C)` values, optionally normals. Outputs: values at the cells of a band and zeros elsewhere, φ,
+/// and what else the pullback needs.
 pub struct Forward;
 
 impl Target for Forward {
@@ -18,28 +17,22 @@ impl Target for Forward {
 
     fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {
         let points = call.vectors::<T>("the points")?;
-        let values = call.input::<T>("the values", 2)?;
-        let given = call.given()?;
-        let mut field = call.output::<T>("the extended values", 4)?;
-        let mut keep = Keep::<T>::take(&mut call)?;
-        let (settings, band) = (call.settings, band(&call)?);
-        let cloud = Cloud { points, given };
-        call.for_each(|k| {
-            with_result(settings, &cloud.of(k)?, |result| {
-                let attribute = attribute(values.of(k), points.of(k).len());
-                let (extension, _) =
-                    result.extend(&attribute, band * result.grid().spacing().f64())?;
-                let out = field.of(k);
-                out.fill(T::zero());
-                extension.scatter(out).map_err(|e| e.to_string())?;
-                keep.fill(k, result)
-            })
+        let attribute = attribute(call.input("the values", 2)?, points.len());
+        let cloud = cloud(points, call.normals()?)?;
+        let field = call.output("the extended values", 4)?;
+        let saved = call.saved_outputs()?;
+        let band = band(&call)?;
+        call.reconstruct(&cloud, |result| {
+            let (extension, _) = result.extend(&attribute, band)?;
+            field.fill(T::zero());
+            extension.scatter(field).map_err(|e| e.to_string())?;
+            saved.fill(result)
         })
     }
 }
 
-/// Points, values, what the forward map kept, cotangents of the extended values and of φ, perhaps normals →
-/// cotangents of values, points and normals.
+/// Inputs: points, values, what the forward map saved, cotangents of the extended values and of φ, optionally normals.
+/// Outputs: cotangents of values, points and normals.
 pub struct Pullback;
 
 impl Target for Pullback {
@@ -47,38 +40,32 @@ impl Target for Pullback {
 
     fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {
         let points = call.vectors::<T>("the points")?;
-        let values = call.input::<T>("the values", 2)?;
-        let kept = Kept::<T>::take(&mut call)?;
-        let field_bar = call.input::<T>("the cotangent of the extended values", 4)?;
-        let sdf_bar = call.input::<T>("the cotangent of φ", 3)?;
-        let given = call.given()?;
-        let mut values_out = call.output::<T>("the cotangent of the values", 2)?;
-        let mut out = CloudBar::<T>::take(&mut call, given.is_some())?;
-        let (settings, band) = (call.settings, band(&call)?);
-        let cloud = Cloud { points, given };
-        call.for_each(|k| {
-            kept.restore(settings, k, &cloud.of(k)?, |restored| {
-                let attribute = attribute(values.of(k), points.of(k).len());
-                let (extension, residual) = restored
-                    .result
-                    .extend(&attribute, band * restored.result.grid().spacing().f64())?;
-                let values_bar = gather(&extension, field_bar.of(k))?;
-                let of_values = ExtensionCotangent {
-                    attribute: &attribute,
-                    extension: &extension,
-                    residual: &residual,
-                    vertices: None,
-                    values: Some(&values_bar),
-                };
-                let bar = restored.pull(&Cotangent {
-                    sdf: Some(sdf_bar.of(k)),
-                    extensions: &[of_values],
-                    ..Cotangent::default()
-                })?;
-                let found = bar.attributes.first().map_or(&[][..], |bar| bar);
-                saved::copy("the values' cotangent", found, values_out.of(k))?;
-                out.fill(k, bar)
-            })
+        let attribute = attribute(call.input("the values", 2)?, points.len());
+        let saved = call.saved()?;
+        let field_bar = call.input("the cotangent of the extended values", 4)?;
+        let sdf_bar = call.input("the cotangent of φ", 3)?;
+        let normals = call.normals()?;
+        let values_out = call.output("the cotangent of the values", 2)?;
+        let out = call.cloud_outputs(normals.is_some())?;
+        let band = band(&call)?;
+        call.restore(&cloud(points, normals)?, &saved, |restored| {
+            let (extension, residual) = restored.result.extend(&attribute, band)?;
+            let values_bar = gather(&extension, field_bar)?;
+            let extended = ExtensionCotangent {
+                attribute: &attribute,
+                extension: &extension,
+                residual: &residual,
+                vertices: None,
+                values: Some(&values_bar),
+            };
+            let bar = restored.pullback(&Cotangent {
+                sdf: Some(sdf_bar),
+                extensions: &[extended],
+                ..Cotangent::default()
+            })?;
+            let attribute_bar = bar.attributes.first().map_or(&[][..], |bar| bar);
+            copy("the values' cotangent", attribute_bar, values_out)?;
+            out.fill(bar)
         })
     }
 }

@@ -4,35 +4,28 @@ use isograd::{Cotangent, Mesh, Real};
 
 use super::Target;
 use super::buffers::Call;
-use super::common::{Cloud, CloudBar, Float, Keep, Kept, with_result};
+use super::common::{Float, cloud};
 use crate::backend::Failure;
 
-/// Points, perhaps normals → vertices and faces, as many as fit, and how many there are of both; alone or with what
-/// the pullback needs.
+/// Inputs: points, optionally normals. Outputs: vertices and faces, as many as fit, and the number of both; alone or
+/// with what the pullback needs.
 pub struct Forward;
 
 impl Target for Forward {
     const NAME: &'static str = "isograd_mesh";
 
     fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {
-        let cloud = Cloud {
-            points: call.vectors::<T>("the points")?,
-            given: call.given()?,
-        };
-        let mut vertices = call.vectors_out::<T>("the vertices")?;
-        let mut faces = call.vectors_out::<u32>("the faces")?;
-        let mut counts = call.output::<u32>("the counts", 1)?;
-        let mut keep = match call.outputs() {
+        let cloud = cloud(call.vectors::<T>("the points")?, call.normals()?)?;
+        let vertices = call.vectors_out("the vertices")?;
+        let faces = call.vectors_out("the faces")?;
+        let counts = call.output("the counts", 1)?;
+        let saved = match call.outputs_left() {
             0 => None,
-            _ => Some(Keep::<T>::take(&mut call)?),
+            _ => Some(call.saved_outputs()?),
         };
-        let settings = call.settings;
-        call.for_each(|k| {
-            with_result(settings, &cloud.of(k)?, |result| {
-                let mesh = result.mesh()?;
-                write(mesh, vertices.of(k), faces.of(k), counts.of(k))?;
-                keep.as_mut().map_or(Ok(()), |keep| keep.fill(k, result))
-            })
+        call.reconstruct(&cloud, |result| {
+            write(result.mesh()?, vertices, faces, counts)?;
+            saved.map_or(Ok(()), |saved| saved.fill(result))
         })
     }
 }
@@ -63,7 +56,8 @@ fn write<T: Real>(
     Ok(())
 }
 
-/// Points, what the forward map kept, cotangent of the vertices, perhaps normals → cotangents of points and normals.
+/// Inputs: points, what the forward map saved, cotangent of the vertices, optionally normals. Outputs: cotangents of
+/// points and normals.
 pub struct Pullback;
 
 impl Target for Pullback {
@@ -71,23 +65,18 @@ impl Target for Pullback {
 
     fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {
         let points = call.vectors::<T>("the points")?;
-        let kept = Kept::<T>::take(&mut call)?;
-        let vertices_bar = call.vectors::<T>("the cotangent of the vertices")?;
-        let given = call.given()?;
-        let mut out = CloudBar::<T>::take(&mut call, given.is_some())?;
-        let (settings, cloud) = (call.settings, Cloud { points, given });
-        call.for_each(|k| {
-            kept.restore(settings, k, &cloud.of(k)?, |restored| {
-                // Places behind the vertices are constant, and vertices that did not fit were not seen.
-                let count = restored.result.mesh()?.vertices().len();
-                let mut bar = vertices_bar.of(k).to_vec();
-                bar.resize(count, [T::zero(); 3]);
-                let cotangent = Cotangent {
-                    vertices: Some(&bar),
-                    ..Cotangent::default()
-                };
-                out.fill(k, restored.pull(&cotangent)?)
-            })
+        let saved = call.saved()?;
+        let mut vertices_bar = call.vectors("the cotangent of the vertices")?.to_vec();
+        let normals = call.normals()?;
+        let out = call.cloud_outputs(normals.is_some())?;
+        call.restore(&cloud(points, normals)?, &saved, |restored| {
+            // Places behind the vertices are constant; vertices that did not fit were not returned.
+            let count = restored.result.mesh()?.vertices().len();
+            vertices_bar.resize(count, [T::zero(); 3]);
+            out.fill(restored.pullback(&Cotangent {
+                vertices: Some(&vertices_bar),
+                ..Cotangent::default()
+            })?)
         })
     }
 }

@@ -1,18 +1,15 @@
 //! Custom calls for XLA, which is how `isograd.jax` gets into compiled programs, without any C++.
 //!
-//! A *target* is a pure function on arrays. XLA calls it through [`api`]; where XLA can't, JAX calls back into
-//! Python, which calls the same function by [`call_target`].
+//! A *target* is a pure function on arrays. XLA calls it through [`api`]; PyTorch, and JAX where XLA can't, call it from
+//! Python by [`call_target`].
 
 mod api;
 mod buffers;
 mod common;
 mod extend;
-mod handlers;
+mod field;
 mod mesh;
 mod query;
-
-use std::any::Any;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
@@ -20,7 +17,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::backend::Failure;
-use buffers::{Call, Data, DataMut, Input, Output};
+use crate::background;
+use buffers::{Array, Batch, Call, Data, DataMut};
 use common::Float;
 
 /// A pure function on arrays.
@@ -28,29 +26,29 @@ trait Target {
     /// Its name in compiled programs.
     const NAME: &'static str;
 
-    /// The function, for one number type.
+    /// The function of one cloud, in one number type.
     ///
     /// # Errors
-    /// What the arrays, the settings or a stage say.
+    /// Errors of the arrays, the settings and the stages.
     fn run<T: Float>(call: Call<'_>) -> Result<(), Failure>;
 
-    /// The same, for that of the first input.
+    /// The function of a batch, in the number type of its first input.
     ///
     /// # Errors
     /// As [`Self::run`].
-    fn call(call: Call<'_>) -> Result<(), Failure> {
-        match call.is_double() {
-            true => Self::run::<f64>(call),
-            false => Self::run::<f32>(call),
+    fn run_batch(batch: Batch<'_>) -> Result<(), Failure> {
+        match batch.is_double() {
+            true => batch.for_each(Self::run::<f64>),
+            false => batch.for_each(Self::run::<f32>),
         }
     }
 }
 
-/// A target in the two ways in which it is called.
+/// A target: its function for XLA and its function for Python.
 struct Entry {
     name: &'static str,
     handler: api::Handler,
-    call: fn(Call<'_>) -> Result<(), Failure>,
+    call: fn(Batch<'_>) -> Result<(), Failure>,
 }
 
 impl Entry {
@@ -58,14 +56,14 @@ impl Entry {
         Self {
             name: W::NAME,
             handler: api::handler::<W>,
-            call: W::call,
+            call: W::run_batch,
         }
     }
 }
 
 const TARGETS: &[Entry] = &[
-    Entry::of::<handlers::Forward>(),
-    Entry::of::<handlers::Pullback>(),
+    Entry::of::<field::Forward>(),
+    Entry::of::<field::Pullback>(),
     Entry::of::<query::Forward>(),
     Entry::of::<query::Pullback>(),
     Entry::of::<mesh::Forward>(),
@@ -96,99 +94,89 @@ pub fn call_target(
     settings: &str,
     band: Option<f64>,
 ) -> PyResult<()> {
+    background::check_process()?;
     let target = TARGETS.iter().find(|target| target.name == name);
     let target = target.ok_or_else(|| PyValueError::new_err(format!("no target '{name}'")))?;
-    let inputs = inputs.iter().map(Readable::of);
+    let inputs = inputs.iter().map(Readable::new);
     let inputs = inputs.collect::<PyResult<Vec<_>>>()?;
-    let outputs = outputs.iter().map(Writable::of);
+    let outputs = outputs.iter().map(Writable::new);
     let mut outputs = outputs.collect::<PyResult<Vec<_>>>()?;
-    let inputs = inputs.iter().map(Readable::input);
-    let inputs = inputs.collect::<PyResult<Vec<_>>>()?;
-    let outputs = outputs.iter_mut().map(Writable::output);
-    let outputs = outputs.collect::<PyResult<Vec<_>>>()?;
-    let result = py.detach(|| guard(|| (target.call)(Call::new(settings, band, inputs, outputs))));
+    let batch = Batch {
+        settings,
+        band,
+        inputs: inputs.iter().map(Readable::array).collect::<PyResult<_>>()?,
+        outputs: outputs.iter_mut().map(Writable::array).collect::<PyResult<_>>()?,
+    };
+    let result = py.detach(|| background::guard(|| (target.call)(batch)));
     Ok(result.map_err(PyRuntimeError::new_err)??)
 }
 
-/// What `work` gives, or what a panic in it said.
-fn guard<R>(work: impl FnOnce() -> R) -> Result<R, String> {
-    catch_unwind(AssertUnwindSafe(work)).map_err(|panic: Box<dyn Any + Send>| {
-        let text = panic.downcast_ref::<&str>().map(|s| s.to_string());
-        let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
-        let text = text.unwrap_or_default();
-        format!("a defect of isograd, please report it: {text}")
-    })
-}
-
+/// A NumPy array as an input.
 enum Readable<'py> {
     F32(PyReadonlyArrayDyn<'py, f32>),
     F64(PyReadonlyArrayDyn<'py, f64>),
     U32(PyReadonlyArrayDyn<'py, u32>),
 }
 
-impl<'py> Readable<'py> {
-    fn of(array: &Bound<'py, PyAny>) -> PyResult<Self> {
-        if let Ok(array) = array.extract() {
-            Ok(Self::F32(array))
-        } else if let Ok(array) = array.extract() {
-            Ok(Self::F64(array))
-        } else {
-            array.extract().map(Self::U32).map_err(|_| refused())
-        }
-    }
-
-    fn input(&self) -> PyResult<Input<'_>> {
-        macro_rules! input {
-            ($array:expr, $variant:ident) => {
-                Input {
-                    dims: $array.as_array().shape().to_vec(),
-                    data: Data::$variant($array.as_slice()?),
-                }
-            };
-        }
-        Ok(match self {
-            Self::F32(array) => input!(array, F32),
-            Self::F64(array) => input!(array, F64),
-            Self::U32(array) => input!(array, U32),
-        })
-    }
-}
-
+/// A NumPy array as an output.
 enum Writable<'py> {
     F32(PyReadwriteArrayDyn<'py, f32>),
     F64(PyReadwriteArrayDyn<'py, f64>),
     U32(PyReadwriteArrayDyn<'py, u32>),
 }
 
+macro_rules! array {
+    ($enum:ident, $data:ident, $array:expr, $slice:ident) => {
+        Ok(match $array {
+            $enum::F32(array) => Array {
+                dims: array.as_array().shape().to_vec(),
+                data: $data::F32(array.$slice()?),
+            },
+            $enum::F64(array) => Array {
+                dims: array.as_array().shape().to_vec(),
+                data: $data::F64(array.$slice()?),
+            },
+            $enum::U32(array) => Array {
+                dims: array.as_array().shape().to_vec(),
+                data: $data::U32(array.$slice()?),
+            },
+        })
+    };
+}
+
+impl<'py> Readable<'py> {
+    fn new(array: &Bound<'py, PyAny>) -> PyResult<Self> {
+        if let Ok(array) = array.extract() {
+            Ok(Self::F32(array))
+        } else if let Ok(array) = array.extract() {
+            Ok(Self::F64(array))
+        } else {
+            array.extract().map(Self::U32).map_err(|_| wrong_type())
+        }
+    }
+
+    fn array(&self) -> PyResult<Array<Data<'_>>> {
+        array!(Self, Data, self, as_slice)
+    }
+}
+
 impl<'py> Writable<'py> {
-    fn of(array: &Bound<'py, PyAny>) -> PyResult<Self> {
+    fn new(array: &Bound<'py, PyAny>) -> PyResult<Self> {
         if let Ok(array) = array.cast::<PyArrayDyn<f32>>() {
             Ok(Self::F32(array.try_readwrite()?))
         } else if let Ok(array) = array.cast::<PyArrayDyn<f64>>() {
             Ok(Self::F64(array.try_readwrite()?))
         } else {
             let array = array.cast::<PyArrayDyn<u32>>();
-            Ok(Self::U32(array.map_err(|_| refused())?.try_readwrite()?))
+            Ok(Self::U32(array.map_err(|_| wrong_type())?.try_readwrite()?))
         }
     }
 
-    fn output(&mut self) -> PyResult<Output<'_>> {
-        macro_rules! output {
-            ($array:expr, $variant:ident) => {
-                Output {
-                    dims: $array.as_array().shape().to_vec(),
-                    data: DataMut::$variant($array.as_slice_mut()?),
-                }
-            };
-        }
-        Ok(match self {
-            Self::F32(array) => output!(array, F32),
-            Self::F64(array) => output!(array, F64),
-            Self::U32(array) => output!(array, U32),
-        })
+    fn array(&mut self) -> PyResult<Array<DataMut<'_>>> {
+        array!(Self, DataMut, self, as_slice_mut)
     }
 }
 
-fn refused() -> PyErr {
+fn wrong_type() -> PyErr {
     PyTypeError::new_err("an array is not of float32, float64 or uint32")
 }

@@ -1,15 +1,14 @@
-//! Signed distance at any points to the surface of a cloud, and its pullback.
+//! Signed distance from any points to the surface of a cloud, and its pullback.
 
 use isograd::Cotangent;
 use isograd::distance::{Hit, Query};
 
 use super::Target;
-use super::buffers::{Batch, BatchMut, Call};
-use super::common::{Cloud, CloudBar, Float, Keep, Kept, with_result};
+use super::buffers::Call;
+use super::common::{Float, cloud, copy};
 use crate::backend::Failure;
-use crate::saved;
 
-/// Points, queries, perhaps normals → distances, alone or with what the pullback needs.
+/// Inputs: points, queries, optionally normals. Outputs: distances, alone or with what the pullback needs.
 pub struct Forward;
 
 impl Target for Forward {
@@ -18,33 +17,28 @@ impl Target for Forward {
     fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {
         let points = call.vectors::<T>("the points")?;
         let queries = call.vectors::<T>("the queries")?;
-        let given = call.given()?;
-        let mut distance = call.output::<T>("the distances", 1)?;
-        let mut keep = match call.outputs() {
+        let cloud = cloud(points, call.normals()?)?;
+        let distance = call.output::<T>("the distances", 1)?;
+        let saved = match call.outputs_left() {
             0 => None,
-            _ => Some((KeepHits::<T>::take(&mut call)?, Keep::<T>::take(&mut call)?)),
+            _ => Some((hit_outputs(&mut call)?, call.saved_outputs()?)),
         };
-        let (settings, cloud) = (call.settings, Cloud { points, given });
-        call.for_each(|k| {
-            with_result(settings, &cloud.of(k)?, |result| {
-                let surface = Query::new(result.mesh()?.clone()).map_err(|e| e.to_string())?;
-                let hits = surface.query(queries.of(k), Some(result.sdf()?));
-                let distances: Vec<T> = hits.iter().map(|hit| hit.distance).collect();
-                saved::copy("the distances", &distances, distance.of(k))?;
-                match &mut keep {
-                    None => Ok(()),
-                    Some((of_hits, of_cloud)) => {
-                        of_hits.fill(k, &hits)?;
-                        of_cloud.fill(k, result)
-                    }
-                }
-            })
+        call.reconstruct(&cloud, |result| {
+            let surface = Query::new(result.mesh()?.clone()).map_err(|e| e.to_string())?;
+            let hits = surface.query(queries, Some(result.sdf()?));
+            let distances: Vec<T> = hits.iter().map(|hit| hit.distance).collect();
+            copy("the distances", &distances, distance)?;
+            let Some((hit_outputs, saved)) = saved else {
+                return Ok(());
+            };
+            hit_outputs.fill(&hits)?;
+            saved.fill(result)
         })
     }
 }
 
-/// Points, queries, what the forward map kept, cotangent of the distances, perhaps normals → cotangents of
-/// queries, points and normals.
+/// Inputs: points, queries, what the forward map saved, cotangent of the distances, optionally normals. Outputs:
+/// cotangents of queries, points and normals.
 pub struct Pullback;
 
 impl Target for Pullback {
@@ -52,95 +46,75 @@ impl Target for Pullback {
 
     fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {
         let points = call.vectors::<T>("the points")?;
-        let queries = call.vectors::<T>("the queries")?;
-        let hits = KeptHits::<T>::take(&mut call)?;
-        let kept = Kept::<T>::take(&mut call)?;
-        let distance_bar = call.input::<T>("the cotangent of the distances", 1)?;
-        let given = call.given()?;
-        let mut queries_out = call.vectors_out("the cotangent of the queries")?;
-        let mut out = CloudBar::<T>::take(&mut call, given.is_some())?;
-        let (settings, cloud) = (call.settings, Cloud { points, given });
-        call.for_each(|k| {
-            kept.restore(settings, k, &cloud.of(k)?, |restored| {
-                let surface = Query::new(restored.result.mesh()?.clone());
-                let (mut queries_bar, mut vertices_bar) = (Vec::new(), Vec::new());
-                let pulled = surface.map_err(|e| e.to_string())?.pullback(
-                    queries.of(k),
-                    &hits.of(k)?,
-                    distance_bar.of(k),
-                    None,
-                    &mut queries_bar,
-                    &mut vertices_bar,
-                );
-                pulled.map_err(|e| e.to_string())?;
-                let what = "the queries' cotangent";
-                saved::copy(what, &queries_bar, queries_out.of(k))?;
-                let cotangent = Cotangent {
-                    vertices: Some(&vertices_bar),
-                    ..Cotangent::default()
-                };
-                out.fill(k, restored.pull(&cotangent)?)
-            })
+        let queries = call.vectors("the queries")?;
+        let hits = saved_hits(&mut call)?;
+        let saved = call.saved()?;
+        let distance_bar = call.input("the cotangent of the distances", 1)?;
+        let normals = call.normals()?;
+        let queries_out = call.vectors_out("the cotangent of the queries")?;
+        let out = call.cloud_outputs(normals.is_some())?;
+        call.restore(&cloud(points, normals)?, &saved, |restored| {
+            let surface = Query::new(restored.result.mesh()?.clone());
+            let (mut queries_bar, mut vertices_bar) = (Vec::new(), Vec::new());
+            let pulled = surface.map_err(|e| e.to_string())?.pullback(
+                queries,
+                &hits,
+                distance_bar,
+                None,
+                &mut queries_bar,
+                &mut vertices_bar,
+            );
+            pulled.map_err(|e| e.to_string())?;
+            copy("the queries' cotangent", &queries_bar, queries_out)?;
+            out.fill(restored.pullback(&Cotangent {
+                vertices: Some(&vertices_bar),
+                ..Cotangent::default()
+            })?)
         })
     }
 }
 
-/// Where the hits are kept, as far as the pullback of a distance looks at them.
-struct KeepHits<'a, T> {
-    gradient: BatchMut<'a, [T; 3]>,
-    triangle: BatchMut<'a, u32>,
-    barycentric: BatchMut<'a, [T; 3]>,
+/// Outputs for the parts of the hits that the pullback of a distance needs.
+struct HitOutputs<'a, T> {
+    gradient: &'a mut [[T; 3]],
+    triangle: &'a mut [u32],
+    barycentric: &'a mut [[T; 3]],
 }
 
-impl<'a, T: Float> KeepHits<'a, T> {
-    fn take(call: &mut Call<'a>) -> Result<Self, Failure> {
-        Ok(Self {
-            gradient: call.vectors_out("the gradients")?,
-            triangle: call.output("the triangles", 1)?,
-            barycentric: call.vectors_out("the barycentric weights")?,
-        })
-    }
+fn hit_outputs<'a, T: Float>(call: &mut Call<'a>) -> Result<HitOutputs<'a, T>, Failure> {
+    Ok(HitOutputs {
+        gradient: call.vectors_out("the gradients")?,
+        triangle: call.output("the triangles", 1)?,
+        barycentric: call.vectors_out("the barycentric weights")?,
+    })
+}
 
-    fn fill(&mut self, k: usize, hits: &[Hit<T>]) -> Result<(), Failure> {
+impl<T: Float> HitOutputs<'_, T> {
+    fn fill(self, hits: &[Hit<T>]) -> Result<(), Failure> {
         let gradient: Vec<_> = hits.iter().map(|hit| hit.gradient).collect();
         let triangle: Vec<_> = hits.iter().map(|hit| hit.triangle).collect();
         let barycentric: Vec<_> = hits.iter().map(|hit| hit.barycentric).collect();
-        saved::copy("the gradients", &gradient, self.gradient.of(k))?;
-        saved::copy("the triangles", &triangle, self.triangle.of(k))?;
-        let what = "the barycentric weights";
-        saved::copy(what, &barycentric, self.barycentric.of(k))
+        copy("the gradients", &gradient, self.gradient)?;
+        copy("the triangles", &triangle, self.triangle)?;
+        copy("the barycentric weights", &barycentric, self.barycentric)
     }
 }
 
-struct KeptHits<'a, T> {
-    gradient: Batch<'a, [T; 3]>,
-    triangle: Batch<'a, u32>,
-    barycentric: Batch<'a, [T; 3]>,
-}
-
-impl<'a, T: Float> KeptHits<'a, T> {
-    fn take(call: &mut Call<'a>) -> Result<Self, Failure> {
-        Ok(Self {
-            gradient: call.vectors("the gradients")?,
-            triangle: call.input("the triangles", 1)?,
-            barycentric: call.vectors("the barycentric weights")?,
-        })
+/// The hits, as [`HitOutputs::fill`] wrote them.
+fn saved_hits<T: Float>(call: &mut Call<'_>) -> Result<Vec<Hit<T>>, Failure> {
+    let gradient = call.vectors("the gradients")?;
+    let triangle = call.input("the triangles", 1)?;
+    let barycentric = call.vectors("the barycentric weights")?;
+    if gradient.len() != triangle.len() || barycentric.len() != triangle.len() {
+        return Err("the saved hits differ in number".into());
     }
-
-    fn of(&self, k: usize) -> Result<Vec<Hit<T>>, Failure> {
-        let triangle = self.triangle.of(k);
-        let (gradient, barycentric) = (self.gradient.of(k), self.barycentric.of(k));
-        if gradient.len() != triangle.len() || barycentric.len() != triangle.len() {
-            return Err("the kept hits are not of one query".into());
-        }
-        let hit = |i: usize| Hit {
-            // Only the cotangent of the closest point would need these two.
-            distance: T::nan(),
-            point: [T::nan(); 3],
-            gradient: gradient[i],
-            triangle: triangle[i],
-            barycentric: barycentric[i],
-        };
-        Ok((0..triangle.len()).map(hit).collect())
-    }
+    let hit = |i: usize| Hit {
+        // Only the cotangent of the closest point would need these two.
+        distance: T::nan(),
+        point: [T::nan(); 3],
+        gradient: gradient[i],
+        triangle: triangle[i],
+        barycentric: barycentric[i],
+    };
+    Ok((0..triangle.len()).map(hit).collect())
 }

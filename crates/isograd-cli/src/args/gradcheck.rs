@@ -12,22 +12,22 @@ use super::{GridArgs, MethodArgs, Running, STATUS, positive};
 pub struct Gradcheck {
     /// The cloud, in any format that `reconstruct` reads
     pub cloud: PathBuf,
-    /// The same numbers: .json
+    /// The table as numbers: .json
     #[arg(long, value_name = "FILE", help_heading = "Outputs")]
     pub report: Option<PathBuf>,
 
-    /// Where to compute.
+    /// Arguments of the grid.
     #[command(flatten)]
     pub grid: GridArgs,
-    /// How to compute.
+    /// Arguments of the method.
     #[command(flatten)]
     pub method: MethodArgs,
 
-    /// Motion of the large step, either way, in cells
+    /// Displacement of the large step in both directions, in cells
     #[arg(long, value_name = "CELLS", default_value = "0.5", value_parser = positive,
         allow_negative_numbers = true, help_heading = "Comparison")]
     pub step: f64,
-    /// Fail where the pullback is off from the small step by more than this share
+    /// Fail if the relative error of the pullback against the small step exceeds this
     #[arg(long, value_name = "SHARE", value_parser = positive, help_heading = "Comparison")]
     pub tolerance: Option<f64>,
     /// Seed of the random directions
@@ -39,7 +39,7 @@ pub struct Gradcheck {
     )]
     pub seed: u64,
 
-    /// How to run.
+    /// Arguments of the run.
     #[command(flatten)]
     pub running: Running,
 }

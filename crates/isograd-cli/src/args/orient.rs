@@ -1,92 +1,75 @@
-//! Arguments of every command that finds normals, and of `orient`, which does nothing else.
+//! Arguments of every command that estimates normals, and of `orient`.
 
 use std::path::PathBuf;
 
 use clap::Args;
 use isograd::neighbors::Radius;
-use isograd::orient::{self, ParityOptions};
+use isograd::orient::{Method, ParityOptions};
 use isograd::{PointCloud, PointCloudError, Real, Sensors};
 
-use super::{AutoOr, Orient, Running, STATUS, finite, positive};
+use super::{Running, STATUS, finite, positive};
 use crate::error::Error;
 
-/// The normals and their sides.
+/// Arguments of the normals.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Method")]
 pub struct OrientArgs {
     /// Neighborhood radius of the normals, in the cloud's unit
-    #[arg(
-        long,
-        value_name = "R|auto",
-        default_value = "auto",
-        help_heading = "Method"
-    )]
-    pub radius: AutoOr,
-    /// How the side of the surface is found
-    #[arg(long, default_value = "auto", help_heading = "Method")]
-    pub orient: Orient,
-    /// A place that the points were seen from, in their unit; more than one where it is not known which saw a
-    /// point. Instead of the columns sensor_x, sensor_y and sensor_z of the cloud
-    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true,
-        help_heading = "Method")]
+    #[arg(long, value_name = "R|auto", default_value = "auto")]
+    pub radius: Radius,
+    /// Method that finds the side of each normal: auto (from enclosure and neighbors), parity (count of crossings, as
+    /// in the paper), given (the cloud's own normals), signs (estimated directions on the side of the cloud's own
+    /// normals), sensors (estimated directions on the side of the sensors) or previous (auto, for a single cloud)
+    #[arg(long, value_name = "METHOD", default_value = "auto")]
+    pub orient: Method,
+    /// Position of a sensor, in the cloud's unit; more than one where it is unknown which one saw a point. Replaces the
+    /// columns sensor_x, sensor_y and sensor_z of the cloud
+    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
     pub sensor: Vec<[f64; 3]>,
     /// Detection radius of --orient parity, in half the largest distance to a nearest point [default: 2.5]
-    #[arg(long, value_name = "FACTOR", value_parser = positive, help_heading = "Method")]
+    #[arg(long, value_name = "FACTOR", value_parser = positive)]
     pub parity_gamma: Option<f64>,
-    /// Points in a row at the beginning of a ray that --orient parity still takes for one [default: 2]
-    #[arg(long, value_name = "N", help_heading = "Method")]
+    /// Points in a row at the beginning of a ray that --orient parity still counts as one [default: 2]
+    #[arg(long, value_name = "N")]
     pub parity_tolerance: Option<u32>,
 }
 
 impl OrientArgs {
-    /// Whether all that is given is used.
+    /// Checks that every argument is used.
     ///
     /// # Errors
-    /// [`Error::Usage`] where not.
+    /// [`Error::Usage`] for an argument without effect.
     pub fn check(&self) -> Result<(), Error> {
-        let unused = |what: &str, needed: &str| {
-            let message = format!("{what} is not used without --orient {needed}");
+        let unused = |name: &str, needed: &str| {
+            let message = format!("{name} is not used without --orient {needed}");
             Err(Error::Usage(message))
         };
-        if !self.sensor.is_empty() && self.orient != Orient::Sensors {
+        if !self.sensor.is_empty() && self.orient != Method::Sensors {
             return unused("--sensor", "sensors");
         }
         let has_parity = self.parity_gamma.is_some() || self.parity_tolerance.is_some();
-        if has_parity && self.orient != Orient::Parity {
+        if has_parity && !matches!(self.orient, Method::Parity(_)) {
             return unused("--parity-gamma or --parity-tolerance", "parity");
         }
         Ok(())
     }
 
-    /// The neighborhood radius.
-    pub fn radius(&self) -> Radius {
-        match self.radius {
-            AutoOr::Auto => Radius::Auto,
-            AutoOr::Value(r) => Radius::Fixed(r),
-        }
+    /// The method, with the options of parity.
+    pub fn method(&self) -> Method {
+        let Method::Parity(default) = self.orient else {
+            return self.orient;
+        };
+        Method::Parity(ParityOptions {
+            gamma: self.parity_gamma.unwrap_or(default.gamma),
+            tolerance: self.parity_tolerance.map_or(default.tolerance, |n| n as usize),
+            ..default
+        })
     }
 
-    /// How the signs are chosen.
-    pub fn method(&self) -> orient::Method {
-        let default = ParityOptions::default();
-        match self.orient {
-            Orient::Auto => orient::Method::Auto,
-            Orient::Parity => orient::Method::Parity(ParityOptions {
-                gamma: self.parity_gamma.unwrap_or(default.gamma),
-                tolerance: self
-                    .parity_tolerance
-                    .map_or(default.tolerance, |n| n as usize),
-                ..default
-            }),
-            Orient::Given => orient::Method::Given,
-            Orient::Signs => orient::Method::Signs,
-            Orient::Sensors => orient::Method::Sensors,
-        }
-    }
-
-    /// The cloud with the sensors of the command line in place of its own, if there are any.
+    /// The cloud, with the sensors of the command line in place of its own where there are any.
     ///
     /// # Errors
-    /// A place beyond the range of `T`.
+    /// A position beyond the range of `T`.
     pub fn with_sensors<T: Real>(
         &self,
         cloud: PointCloud<T>,

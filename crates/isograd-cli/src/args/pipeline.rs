@@ -1,13 +1,15 @@
-//! Arguments of every command that runs the pipeline.
+//! Arguments of every command that reconstructs.
 
-use clap::Args;
-use isograd::distance::lattice::Band;
+use clap::{ArgAction, Args};
+use isograd::distance::Band;
+use isograd::isosurface::Level;
 use isograd::poisson::Smoothing;
-use isograd::{Grid, GridError, Options, PointCloud, Real, Resolution, isosurface, splat};
+use isograd::splat::Weights;
+use isograd::{Grid, GridError, Options, PointCloud, Real, Resolution};
 
-use super::{AutoOrZero, FullOr, Level, OrientArgs, Splat, Switch, finite, not_negative, positive};
+use super::{OrientArgs, finite, not_negative, positive};
 
-/// The grid.
+/// Arguments of the grid.
 #[derive(Debug, Args)]
 pub struct GridArgs {
     /// Cells on the longest side [default: 128]
@@ -17,55 +19,46 @@ pub struct GridArgs {
     /// Cell size, in the cloud's unit
     #[arg(long, value_name = "H", value_parser = positive, help_heading = "Grid")]
     pub spacing: Option<f64>,
-    /// Room on every side, as a fraction of the longest side [default: 0.1]
+    /// Padding on every side, as a fraction of the longest side [default: 0.1]
     #[arg(long, value_name = "FRACTION", value_parser = not_negative, help_heading = "Grid")]
     pub padding: Option<f64>,
-    /// The box to compute in, instead of a fitted one
+    /// Corners of the grid, instead of the padded bounds of the cloud
     #[arg(long, num_args = 6, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"],
         allow_negative_numbers = true, value_parser = finite, conflicts_with = "padding",
         help_heading = "Grid")]
     pub bounds: Option<Vec<f64>>,
 }
 
-/// The method.
+/// Arguments of the method: the fields of [`Options`].
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Method")]
 pub struct MethodArgs {
-    /// The normals.
+    /// Arguments of the normals.
     #[command(flatten)]
     pub normals: OrientArgs,
-    /// How a sample is spread over the cells round it
-    #[arg(long, default_value = "bspline", help_heading = "Method")]
-    pub splat: Splat,
-    /// Whether a sample counts by the area that it stands for
-    #[arg(long, default_value = "on", help_heading = "Method")]
-    pub area: Switch,
+    /// Weights that spread a sample over the cells around it: bspline (quadratic B-spline) or paper
+    #[arg(long, value_name = "WEIGHTS", default_value = "bspline")]
+    pub splat: Weights,
+    /// Whether a sample is weighted by the area that it stands for: on or off
+    #[arg(long, value_name = "on|off", default_value = "on", action = ArgAction::Set, value_parser = switch)]
+    pub area: bool,
     /// Width of the smoothing of the indicator, in cells; auto: 0.8 of the distance between samples
-    #[arg(
-        long,
-        value_name = "CELLS|auto",
-        default_value = "auto",
-        help_heading = "Method"
-    )]
-    pub smooth: AutoOrZero,
-    /// How strongly the indicator is drawn to one value at the samples; 1 to 4 are usual, 0 is off
-    #[arg(long, value_name = "ALPHA", default_value = "0", value_parser = not_negative,
-        help_heading = "Method")]
+    #[arg(long, value_name = "CELLS|auto", default_value = "auto")]
+    pub smoothing: Smoothing,
+    /// Strength of the pull of the indicator to one value at the samples; 1 to 4 are usual, 0 is off
+    #[arg(long, value_name = "ALPHA", default_value = "0", value_parser = not_negative)]
     pub screening: f64,
-    /// Which value of the indicator the surface is at: that at the samples near by, or their mean
-    #[arg(long, default_value = "local", help_heading = "Method")]
+    /// Value of the indicator at the surface: local (that at the samples nearby), thin (like local, and parts thinner
+    /// than a cell are made a cell thick; gradients oscillate there) or mean (the mean at all samples)
+    #[arg(long, value_name = "LEVEL", default_value = "local")]
     pub level: Level,
-    /// How far from the surface φ is computed, in the cloud's unit
-    #[arg(
-        long,
-        value_name = "H|full",
-        default_value = "full",
-        help_heading = "Method"
-    )]
-    pub band: FullOr,
+    /// Distance from the surface up to which φ is computed, in the cloud's unit
+    #[arg(long, value_name = "H|full", default_value = "full")]
+    pub band: Band,
 }
 
 impl GridArgs {
-    /// The grid that is asked for, round `cloud` where no bounds are given.
+    /// The grid: between `--bounds`, or around `cloud`.
     ///
     /// # Errors
     /// See [`GridError`].
@@ -88,26 +81,21 @@ impl MethodArgs {
     /// The options of the pipeline.
     pub fn options(&self) -> Options {
         Options::default()
-            .radius(self.normals.radius())
+            .radius(self.normals.radius)
             .orient(self.normals.method())
-            .splat(match self.splat {
-                Splat::Bspline => splat::Weights::BSpline,
-                Splat::Paper => splat::Weights::Paper,
-            })
-            .area(self.area == Switch::On)
-            .smoothing(match self.smooth {
-                AutoOrZero::Auto => Smoothing::Auto,
-                AutoOrZero::Value(cells) => Smoothing::Cells(cells),
-            })
+            .splat(self.splat)
+            .area(self.area)
+            .smoothing(self.smoothing)
             .screening(self.screening)
-            .level(match self.level {
-                Level::Local => isosurface::Level::Local,
-                Level::Thin => isosurface::Level::Thin,
-                Level::Mean => isosurface::Level::Mean,
-            })
-            .band(match self.band {
-                FullOr::Full => Band::Full,
-                FullOr::Value(h) => Band::Within(h),
-            })
+            .level(self.level)
+            .band(self.band)
+    }
+}
+
+fn switch(text: &str) -> Result<bool, String> {
+    match text {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err("give on or off".into()),
     }
 }

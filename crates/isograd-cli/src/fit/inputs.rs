@@ -1,20 +1,20 @@
-//! From the command line to a target, variables and options.
+//! Target, variables and options of a fit from the command line.
 
 use isograd::{Grid, GridError, PointCloud};
 use isograd_fit::{
-    Adam, Decay, Lbfgs, Optimizer, Options, Points, Region, ShapeParameters, Start, Target,
+    Decay, Optimizer, Options, Points, ShapeParameters, Start, Target,
     TargetError, Variables,
 };
 use isograd_io::{Content, Geometry};
 use isograd_shapes::{Sampling, Shape};
 
-use crate::args::{self, FullOr, Method, TargetKind};
+use crate::args::{self, Method, TargetKind};
 use crate::error::Error;
 
-/// Samples that tell where a shape is.
-const SCOUTS: usize = 4000;
+/// Number of samples from which the bounds of a shape are estimated.
+const BOUNDS_SAMPLES: usize = 4000;
 
-/// All that a fit begins with.
+/// Inputs of a fit.
 pub struct Inputs {
     pub target: Target,
     pub variables: Variables,
@@ -37,34 +37,21 @@ impl Inputs {
 fn options(args: &args::Fit) -> Options {
     let steps = args.epochs as usize;
     let optimizer = match args.optimizer {
-        Method::Lbfgs => {
-            let default = Lbfgs::default();
-            Optimizer::Lbfgs(Lbfgs {
-                first_step: args.rate.unwrap_or(default.first_step),
-                ..default
-            })
-        }
-        Method::Adam => {
-            let default = Adam::default();
-            Optimizer::Adam(Adam {
-                rate: args.rate.unwrap_or(default.rate),
-                decay: match args.decay {
-                    args::Decay::Constant => Decay::Constant,
-                    args::Decay::Cosine => Decay::Cosine { steps },
-                    args::Decay::Exponential => Decay::Exponential {
-                        half_life: 0.1 * steps as f64,
-                    },
+        Method::Lbfgs => Optimizer::lbfgs(args.rate),
+        Method::Adam => Optimizer::adam(
+            args.rate,
+            match args.decay {
+                args::Decay::Constant => Decay::Constant,
+                args::Decay::Cosine => Decay::Cosine { steps },
+                args::Decay::Exponential => Decay::Exponential {
+                    half_life: 0.1 * steps as f64,
                 },
-                ..default
-            })
-        }
+            },
+        ),
     };
     Options {
         optimizer,
-        region: match args.band {
-            FullOr::Full => Region::Full,
-            FullOr::Value(cells) => Region::Band(cells),
-        },
+        band: args.band,
         epochs: steps,
         tolerance: args.tolerance,
         backend: args.backend,
@@ -82,7 +69,7 @@ fn variables(args: &args::Fit) -> Result<Variables, Error> {
         })?;
         let mut points = Points::new(cloud);
         if let Some(weight) = args.smoothness {
-            points.smoothness = weight.0;
+            points.smoothness = weight;
         }
         return Ok(Variables::Points(points));
     }
@@ -105,7 +92,7 @@ fn variables(args: &args::Fit) -> Result<Variables, Error> {
     }))
 }
 
-/// The names that `--only` stands for.
+/// The names that match `--only`.
 fn only(args: &args::Fit, shape: &Shape) -> Result<Option<Vec<String>>, Error> {
     if args.only.is_empty() {
         return Ok(None);
@@ -132,7 +119,7 @@ fn only(args: &args::Fit, shape: &Shape) -> Result<Option<Vec<String>>, Error> {
     Ok(Some(names))
 }
 
-/// Before anything of the size of the grid is made.
+/// Checks that the grid fits into memory, before anything of its size is allocated.
 fn check_memory(args: &args::Fit, grid: &Grid<f64>) -> Result<(), Error> {
     isograd::check_memory(grid).map_err(|source| Error::Reconstruct {
         file: args.target.display().to_string(),
@@ -191,7 +178,7 @@ fn has_grid(args: &args::Fit) -> bool {
     resolution.is_some() || spacing.is_some() || padding.is_some() || bounds.is_some()
 }
 
-/// The grid asked for, or one round the target and the start.
+/// The grid of the command line, by default around the target and the start.
 fn grid(args: &args::Fit, target: &Geometry, variables: &Variables) -> Result<Grid<f64>, Error> {
     let refused = |source: GridError| Error::Grid {
         file: args.target.display().to_string(),
@@ -202,8 +189,8 @@ fn grid(args: &args::Fit, target: &Geometry, variables: &Variables) -> Result<Gr
         Variables::Points(start) => points.extend(start.cloud.points()),
         Variables::Shape(parameters) => {
             let shape = parameters.started()?;
-            let scouts = shape.sample::<f64>(SCOUTS, &Sampling::default(), args.seed)?;
-            points.extend(scouts.cloud.points());
+            let samples = shape.sample::<f64>(BOUNDS_SAMPLES, &Sampling::default(), args.seed)?;
+            points.extend(samples.cloud.points());
         }
     }
     let all = PointCloud::new(points).map_err(|source| Error::Cloud {

@@ -1,7 +1,7 @@
 //! Descent: from a point with a value and a gradient to a lower one, a step at a time.
 //!
-//! Both methods keep all they know in a [`State`] that can be written and read: a run that was stopped and
-//! resumed takes the same steps, to the last bit, as one that was not.
+//! Both optimizers store their memory in a serializable [`State`]: a run that was stopped and resumed takes the same
+//! steps, to the last bit, as an uninterrupted one.
 //!
 //! # Why these are here
 //!
@@ -32,10 +32,10 @@ use serde::{Deserialize, Serialize};
 pub use adam::{Adam, Decay};
 pub use lbfgs::Lbfgs;
 
-/// How often a step is halved before a failing function ends the run.
+/// Number of times that a step is halved before a failing function ends the run.
 pub const HALVINGS: usize = 12;
 
-/// A method of descent and its options.
+/// An optimizer and its options.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Optimizer {
@@ -46,29 +46,50 @@ pub enum Optimizer {
     Adam(Adam),
 }
 
+impl Optimizer {
+    /// L-BFGS whose first step has the length `rate`, by default that of [`Lbfgs::default`].
+    pub fn lbfgs(rate: Option<f64>) -> Self {
+        let default = Lbfgs::default();
+        Self::Lbfgs(Lbfgs {
+            first_step: rate.unwrap_or(default.first_step),
+            ..default
+        })
+    }
+
+    /// Adam with this rate, by default that of [`Adam::default`].
+    pub fn adam(rate: Option<f64>, decay: Decay) -> Self {
+        let default = Adam::default();
+        Self::Adam(Adam {
+            rate: rate.unwrap_or(default.rate),
+            decay,
+            ..default
+        })
+    }
+}
+
 impl Default for Optimizer {
     fn default() -> Self {
         Self::Lbfgs(Lbfgs::default())
     }
 }
 
-/// A value, its gradient, and what else the function says of the point.
+/// Value and gradient of the function at a point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Evaluation<D> {
-    /// What is made small.
+    /// Value.
     pub value: f64,
-    /// Its gradient.
+    /// Gradient.
     pub gradient: Vec<f64>,
-    /// Anything to be kept with it.
+    /// Additional results of the function.
     pub detail: D,
 }
 
-/// Where the descent is, and what the method remembers.
+/// Current point, and memory of the optimizer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State<D> {
     /// The point.
     pub x: Vec<f64>,
-    /// The function there.
+    /// Value and gradient there.
     pub here: Evaluation<D>,
     memory: Memory,
 }
@@ -80,22 +101,22 @@ enum Memory {
     Adam(adam::Memory),
 }
 
-/// What a step came to.
+/// Result of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// The point moved.
     Moved,
-    /// No lower point was found along the direction of steepest descent: a minimum, as far as rounding and
-    /// the kinks of the function let one see.
+    /// No lower point was found along the direction of steepest descent: a minimum, up to rounding and the kinks of
+    /// the function.
     Stalled,
 }
 
-/// A function to be made small: the value and gradient at a point, or why there is none.
+/// The function to be minimized: value and gradient at a point, or an error.
 pub trait Function<D, E>: FnMut(&[f64]) -> Result<Evaluation<D>, E> {}
 impl<D, E, F: FnMut(&[f64]) -> Result<Evaluation<D>, E>> Function<D, E> for F {}
 
 impl<D: Clone> State<D> {
-    /// The start at `x`, where the function is `here`.
+    /// The start at `x`, where the function has the value `here`.
     pub fn new(optimizer: &Optimizer, x: Vec<f64>, here: Evaluation<D>) -> Self {
         let memory = match optimizer {
             Optimizer::Lbfgs(_) => Memory::Lbfgs(lbfgs::Memory::default()),
@@ -117,8 +138,8 @@ impl<D: Clone> State<D> {
     /// One step. Where the function has no value, or one that is not finite, the step is shortened.
     ///
     /// # Errors
-    /// What the function says, where however short a step ends in a point without a value; the state is then
-    /// as it was.
+    /// The error of the function where even the shortest step ends in a point without a value; the state is then
+    /// unchanged.
     pub fn step<E>(
         &mut self,
         optimizer: &Optimizer,
@@ -131,7 +152,7 @@ impl<D: Clone> State<D> {
             (Optimizer::Adam(options), Memory::Adam(memory)) => {
                 memory.step(options, &mut self.x, &mut self.here, function)
             }
-            // The memory of one method says nothing to the other: it begins anew.
+            // The memory of one optimizer is of no use to the other.
             _ => {
                 *self = Self::new(optimizer, self.x.clone(), self.here.clone());
                 self.step(optimizer, function)

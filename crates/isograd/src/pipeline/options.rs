@@ -7,7 +7,8 @@ use crate::{distance, isosurface, neighbors, orient, poisson, splat};
 macro_rules! options {
     ($($(#[$doc:meta])+ $field:ident: $type:ty = $default:expr,)+) => {
         /// Parameters of the reconstruction. `Options::default().screening(4.0)` changes one of them.
-        #[derive(Clone, Debug, PartialEq)]
+        #[derive(Clone, Debug, PartialEq, serde::Deserialize)]
+        #[serde(default, deny_unknown_fields)]
         #[non_exhaustive]
         pub struct Options {
             $($(#[$doc])+ pub $field: $type,)+
