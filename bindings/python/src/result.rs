@@ -296,10 +296,7 @@ fn extended<T: Number>(
             let known = attributes.iter().map(|a| a.name.clone()).collect();
             Failure::Value(extend::Error::Missing { name, known }.to_string())
         })?;
-        let (extension, residual) = kept
-            .result
-            .view()
-            .extend(&attribute, band)?;
+        let (extension, residual) = kept.result.view().extend(&attribute, band)?;
         Ok::<_, Failure>(Extended {
             attribute,
             extension,

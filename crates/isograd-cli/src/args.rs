@@ -277,7 +277,10 @@ mod tests {
             args.grid.bounds,
             Some(vec![-1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
         );
-        assert_eq!(args.method.normals.radius, isograd::neighbors::Radius::Fixed(0.2));
+        assert_eq!(
+            args.method.normals.radius,
+            isograd::neighbors::Radius::Fixed(0.2)
+        );
         let cli = parse("isograd orient a.ply -o b.ply --sensor -1,0,2e1 --sensor 3,-4,5");
         let Ok(Cli {
             command: Command::Orient(args),

@@ -115,7 +115,8 @@ impl Job<'_> {
         }
         progress.step("write");
         let begin = Instant::now();
-        let out = oriented(&cloud, &orientation.normals, &orientation.confidence).map_err(refused)?;
+        let out =
+            oriented(&cloud, &orientation.normals, &orientation.confidence).map_err(refused)?;
         isograd_io::write_cloud(&self.args.output, &out)?;
         progress.say(&format!("wrote {}", self.args.output.display()));
         if let Some(path) = &self.args.report {
@@ -161,5 +162,8 @@ fn doubtful(doubt: &Doubt) -> String {
         true => String::new(),
         false => format!(" ({})", reasons.join(", ")),
     };
-    format!("doubtful: {} of the points{reasons}", percent(doubt.share()))
+    format!(
+        "doubtful: {} of the points{reasons}",
+        percent(doubt.share())
+    )
 }

@@ -54,7 +54,10 @@ fn the_folder_gets_its_five_files_and_the_report_its_fields() {
     );
     assert_keys(&report["input"], "path points");
     assert_keys(&report["grid"], "shape origin spacing");
-    assert_keys(&report["normals"], "radius sample_spacing neighbours guarded");
+    assert_keys(
+        &report["normals"],
+        "radius sample_spacing neighbours guarded",
+    );
     assert_keys(&report["normals"]["neighbours"], "min median max");
     assert_keys(&report["orientation"], "method flipped confidence doubtful");
     assert_keys(&report["orientation"]["confidence"], "p05 median");

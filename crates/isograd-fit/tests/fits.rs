@@ -56,7 +56,11 @@ fn the_radius_of_a_sphere_is_found_with_both_methods_and_in_a_band() {
     });
     for (optimizer, band, epochs) in [
         (Optimizer::default(), Band::Full, 12),
-        (Optimizer::default(), Band::Within(3.0 * target.grid().spacing()), 12),
+        (
+            Optimizer::default(),
+            Band::Within(3.0 * target.grid().spacing()),
+            12,
+        ),
         (adam, Band::Full, 60),
     ] {
         let options = Options {

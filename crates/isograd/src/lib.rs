@@ -36,9 +36,9 @@ pub use data::{
     PointCloud, PointCloudError, Resolution, Sensors,
 };
 pub use pipeline::{
-    CloudCotangent, Cotangent, Error, ExtensionCotangent, Options, Orienter, ParseOptionError, PullbackError,
-    PullbackScratch, Reconstruction, Reconstructor, RestoreError, Saved, available_memory,
-    check_memory,
+    CloudCotangent, Cotangent, Error, ExtensionCotangent, Options, Orienter, ParseOptionError,
+    PullbackError, PullbackScratch, Reconstruction, Reconstructor, RestoreError, Saved,
+    available_memory, check_memory,
 };
 pub use real::Real;
 pub use report::{JsonReport, Report, Seconds, Stage, Warning};

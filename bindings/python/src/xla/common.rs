@@ -100,10 +100,7 @@ impl<'a, T: Number> Restored<'a, T> {
     ///
     /// # Errors
     /// See [`isograd::PullbackError`].
-    pub fn pullback(
-        self,
-        cotangent: &Cotangent<'_, T>,
-    ) -> Result<&'a CloudCotangent<T>, Failure> {
+    pub fn pullback(self, cotangent: &Cotangent<'_, T>) -> Result<&'a CloudCotangent<T>, Failure> {
         self.result
             .pullback_into(self.cloud, cotangent, self.scratch, self.bar)?;
         Ok(self.bar)

@@ -104,8 +104,14 @@ pub fn call_target(
     let batch = Batch {
         settings,
         band,
-        inputs: inputs.iter().map(Readable::array).collect::<PyResult<_>>()?,
-        outputs: outputs.iter_mut().map(Writable::array).collect::<PyResult<_>>()?,
+        inputs: inputs
+            .iter()
+            .map(Readable::array)
+            .collect::<PyResult<_>>()?,
+        outputs: outputs
+            .iter_mut()
+            .map(Writable::array)
+            .collect::<PyResult<_>>()?,
     };
     let result = py.detach(|| background::guard(|| (target.call)(batch)));
     Ok(result.map_err(PyRuntimeError::new_err)??)

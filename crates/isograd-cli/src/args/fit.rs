@@ -70,7 +70,12 @@ pub struct Fit {
     pub grid: GridArgs,
 
     /// Compare the fields up to this distance from the surface of the target, in the target's unit; auto: 8 cells
-    #[arg(long, value_name = "H|auto|full", default_value = "auto", help_heading = "Descent")]
+    #[arg(
+        long,
+        value_name = "H|auto|full",
+        default_value = "auto",
+        help_heading = "Descent"
+    )]
     pub band: Band,
     /// Optimizer
     #[arg(long, default_value = "lbfgs", help_heading = "Descent")]

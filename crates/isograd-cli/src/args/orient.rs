@@ -61,7 +61,9 @@ impl OrientArgs {
         };
         Method::Parity(ParityOptions {
             gamma: self.parity_gamma.unwrap_or(default.gamma),
-            tolerance: self.parity_tolerance.map_or(default.tolerance, |n| n as usize),
+            tolerance: self
+                .parity_tolerance
+                .map_or(default.tolerance, |n| n as usize),
             ..default
         })
     }

@@ -2,8 +2,7 @@
 
 use isograd::{Grid, GridError, PointCloud};
 use isograd_fit::{
-    Decay, Optimizer, Options, Points, ShapeParameters, Start, Target,
-    TargetError, Variables,
+    Decay, Optimizer, Options, Points, ShapeParameters, Start, Target, TargetError, Variables,
 };
 use isograd_io::{Content, Geometry};
 use isograd_shapes::{Sampling, Shape};

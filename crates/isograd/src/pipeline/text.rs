@@ -139,9 +139,15 @@ mod tests {
     #[test]
     fn an_invalid_option_is_an_error_that_names_it() {
         for (text, message) in [
-            (r#"{"radius": 0}"#, "radius is '0'; give a finite length above 0, or 'auto'"),
+            (
+                r#"{"radius": 0}"#,
+                "radius is '0'; give a finite length above 0, or 'auto'",
+            ),
             (r#"{"radius": "wide"}"#, "radius is 'wide'"),
-            (r#"{"smoothing": -1}"#, "smoothing is '-1'; give 0 or more cells"),
+            (
+                r#"{"smoothing": -1}"#,
+                "smoothing is '-1'; give 0 or more cells",
+            ),
             (r#"{"band": 1e999}"#, "number out of range"),
             (r#"{"level": "global"}"#, "give 'local', 'thin' or 'mean'"),
             (r#"{"smothing": 1}"#, "unknown field `smothing`"),

@@ -174,9 +174,7 @@ fn moments(spread: &Spread) -> Moments {
 fn seconds(report: &Report, stages: &[Stage]) -> Vec<(&'static str, f64)> {
     let stages = stages.iter();
     let stages = stages.map(|&stage| (stage.name(), report.seconds.of(stage)));
-    stages
-        .chain([("total", report.seconds.total())])
-        .collect()
+    stages.chain([("total", report.seconds.total())]).collect()
 }
 
 fn as_map<S: Serializer>(entries: &[(&'static str, f64)], to: S) -> Result<S::Ok, S::Error> {
