@@ -6,7 +6,7 @@
     >>> gradient = result.pullback(sdf=result.sdf).points   # of the loss Σ φ²/2
 
 φ is negative inside, in the unit of the points, at the centers of the cells; arrays are ``(nx, ny, nz)``, points
-``(N, 3)``; float32 stays float32. ``isograd.jax`` and ``isograd.torch`` are the same inside these libraries.
+``(N, 3)``; float32 stays float32. ``isograd.jax`` and ``isograd.torch`` are differentiable functions of these libraries.
 """
 
 from ._core import __version__

@@ -1,4 +1,4 @@
-"""Whatever a user passes, as arrays that the Rust side takes; never reinterpreted, never silently cut."""
+"""Conversion of arguments to the arrays of the extension module; nothing is reinterpreted or truncated silently."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ if TYPE_CHECKING:
 def floats(values: object, name: str, shape: tuple[int | None, ...], dtype: DTypeLike | None = None) -> np.ndarray:
     """A float32 or float64 array: C-contiguous, aligned, of the native byte order.
 
-    float32 and float64 stay what they are, float16 becomes float32, integers become float64.
+    float32 and float64 are unchanged, float16 becomes float32, integers become float64.
 
     Args:
-        values: anything that NumPy takes for an array.
-        name: for errors.
-        shape: what it must have; ``None`` for any length.
-        dtype: the type that it must have after that, such as the points'; ``None`` for either.
+        values: anything that NumPy converts to an array.
+        name: name in error messages.
+        shape: expected shape; ``None`` for any length.
+        dtype: type of the result, such as that of the points; ``None`` for either.
 
     Raises:
-        TypeError: for numbers that would lose something, and for what is no array of numbers.
-        ValueError: for another shape.
+        TypeError: numbers that would lose precision, or no array of numbers.
+        ValueError: another shape.
     """
     if isinstance(values, np.ma.MaskedArray):
         raise TypeError(f"{name} is a masked array; fill it or drop what is masked")
@@ -48,11 +48,11 @@ def floats(values: object, name: str, shape: tuple[int | None, ...], dtype: DTyp
 
 
 def indices(values: object, name: str, shape: tuple[int | None, ...]) -> np.ndarray:
-    """A uint32 array of the same kind, from whole numbers that fit.
+    """A uint32 array, C-contiguous and aligned, from whole numbers.
 
     Raises:
-        TypeError: for what is no array of whole numbers.
-        ValueError: for another shape, or numbers below 0 or beyond 2³² − 1.
+        TypeError: no array of whole numbers.
+        ValueError: another shape, or numbers outside 0 to 2³² − 1.
     """
     array = np.asarray(values)
     if array.dtype.kind not in "iu" and array.size:
@@ -79,24 +79,24 @@ def known(
     return normals, sensors
 
 
-# Numbers of DLPack: the memory of the CPU, and what it shares with devices of CUDA and ROCm.
-_OF_CPU = {1, 3, 11, 13}
+# DLPack device types with CPU memory: CPU, and memory shared with CUDA and ROCm devices.
+_CPU_DEVICES = {1, 3, 11, 13}
 
 
 def _check_memory(values: object, name: str) -> None:
-    """Whether an array that says where it is, is where the CPU can read it.
+    """Checks that an array with a known device is in memory that the CPU can read.
 
     Raises:
-        TypeError: where not: a copy is for the caller to make.
+        TypeError: it is in the memory of a device.
     """
     where = getattr(values, "__dlpack_device__", None)
     if where is None or isinstance(values, np.ndarray):
         return
     try:
         kind = int(where()[0])
-    except Exception:  # tracers, sharded arrays, and what else has the method but no one place
+    except Exception:  # tracers, sharded arrays and others without a single device
         return
-    if kind not in _OF_CPU:
+    if kind not in _CPU_DEVICES:
         raise TypeError(
             f"{name} is in the memory of a device, and this function takes arrays of the CPU: copy it, "
             "with .cpu() of PyTorch, numpy.asarray of JAX, .get() of CuPy"

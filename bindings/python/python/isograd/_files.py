@@ -21,29 +21,29 @@ if TYPE_CHECKING:
 
 
 class Cloud(NamedTuple):
-    """What a file of points holds."""
+    """Contents of a point file."""
 
     points: np.ndarray
-    """``(N, 3)``, float32 or float64 as they are stored."""
+    """``(N, 3)``, float32 or float64 as in the file."""
     normals: np.ndarray | None
-    """``(N, 3)``, as they stand in the file."""
+    """``(N, 3)``, unchanged."""
     attributes: dict[str, np.ndarray]
     """``(N, components)`` by name."""
 
 
 def read_points(path: Path) -> Cloud:
-    """The points of a file; of a mesh, its vertices.
+    """Reads the points of a file, or the vertices of a mesh.
 
     Raises:
-        FileNotFoundError, OSError: what the operating system says.
-        ValueError: content that can't be read, with its line or byte.
+        FileNotFoundError, OSError: an error of the operating system.
+        ValueError: invalid content, with its line or byte.
     """
     points, normals, attributes, _ = _core.read_geometry(os.fspath(path))
     return Cloud(points, normals, dict(attributes))
 
 
 def read_mesh(path: Path) -> Mesh:
-    """The triangles of a file; errors as :func:`read_points`, and ValueError where it has none."""
+    """Reads a triangle mesh; errors as :func:`read_points`, and ValueError for a file without faces."""
     points, _, _, faces = _core.read_geometry(os.fspath(path))
     if len(faces) == 0:
         raise ValueError(f"{os.fspath(path)} has points and no faces; read it with read_points")
@@ -51,7 +51,7 @@ def read_mesh(path: Path) -> Mesh:
 
 
 def read_sdf(path: Path) -> tuple[Grid, np.ndarray]:
-    """Grid and values of a field (VTI or NPZ); errors as :func:`read_points`."""
+    """Reads grid and values of a field (VTI or NPZ); errors as :func:`read_points`."""
     lower, spacing, shape, values = _core.read_field(os.fspath(path))
     return Grid(lower, spacing, shape), values
 
@@ -63,7 +63,7 @@ def write_points(
     normals: ArrayLike | None = None,
     attributes: Mapping[str, ArrayLike] | None = None,
 ) -> None:
-    """Writes points (PLY, NPZ, XYZ or CSV); the file appears whole or not at all."""
+    """Writes points (PLY, NPZ, XYZ or CSV); atomically."""
     cloud = floats(points, "points", (None, 3))
     if normals is not None:
         normals = floats(normals, "normals", cloud.shape, cloud.dtype)
@@ -71,12 +71,12 @@ def write_points(
 
 
 def write_mesh(path: Path, mesh: Mesh | tuple[ArrayLike, ArrayLike]) -> None:
-    """Writes a mesh (PLY, OBJ, STL or VTP); the file appears whole or not at all."""
+    """Writes a mesh (PLY, OBJ, STL or VTP); atomically."""
     mesh = as_mesh(mesh)
     _core.write_mesh(os.fspath(path), mesh.vertices, mesh.faces)
 
 
 def write_sdf(path: Path, grid: Grid, sdf: ArrayLike) -> None:
-    """Writes a field (VTI or NPZ); the file appears whole or not at all."""
+    """Writes a field (VTI or NPZ); atomically."""
     values = floats(sdf, "sdf", grid.shape)
     _core.write_field(os.fspath(path), grid.lower, grid.spacing, grid.shape, values)

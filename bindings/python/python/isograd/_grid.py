@@ -27,7 +27,7 @@ class Grid:
     The center of cell ``(i, j, k)`` is ``lower + spacing * (i + 0.5, j + 0.5, k + 0.5)``.
 
     Raises:
-        ValueError: where a number is not finite, or there are no cells.
+        ValueError: a number is not finite, or there are no cells.
     """
 
     lower: tuple[float, float, float]
@@ -51,16 +51,16 @@ class Grid:
         spacing: float | None = None,
         padding: float = 0.1,
     ) -> Grid:
-        """The grid round a cloud.
+        """A grid around a cloud.
 
         Args:
             points: ``(N, 3)``.
             resolution: cells on the longest side; 128 unless ``spacing`` is given.
-            spacing: side of a cell, instead of a resolution.
-            padding: room on every side, as a share of the longest side (at least 4 cells).
+            spacing: cell size, in the unit of the points, instead of a resolution.
+            padding: distance to every wall, as a fraction of the longest side (at least 4 cells).
 
         Raises:
-            ValueError: points that make no grid, or both ``resolution`` and ``spacing``.
+            ValueError: no valid grid results, or both ``resolution`` and ``spacing`` are given.
         """
         if resolution is not None and spacing is not None:
             raise ValueError("give resolution or spacing, not both")

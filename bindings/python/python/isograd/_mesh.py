@@ -1,4 +1,4 @@
-"""Triangle meshes, and what they say about points."""
+"""Triangle meshes and distances to them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Mesh:
         faces: ``(F, 3)`` uint32, counter-clockwise seen from outside.
 
     Raises:
-        TypeError, ValueError: arrays of another kind or shape.
+        TypeError, ValueError: arrays of another type or shape.
     """
 
     vertices: np.ndarray
@@ -35,27 +35,27 @@ class Mesh:
 
 
 class Hits(NamedTuple):
-    """What a mesh says about ``M`` points."""
+    """Distances of ``M`` points to a mesh."""
 
     distance: np.ndarray
     """``(M,)`` signed distance, negative inside."""
     gradient: np.ndarray
-    """``(M, 3)`` derivative of the distance in the point: a unit vector."""
+    """``(M, 3)`` derivative of the distance in the query: a unit vector."""
     point: np.ndarray
     """``(M, 3)`` closest point of the mesh."""
     face: np.ndarray
-    """``(M,)`` face that it lies on."""
+    """``(M,)`` face of the closest point."""
     barycentric: np.ndarray
-    """``(M, 3)`` weights of the corners of that face."""
+    """``(M, 3)`` weights of the corners of that face in the closest point."""
 
 
 def query(mesh: Mesh | tuple[ArrayLike, ArrayLike], queries: ArrayLike) -> Hits:
-    """The exact distance to a mesh, and where it is closest, for ``(M, 3)`` points.
+    """Exact distances of ``(M, 3)`` points to a mesh, and their closest points.
 
-    The sign is that of the pseudonormal: right for closed, consistently wound meshes.
+    The sign is that of the pseudonormal: correct for closed, consistently wound meshes.
 
     Raises:
-        TypeError, ValueError: for arrays of another kind or shape, or a mesh without faces.
+        TypeError, ValueError: arrays of another type or shape, or a mesh without faces.
     """
     mesh = as_mesh(mesh)
     points = floats(queries, "queries", (None, 3), mesh.vertices.dtype)
@@ -72,7 +72,7 @@ def query_pullback(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Cotangents of the vertices ``(V, 3)`` and of the queries ``(M, 3)``, from those of the distances ``(M,)``.
 
-    Sign and closest face are held constant: on the medial axis it is the derivative on one side.
+    Sign and closest face are held constant: on the medial axis the derivative is one-sided.
     """
     mesh = as_mesh(mesh)
     dtype = mesh.vertices.dtype

@@ -1,4 +1,4 @@
-"""Single numbers that users pass."""
+"""Checks of numbers passed by the user."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 
 
 def number(value: object, name: str) -> float:
-    """A real number; no text, and nothing complex.
+    """A real number as ``float``.
 
     Raises:
-        ValueError: for anything else.
+        ValueError: it is no real number.
     """
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
@@ -22,10 +22,10 @@ def number(value: object, name: str) -> float:
 
 
 def whole(value: object, name: str) -> int:
-    """A whole number.
+    """A whole number as ``int``.
 
     Raises:
-        ValueError: for anything else, or one beyond 64 bits.
+        ValueError: it is no whole number of 64 bits.
     """
     try:
         found = operator.index(value)  # type: ignore[arg-type]

@@ -56,7 +56,7 @@ def orient(
 
     Raises:
         TypeError, ValueError: invalid points; the message says what is wrong and what to do.
-        KeyboardInterrupt: at once, where Ctrl-C is pressed.
+        KeyboardInterrupt: at once, on Ctrl-C.
     """
     cloud = floats(points, "points", (None, 3))
     options = Options(radius=radius, orient=orient)

@@ -1,4 +1,4 @@
-"""From points to φ, the surface and the normals, and back."""
+"""Reconstruction of φ, surface and normals from points, and its pullback."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Gradients:
-    """Cotangents of what a reconstruction was made from: the derivative of a loss in each input.
+    """Cotangents of the inputs of a reconstruction: the derivative of a loss in each input.
 
     Attributes:
         points: ``(N, 3)``.
-        normals: ``(N, 3)`` of the given normals; ``None`` where normals were found.
+        normals: ``(N, 3)`` of the given normals; ``None`` where normals were estimated.
         attributes: of each extended attribute, ``(N, components)``.
         lower: of the grid's corner, at fixed points.
         spacing: of the grid's cell size, at fixed points.
-        guarded: places where a derivative does not exist, or has no bound, and a bounded one was taken.
+        guarded: number of places where a derivative is undefined or unbounded and was replaced by a bounded one.
     """
 
     points: np.ndarray
@@ -44,7 +44,7 @@ class Gradients:
 
 
 class Extension:
-    """An attribute of the samples, carried to the surface and to the cells near it."""
+    """An attribute of the samples, extended to the surface and to the cells near it."""
 
     def __init__(self, core: _core.Extension, name: str, grid: Grid) -> None:
         self._core = core
@@ -77,7 +77,7 @@ class Extension:
 
 
 class Reconstruction:
-    """What was made of a cloud. Arrays have the type of the points, are copies, and belong to you."""
+    """Reconstruction of a cloud. Arrays have the type of the points and are copies, which may be modified."""
 
     def __init__(
         self, core: _core.Result, grid: Grid, options: Options, count: int, dtype: np.dtype
@@ -89,7 +89,7 @@ class Reconstruction:
         self.grid = grid
         """The grid of all fields."""
         self.options = options
-        """The options that it was made with."""
+        """The options of the reconstruction."""
 
     def __repr__(self) -> str:
         return f"Reconstruction of {self._count} points on {self.grid.shape} cells, {self.dtype}"
@@ -106,7 +106,7 @@ class Reconstruction:
 
     @cached_property
     def iso_value(self) -> float:
-        """The level of the surface."""
+        """The iso-value of the surface."""
         return self._core.iso_value()
 
     @cached_property
@@ -126,7 +126,7 @@ class Reconstruction:
 
     @cached_property
     def confidence(self) -> np.ndarray:
-        """``(N,)`` how sure the side of each normal is, from 0 to 1."""
+        """``(N,)`` confidence in the side of each normal, from 0 to 1."""
         return self._core.array("confidence")
 
     @cached_property
@@ -141,17 +141,17 @@ class Reconstruction:
 
     @cached_property
     def report(self) -> dict[str, Any]:
-        """Numbers, times and warnings, with the names of the command line's ``report.json``."""
+        """Settings, measurements, timings and warnings, with the names of the command line's ``report.json``."""
         return {"backend": self.backend, **json.loads(self._core.report())}
 
     @property
     def backend(self) -> str:
-        """Who computed: ``"cpu"``, or a backend and its device, such as ``"cuda: NVIDIA H100"``."""
+        """Name of the backend: ``"cpu"``, or a backend and its device, such as ``"cuda: NVIDIA H100"``."""
         return self._core.backend()
 
     @property
     def warnings(self) -> list[str]:
-        """What to know before trusting the result."""
+        """Reasons not to trust the result."""
         return list(self.report["warnings"])
 
     def extend(self, name: str, band: float) -> Extension:
@@ -178,7 +178,7 @@ class Reconstruction:
         iso_value: float = 0.0,
         extensions: list[tuple[Extension, ArrayLike | None, ArrayLike | None]] | None = None,
     ) -> Gradients:
-        """Cotangents of the inputs, from those of any of the results.
+        """Cotangents of the inputs, from those of any results.
 
         Args:
             sdf: ``(nx, ny, nz)`` derivative of a loss in φ.
@@ -187,12 +187,12 @@ class Reconstruction:
             indicator: ``(nx, ny, nz)`` in χ.
             areas: ``(N,)`` in the areas.
             iso_value: in the level.
-            extensions: an :class:`Extension` with its derivatives in ``vertices`` and ``values``, or ``None``.
+            extensions: triples of an :class:`Extension` and its derivatives in ``vertices`` and ``values``, or ``None``.
 
         Neighborhoods, signs of normals, signs of cells and closest faces are held constant.
 
         Raises:
-            TypeError, ValueError: an array of another shape or type, or one that is not finite.
+            TypeError, ValueError: an array of another type or shape, or one that is not finite.
         """
         shape = self.grid.shape
         given = {
@@ -240,20 +240,19 @@ class Reconstruction:
 class Reconstructor:
     """A plan for one grid and one set of options: made once, used for every time step.
 
-    Its memory is used again by every call. It may be called from several threads; they then wait for no one,
-    and each beyond the first makes a plan of its own. With ``orient="previous"``, call it from one thread at a
-    time: each call follows the one before, and the result depends on them.
+    Calls reuse its memory. It may be called from several threads at once; each call beyond the first then makes a plan
+    of its own. With ``orient="previous"``, call it from one thread at a time: the result depends on the previous calls.
     """
 
     def __init__(
         self, grid: Grid, options: Options | None = None, *, backend: str = "cpu", **changes: Any
     ) -> None:
         self.options = resolve(options, changes)
-        """What to compute, and how."""
+        """Options of the reconstruction."""
         self.grid = grid
         """The grid of all results."""
         self.backend = check_backend(backend)
-        """Where to compute, as it was asked for."""
+        """The requested backend."""
         self._plan = _core.Plan(encode(grid, self.options, self.backend))
         warn_note(self._plan.take_note())
 
@@ -287,26 +286,25 @@ def reconstruct(
     backend: str = "cpu",
     **changes: Any,
 ) -> Reconstruction:
-    """The signed distance field and the surface of a cloud.
+    """Reconstructs the signed distance field and the surface of a cloud.
 
     Args:
         points: ``(N, 3)`` samples of the surface; float32 or float64 decides the type of all results.
-        grid: where φ is wanted; ``Grid.fit(points)`` unless given.
-        normals: ``(N, 3)``, where ``orient`` is ``"given"`` or ``"signs"``, and only there.
-        sensors: where the points were seen from, where ``orient`` is ``"sensors"``, and only there: ``(N, 3)`` one
-            for each point, ``(3,)`` one for all, or ``(M, 3)`` with another ``M`` where it is not known which of
-            them saw a point.
+        grid: grid of φ; by default ``Grid.fit(points)``.
+        normals: ``(N, 3)`` outward normals, only with ``orient="given"`` or ``"signs"``.
+        sensors: positions of the sensors, only with ``orient="sensors"``: ``(N, 3)`` one for each point, ``(3,)`` one
+            for all, or ``(M, 3)`` with another ``M`` where it is unknown which one saw a point.
         attributes: values of the samples, ``(N,)`` or ``(N, components)`` by name, for
             :meth:`Reconstruction.extend`.
-        options: what to compute, and how.
-        backend: where to compute: ``"cpu"``, ``"cuda"`` (``"cuda:1"`` is the second device), ``"vulkan"``, or
-            ``"auto"``: a GPU where there is one, else the CPU with a ``RuntimeWarning`` that says why.
+        options: options of the reconstruction.
+        backend: ``"cpu"``, ``"cuda"`` (``"cuda:1"`` is the second device), ``"vulkan"``, or
+            ``"auto"``: a GPU if available, else the CPU with a ``RuntimeWarning`` that gives the reason.
         changes: single options by name, such as ``orient="given"``.
 
     Raises:
-        TypeError, ValueError: input that makes no surface, with the reason and the remedy.
-        RuntimeError: a backend that can't be had, with the reason and the remedy.
-        KeyboardInterrupt: at once, where Ctrl-C is pressed.
+        TypeError, ValueError: invalid input; the message says what is wrong and what to do.
+        RuntimeError: an unavailable backend.
+        KeyboardInterrupt: at once, on Ctrl-C.
     """
     cloud = floats(points, "points", (None, 3))
     grid = Grid.fit(cloud) if grid is None else grid

@@ -1,4 +1,4 @@
-"""Parametric bodies with exact points, normals and derivatives."""
+"""Parametric shapes with exact points, normals and derivatives."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Coordinates(NamedTuple):
-    """Where on a surface ``N`` samples are: the same material points whatever the parameters are."""
+    """Surface coordinates of ``N`` samples: the same material points for any parameters."""
 
     patch: np.ndarray
     """``(N,)`` uint32."""
@@ -24,20 +24,20 @@ class Coordinates(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """Samples of a body."""
+    """Samples of a shape."""
 
     points: np.ndarray
     """``(N, 3)``."""
     normals: np.ndarray
     """``(N, 3)`` outward unit normals."""
     velocity: np.ndarray | None
-    """``(N, 3)`` of a body that moves."""
+    """``(N, 3)`` velocity of a moving shape; ``None`` for others."""
     coordinates: Coordinates
-    """Where they are."""
+    """Surface coordinates of the samples."""
 
 
 class Parameter(NamedTuple):
-    """A parameter of a body."""
+    """A parameter of a shape."""
 
     name: str
     meaning: str
@@ -49,10 +49,10 @@ class Parameter(NamedTuple):
 
 
 class Shape:
-    """A parametric body: ``Shape("fish", width1=0.04)``. :func:`shapes` lists all.
+    """A parametric shape: ``Shape("fish", width1=0.04)``. :func:`shapes` lists all.
 
     Raises:
-        ValueError: no such body or parameter, or a value out of range; the text lists what there is.
+        ValueError: an unknown shape or parameter, or a value out of range; the message lists the valid ones.
     """
 
     def __init__(self, name: str, **parameters: float) -> None:
@@ -69,7 +69,7 @@ class Shape:
 
     @property
     def parameters(self) -> dict[str, Parameter]:
-        """What its parameters are, in order."""
+        """Descriptions of the parameters, in order."""
         return {entry[0]: Parameter(*entry) for entry in self._core.parameters()}
 
     @property
@@ -88,7 +88,7 @@ class Shape:
         return self._core.volume()
 
     def replace(self, **parameters: float) -> Shape:
-        """The same body with some parameters changed."""
+        """A copy with some parameters changed."""
         return Shape(self.name, **{**self.values, **parameters})
 
     def sample(
@@ -104,7 +104,7 @@ class Shape:
 
         Args:
             layout: ``"even"`` (blue noise) or ``"random"``.
-            density: ``(axis, ratio)``: so many times as many samples per area at the high end of an axis.
+            density: ``(axis, ratio)``: ratio of the samples per area at the high and the low end of an axis.
             dtype: float32 or float64.
         """
         if layout not in ("even", "random"):
@@ -139,12 +139,12 @@ def _checked(coordinates: Coordinates) -> tuple[np.ndarray, np.ndarray]:
 
 
 def shapes() -> dict[str, str]:
-    """Name and summary of every body."""
+    """Name and summary of every shape."""
     return dict(_core.shapes())
 
 
 def sample(shape: str, n: int, **parameters: object) -> Samples:
-    """``n`` samples of a body: ``sample("fish", 20_000, seed=3, width1=0.04)``; see :meth:`Shape.sample`."""
+    """``n`` samples of a shape: ``sample("fish", 20_000, seed=3, width1=0.04)``; see :meth:`Shape.sample`."""
     drawing = {"seed", "layout", "density", "dtype"}
     how = {key: value for key, value in parameters.items() if key in drawing}
     of = {key: value for key, value in parameters.items() if key not in drawing}

@@ -1,4 +1,4 @@
-"""Calls of the targets in Rust from JAX: what `isograd.jax` is made of."""
+"""Calls of the targets in Rust from JAX, for `isograd.jax`."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Plan:
-    """What is static: grid and options as one text, and the shape of fields."""
+    """Static arguments: grid, options and backend as one text, and the shape of fields."""
 
     settings: str
     shape: tuple[int, int, int]
     band: float | None = None
     """Distance up to which an attribute is extended, in the unit of the points."""
 
-    def kept(self, points: jax.Array) -> tuple[jax.ShapeDtypeStruct, ...]:
-        """φ, closest faces and normals: what a pullback needs besides its inputs."""
+    def saved(self, points: jax.Array) -> tuple[jax.ShapeDtypeStruct, ...]:
+        """φ, closest faces and normals, which a pullback needs besides its inputs."""
         sdf = jax.ShapeDtypeStruct(self.shape, points.dtype)
         closest = jax.ShapeDtypeStruct(self.shape, np.uint32)
         return (sdf, closest, *like(points))
 
 
 def like(*arrays: jax.Array | None) -> tuple[jax.ShapeDtypeStruct, ...]:
-    """Results of the shapes and types of these arrays, of those that are there."""
+    """Shapes and types of those arrays that are not ``None``."""
     return tuple(jax.ShapeDtypeStruct(a.shape, a.dtype) for a in arrays if a is not None)
 
 
 def pair(bars: tuple[jax.Array, ...]) -> tuple[jax.Array, jax.Array | None]:
-    """Cotangents of points and normals, of which the latter may not be there."""
+    """Cotangents of points and normals; ``None`` for normals that are not inputs."""
     return bars[0], bars[1] if len(bars) > 1 else None
 
 
@@ -54,12 +54,12 @@ def prepare(
     options: Options | None,
     backend: str,
 ) -> tuple[Plan, jax.Array, jax.Array | None]:
-    """Checks what can be checked while tracing.
+    """Checks the arguments that are known while tracing.
 
     Raises:
-        TypeError: for what is no array of numbers, no grid, no options.
-        ValueError: for another shape, and for normals that are missing or not used.
-        RuntimeError: for a backend that can't be had.
+        TypeError: an argument of another type.
+        ValueError: another shape; normals that are missing or not used.
+        RuntimeError: an unavailable backend.
     """
     points = floats(points, "points", (None, 3))
     if normals is not None:
@@ -75,8 +75,8 @@ def floats(
     """An array of ``dtype``, or of float32 or float64 if there is none; ``None`` in the shape is any length.
 
     Raises:
-        TypeError: for what is no array of real numbers.
-        ValueError: for another shape.
+        TypeError: no array of real numbers.
+        ValueError: another shape.
     """
     try:
         array = jnp.asarray(values)
@@ -104,7 +104,7 @@ def call(
     results: tuple[jax.ShapeDtypeStruct, ...],
     *arrays: jax.Array | None,
 ) -> tuple[jax.Array, ...]:
-    """Calls a target: by XLA, or through Python where that is asked for. Arrays on other devices are refused."""
+    """Calls a target: by XLA, or through Python if ``ISOGRAD_JAX_CALLBACK`` is set. Arrays on other devices are errors."""
     present = [array for array in arrays if array is not None]
     attributes: dict[str, Any] = {"settings": plan.settings}
     if plan.band is not None:
@@ -127,7 +127,7 @@ def call(
 
 
 def refuse(*_arrays: ArrayLike) -> tuple[np.ndarray, ...]:
-    """What becomes of arrays on a device: nobody has asked for copies.
+    """Rejects arrays on a device, since copies are made on request only.
 
     Raises:
         ValueError: always.
@@ -141,7 +141,7 @@ def refuse(*_arrays: ArrayLike) -> tuple[np.ndarray, ...]:
 
 @dataclass(frozen=True)
 class _Callback:
-    """A target as a function of NumPy arrays. Equal ones compare equal, so that JAX compiles once."""
+    """A target as a function of NumPy arrays, with equality by value, so that JAX compiles once."""
 
     name: str
     results: tuple[jax.ShapeDtypeStruct, ...]
@@ -156,25 +156,25 @@ class _Callback:
 
 
 _lock = threading.Lock()
-_taken: bool | None = None
+_registered: bool | None = None
 
 
 def _has_handlers() -> bool:
-    """Whether XLA has taken the handlers, which are offered on the first call."""
-    global _taken
+    """Whether the handlers are registered with XLA, which happens on the first call."""
+    global _registered
     if os.environ.get("ISOGRAD_JAX_CALLBACK", "0") not in ("", "0"):
         return False
     with _lock:
-        if _taken is None:
-            _taken = _register()
-        return _taken
+        if _registered is None:
+            _registered = _register()
+        return _registered
 
 
 def _register() -> bool:
     try:
         for name, capsule in _core.xla_targets().items():
             jax.ffi.register_ffi_target(name, capsule, platform="cpu")
-    except Exception as error:  # whatever a JAX of another age raises
+    except Exception as error:  # any exception of another version of JAX
         warnings.warn(
             f"this JAX does not take isograd's handlers ({error}); jax.pure_callback is used instead, "
             "with the same results",

@@ -4,19 +4,19 @@
     >>> loss = lambda points: jnp.mean(isograd.jax.signed_distance(points, grid) ** 2)
     >>> gradient = jax.jit(jax.grad(loss))(points)   # (N, 3)
 
-Points and normals are arrays that are traced; grid and options are static. float32 and float64 stay what they are
-(float64 needs ``jax_enable_x64``), half precision becomes float32, whole numbers JAX's default float. The work is
-done by handlers that XLA calls without Python, on arrays of the CPU. Arrays on other devices are refused, unless the
-environment has ``ISOGRAD_JAX_CALLBACK=1``: then they are copied, and the work is done through ``jax.pure_callback``,
-with the same bits. With ``backend="cuda"`` or ``"vulkan"`` the handlers compute on that device: points and φ, and
-their cotangents, are copied there and back at every call, and the pullback reconstructs once more.
+Points and normals are traced; grid and options are static. float32 and float64 are unchanged (float64 needs
+``jax_enable_x64``), half precision becomes float32, integers JAX's default float. XLA calls the handlers without Python,
+with arrays on the CPU. Arrays on other devices are errors, unless the environment has ``ISOGRAD_JAX_CALLBACK=1``: then
+they are copied, and computed through ``jax.pure_callback``, with the same bits. With ``backend="cuda"`` or ``"vulkan"``
+the handlers compute on that device: points, φ and their cotangents are copied at every call, and the pullback
+reconstructs again.
 
-What can be seen from types and shapes raises ``TypeError`` or ``ValueError`` at once. What depends on the values (a
-point that is not finite or off the grid) raises ``jax.errors.JaxRuntimeError`` or, as JAX chooses, ``ValueError``,
-with the text of the NumPy functions, when the result is waited for.
+Invalid types and shapes raise ``TypeError`` or ``ValueError`` at once. Invalid values (a point that is not finite or off
+the grid) raise ``jax.errors.JaxRuntimeError`` or, as JAX chooses, ``ValueError``, with the message of the NumPy
+functions, when the result is awaited.
 
-Gradients are of reverse mode and first order; see each function for what is held constant. A batch under ``vmap`` is
-worked through one cloud after the other, each on all cores. Under ``jax.shard_map`` pass ``check_vma=False``.
+Gradients are of reverse mode and first order; each function lists what is held constant. The clouds of a batch under
+``vmap`` are computed one after the other, each on all cores. Under ``jax.shard_map`` pass ``check_vma=False``.
 """
 
 from __future__ import annotations
@@ -59,16 +59,16 @@ def signed_distance(
         grid: static.
         normals: ``(N, 3)``, outward, of any length but zero, where ``options.orient`` is ``"given"`` or ``"signs"``.
         options: static; ``checks`` has no effect, since there is no report.
-        backend: static; where to compute, as for :func:`isograd.reconstruct`.
+        backend: static; as for :func:`isograd.reconstruct`.
 
     Returns:
         ``(nx, ny, nz)``, in the unit of the points, negative inside, of the type of the points.
 
     Raises:
-        TypeError: for what is no array of numbers, no grid, no options.
-        ValueError: for another shape, and for normals that are missing or not used.
-        RuntimeError: for a backend that can't be had, with the reason and the remedy.
-        jax.errors.JaxRuntimeError: for values that no surface can be made from.
+        TypeError: an argument of another type.
+        ValueError: another shape; normals that are missing or not used.
+        RuntimeError: an unavailable backend.
+        jax.errors.JaxRuntimeError: values from which no surface can be made.
     """
     plan, points, normals = prepare(points, grid, normals, options, backend)
     return _distance(plan, points, normals)
@@ -76,19 +76,19 @@ def signed_distance(
 
 @functools.partial(jax.custom_vjp, nondiff_argnums=(0,))
 def _distance(plan: Plan, points: jax.Array, normals: jax.Array | None) -> jax.Array:
-    (sdf,) = call("isograd_forward", plan, plan.kept(points)[:1], points, normals)
+    (sdf,) = call("isograd_forward", plan, plan.saved(points)[:1], points, normals)
     return sdf
 
 
 def _distance_forward(plan: Plan, points: jax.Array, normals: jax.Array | None) -> tuple:
-    kept = call("isograd_forward", plan, plan.kept(points), points, normals)
-    return kept[0], (points, normals, kept)
+    saved = call("isograd_forward", plan, plan.saved(points), points, normals)
+    return saved[0], (points, normals, saved)
 
 
 def _distance_pullback(plan: Plan, residuals: tuple, sdf_bar: jax.Array) -> tuple:
-    points, normals, kept = residuals
+    points, normals, saved = residuals
     bars = call(
-        "isograd_pullback", plan, like(points, normals), points, *kept, sdf_bar, normals
+        "isograd_pullback", plan, like(points, normals), points, *saved, sdf_bar, normals
     )
     return pair(bars)
 
@@ -105,11 +105,11 @@ def query(
     options: Options | None = None,
     backend: str = "cpu",
 ) -> jax.Array:
-    """The signed distance from any places to the surface through ``points``: exact to each triangle of it.
+    """The signed distance from any positions to the surface through ``points``: exact to each triangle of it.
 
     Differentiable in ``points``, ``queries`` and, with ``orient="given"``, ``normals``. Held constant: what
-    :func:`signed_distance` holds, and which face is closest. Pass all places at once: under ``vmap`` the surface is
-    made for each member of the batch.
+    :func:`signed_distance` holds, and which face is closest. Pass all queries at once: under ``vmap`` the surface
+    is made for each member of the batch.
 
     Args:
         points: ``(N, 3)``, as for :func:`signed_distance`.
@@ -143,15 +143,15 @@ def _query_forward(
 ) -> tuple:
     triangle = jax.ShapeDtypeStruct(queries.shape[:1], np.uint32)
     (vector,) = like(queries)
-    results = (*_distances(queries), vector, triangle, vector, *plan.kept(points))
-    distance, *kept = call("isograd_query", plan, results, points, queries, normals)
-    return distance, (points, queries, normals, kept)
+    results = (*_distances(queries), vector, triangle, vector, *plan.saved(points))
+    distance, *saved = call("isograd_query", plan, results, points, queries, normals)
+    return distance, (points, queries, normals, saved)
 
 
 def _query_pullback(plan: Plan, residuals: tuple, distance_bar: jax.Array) -> tuple:
-    points, queries, normals, kept = residuals
+    points, queries, normals, saved = residuals
     results = like(queries, points, normals)
-    arrays = (points, queries, *kept, distance_bar, normals)
+    arrays = (points, queries, *saved, distance_bar, normals)
     queries_bar, *bars = call("isograd_query_pullback", plan, results, *arrays)
     points_bar, normals_bar = pair(bars)
     return points_bar, queries_bar, normals_bar
@@ -191,7 +191,7 @@ def mesh(
 
     The vertices are differentiable in ``points`` and, where they are used, ``normals``. Where a surface has more
     vertices or faces than fit, the counts exceed the sizes of the arrays: these hold the first ones, and a face with
-    a vertex that is not there is ``(0, 0, 0)``. Nothing is raised, so check the counts. A closed surface has about
+    a vertex that is not there is ``(0, 0, 0)``. No error is raised: check the counts. A closed surface has about
     twice as many faces as vertices.
 
     Faces ``(0, 0, 0)`` have no area, and sums of products of their corners, such as the volume, need no mask. A norm
@@ -200,8 +200,8 @@ def mesh(
     Args:
         points: ``(N, 3)``, as for :func:`signed_distance`.
         grid: static.
-        max_vertices: static; how many vertices to make room for.
-        max_faces: static; how many faces to make room for.
+        max_vertices: static; capacity for vertices.
+        max_faces: static; capacity for faces.
         normals: as for :func:`signed_distance`.
         options: as for :func:`signed_distance`.
         backend: as for :func:`signed_distance`.
@@ -231,14 +231,14 @@ def _mesh(
 def _mesh_forward(
     plan: Plan, sizes: tuple[int, int], points: jax.Array, normals: jax.Array | None
 ) -> tuple:
-    results = (*_surface(points, sizes), *plan.kept(points))
+    results = (*_surface(points, sizes), *plan.saved(points))
     found = call("isograd_mesh", plan, results, points, normals)
     return found[:3], (points, normals, found[3:])
 
 
 def _mesh_pullback(plan: Plan, sizes: tuple[int, int], residuals: tuple, bars: tuple) -> tuple:
-    points, normals, kept = residuals
-    arrays = (points, *kept, bars[0], normals)
+    points, normals, saved = residuals
+    arrays = (points, *saved, bars[0], normals)
     return pair(call("isograd_mesh_pullback", plan, like(points, normals), *arrays))
 
 
@@ -252,10 +252,10 @@ _mesh.defvjp(_mesh_forward, _mesh_pullback)
 
 
 class Extension(NamedTuple):
-    """What a solver with an immersed boundary needs at its cells."""
+    """φ and extended values at the cells, as solvers with immersed boundaries need them."""
 
     sdf: jax.Array
-    """``(nx, ny, nz)``, what :func:`signed_distance` gives."""
+    """``(nx, ny, nz)``, as :func:`signed_distance` returns it."""
     values: jax.Array
     """``(nx, ny, nz, C)`` or ``(nx, ny, nz)``: in the band the value at the closest point of the surface, else 0."""
 
@@ -270,7 +270,7 @@ def extend(
     options: Options | None = None,
     backend: str = "cpu",
 ) -> Extension:
-    """φ, and values of the samples (a surface velocity, a temperature) at the cells round the surface.
+    """φ, and values of the samples (a surface velocity, a temperature) at the cells around the surface.
 
     Both are differentiable in ``points`` and, where they are used, ``normals``; the extended values also in
     ``values``, of which they are a linear function. Held constant: what :func:`signed_distance` holds, and which
@@ -314,15 +314,15 @@ def _extend_forward(
     plan: Plan, points: jax.Array, values: jax.Array, normals: jax.Array | None
 ) -> tuple:
     field = jax.ShapeDtypeStruct((*plan.shape, values.shape[1]), points.dtype)
-    results = (field, *plan.kept(points))
-    field, *kept = call("isograd_extend", plan, results, points, values, normals)
-    return (field, kept[0]), (points, values, normals, kept)
+    results = (field, *plan.saved(points))
+    field, *saved = call("isograd_extend", plan, results, points, values, normals)
+    return (field, saved[0]), (points, values, normals, saved)
 
 
 def _extend_pullback(plan: Plan, residuals: tuple, bars: tuple) -> tuple:
-    points, values, normals, kept = residuals
+    points, values, normals, saved = residuals
     results = like(values, points, normals)
-    arrays = (points, values, *kept, *bars, normals)
+    arrays = (points, values, *saved, *bars, normals)
     values_bar, *cloud_bars = call("isograd_extend_pullback", plan, results, *arrays)
     points_bar, normals_bar = pair(cloud_bars)
     return points_bar, values_bar, normals_bar

@@ -1,9 +1,9 @@
 """Signed distance of points for PyTorch: inside ``autograd``, ``vmap`` and ``torch.compile``.
 
-Tensors are those of the CPU, and the work is done in their number type, where ``backend`` says: on another device
-points and φ, and their cotangents, are copied there and back at every call. The operators are registered with
+Tensors are on the CPU, and computations use their number type. With another ``backend``, points, φ and their cotangents
+are copied to the device and back at every call. The operators are registered with
 ``torch.library`` as ``isograd::signed_distance`` and ``isograd::signed_distance_pullback``. ``torch.func.grad``
-refuses every operator of that kind: call ``torch.autograd.grad``. Needs PyTorch 2.5.
+does not support custom operators: call ``torch.autograd.grad``. Needs PyTorch 2.5.
 """
 
 from __future__ import annotations
@@ -33,26 +33,26 @@ def signed_distance(
     options: Options | None = None,
     backend: str = "cpu",
 ) -> Tensor:
-    """φ: the signed distance to the surface that the points sample.
+    """φ: the signed distance to the surface through the points.
 
-    Differentiable once in ``points``, and in ``normals`` where the options use them. What jumps is held fixed:
-    which points are neighbors, on which side a normal is, and with ``radius="auto"`` the radius too.
+    Differentiable once in ``points``, and in ``normals`` with ``orient="given"``. Held constant: which points are
+    neighbors, the sides of the normals, which face is closest to a cell, and with ``radius="auto"`` the radius.
 
     Args:
         points: ``(N, 3)``, float32 or float64, on the CPU. float16 and bfloat16 become float32.
-        grid: where φ is computed.
+        grid: grid of φ.
         normals: ``(N, 3)`` outward normals, for the orientations ``"given"`` and ``"signs"``.
-        options: how; ``checks`` has no effect, since a tensor can't carry a report.
-        backend: where to compute, as for :func:`isograd.reconstruct`. The pullback reconstructs once more there.
+        options: options; ``checks`` has no effect, since there is no report.
+        backend: as for :func:`isograd.reconstruct`. On a device the pullback reconstructs again.
 
     Returns:
         ``grid.shape`` tensor of φ at the centers of the cells, in the unit of the points: negative inside.
 
     Raises:
-        TypeError: for what is no tensor, and for integers and complex numbers.
-        ValueError: for another shape or device, and for what makes no surface: points that are not finite, too
-            few of them, or nearer than two cells to the border of the grid.
-        RuntimeError: for a backend that can't be had, with the reason and the remedy.
+        TypeError: no tensor, or integers or complex numbers.
+        ValueError: another shape or device; points from which no surface can be made: not finite, too few, or closer
+            than two cells to a wall of the grid.
+        RuntimeError: an unavailable backend.
     """
     points = _checked(points, "points")
     if normals is not None:
@@ -161,7 +161,7 @@ _pullback.register_autograd(_twice)
 
 
 def _one_by_one(operator: Any) -> Any:
-    """How ``torch.vmap`` applies an operator to a batch: a call has many threads already."""
+    """A ``torch.vmap`` rule that calls an operator for one member of the batch after the other."""
 
     def apply(info: Any, axes: tuple[int | None, ...], *batch: Any) -> tuple[tuple[Tensor, ...], tuple[int, ...]]:
         if info.batch_size == 0:
@@ -181,5 +181,5 @@ _pullback.register_vmap(_one_by_one(_pullback))
 
 
 def _array(tensor: Tensor | None) -> np.ndarray | None:
-    """The same numbers in C order; a copy only where the tensor has another order."""
+    """The values in C order; a copy only where the tensor has another order."""
     return None if tensor is None else tensor.detach().resolve_neg().contiguous().numpy()

@@ -1,6 +1,6 @@
-"""Pictures: slices of a field with matplotlib, a surface and its points with PyVista.
+"""Plots: slices of a field with matplotlib, a surface and its points with PyVista.
 
-Both come with ``pip install isograd[viz]``; each is imported by the function that needs it.
+Both libraries come with ``pip install isograd[viz]``; each is imported by the function that needs it.
 """
 
 from __future__ import annotations
@@ -48,11 +48,9 @@ def slices(
     Args:
         phi: ``grid.shape`` field, such as ``Reconstruction.sdf``.
         grid: its grid.
-        at: the point ``(x, y, z)`` that the slices pass through, to the nearest cell; the center of the grid
-            where it is left out.
+        at: the point ``(x, y, z)`` through whose cell the slices pass; by default the center of the grid.
         points: ``(N, 3)``: those in the cells of a slice are drawn on it as dots.
-        limit: the value of the darkest colors, in the unit of φ; the largest of the three slices where it is
-            left out.
+        limit: value of the darkest colors, in the unit of φ; by default the largest of the three slices.
         title: above the three.
         label: of the colors.
 
@@ -61,8 +59,8 @@ def slices(
         ``pyplot.close(figure)``.
 
     Raises:
-        ImportError: without matplotlib.
-        TypeError, ValueError: for a field that does not fit the grid, and a place outside it.
+        ImportError: matplotlib is not installed.
+        TypeError, ValueError: a field of another shape than the grid, or ``at`` outside of it.
     """
     try:
         from matplotlib import pyplot
@@ -153,7 +151,7 @@ def scene(
     opacity: float = 1.0,
     off_screen: bool = False,
 ) -> pyvista.Plotter:
-    """A surface in three dimensions, with the points that it was made from.
+    """A surface in three dimensions, with the points that it was reconstructed from.
 
     Args:
         mesh: such as ``Reconstruction.mesh``.
@@ -168,8 +166,8 @@ def scene(
         A plotter: ``plotter.show()`` opens it, ``plotter.close()`` frees it.
 
     Raises:
-        ImportError: without PyVista.
-        TypeError, ValueError: for arrays of another kind or shape, and a mesh without faces.
+        ImportError: PyVista is not installed.
+        TypeError, ValueError: arrays of another type or shape, or a mesh without faces.
     """
     try:
         import pyvista
@@ -200,7 +198,7 @@ def scene(
 
 
 def _drawable(mesh: Mesh) -> Mesh:
-    """The mesh, if VTK can draw it: it trusts every index."""
+    """The mesh, after the checks that VTK leaves out."""
     if len(mesh.faces) == 0:
         raise ValueError("the mesh has no faces, so there is nothing to draw")
     if int(mesh.faces.max()) >= len(mesh.vertices):
@@ -214,5 +212,5 @@ def _arrows(points: np.ndarray | None, normals: ArrayLike | None) -> np.ndarray 
     if normals is None:
         return None
     if points is None:
-        raise ValueError("normals need points to stand on; give both")
+        raise ValueError("normals are drawn at points; give both")
     return floats(normals, "normals", (len(points), 3), points.dtype)
