@@ -1,5 +1,16 @@
-//! What the benchmarks share: a body, and pools of threads.
+//! Measurements of isograd: the programs of this package write their results as JSON, from which `benches/pages`
+//! renders the pages below `docs/`.
 
+pub mod accuracy;
+#[cfg(feature = "gpu")]
+pub mod gpu;
+pub mod gradients;
+pub mod orientation;
+pub mod output;
+pub mod sampling;
+pub mod scaling;
+pub mod statistics;
+pub mod timing;
 pub mod torus;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -16,7 +27,7 @@ pub const THREADS: [usize; 2] = [1, 2];
 /// A pool of `threads` threads.
 ///
 /// # Panics
-/// Where the system refuses a thread: nothing can be measured then.
+/// If the system refuses a thread: nothing can be measured then.
 pub fn pool(threads: usize) -> ThreadPool {
     ThreadPoolBuilder::new()
         .num_threads(threads)

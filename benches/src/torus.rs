@@ -26,7 +26,7 @@ pub fn field<T: Real>(cells: usize) -> Field<T> {
     field
 }
 
-/// `count` samples, uniform by area, and their outward normals; the same every time.
+/// `count` reproducible samples, uniform by area, and their outward normals.
 pub fn samples<T: Real>(count: usize) -> (Vec<[T; 3]>, Vec<[T; 3]>) {
     let mut random = SplitMix(1);
     (0..count).map(|_| sample(&mut random)).unzip()
@@ -54,7 +54,7 @@ fn sample<T: Real>(random: &mut SplitMix) -> ([T; 3], [T; 3]) {
     }
 }
 
-/// Steele, Lea and Flood's generator: enough for samples, and a few lines.
+/// Random generator of Steele, Lea and Flood.
 struct SplitMix(u64);
 
 impl SplitMix {

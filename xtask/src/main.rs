@@ -40,8 +40,9 @@ Checks
                    --offline leaves the advisories out
 
 Figures and pages
-  docs             every page and picture below docs/ that a command makes: accuracy, gradients,
-                   orientation, scaling, gallery, fit
+  docs             measures and renders every page below docs/ that a command makes: accuracy,
+                   gradients, orientation, scaling, gallery, fit; --render renders all pages from
+                   their JSON without measuring; --check fails if a page differs from its JSON
   accuracy         docs/accuracy.md: errors against bodies with a closed form
   gradients        docs/gradients.md: the pullback against differences and closed forms, and its
                    cost; compares times, so leave the machine alone meanwhile
@@ -51,7 +52,7 @@ Figures and pages
                    alone meanwhile
   gallery          docs/images/: pictures of the clouds in examples/clouds
   fit              docs/fit.md: a fish found from its signed distance field
-  gpu              docs/gpu.md: time and memory on a GPU; without a GPU, memory only
+  gpu              docs/gpu.md: time and memory on a GPU
   gpu --pack       target/isograd-gpu-kit.tar.xz: tests and benchmarks for a machine with an NVIDIA
                    driver but without Rust and network
   gpu --page FILE  docs/gpu.md from the results that this kit has written
@@ -96,13 +97,14 @@ fn run(command: &str, rest: &[String]) -> Option<Outcome> {
         ("deny", []) => Some(deny::run(false)),
         ("deny", [flag]) if flag == "--offline" => Some(deny::run(true)),
         ("docs", []) => Some(pages::all()),
-        ("accuracy", []) => Some(pages::accuracy()),
-        ("gradients", []) => Some(pages::gradients()),
-        ("orientation", []) => Some(pages::orientation()),
+        ("docs", [flag]) if flag == "--render" => Some(pages::render(&[])),
+        ("docs", [flag]) if flag == "--check" => Some(pages::check().map(drop)),
+        ("accuracy" | "gradients" | "orientation" | "scaling", []) => Some(pages::measure(command)),
         ("gpu", []) => Some(pages::gpu()),
         ("gpu", [flag]) if flag == "--pack" => Some(kit::pack()),
-        ("gpu", [flag, file]) if flag == "--page" => Some(kit::import(file)),
-        ("scaling", []) => Some(pages::scaling()),
+        ("gpu", [flag, file]) if flag == "--page" => {
+            Some(kit::import(file).and_then(|()| pages::render(&["gpu"])))
+        }
         ("gallery", []) => Some(pages::gallery()),
         ("fit", []) => Some(fit::run()),
         ("bench", _) => Some(bench::run(rest)),

@@ -1,79 +1,88 @@
-//! The pages and pictures below `docs/` that commands make.
+//! The pages and pictures below `docs/` that commands make: a program measures and writes JSON, from which
+//! `benches/pages/render.py` makes Markdown and charts.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use std::process::Command;
 
+use crate::environment::{Environment, Obstacle};
 use crate::process::{self, Outcome};
+use crate::workspace::Workspace;
 
-/// Everything that a command makes, but for the comparison with peers, which needs Python, and what needs a GPU.
+/// Pages with a program of `isograd-benches` of the same name.
+const MEASURED: [&str; 4] = ["accuracy", "gradients", "orientation", "scaling"];
+
+/// Measures and renders all pages but the comparison with other libraries and the page that needs a GPU.
 pub fn all() -> Outcome {
-    accuracy()?;
-    gradients()?;
-    orientation()?;
-    scaling()?;
+    for page in MEASURED {
+        measure(page)?;
+    }
     gallery()?;
     crate::fit::run()
 }
 
-/// `docs/accuracy.md`, with its numbers and pictures.
-pub fn accuracy() -> Outcome {
-    program("isograd-accuracy")
+/// Measures one page with its program, and renders it.
+pub fn measure(page: &str) -> Outcome {
+    process::run(&mut program(page))?;
+    render(&[page])
 }
 
-/// `docs/gradients.md`, with its numbers and pictures.
-pub fn gradients() -> Outcome {
-    program("isograd-gradients")
+/// Renders pages from their JSON; all of them if none is named.
+pub fn render(pages: &[&str]) -> Outcome {
+    match renderer() {
+        Ok(mut command) => process::run(command.args(pages)),
+        Err(Obstacle::Absent(reason) | Obstacle::Failure(reason)) => Err(reason),
+    }
 }
 
-/// `docs/orientation.md`, with its numbers and pictures.
-pub fn orientation() -> Outcome {
-    program("isograd-orientation")
+/// Fails if a page is not what the renderer makes of its JSON. Returns a `SKIPPED` line if Python or its packages are
+/// missing.
+pub fn check() -> Outcome<Vec<String>> {
+    match renderer() {
+        Ok(mut command) => process::run(command.arg("--check")).map(|()| Vec::new()),
+        Err(Obstacle::Absent(reason)) => Ok(vec![format!("SKIPPED pages: {reason}")]),
+        Err(Obstacle::Failure(failure)) => Err(failure),
+    }
 }
 
-/// `docs/scaling.md`, with its numbers and picture.
-pub fn scaling() -> Outcome {
-    program("isograd-scaling")
-}
-
-/// `docs/gpu.json`, and the part of `docs/gpu.md` about speed.
+/// Measures on a GPU, and renders docs/gpu.md.
 pub fn gpu() -> Outcome {
-    process::run(&mut process::cargo([
-        "run",
-        "--release",
-        "--package",
-        "isograd-gpu-times",
-        "--features",
-        "cuda",
-    ]))
-}
-
-/// Runs the program of a package, which writes its page.
-fn program(package: &str) -> Outcome {
-    process::run(&mut process::cargo([
-        "run",
-        "--release",
-        "--package",
-        package,
-    ]))
+    let file = process::root().join("docs/gpu.json");
+    let mut times = program("gpu-times");
+    process::run(times.args(["--features", "cuda", "--"]).arg(file))?;
+    render(&["gpu"])
 }
 
 /// `docs/images/NAME.png` for every cloud in `examples/clouds`.
 pub fn gallery() -> Outcome {
     let pictures = process::root().join("docs").join("images");
-    fs::create_dir_all(&pictures).map_err(|e| format!("{}: {e}", pictures.display()))?;
     for cloud in clouds()? {
         let name = cloud.file_stem().unwrap_or_default();
         let picture = pictures.join(name).with_extension("png");
         println!("{} → {}", cloud.display(), picture.display());
-        process::run(&mut reconstruct(&cloud, &picture))?;
+        let mut command = process::cargo(["run", "--release", "--quiet", "--", "reconstruct"]);
+        process::run(command.arg(cloud).arg("--picture").arg(picture))?;
     }
     Ok(())
 }
 
-fn reconstruct(cloud: &Path, picture: &Path) -> std::process::Command {
-    let mut command = process::cargo(["run", "--release", "--quiet", "--", "reconstruct"]);
-    command.arg(cloud).arg("--picture").arg(picture);
+/// A program of `isograd-benches`.
+fn program(name: &str) -> Command {
+    let package = ["run", "--release", "--package", "isograd-benches", "--bin"];
+    let mut command = process::cargo(package);
+    command.arg(name);
     command
+}
+
+/// `render.py` in its virtual environment.
+fn renderer() -> Result<Command, Obstacle> {
+    let folder = process::root().join("benches/pages");
+    let environment = Workspace::load()?.target.join("xtask/pages");
+    let requirements = folder.join("requirements.txt");
+    let python = Environment::with_requirements(environment, &requirements)?.python;
+    let mut command = Command::new(python);
+    command.arg(folder.join("render.py"));
+    Ok(command)
 }
 
 /// The clouds in the repository, sorted by name.

@@ -1,9 +1,8 @@
-//! A swimming fish on a fixed grid: the first call against those of the time steps after it.
+//! A swimming fish on a fixed grid: the first call compared with the time steps after it.
 //!
-//! `time-steps [THREADS] [STEPS]` prints a table in Markdown. The first call knows nothing but the points,
-//! and takes all memory. The steps run in a second plan, with what the step before found: its radius, and
-//! its normals for the sides ([`Method::Signs`]). The second plan's own first step, which takes its memory,
-//! is shown apart.
+//! `time-steps [THREADS] [STEPS]` prints a table in Markdown. The first call gets only points, and allocates. The steps run in
+//! a second plan with the radius of the first call and the normals of the previous step ([`Method::Signs`]). The first step
+//! of the second plan, which allocates as well, has its own column.
 
 use std::error::Error;
 use std::time::Instant;
@@ -12,18 +11,13 @@ use isograd::neighbors::Radius;
 use isograd::orient::Method;
 use isograd::{Grid, Options, PointCloud, Reconstructor, Seconds, Stage};
 use isograd_benches::pool;
-use isograd_element::vector;
+use isograd_benches::sampling::{Body, centered_grid};
+use isograd_benches::statistics::median;
 use isograd_shapes::{Sampling, Shape, SurfaceCoordinate, by_name};
 
 type Outcome<T = ()> = Result<T, Box<dyn Error + Send + Sync>>;
 
-/// Grid of the paper's fish.
-const SHAPE: [usize; 3] = [338, 120, 151];
-/// Samples that stay with the skin.
-const SAMPLES: usize = 50_000;
-/// Longest side of the grid over the length swept by the body.
-const AIR: f64 = 1.2;
-/// Steps in one beat of the tail.
+/// Time steps per tail beat.
 const STEPS_A_BEAT: usize = 50;
 
 fn main() -> Outcome {
@@ -36,27 +30,27 @@ fn main() -> Outcome {
 fn swim(threads: usize, steps: usize) -> Outcome {
     let mut fish = by_name("fish")?;
     fish.set("amplitude", 0.125)?;
-    let samples = fish.sample::<f64>(SAMPLES, &Sampling::default(), 1)?;
+    let samples = fish.sample::<f64>(Body::FISH.samples, &Sampling::default(), 1)?;
     let mut clouds = Vec::new();
     for step in 0..=steps {
         clouds.push(at(&mut fish, &samples.coordinates, step)?);
     }
-    let grid = round(&clouds)?;
-    let (first, found) = first_call(&clouds[0], grid)?;
-    let mut later = steps_after(&found, &clouds[1..], grid)?;
+    let grid = grid_around(&clouds)?;
+    let (first, carried) = first_call(&clouds[0], grid)?;
+    let mut later = steps_after(&carried, &clouds[1..], grid)?;
     let second = later.remove(0);
     show(threads, &first, &second, &later);
     Ok(())
 }
 
-/// The skin's points at a time.
+/// Points of the skin at a time step.
 fn at(fish: &mut Shape, skin: &[SurfaceCoordinate], step: usize) -> Outcome<Vec<[f32; 3]>> {
     fish.set("time", step as f64 / STEPS_A_BEAT as f64)?;
     Ok(fish.points_at(skin)?)
 }
 
-/// A grid with room for all clouds.
-fn round(clouds: &[Vec<[f32; 3]>]) -> Outcome<Grid<f32>> {
+/// Grid around all clouds.
+fn grid_around(clouds: &[Vec<[f32; 3]>]) -> Outcome<Grid<f32>> {
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for point in clouds.iter().flatten() {
         for a in 0..3 {
@@ -64,26 +58,22 @@ fn round(clouds: &[Vec<[f32; 3]>]) -> Outcome<Grid<f32>> {
             high[a] = high[a].max(f64::from(point[a]));
         }
     }
-    let longest = (0..3).map(|a| high[a] - low[a]).fold(0.0, f64::max);
-    let spacing = AIR * longest / SHAPE[0] as f64;
-    let corner = |a: usize| 0.5 * (low[a] + high[a]) - 0.5 * spacing * SHAPE[a] as f64;
-    let lower = vector::of_f64(std::array::from_fn(corner));
-    Ok(Grid::new(lower, spacing as f32, SHAPE)?)
+    centered_grid((low, high), Body::FISH.shape).map_err(|error| error.to_string().into())
 }
 
-/// What a call took: as a whole, the making of the plan included where it is new, and stage by stage.
+/// Seconds of a call, including the creation of a new plan, and of its stages.
 struct Call {
     seconds: f64,
     stages: Seconds,
 }
 
-/// What a call leaves for the next.
-struct Found {
+/// Result of a call that the next one uses.
+struct Carried {
     radius: f64,
     normals: Vec<[f32; 3]>,
 }
 
-fn first_call(points: &[[f32; 3]], grid: Grid<f32>) -> Outcome<(Call, Found)> {
+fn first_call(points: &[[f32; 3]], grid: Grid<f32>) -> Outcome<(Call, Carried)> {
     let cloud = PointCloud::new(points.to_vec())?;
     let start = Instant::now();
     let mut plan = Reconstructor::new(grid, unchecked())?;
@@ -92,19 +82,19 @@ fn first_call(points: &[[f32; 3]], grid: Grid<f32>) -> Outcome<(Call, Found)> {
         seconds: start.elapsed().as_secs_f64(),
         stages: result.report().seconds,
     };
-    let found = Found {
+    let carried = Carried {
         radius: result.report().radius,
         normals: result.normals().to_vec(),
     };
-    Ok((call, found))
+    Ok((call, carried))
 }
 
-fn steps_after(found: &Found, clouds: &[Vec<[f32; 3]>], grid: Grid<f32>) -> Outcome<Vec<Call>> {
+fn steps_after(carried: &Carried, clouds: &[Vec<[f32; 3]>], grid: Grid<f32>) -> Outcome<Vec<Call>> {
     let options = unchecked()
-        .radius(Radius::Fixed(found.radius))
+        .radius(Radius::Fixed(carried.radius))
         .orient(Method::Signs);
     let mut plan = Reconstructor::new(grid, options)?;
-    let mut normals = found.normals.clone();
+    let mut normals = carried.normals.clone();
     let mut calls = Vec::new();
     for points in clouds {
         let cloud = PointCloud::new(points.clone())?.with_normals(normals)?;
@@ -124,9 +114,13 @@ fn unchecked() -> Options {
 }
 
 fn show(threads: usize, first: &Call, second: &Call, later: &[Call]) {
-    let [x, y, z] = SHAPE;
+    let Body {
+        samples,
+        shape: [x, y, z],
+        ..
+    } = Body::FISH;
     let count = later.len();
-    println!("Fish, {SAMPLES} samples, {x} × {y} × {z} cells, f32, {threads} threads; seconds.\n");
+    println!("Fish, {samples} samples, {x} × {y} × {z} cells, f32, {threads} threads; seconds.\n");
     println!(
         "| | first call | first step | later steps, median of {count} | over the first call |"
     );
@@ -140,9 +134,7 @@ fn show(threads: usize, first: &Call, second: &Call, later: &[Call]) {
 }
 
 fn row(name: &str, first: f64, second: f64, later: impl Iterator<Item = f64>) {
-    let mut later: Vec<f64> = later.collect();
-    later.sort_by(f64::total_cmp);
-    let median = later[later.len() / 2];
+    let median = median(later.collect());
     let ratio = median / first;
     println!("| {name} | {first:.4} | {second:.4} | {median:.4} | {ratio:.2} |");
 }

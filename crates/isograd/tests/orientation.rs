@@ -12,8 +12,8 @@ use isograd_element::vector;
 
 /// Most wrong signs, in per cent of the axes within 60° of the truth: half a per cent on clean clouds and
 /// where samples are missing, a tenth where they are uneven or the noise is small beside the body, and 3
-/// where the wings are two to four deviations of the noise thick: who knows the clean surface gets 1.8 wrong there
-/// (`least` in the table of `isograd-orientation -- --only noise`).
+/// where the wings are two to four deviations of the noise thick: the lower bound given the clean surface is 1.8 there
+/// (`lower_bound` in docs/orientation.json).
 const LIMITS: [(&str, f64); 16] = [
     ("airliner", 0.5),
     ("aorta", 0.5),

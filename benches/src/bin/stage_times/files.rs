@@ -1,4 +1,4 @@
-//! The folder that input comes from and output goes to.
+//! Folder of input and output arrays.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 use isograd::{Grid, Real};
 use serde::Deserialize;
 
-use super::Outcome;
+use isograd_benches::output::Outcome;
 
-/// A number that is stored as raw little-endian bytes.
+/// A number stored as raw little-endian bytes.
 pub trait Number: Copy {
-    /// The ending of its files.
+    /// Extension of its files.
     const SUFFIX: &'static str;
-    /// From its bytes; the slice has as many as the number.
+    /// Number from its bytes; the slice has its size.
     fn read(bytes: &[u8]) -> Self;
     /// Appends its bytes.
     fn write(self, bytes: &mut Vec<u8>);
@@ -35,25 +35,14 @@ macro_rules! number {
 }
 number!(f32 f64 u32);
 
-/// What is not an array.
-#[derive(Deserialize)]
+/// Scalars of the input; missing ones are 0.
+#[derive(Default, Deserialize)]
 #[serde(default)]
 struct Settings {
     shape: [usize; 3],
     lower: [f64; 3],
     spacing: f64,
     radius: f64,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self {
-            shape: [2; 3],
-            lower: [0.0; 3],
-            spacing: 1.0,
-            radius: 0.0,
-        }
-    }
 }
 
 /// A folder and its `settings.json`.

@@ -1,24 +1,21 @@
 //! Times one stage, one run at a time, for a program that runs other libraries in between.
 //!
-//! `stage-times STAGE FOLDER TYPE THREADS` reads its input from FOLDER, prints `ready`, and then answers
-//! each line of its input: `run` with the seconds of one forward pass, `save` with `saved` once the
-//! outputs are in FOLDER. Arrays are raw little-endian files, `NAME.f32`, `.f64` or `.u32`.
+//! `stage-times STAGE FOLDER TYPE THREADS` reads its input from FOLDER, prints `ready`, and then replies to each line of its
+//! input: to `run` with the seconds of one forward pass, to `save` with `saved` once the outputs are in FOLDER. Arrays are raw little-endian files, `NAME.f32`, `.f64` or `.u32`.
 
 mod files;
 mod samples;
 mod stages;
 
-use std::error::Error;
 use std::io::{BufRead, Write};
 use std::time::Instant;
 
 use isograd::Real;
+use isograd_benches::output::Outcome;
 use isograd_benches::pool;
 
 use files::{Folder, Number};
 use stages::Stage;
-
-type Outcome<T = ()> = Result<T, Box<dyn Error>>;
 
 fn main() -> Outcome {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -34,20 +31,20 @@ fn main() -> Outcome {
     }
 }
 
-/// Answers requests until the input ends.
+/// Replies to requests until the input ends.
 fn serve<T: Real + Number>(name: &str, folder: &Folder, threads: usize) -> Outcome {
     let pool = pool(threads);
     let mut stage =
         pool.install(|| stages::by_name::<T>(name, folder).map_err(|e| e.to_string()))?;
-    answer("ready")?;
+    reply("ready")?;
     for request in std::io::stdin().lock().lines() {
         match request?.as_str() {
-            "run" => answer(&pool.install(|| seconds(stage.as_mut()))?.to_string())?,
+            "run" => reply(&pool.install(|| seconds(stage.as_mut()))?.to_string())?,
             "save" => {
                 stage.save(folder)?;
-                answer("saved")?;
+                reply("saved")?;
             }
-            other => return Err(format!("'{other}' is no request").into()),
+            other => return Err(format!("'{other}' is not a request: expected run or save").into()),
         }
     }
     Ok(())
@@ -60,7 +57,7 @@ fn seconds(stage: &mut dyn Stage) -> Result<f64, String> {
     Ok(start.elapsed().as_secs_f64())
 }
 
-fn answer(line: &str) -> Outcome {
+fn reply(line: &str) -> Outcome {
     let mut output = std::io::stdout().lock();
     writeln!(output, "{line}")?;
     Ok(output.flush()?)

@@ -5,7 +5,8 @@ use isograd::neighbors::{Neighborhoods, Radius};
 use isograd::splat::{self, SampleCotangent, Samples, area};
 use isograd::{Field, Real, normals, orient, poisson};
 
-use super::Outcome;
+use isograd_benches::output::Outcome;
+
 use super::files::{Folder, Number};
 use super::stages::Stage;
 
@@ -19,7 +20,7 @@ pub struct Normals<T: Real> {
 }
 
 impl<T: Real + Number> Normals<T> {
-    /// With the radius of the settings, or the automatic one where that is 0.
+    /// Reads the points; a radius of 0 in the settings is automatic.
     pub fn open(folder: &Folder) -> Outcome<Self> {
         Ok(Self {
             points: folder.read_rows("points")?,
@@ -36,13 +37,13 @@ impl<T: Real + Number> Normals<T> {
 
 impl<T: Real + Number> Stage for Normals<T> {
     fn run(&mut self) -> Result<(), String> {
-        let found = normals::forward_with_neighborhoods(
+        let computed = normals::forward_with_neighborhoods(
             &self.points,
             self.radius,
             &mut self.neighborhoods,
             &mut self.residual,
         );
-        found.map_err(|error| error.to_string())?;
+        computed.map_err(|error| error.to_string())?;
         area::forward(&self.neighborhoods, &mut self.areas);
         Ok(())
     }
@@ -61,7 +62,7 @@ pub struct Oriented<T: Real> {
 }
 
 impl<T: Real + Number> Oriented<T> {
-    /// As [`Normals::open`].
+    /// Reads the input of [`Normals`].
     pub fn open(folder: &Folder) -> Outcome<Self> {
         Ok(Self {
             axes: Normals::open(folder)?,
@@ -114,7 +115,7 @@ pub struct Indicator<T: Real> {
 }
 
 impl<T: Real + Number> Indicator<T> {
-    /// Points, normals and the cotangent.
+    /// Reads points, normals and the cotangent.
     pub fn open(folder: &Folder) -> Outcome<Self> {
         let points: Vec<[T; 3]> = folder.read_rows("points")?;
         let grid = folder.grid()?;

@@ -1,17 +1,18 @@
-//! The stages, each with its input in memory, its scratch warm, and its output kept.
+//! Stages with their input, scratch buffers and output in memory.
 
 use isograd::distance::Band;
 use isograd::{
     Field, Mesh, Options, PointCloud, Real, Reconstructor, distance, isosurface, poisson,
 };
 
-use super::Outcome;
+use isograd_benches::output::Outcome;
+
 use super::files::{Folder, Number};
 use super::samples::{Indicator, Normals, Oriented};
 
 /// One stage with its input.
 pub trait Stage: Send {
-    /// What a run needs and must not be timed.
+    /// Untimed preparation of a run.
     fn prepare(&mut self) {}
     /// One forward pass.
     fn run(&mut self) -> Result<(), String>;
@@ -30,7 +31,7 @@ pub fn by_name<T: Real + Number>(name: &str, folder: &Folder) -> Outcome<Box<dyn
         "indicator" => Box::new(Indicator::<T>::open(folder)?),
         "poisson" => Box::new(Poisson::<T>::open(folder)?),
         "isosurface" => Box::new(Isosurface::<T>::open(folder)?),
-        _ => return Err(format!("there is no stage '{name}'").into()),
+        _ => return Err(format!("unknown stage '{name}'").into()),
     })
 }
 
@@ -69,7 +70,7 @@ impl<T: Real + Number> Stage for Poisson<T> {
     }
 }
 
-/// A field → the surface where it is 0.
+/// A field → its zero level set.
 struct Isosurface<T: Real> {
     chi: Field<T>,
     mesh: Mesh<T>,
@@ -98,7 +99,7 @@ impl<T: Real + Number> Stage for Isosurface<T> {
     }
 }
 
-/// A mesh and the field that made it → `φ`. The mesh is made before, by marching cubes at 0.
+/// A field and its zero level set, extracted beforehand → `φ`.
 struct Distance<T: Real> {
     band: Band,
     mesh: Mesh<T>,
@@ -146,7 +147,7 @@ impl<T: Real + Number> Stage for Distance<T> {
     }
 }
 
-/// Points → `φ`, by a plan with the default options; its report is made as well.
+/// Points → `φ` and the report, by a plan with the default options.
 struct Whole<T: Real> {
     cloud: PointCloud<T>,
     plan: Reconstructor<T>,

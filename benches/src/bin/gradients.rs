@@ -1,0 +1,15 @@
+//! The pullback against differences and closed forms, as JSON:
+//! `cargo run --release -p isograd-benches --bin gradients [FILE]` writes FILE, or docs/gradients.json.
+
+use std::process::ExitCode;
+
+use isograd_benches::gradients::Study;
+use isograd_benches::output::run;
+use peak_alloc::PeakAlloc;
+
+#[global_allocator]
+static ALLOCATOR: PeakAlloc = PeakAlloc;
+
+fn main() -> ExitCode {
+    run("gradients", || Study::full().run()?.json())
+}

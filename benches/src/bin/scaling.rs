@@ -1,0 +1,15 @@
+//! Time and memory against the size of the problem, as JSON:
+//! `cargo run --release -p isograd-benches --bin scaling [FILE]` writes FILE, or docs/scaling.json.
+
+use std::process::ExitCode;
+
+use isograd_benches::output::run;
+use isograd_benches::scaling;
+use peak_alloc::PeakAlloc;
+
+#[global_allocator]
+static ALLOCATOR: PeakAlloc = PeakAlloc;
+
+fn main() -> ExitCode {
+    run("scaling", scaling::run)
+}

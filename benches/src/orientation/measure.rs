@@ -1,0 +1,236 @@
+//! Errors of one orientation method on one cloud.
+
+use std::time::Instant;
+
+use isograd::neighbors::{self, CellIndex, Neighborhoods, Radius};
+use isograd::normals;
+use isograd::orient::doubt::{Doubt, Reason, reasons};
+use isograd::orient::{self, Known, Method, Orientation};
+use isograd_element::vector;
+use serde::Serialize;
+
+use super::body::{Body, Clean};
+
+/// Smallest absolute cosine between an axis and the true normal for its sign to be evaluated: 60 degrees.
+const EVALUATED: f64 = 0.5;
+
+/// Errors of one method on one cloud, in percent and degrees.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Errors {
+    /// Wrong signs, in percent of those evaluated.
+    pub wrong: f64,
+    /// Lower bound of `wrong` for a noisy cloud, given the clean surface.
+    pub lower_bound: Option<f64>,
+    /// Samples whose axis is within 60 degrees of the true normal, in percent; only their signs are evaluated.
+    pub evaluated: f64,
+    /// Median angle between axis and true normal.
+    pub axis_median: f64,
+    /// Mean angle between axis and true normal.
+    pub axis_mean: f64,
+    /// Mean angle with the common radius for all neighborhoods.
+    pub axis_mean_narrow: f64,
+    /// Doubtful samples, in percent.
+    pub doubtful: f64,
+    /// Doubtful samples by reason, in percent.
+    pub reasons: Vec<(&'static str, f64)>,
+    /// Doubtful ones among the wrong signs, in percent; absent if no sign is wrong.
+    pub caught: Option<f64>,
+}
+
+/// Result of one method on one cloud.
+#[derive(Clone, Debug)]
+pub struct Measured {
+    /// Number of points.
+    pub points: usize,
+    /// Errors of signs and axes.
+    pub errors: Errors,
+    /// Seconds for neighborhoods and axes, and for the signs.
+    pub seconds: [f64; 2],
+    /// Normals and confidence.
+    pub orientation: Orientation<f32>,
+}
+
+/// A cloud with neighborhoods and axes, in single precision.
+pub struct Prepared {
+    /// `(N, 3)`.
+    pub points: Vec<[f32; 3]>,
+    /// Neighborhoods of the points.
+    pub neighborhoods: Neighborhoods<f32>,
+    /// Unoriented normals.
+    pub axes: normals::Residual<f32>,
+    /// Seconds for neighborhoods and axes.
+    pub seconds: f64,
+}
+
+impl Prepared {
+    /// Neighborhoods and axes of points.
+    ///
+    /// # Panics
+    /// On a degenerate cloud; the suite has none.
+    pub fn new(points: &[[f64; 3]]) -> Self {
+        let points: Vec<[f32; 3]> = points.iter().map(|&p| vector::of_f64(p)).collect();
+        let start = Instant::now();
+        let mut neighborhoods = Neighborhoods::default();
+        neighbors::forward(&points, Radius::Auto, &mut neighborhoods).expect("neighborhoods");
+        let mut axes = normals::Residual::default();
+        normals::forward(&neighborhoods, &mut axes);
+        Self {
+            points,
+            neighborhoods,
+            axes,
+            seconds: start.elapsed().as_secs_f64(),
+        }
+    }
+
+    /// Chooses signs, and returns them with the seconds taken.
+    ///
+    /// # Panics
+    /// On a method that fails; those of the suite do not.
+    pub fn orient(
+        &self,
+        known: Known<'_, f32>,
+        method: &Method,
+        scratch: &mut orient::Scratch,
+    ) -> (Orientation<f32>, f64) {
+        let mut out = Orientation::default();
+        let start = Instant::now();
+        orient::forward(
+            &self.points,
+            &self.axes,
+            &self.neighborhoods,
+            known,
+            method,
+            scratch,
+            &mut out,
+        )
+        .expect("signs");
+        (out, start.elapsed().as_secs_f64())
+    }
+}
+
+/// Evaluates a method on a cloud. The fastest of `runs` counts.
+pub fn measure(body: &Body, method: &Method, runs: usize) -> Measured {
+    let prepared = Prepared::new(&body.points);
+    let mut scratch = orient::Scratch::default();
+    let known = || Known::from(None);
+    let (orientation, mut seconds) = prepared.orient(known(), method, &mut scratch);
+    for _ in 1..runs {
+        seconds = seconds.min(prepared.orient(known(), method, &mut scratch).1);
+    }
+    Measured {
+        points: body.points.len(),
+        errors: evaluate(body, &prepared, &orientation),
+        seconds: [prepared.seconds, seconds],
+        orientation,
+    }
+}
+
+fn evaluate(body: &Body, prepared: &Prepared, out: &Orientation<f32>) -> Errors {
+    let truth = body.normals.iter().enumerate();
+    let known = truth.filter(|(_, truth)| vector::norm(**truth) > 0.0);
+    let cosines: Vec<(usize, f64)> = known
+        .map(|(i, &truth)| (i, vector::dot(vector::to_f64(out.normals[i]), truth)))
+        .collect();
+    let is_evaluated = |cosine: f64| cosine.abs() > EVALUATED;
+    let evaluated = cosines.iter().filter(|c| is_evaluated(c.1)).count();
+    let wrong: Vec<usize> = cosines
+        .iter()
+        .filter(|c| is_evaluated(c.1) && c.1 < 0.0)
+        .map(|c| c.0)
+        .collect();
+    let angles_of_narrow = angles(body, &narrow_axes(prepared));
+    let mut angles = angles(body, &out.normals);
+    angles.sort_by(f64::total_cmp);
+    let why = reasons(&prepared.points, out, &prepared.neighborhoods);
+    let is_doubtful = |i: &&usize| why.binary_search_by_key(*i, |f| f.0 as usize).is_ok();
+    let caught = wrong.iter().filter(is_doubtful).count();
+    let doubt = Doubt::count(body.points.len(), &why);
+    let share = |part: usize, whole: usize| 100.0 * part as f64 / whole.max(1) as f64;
+    Errors {
+        wrong: share(wrong.len(), evaluated),
+        lower_bound: body.clean.as_ref().map(|clean| {
+            let evaluated = cosines.iter().filter(|c| is_evaluated(c.1)).map(|c| c.0);
+            100.0 * least_wrong(body, clean, &evaluated.collect::<Vec<_>>())
+        }),
+        evaluated: share(evaluated, cosines.len()),
+        axis_median: angles.get(angles.len() / 2).copied().unwrap_or(0.0),
+        axis_mean: mean(&angles),
+        axis_mean_narrow: mean(&angles_of_narrow),
+        doubtful: 100.0 * doubt.share(),
+        reasons: Reason::ALL
+            .map(|reason| (reason.name(), 100.0 * doubt.share_of(reason)))
+            .to_vec(),
+        caught: (!wrong.is_empty()).then(|| share(caught, wrong.len())),
+    }
+}
+
+/// Axes with the common radius for all neighborhoods.
+fn narrow_axes(prepared: &Prepared) -> Vec<[f32; 3]> {
+    let common = Radius::Fixed(f64::from(prepared.neighborhoods.common_radius));
+    let (mut fixed, mut narrow) = (Neighborhoods::default(), normals::Residual::default());
+    neighbors::forward(&prepared.points, common, &mut fixed).expect("neighborhoods");
+    normals::forward(&fixed, &mut narrow);
+    narrow.normals
+}
+
+/// Fraction of these samples whose true normal disagrees with the expected one, given the clean surface: the mean of the
+/// normals of the 64 nearest clean samples, weighted by the likelihood of the displacement.
+fn least_wrong(body: &Body, clean: &Clean, evaluated: &[usize]) -> f64 {
+    let surface = CellIndex::new(&clean.body.points);
+    let (mut nearest, mut wrong) = (Vec::new(), 0);
+    for &i in evaluated {
+        surface.nearest(body.points[i], 64, &mut nearest);
+        let expected = nearest.iter().fold([0.0; 3], |sum, &(j, d2)| {
+            let probable = (-0.5 * d2 / (clean.deviation * clean.deviation)).exp();
+            vector::add(sum, vector::scale(clean.body.normals[j as usize], probable))
+        });
+        wrong += usize::from(vector::dot(expected, body.normals[i]) < 0.0);
+    }
+    wrong as f64 / evaluated.len().max(1) as f64
+}
+
+/// Angles in degrees between axes and true normals.
+fn angles(body: &Body, axes: &[[f32; 3]]) -> Vec<f64> {
+    let pairs = axes.iter().zip(&body.normals);
+    let known = pairs.filter(|(_, truth)| vector::norm(**truth) > 0.0);
+    let cosine = |(&axis, &truth): (&[f32; 3], &[f64; 3])| {
+        vector::dot(vector::to_f64(axis), truth).abs().min(1.0)
+    };
+    known.map(|pair| cosine(pair).acos().to_degrees()).collect()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wrong_signs_are_counted_among_evaluated_ones() {
+        // A tenth of the true normals points inward, and half of all are not evaluated.
+        let body = Body::sphere(1.0, 2_000, 3);
+        let mut shown = body.clone();
+        for (i, n) in shown.normals.iter_mut().enumerate() {
+            match i % 10 {
+                0 => *n = n.map(|x| -x),
+                5.. => *n = [0.0; 3],
+                _ => {}
+            }
+        }
+        let measured = measure(&shown, &Method::Auto, 1);
+        let Errors {
+            wrong,
+            evaluated,
+            caught,
+            ..
+        } = measured.errors;
+        assert!(
+            (wrong - 20.0).abs() < 1e-9 && evaluated > 99.9,
+            "{wrong} {evaluated}"
+        );
+        assert_eq!(caught, Some(0.0));
+        assert!(measured.errors.axis_median < 3.0);
+    }
+}
