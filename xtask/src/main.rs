@@ -32,7 +32,7 @@ Checks
   test [--all]     everything a change must pass, cheapest first: format, limits, links, clippy,
                    docs, tests, doc tests, the Python package, examples, and the commands and code
                    of the README; --all adds the GPU kernels on Vulkan and as PTX, PyTorch, the
-                   benchmarks, and crates and source distribution as they are published
+                   benchmarks, whether the pages match their figures, and the published packages
   lint             the first four of these, for the whole workspace
   python           the tests of the Python package alone
   package          the packages as they are published: crates, source distribution

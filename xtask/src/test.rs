@@ -7,6 +7,7 @@ use crate::limits;
 use crate::links;
 use crate::nvrtc::Nvrtc;
 use crate::packages;
+use crate::pages;
 use crate::process::{self, Outcome};
 use crate::python;
 use crate::readme;
@@ -102,6 +103,7 @@ fn run_steps(scope: Scope, steps: &mut Steps, tally: &mut Tally) -> Outcome {
     steps.step("examples", examples::run)?;
     steps.step("README commands", readme::run)?;
     if scope == Scope::All {
+        steps.step("pages", pages::check)?;
         steps.step("crates", packages::crates)?;
         steps.step("source distribution", packages::source_distribution)?;
     }
