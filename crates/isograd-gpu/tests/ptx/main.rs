@@ -1,6 +1,6 @@
 //! Every kernel as CUDA C++, compiled to PTX for sm_90 by NVRTC: no GPU is needed for that.
 //!
-//! `cargo xtask test` fetches NVRTC from PyPI and sets `ISOGRAD_CUDA_INCLUDE` to the folder of its headers.
+//! `cargo xtask test --all` fetches NVRTC from PyPI and sets `ISOGRAD_CUDA_INCLUDE` to the folder of its headers.
 
 mod recorder;
 mod stages;
@@ -25,7 +25,7 @@ fn every_kernel_becomes_ptx() {
         );
     }
     let Ok(include) = std::env::var("ISOGRAD_CUDA_INCLUDE") else {
-        println!("SKIPPED PTX: ISOGRAD_CUDA_INCLUDE is not set; `cargo xtask test` sets it");
+        println!("SKIPPED PTX: ISOGRAD_CUDA_INCLUDE is not set; `cargo xtask test --all` sets it");
         return;
     };
     let sources: Vec<_> = sources.iter().collect();
