@@ -160,7 +160,7 @@ def normals(results: Results) -> str:
     for body in results.bodies:
         cells = [body]
         for draw in DRAWS:
-            errors = results.row(results.cells[0], body, draw=draw)["normals"]
+            errors = results.row(results.cells[0], body, draw=draw)["normal_errors"]
             degrees = errors["degrees"]
             cells += [f"{pair_p99(degrees)}", number(100 * errors["wrong_signs"])]
         rows.append(cells)
@@ -229,7 +229,7 @@ def precision(results: Results) -> str:
     rows = []
     for name in ("f32", "f64"):
         row = results.row(results.middle, precision=name)
-        surface, degrees = row["surface"], row["normals"]["degrees"]
+        surface, degrees = row["surface"], row["normal_errors"]["degrees"]
         errors = [surface["vertices"], surface["faces"], row["band"], row["field"]["gradient"], degrees]
         rows.append([name] + [pair(e) for e in errors] + [percent(surface[m]) for m in ("area", "volume")])
     return table(["type"], ["vertices", "faces", "φ", "∇φ", "normals", "area, %", "volume, %"], rows)
@@ -239,7 +239,8 @@ def draw(data: dict, images) -> None:
     results = Results(data)
     draw_convergence(results, images / "accuracy-convergence.png")
     draw_weights(results, images / "accuracy-weights.png")
-    draw_gradient(results, images / "accuracy-gradient.png")
+    if "histograms" in data:
+        draw_gradient(results, images / "accuracy-gradient.png")
 
 
 def draw_convergence(results: Results, path) -> None:

@@ -1,9 +1,8 @@
-"""How far isograd and Open3D's PoissonRecon are from the truth, with the same samples, the same true normals and
-the same cell: `python benches/peers/accuracy.py --isograd PROGRAM [--data FOLDER]`.
+"""Errors of isograd and Open3D's PoissonRecon with the same samples, exact normals and cell size: `python benches/peers/accuracy.py --isograd PROGRAM [--data FOLDER]`.
 
-The torus is the one of the other comparisons. FOLDER holds NAME.points.ply, with normals, and NAME.mesh.ply, the
-truth; what is not there is skipped. Distances are in cells. *made*: from the surface to the truth; *found*: from
-the truth to the surface; each the mean over 100,000 random places, and the 99th percentile."""
+The torus is that of the other comparisons. FOLDER holds NAME.points.ply, with normals, and NAME.mesh.ply, the exact
+surface; missing ones are skipped. Distances are in cells: from the reconstruction to the exact surface (*precision*) and
+back (*completeness*), each the mean over 100,000 random points and the 99th percentile."""
 
 import argparse
 import subprocess
@@ -54,7 +53,7 @@ def torus_field(options, folder: Path) -> None:
 def clouds(options, folder: Path) -> None:
     files = sorted(options.data.glob("*.points.ply")) if options.data else []
     if not files:
-        print("SKIPPED: there is no folder of clouds (--data)")
+        print("SKIPPED clouds: no folder given (--data)")
     for path in files:
         truth = path.with_name(path.name.replace(".points.ply", ".mesh.ply"))
         cloud = o3d.io.read_point_cloud(str(path))
@@ -67,11 +66,11 @@ def clouds(options, folder: Path) -> None:
         for name, made in surfaces(options, folder, points, normals, spacing, options.depth):
             there = [distances(body, random_places(*made)), distances(made, random_places(*body))]
             shown = [f"{np.mean(d) / spacing:.4f}, {np.quantile(d, 0.99) / spacing:.3f}" for d in there]
-            print(f"{path.name.removesuffix('.points.ply'):12} {name:8} made {shown[0]}   found {shown[1]}", flush=True)
+            print(f"{path.name.removesuffix('.points.ply'):12} {name:8} precision {shown[0]}   completeness {shown[1]}", flush=True)
 
 
 def surfaces(options, folder: Path, points, normals, spacing: float, depth: int):
-    """Vertices and faces of each way."""
+    """Vertices and faces of each reconstruction."""
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
     cloud.normals = o3d.utility.Vector3dVector(normals)
     mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth=depth, scale=SCALE)
@@ -86,7 +85,7 @@ def surfaces(options, folder: Path, points, normals, spacing: float, depth: int)
 
 
 def random_places(vertices, faces) -> np.ndarray:
-    """Uniform by area, the same at every call."""
+    """Reproducible points, uniform by area."""
     random = np.random.default_rng(0)
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)

@@ -1,4 +1,4 @@
-"""Times isograd beside other libraries in one run: `cargo xtask peers`."""
+"""Times isograd and other libraries in one run: `cargo xtask peers`."""
 
 import argparse
 import os
@@ -32,7 +32,7 @@ def main() -> None:
             if options.only and name not in options.only:
                 continue
             for build in builders:
-                # The programs of one case are gone before the next begins.
+                # The processes of one case end before the next begins.
                 with ExitStack() as stack:
                     case = build(stack, options.stage_times, Path(folder))
                     if case is None:
@@ -40,12 +40,12 @@ def main() -> None:
                     case.measure(options.repeats)
                 show(case)
                 cases.append(case)
-    report.write(cases, options.repeats, options.docs, "cargo xtask peers")
-    print(f"wrote {options.docs}/peers.md, peers.json and images/peers.png")
+    report.write(cases, options.repeats, options.json)
+    print(f"wrote {options.json}")
 
 
 def jobs(options) -> dict:
-    """Every comparison, by name; each is built when its turn comes."""
+    """All comparisons by name, as functions that set them up."""
     cells, count = (64, 10_000) if options.quick else (128, 50_000)
     shapes = [(cells,) * 3, (2 * cells, cells, cells)]
     threads = options.threads
@@ -69,22 +69,24 @@ def jobs(options) -> dict:
 
 
 def show(case) -> None:
-    print("\n".join(report.table(case)), flush=True)
+    print(case.title)
+    for entry in case.entries:
+        print(f"  {entry.name}, {entry.dtype}, {entry.threads} threads: {entry.median:.4g} s")
+    print(*(f"  {check}" for check in case.checks), sep="\n", flush=True)
 
 
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--stage-times", type=Path, required=True, help="the program of isograd")
-    parser.add_argument("--docs", type=Path, default=None, help="where the page goes")
-    parser.add_argument("--repeats", type=int, default=None, help="runs that count (5; quick: 2)")
+    parser.add_argument("--json", type=Path, help="results; default: docs/peers.json after a complete run")
+    parser.add_argument("--repeats", type=int, default=None, help="timed runs (5; quick: 2)")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--quick", action="store_true", help="small sizes, few runs")
     parser.add_argument("--only", nargs="*", help="names of comparisons")
     options = parser.parse_args()
     options.repeats = options.repeats or (2 if options.quick else 5)
-    # What is committed is a whole run.
     partial = options.quick or options.only
-    options.docs = options.docs or (ROOT / "out" / "peers" if partial else ROOT / "docs")
+    options.json = options.json or ROOT / ("out/peers.json" if partial else "docs/peers.json")
     return options
 
 

@@ -15,9 +15,9 @@ from case import Case, peer
 try:
     import pysdf
 except ImportError:
-    # It is built where it is installed, and needs the headers of Eigen.
+    # Built on installation, which needs the headers of Eigen.
     pysdf = None
-from stage import Stage, write_input
+from stage import Stage, stages, write_input
 
 
 @wp.kernel
@@ -37,15 +37,13 @@ def case(stack, program, folder, cells: int, threads: int) -> Case:
     field = torus.distance(centers)
     write_input(folder, torus.grid(cells), chi=field)
     write_input(folder, torus.grid(cells), chi=field.astype(np.float32))
-    stages = [
-        stack.enter_context(Stage(program, "distance", folder, dtype, count))
-        for dtype in (np.float32, np.float64)
-        for count in sorted({1, threads})
-    ]
-    ours = [stage.entry("phi") for stage in stages]
-    stages[-1].run()
-    vertices = stages[-1].result("vertices").reshape(-1, 3)
-    faces = stages[-1].result("faces", np.uint32).reshape(-1, 3).astype(np.int64)
+    single, double = (
+        stages(stack, program, "distance", folder, threads, dtype) for dtype in (np.float32, np.float64)
+    )
+    ours = [stage.entry("phi") for stage in single + double]
+    double[-1].run()
+    vertices = double[-1].result("vertices").reshape(-1, 3)
+    faces = double[-1].result("faces", np.uint32).reshape(-1, 3).astype(np.int64)
     peers = [
         peer("libigl, pseudonormal", "float64", threads, libigl(centers, vertices, faces)),
         peer("Open3D RaycastingScene", "float32", threads, open3d(centers, vertices, faces, threads)),
@@ -69,17 +67,16 @@ def band(stack, program, folder, cells: int, threads: int) -> Case | None:
     """Only within 3 cells of the surface. `None` where OpenVDB's Python module is not installed."""
     python = "/usr/bin/python3"
     if not has_openvdb(python):
-        print("no band: install Debian's python3-openvdb to compare with OpenVDB", flush=True)
+        print("SKIPPED OpenVDB: install Debian's python3-openvdb", flush=True)
         return None
     folder = folder / "band"
     field = torus.distance(torus.centers(cells)).astype(np.float32)
     write_input(folder, torus.grid(cells), chi=field)
-    counts = sorted({1, threads})
-    stages = [Stage(program, "band", folder, np.float32, count) for count in counts]
-    ours = [stack.enter_context(stage).entry("phi") for stage in stages]
+    single = stages(stack, program, "band", folder, threads)
+    ours = [stage.entry("phi") for stage in single]
     # Saves the mesh that OpenVDB reads.
-    stages[-1].run()
-    faces = len(stages[-1].result("faces", np.uint32)) // 3
+    single[-1].run()
+    faces = len(single[-1].result("faces", np.uint32)) // 3
     script = [python, Path(__file__).with_name("vdb.py")]
     vdb = stack.enter_context(Stage(script, "band", folder, np.float32, threads))
     peers = [vdb.entry("phi", "OpenVDB createLevelSetFromPolygons")]
@@ -106,14 +103,14 @@ def has_openvdb(python: str) -> bool:
 
 
 def agreement(entry, exact: np.ndarray, spacing: float) -> str:
-    """How far a field is from ours in double precision, in cells, signs apart from lengths."""
+    """Difference of a field from ours in double precision, in cells: of the lengths, and of the signs."""
     field = entry.result()
     lengths = np.abs(np.abs(field) - np.abs(exact)).max() / spacing
     signs = int(np.sum((field < 0) != (exact < 0)))
     name = f"{entry.name}, {entry.dtype}, {entry.threads} threads"
     return (
         f"{name}: |φ| within {lengths:.1e} cell of isograd in float64, "
-        f"another sign at {signs} cells"
+        f"different sign at {signs} cells"
     )
 
 

@@ -5,7 +5,7 @@ from skimage.measure import marching_cubes, mesh_surface_area
 
 import torus
 from case import Case, peer
-from stage import Stage, write_input
+from stage import stages, write_input
 
 
 def case(stack, program, folder, cells: int, threads: int) -> Case:
@@ -13,15 +13,12 @@ def case(stack, program, folder, cells: int, threads: int) -> Case:
     folder = folder / f"isosurface-{cells}"
     field = torus.distance(torus.centers(cells)).astype(np.float32).reshape([cells] * 3)
     write_input(folder, torus.grid(cells), chi=field)
-    stages = [
-        stack.enter_context(Stage(program, "isosurface", folder, np.float32, count))
-        for count in sorted({1, threads})
-    ]
+    ours = stages(stack, program, "isosurface", folder, threads)
     theirs = peer("scikit-image, Lewiner", "float32", 1, scikit_image(field, cells))
 
     def check() -> list[str]:
-        vertices = stages[0].result("vertices").reshape(-1, 3)
-        faces = stages[0].result("faces", np.uint32).reshape(-1, 3).astype(np.int64)
+        vertices = ours[0].result("vertices").reshape(-1, 3)
+        faces = ours[0].result("faces", np.uint32).reshape(-1, 3).astype(np.int64)
         return [
             f"isograd: {shown(vertices, faces)}",
             f"scikit-image: {shown(*theirs.result()[:2])}",
@@ -32,7 +29,7 @@ def case(stack, program, folder, cells: int, threads: int) -> Case:
         "vertices and faces at a level; isograd names the edge that each vertex lies on as well, "
         "scikit-image a normal and a value for each vertex"
     )
-    entries = [stage.entry("vertices") for stage in stages] + [theirs]
+    entries = [stage.entry("vertices") for stage in ours] + [theirs]
     return Case(title, what, ("cell", cells**3), entries, check)
 
 

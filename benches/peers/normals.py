@@ -1,13 +1,13 @@
-"""D-PCA normals and area weights against Warp's hash grid doing the same sums."""
+"""D-PCA normals and area weights with Warp's hash grid and the same sums."""
 
 import numpy as np
 import warp as wp
 
 import torus
 from case import Case, peer
-from stage import Stage, write_input
+from stage import stages, write_input
 
-# ε over the radius, as isograd has it.
+# ε over the radius, as in isograd.
 GUARD = 0.2
 
 
@@ -20,11 +20,11 @@ def warp_normals(
     out: wp.array(dtype=wp.vec3),
     areas: wp.array(dtype=float),
 ):
-    # Neighboring threads take neighboring points, as Warp's manual advises.
+    # Neighboring threads take neighboring points, as recommended by Warp's manual.
     i = wp.hash_grid_point_id(grid, wp.tid())
     x = points[i]
     total = float(0.0)
-    crowd = float(0.0)
+    density = float(0.0)
     first = wp.vec3()
     second = wp.mat33()
     query = wp.hash_grid_query(grid, x, radius)
@@ -36,14 +36,14 @@ def warp_normals(
             w = 1.0 / (r + guard)
             total += w
             rise = 1.0 - r * r / (radius * radius)
-            crowd += rise * rise
+            density += rise * rise
             first += w * d
             second += w * wp.outer(d, d)
     m = first / total
     vectors, values = wp.eig3(second / total - wp.outer(m, m))
     least = wp.argmin(values)
     out[i] = wp.vec3(vectors[0, least], vectors[1, least], vectors[2, least])
-    areas[i] = wp.pi * radius * radius / (3.0 * crowd)
+    areas[i] = wp.pi * radius * radius / (3.0 * density)
 
 
 def case(stack, program, folder, count: int, threads: int) -> Case:
@@ -54,17 +54,14 @@ def case(stack, program, folder, count: int, threads: int) -> Case:
     area = 4 * np.pi**2 * torus.MAJOR * torus.MINOR
     radius = float(np.sqrt(24 * area / (np.pi * count)))
     write_input(folder, {"radius": radius}, points=points)
-    stages = [
-        stack.enter_context(Stage(program, "normals", folder, np.float32, number))
-        for number in sorted({1, threads})
-    ]
-    entries = [stage.entry("normals") for stage in stages]
+    ours = stages(stack, program, "normals", folder, threads)
+    entries = [stage.entry("normals") for stage in ours]
     entries.append(peer("Warp hash grid, CPU", "float32", 1, warp(points, radius)))
 
     def check() -> list[str]:
         mine = entries[0].result().reshape(-1, 3)
         theirs, their_areas = entries[-1].result()
-        areas = stages[0].result("areas")
+        areas = ours[0].result("areas")
         return [
             f"isograd: {degrees(mine, truth)} from the true axis",
             f"Warp: {degrees(theirs, truth)} from the true axis",

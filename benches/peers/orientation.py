@@ -1,4 +1,4 @@
-"""Outward normals from nothing but points: isograd and PyMeshLab."""
+"""Outward normals from points only: isograd and PyMeshLab."""
 
 import numpy as np
 import pymeshlab
@@ -6,7 +6,7 @@ import pymeshlab
 import torus
 from case import Case, peer
 from normals import degrees
-from stage import Stage, write_input
+from stage import stages, write_input
 
 
 def case(stack, program, folder, count: int, threads: int) -> Case:
@@ -15,10 +15,7 @@ def case(stack, program, folder, count: int, threads: int) -> Case:
     points, truth = torus.samples(count)
     points = points.astype(np.float32)
     write_input(folder, {}, points=points)
-    entries = [
-        stack.enter_context(Stage(program, "orient", folder, np.float32, number)).entry("normals")
-        for number in sorted({1, threads})
-    ]
+    entries = [stage.entry("normals") for stage in stages(stack, program, "orient", folder, threads)]
     entries.append(peer("PyMeshLab, k = 18", "float64", 1, meshlab(points)))
 
     def check() -> list[str]:

@@ -1,10 +1,10 @@
-"""The Poisson solve against SciPy's transforms of the same size and type."""
+"""Poisson solve: isograd and SciPy's transforms of the same size and type."""
 
 import numpy as np
 from scipy.fft import dctn, idctn
 
 from case import Case, peer
-from stage import Stage, write_input
+from stage import stages, write_input
 
 
 def case(stack, program, folder, shape: tuple[int, int, int], dtype, threads: int) -> Case:
@@ -17,11 +17,10 @@ def case(stack, program, folder, shape: tuple[int, int, int], dtype, threads: in
     write_input(folder, {"shape": shape, "lower": [0, 0, 0], "spacing": 1.0}, b=b)
     inverse = inverse_eigenvalues(shape, dtype)
     entries = []
-    for count in sorted({1, threads}):
-        stage = stack.enter_context(Stage(program, "poisson", folder, dtype, count))
+    for stage in stages(stack, program, "poisson", folder, threads, dtype):
         entries.append(stage.entry("chi"))
-        work = scipy_solve(b, inverse, count)
-        entries.append(peer("SciPy dctn + idctn", str(np.dtype(dtype)), count, work))
+        work = scipy_solve(b, inverse, stage.threads)
+        entries.append(peer("SciPy dctn + idctn", str(np.dtype(dtype)), stage.threads, work))
 
     def check() -> list[str]:
         mine, theirs = entries[0].result().reshape(shape), entries[1].result()

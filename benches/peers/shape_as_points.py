@@ -7,7 +7,7 @@ import numpy as np
 
 import torus
 from case import Case, peer
-from stage import Stage, write_input
+from stage import stages, write_input
 
 # Width of the Gaussian of the spectral filter in cells, as the paper's optimization has it.
 SIGMA = 2.0
@@ -21,11 +21,8 @@ def case(stack, program, folder, count: int, cells: int, threads: int) -> Case:
     bar = np.random.default_rng(2).standard_normal([cells] * 3).astype(np.float32)
     arrays = {"points": points, "normals": normals, "bar": bar}
     write_input(folder, torus.grid(cells), **arrays)
-    entries = [
-        stack.enter_context(Stage(program, "indicator", folder, np.float32, number)).entry("chi")
-        for number in sorted({1, threads})
-    ]
-    # XLA takes all the cores there are.
+    entries = [stage.entry("chi") for stage in stages(stack, program, "indicator", folder, threads)]
+    # XLA uses all cores.
     entries.append(peer("Shape As Points in JAX", "float32", threads, sap(**arrays)))
     inside = torus.distance(torus.centers(cells)) < 0
 
@@ -66,7 +63,7 @@ def indicator(cells: int):
     filters = [-1j * x * gaussian / square for x in u]
 
     def corners(places):
-        """The eight cells round each place, and their trilinear weights."""
+        """The eight cells around each place, and their trilinear weights."""
         low = jnp.floor(places)
         fraction = places - low
         for corner in np.ndindex(2, 2, 2):
@@ -87,6 +84,6 @@ def indicator(cells: int):
 
 
 def shown(field: np.ndarray, inside: np.ndarray) -> str:
-    """Whether the field is an indicator: its sign against the truth."""
+    """Share of cells whose sign differs from the exact one."""
     wrong = np.mean((field < 0) != inside)
     return f"{100 * wrong:.3f} % of all cells on the wrong side"

@@ -1,4 +1,4 @@
-"""The timing program of isograd, or of a peer, as a process that stays alive between runs."""
+"""The timing program of isograd, or of another library, as a process that stays alive between runs."""
 
 import json
 import subprocess
@@ -17,6 +17,12 @@ def write_input(folder: Path, settings: dict, **arrays: np.ndarray) -> None:
     (folder / "settings.json").write_text(json.dumps(settings))
     for name, array in arrays.items():
         np.ascontiguousarray(array).tofile(folder / f"{name}.{SUFFIX[array.dtype]}")
+
+
+def stages(stack, program: Path, name: str, folder: Path, threads: int, dtype=np.float32) -> list["Stage"]:
+    """A stage of isograd with one thread and with `threads`."""
+    counts = sorted({1, threads})
+    return [stack.enter_context(Stage(program, name, folder, dtype, count)) for count in counts]
 
 
 class Stage:
@@ -39,10 +45,8 @@ class Stage:
         return float(self._ask("run"))
 
     def entry(self, output: str, name: str = "isograd") -> Entry:
-        """It as an entry of a comparison, whose result is the array `output`."""
-        result = lambda: self.result(output)  # noqa: E731
-        ours = name == "isograd"
-        return Entry(name, str(self.dtype), self.threads, self.run, ours, result)
+        """An entry of a comparison, whose result is the array `output`."""
+        return Entry(name, str(self.dtype), self.threads, self.run, lambda: self.result(output))
 
     def result(self, name: str, dtype=None) -> np.ndarray:
         """An output of the last run, as a flat array."""

@@ -1,4 +1,4 @@
-"""OpenVDB's narrow band from a mesh, one run at a time: speaks as `stage-times` does (see stage.py).
+"""OpenVDB's narrow band from a mesh, one run at a time: the protocol of `stage-times` (see stage.py).
 
 A process of its own, and for Debian's Python: Debian's `python3-openvdb`, the one that can be had, is built for
 Debian's NumPy. `vdb.py STAGE FOLDER TYPE THREADS`; it takes all threads of the machine.

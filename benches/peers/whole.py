@@ -1,30 +1,27 @@
-"""Cloud to signed distance field: isograd against the chain that Open3D offers."""
+"""Cloud to signed distance field: isograd and the chain of Open3D's functions."""
 
 import numpy as np
 import open3d as o3d
 
 import torus
 from case import Case, peer
-from stage import Stage, write_input
+from stage import stages, write_input
 
 
 def case(stack, program, folder, count: int, cells: int, threads: int) -> Case:
-    """Points in memory to the field in memory; both from nothing but the points."""
+    """Points in memory to the field in memory, without normals."""
     folder = folder / "whole"
     points, _ = torus.samples(count)
     write_input(folder, torus.grid(cells), points=points.astype(np.float32))
     centers = torus.centers(cells)
-    entries = [
-        stack.enter_context(Stage(program, "whole", folder, np.float32, number)).entry("phi")
-        for number in sorted({1, threads})
-    ]
+    entries = [stage.entry("phi") for stage in stages(stack, program, "whole", folder, threads)]
     entries.append(peer("Open3D chain", "float32", threads, chain(points, centers, threads)))
 
     def check() -> list[str]:
         exact = torus.distance(centers)
         return [f"{e.name}: {accuracy(e.result(), exact, cells)}" for e in entries[-2:]]
 
-    title = f"The whole, {count:,} points, {cells}³ cells"
+    title = f"Whole pipeline, {count:,} points, {cells}³ cells"
     what = (
         "points to signed distance at every cell. The chain: estimate_normals, "
         "orient_normals_consistent_tangent_plane, Poisson of depth 7, RaycastingScene"
@@ -33,7 +30,7 @@ def case(stack, program, folder, count: int, cells: int, threads: int) -> Case:
 
 
 def accuracy(field: np.ndarray, exact: np.ndarray, cells: int) -> str:
-    """|φ − exact| in cells, within three cells of the surface. Either sign of the whole is taken."""
+    """|φ − exact| in cells, within three cells of the surface, with the better sign of the whole field."""
     spacing = 2 * torus.HALF / cells
     near = np.abs(exact) < 3 * spacing
     field, exact = field[near], exact[near]

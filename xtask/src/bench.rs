@@ -1,8 +1,8 @@
-//! `cargo xtask bench`: the benchmarks of the package `isograd-benches`.
+//! `cargo xtask bench`: the criterion benchmarks of `isograd-benches`.
 
 use crate::process::{self, Outcome};
 
-/// Runs all benchmarks, or those of the stage named first; what follows goes to criterion.
+/// Runs all benchmarks, or those of the stage named first; other arguments go to criterion.
 pub fn run(arguments: &[String]) -> Outcome {
     let mut command = process::cargo(["bench", "--package", "isograd-benches"]);
     let rest = match arguments.split_first() {

@@ -85,7 +85,7 @@ pub struct Measured {
     /// |Error of φ| where the exact |φ| is below 3 cells, in cells.
     pub band: Spread,
     /// Errors of the normals, if they were estimated.
-    pub normals: Option<NormalErrors>,
+    pub normal_errors: Option<NormalErrors>,
     /// Errors of the gradient, if φ was computed in all cells.
     pub field: Option<FieldErrors>,
 }
@@ -106,7 +106,7 @@ pub fn measure<T: Real>(
     let truth = cloud
         .normals()
         .ok_or("the cloud has no normals to compare with")?;
-    let normals =
+    let normal_errors =
         (case.normals == Normals::Estimated).then(|| normal_errors(result.normals(), truth));
     let field = case
         .is_default()
@@ -116,7 +116,7 @@ pub fn measure<T: Real>(
         sample_spacing: result.report().sample_spacing / cell,
         surface: surface_errors(result.mesh(), shape, cell),
         band: band_errors(result.sdf(), exact),
-        normals,
+        normal_errors,
         field: field.transpose()?,
     })
 }
