@@ -1,4 +1,4 @@
-//! A number with a few derivatives: forward-mode differentiation for the surface maps.
+//! Numbers with derivatives: forward-mode differentiation of the surface maps.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -6,17 +6,14 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 pub(crate) const U: usize = 0;
 /// Slot of the derivative with respect to the second surface coordinate.
 pub(crate) const V: usize = 1;
-/// Slot of the derivative with respect to one parameter of the shape.
-pub(crate) const PARAMETER: usize = 2;
 
-/// Derivatives that one number carries: as many as fill a vector register or two.
+/// Derivatives per number: as many as fill one or two vector registers.
 pub(crate) const SLOTS: usize = 4;
 
-/// A value and its derivatives with respect to `u`, `v` and one parameter, or to any other [`SLOTS`]
-/// variables: a map does not care what its derivatives stand for.
+/// A value and its derivatives with respect to [`SLOTS`] variables: `u` and `v`, or parameters.
 ///
-/// Every surface map is written once, in jets. Its normals, area elements, velocities and parameter
-/// derivatives follow from the same lines, exact to rounding.
+/// Every surface map is written once, in jets. Normals, area elements, velocities and parameter
+/// derivatives follow from it, exact to rounding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Jet {
     pub value: f64,
@@ -24,7 +21,7 @@ pub(crate) struct Jet {
 }
 
 impl Jet {
-    /// A number that depends on nothing.
+    /// A constant.
     pub const fn constant(value: f64) -> Self {
         Self {
             value,
@@ -39,7 +36,7 @@ impl Jet {
         jet
     }
 
-    /// `f(self)`, given the value and the slope of `f` here.
+    /// `f(self)`, given the value and the derivative of `f`.
     fn chain(self, value: f64, derivative: f64) -> Self {
         Self {
             value,
@@ -47,7 +44,7 @@ impl Jet {
         }
     }
 
-    /// Square root. The slope at 0 is infinite: surface maps avoid it by their choice of coordinates.
+    /// Square root. Its derivative at 0 is infinite, which surface maps avoid by their choice of coordinates.
     pub fn sqrt(self) -> Self {
         let root = self.value.sqrt();
         self.chain(root, 0.5 / root)
@@ -119,7 +116,7 @@ impl Div for Jet {
     }
 }
 
-/// `f(a, b)`, given its value and its slopes in each of the two.
+/// `f(a, b)`, given its value and its two partial derivatives.
 fn chain_of_two(value: f64, (a, by_a): (Jet, f64), (b, by_b): (Jet, f64)) -> Jet {
     Jet {
         value,
@@ -214,6 +211,6 @@ mod tests {
         // Central differences of an O(1) function: truncation e² and rounding 1e-16/e.
         assert!((jet.slope[U] - by_u).abs() < 1e-9, "{jet:?} {by_u}");
         assert!((jet.slope[V] - by_v).abs() < 1e-9, "{jet:?} {by_v}");
-        assert_eq!(jet.slope[PARAMETER], 0.0);
+        assert_eq!(jet.slope[2], 0.0);
     }
 }

@@ -1,81 +1,90 @@
-//! The kinds of body: their names, their parameters, and how they are built.
+//! Kinds of bodies: names, parameters, and how a body is built from them.
 
 use crate::jet::Jet;
 use crate::surface::Surface;
 
-/// Lengths are in whatever unit the user means.
+/// Unit of lengths: any, as long as it is the same for all.
 pub(crate) const UNIT_OF_LENGTH: &str = "unit length";
 
 /// One parameter of a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
-    /// Its name, as `--param NAME=VALUE` takes it.
+    /// Name, as in `--param NAME=VALUE`.
     pub name: &'static str,
-    /// What it is.
+    /// Description.
     pub meaning: &'static str,
-    /// Its unit; empty for a plain number.
+    /// Unit; empty for a plain number.
     pub unit: &'static str,
-    /// Its value unless set.
+    /// Default value.
     pub default: f64,
-    /// The least value allowed.
+    /// Smallest allowed value.
     pub min: f64,
-    /// The greatest value allowed.
+    /// Largest allowed value.
     pub max: f64,
-    /// Whether only whole numbers are allowed. Nothing is differentiable in such a parameter.
+    /// Whether the value must be an integer. Points are not differentiable in such a parameter.
     pub whole: bool,
 }
 
-/// A positive length.
-pub(crate) const fn length(name: &'static str, meaning: &'static str, default: f64) -> Parameter {
-    Parameter {
-        name,
-        meaning,
-        unit: UNIT_OF_LENGTH,
-        default,
-        min: 1e-6,
-        max: 1e6,
-        whole: false,
+/// A table of parameters, one per line: `"name" = default in (min, max), unit, "meaning";`.
+macro_rules! parameters {
+    ($($name:literal = $default:literal in $range:expr, $unit:expr, $meaning:expr;)*) => {
+        [$(crate::kind::Parameter {
+            name: $name,
+            meaning: $meaning,
+            unit: $unit,
+            default: $default,
+            min: $range.0,
+            max: $range.1,
+            whole: false,
+        }),*]
+    };
+}
+pub(crate) use parameters;
+
+/// Joins tables of `N` parameters in all.
+pub(crate) const fn concat<const N: usize>(tables: &[&[Parameter]]) -> [Parameter; N] {
+    let mut joined = [tables[0][0]; N];
+    let (mut table, mut row, mut i) = (0, 0, 0);
+    while i < N {
+        if row == tables[table].len() {
+            (table, row) = (table + 1, 0);
+        }
+        joined[i] = tables[table][row];
+        (row, i) = (row + 1, i + 1);
+    }
+    joined
+}
+
+/// Range of positive lengths.
+pub(crate) const POSITIVE: (f64, f64) = (1e-6, 1e6);
+
+/// Refuses values that do not form a body together.
+pub(crate) fn require(condition: bool, problem: &str) -> Result<(), ShapeError> {
+    match condition {
+        true => Ok(()),
+        false => Err(ShapeError::Combination(problem.into())),
     }
 }
 
-/// A plain number, or one with a unit of its own, in `[range.0, range.1]`.
-pub(crate) const fn number(
-    name: &'static str,
-    meaning: &'static str,
-    unit: &'static str,
-    default: f64,
-    range: (f64, f64),
-) -> Parameter {
-    Parameter {
-        name,
-        meaning,
-        unit,
-        default,
-        min: range.0,
-        max: range.1,
-        whole: false,
-    }
-}
-
-/// Why a shape was refused.
+/// Errors of a shape.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ShapeError {
-    /// There is no shape of that name.
-    #[error("there is no shape '{name}'; the shapes are: {known}")]
+    /// Unknown name of a shape.
+    #[error("unknown shape '{name}'; the shapes are: {known}")]
     UnknownShape {
-        /// What was asked for.
+        /// The unknown name.
         name: String,
-        /// All names.
+        /// All known names.
         known: String,
     },
-    /// The shape has no parameter of that name.
+    /// Unknown name of a parameter.
     #[error("{shape} has no parameter '{name}'; its parameters are: {known}")]
     UnknownParameter {
         /// The shape.
         shape: &'static str,
-        /// What was asked for.
+        /// The unknown name.
         name: String,
-        /// All names.
+        /// All known names.
         known: String,
     },
     /// A value out of its range, or NaN.
@@ -85,38 +94,38 @@ pub enum ShapeError {
         shape: &'static str,
         /// The parameter.
         name: &'static str,
-        /// What was given.
+        /// The refused value.
         value: f64,
-        /// The least value allowed.
+        /// Smallest allowed value.
         min: f64,
-        /// The greatest value allowed.
+        /// Largest allowed value.
         max: f64,
     },
-    /// A fraction where only whole numbers are allowed.
+    /// A fraction for a parameter that must be an integer.
     #[error("{shape}: {name} is {value}; it must be a whole number")]
     NotWhole {
         /// The shape.
         shape: &'static str,
         /// The parameter.
         name: &'static str,
-        /// What was given.
+        /// The refused value.
         value: f64,
     },
-    /// A coordinate of a patch that the shape does not have (now).
+    /// A surface coordinate on a patch that the shape does not have.
     #[error(
         "coordinate {index} is on patch {patch}, and {shape} has {patches}; sample the shape again"
     )]
     Coordinate {
         /// The shape.
         shape: &'static str,
-        /// The first such coordinate.
+        /// Index of the first such coordinate.
         index: usize,
         /// Its patch.
         patch: u32,
-        /// How many there are.
+        /// Number of patches.
         patches: usize,
     },
-    /// Not one cotangent for each coordinate.
+    /// The numbers of cotangents and coordinates differ.
     #[error("{cotangents} cotangents for {coordinates} surface coordinates; give one for each")]
     Cotangents {
         /// Number of cotangents.
@@ -124,12 +133,12 @@ pub enum ShapeError {
         /// Number of coordinates.
         coordinates: usize,
     },
-    /// Values that are good each alone, but make no body together.
+    /// Values that are in range but do not form a body together.
     #[error("{0}")]
     Combination(String),
 }
 
-/// How a body is made of its parameters, given as jets.
+/// Builds a body from its parameters, given as jets.
 pub(crate) type Build = fn(&[Jet]) -> Result<Box<dyn Surface>, ShapeError>;
 
 /// A family of bodies.
@@ -137,23 +146,23 @@ pub(crate) struct Kind {
     pub name: &'static str,
     pub summary: &'static str,
     pub parameters: &'static [Parameter],
-    /// Index of the parameter that is time, for bodies that move.
+    /// Index of the time parameter of a moving body.
     pub time: Option<usize>,
     pub build: Build,
 }
 
 impl Kind {
-    /// Place of a parameter.
+    /// Index of a parameter.
     pub fn index(&self, name: &str) -> Result<usize, ShapeError> {
-        let found = self.parameters.iter().position(|p| p.name == name);
-        found.ok_or_else(|| ShapeError::UnknownParameter {
+        let index = self.parameters.iter().position(|p| p.name == name);
+        index.ok_or_else(|| ShapeError::UnknownParameter {
             shape: self.name,
             name: name.into(),
             known: names(self.parameters.iter().map(|p| p.name)),
         })
     }
 
-    /// Whether `value` is allowed for parameter `index` by itself.
+    /// Checks the range of parameter `index`.
     pub fn check(&self, index: usize, value: f64) -> Result<(), ShapeError> {
         let Parameter {
             name,
@@ -179,7 +188,7 @@ impl Kind {
     }
 }
 
-/// Names in one line, for messages.
+/// Joins names for messages.
 pub(crate) fn names(all: impl Iterator<Item = &'static str>) -> String {
     all.collect::<Vec<_>>().join(", ")
 }

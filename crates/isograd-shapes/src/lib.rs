@@ -1,5 +1,5 @@
-//! Parametric bodies whose points, normals, volumes and (where known) distances are exact, sampled as
-//! point clouds: what the pipeline of [`isograd`] is measured on.
+//! Parametric bodies with exact points, normals, volumes and (where known) distances, sampled as point
+//! clouds: test data with known truth for the pipeline of [`isograd`].
 //!
 //! ```
 //! use isograd_shapes::{Sampling, by_name};
@@ -10,11 +10,11 @@
 //! assert_eq!(samples.cloud.len(), 2000);
 //! assert_eq!(samples.cloud.attributes()[0].name, "velocity");
 //!
-//! // The same material points a little later: a parameter moves points along smooth paths.
+//! // Derivative of the points in a parameter, at fixed surface coordinates.
 //! let width_tangent = fish.tangent("width3", &samples.coordinates)?;
 //! assert_eq!(width_tangent.len(), 2000);
 //!
-//! // And back: from a cotangent of each point to one of each parameter.
+//! // Pullback: from cotangents of the points to cotangents of all parameters.
 //! let along_x = vec![[1.0f64, 0.0, 0.0]; 2000];
 //! let gradient = fish.pullback(&samples.coordinates, &along_x)?;
 //! assert_eq!(gradient.len(), fish.values().len());

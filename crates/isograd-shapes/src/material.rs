@@ -1,5 +1,5 @@
-//! Material points, which stay at their surface coordinates while parameters change: where they are, and
-//! the pullback of the map from parameters to points.
+//! Material points at fixed surface coordinates: positions, normals, and the pullback of the map from
+//! parameters to points.
 
 use isograd::Real;
 use isograd_element::vector::of_f64;
@@ -10,15 +10,15 @@ use crate::kind::ShapeError;
 use crate::shape::{Shape, SurfaceCoordinate, evaluate};
 use crate::surface::Surface;
 
-/// Points in one task: a fixed number, so that sums have the same bits for any number of threads.
+/// Points per task, fixed so that sums have the same bits for any number of threads.
 const CHUNK: usize = 2048;
 
 impl Shape {
-    /// `(N, 3)` points at `(N,)` surface coordinates, in their order: the same material points whatever the
-    /// parameters are now. Computed in double precision and rounded once.
+    /// `(N, 3)` points at `(N,)` surface coordinates, with the current parameters. Computed in double precision
+    /// and rounded once.
     ///
     /// # Errors
-    /// A coordinate on a patch that is not there.
+    /// A coordinate on a patch that the shape does not have.
     pub fn points_at<T: Real>(
         &self,
         coordinates: &[SurfaceCoordinate],
@@ -28,8 +28,8 @@ impl Shape {
         Ok(coordinates.par_iter().map(point).collect())
     }
 
-    /// `(N, 3)` outward unit normals of the same material points; zero where the map from the square to the
-    /// surface degenerates, which it does not at coordinates that were [sampled](Shape::sample) here.
+    /// `(N, 3)` outward unit normals at `(N,)` surface coordinates; zero where the map from the square to the
+    /// surface is degenerate, which it is not at [sampled](Shape::sample) coordinates.
     ///
     /// # Errors
     /// As [`Shape::points_at`].
@@ -48,11 +48,11 @@ impl Shape {
     /// Cotangents of all parameters, in the order of [`Shape::values`], from those of the points at fixed
     /// surface coordinates: `p̄ = Σ_i x̄_i · ∂x_i/∂p`, in the cotangents' unit per unit of the parameter.
     ///
-    /// Not differentiable: which samples of a union are buried, and whole-number parameters (their cotangent
-    /// is given as zero).
+    /// Not differentiable: which samples of a union are inside another part, and integer parameters (their
+    /// cotangent is zero).
     ///
     /// # Errors
-    /// Another number of cotangents than of coordinates; a coordinate on a patch that is not there.
+    /// Different numbers of cotangents and coordinates; a coordinate on a patch that the shape does not have.
     pub fn pullback<T: Real>(
         &self,
         coordinates: &[SurfaceCoordinate],
@@ -62,11 +62,11 @@ impl Shape {
         self.pullback_of(&all, coordinates, points_bar)
     }
 
-    /// The same for some parameters, named by their places in [`Shape::values`], in the order in which they
-    /// are named: it takes as much less time as they are fewer.
+    /// Like [`Shape::pullback`], for the parameters at the given indices of [`Shape::values`] only; the time is
+    /// proportional to their number.
     ///
     /// # Errors
-    /// As [`Shape::pullback`]. Places beyond the last get zero.
+    /// As [`Shape::pullback`]. The cotangent of an index out of range is zero.
     pub fn pullback_of<T: Real>(
         &self,
         parameters: &[usize],
@@ -81,29 +81,17 @@ impl Shape {
         }
         self.check_coordinates(coordinates)?;
         let mut cotangents = vec![0.0; parameters.len()];
-        let smooth = |place: &usize| self.is_differentiable(parameters[*place]);
-        let places: Vec<usize> = (0..parameters.len()).filter(smooth).collect();
-        // One walk over the points for as many parameters as a jet carries.
-        for group in places.chunks(SLOTS) {
-            let surface = self.moving(group.iter().map(|&place| parameters[place]))?;
+        let differentiable = |&i: &usize| self.is_differentiable(parameters[i]);
+        let outputs: Vec<usize> = (0..parameters.len()).filter(differentiable).collect();
+        // One pass over the points for as many parameters as a jet has slots.
+        for group in outputs.chunks(SLOTS) {
+            let surface = self.with_slots(group.iter().map(|&i| parameters[i]))?;
             let sums = pulled_back(&*surface, coordinates, points_bar);
-            for (&place, sum) in group.iter().zip(sums) {
-                cotangents[place] = sum;
+            for (&i, sum) in group.iter().zip(sums) {
+                cotangents[i] = sum;
             }
         }
         Ok(cotangents)
-    }
-
-    /// The surface with one parameter in each slot.
-    fn moving(
-        &self,
-        parameters: impl Iterator<Item = usize>,
-    ) -> Result<Box<dyn Surface>, ShapeError> {
-        let mut jets: Vec<Jet> = self.values().iter().map(|&x| Jet::constant(x)).collect();
-        for (slot, parameter) in parameters.enumerate() {
-            jets[parameter] = Jet::variable(self.values()[parameter], slot);
-        }
-        self.build(&jets)
     }
 
     fn check_coordinates(&self, coordinates: &[SurfaceCoordinate]) -> Result<(), ShapeError> {
@@ -120,12 +108,12 @@ impl Shape {
     }
 }
 
-/// The point at a coordinate, with the slopes that the surface's own parameters bring.
-fn at(surface: &dyn Surface, c: &SurfaceCoordinate) -> [Jet; 3] {
+/// The point at a coordinate, with its derivatives in the parameters of the surface.
+pub(crate) fn at(surface: &dyn Surface, c: &SurfaceCoordinate) -> [Jet; 3] {
     surface.map(c.patch as usize, Jet::constant(c.u), Jet::constant(c.v))
 }
 
-/// `Σ_i x̄_i · ∂x_i/∂(slot)` for every slot, in one order.
+/// `Σ_i x̄_i · ∂x_i/∂(slot)` for every slot, summed in a fixed order.
 fn pulled_back<T: Real>(
     surface: &dyn Surface,
     coordinates: &[SurfaceCoordinate],

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::shape::evaluate;
 use crate::surface::Surface;
 
-/// Nodes in `(−1, 1)` and weights of Gauss and Legendre's rule with five points.
+/// Nodes in `(−1, 1)` and weights of the five-point Gauss–Legendre rule.
 pub(crate) const GAUSS: [(f64, f64); 5] = [
     (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
     (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
@@ -16,14 +16,14 @@ pub(crate) const GAUSS: [(f64, f64); 5] = [
 ];
 
 /// Cells along each side of a patch of a single body. A multiple of 5 and 6, so that the knots of the
-/// fish's splines lie between cells.
+/// fish's splines lie on cell borders.
 const CELLS: usize = 60;
 
-/// Cells of all patches of a union together, before those on a cut are divided further.
+/// Cells of all patches of a union together, before those on an intersection are subdivided.
 const CELLS_OF_UNION: usize = 20_000;
 
-/// How often a cell on the cut between two parts of a union is halved.
-const HALVINGS: usize = 7;
+/// Levels of subdivision of a cell on the intersection of two parts of a union.
+const LEVELS: usize = 7;
 
 /// Area and volume.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -42,7 +42,7 @@ impl Measure {
     }
 }
 
-/// A square of a patch: low corner and side.
+/// A square of a patch: lower corner and side.
 #[derive(Clone, Copy)]
 struct Square {
     u: f64,
@@ -50,7 +50,7 @@ struct Square {
     side: f64,
 }
 
-/// Area and volume of the exposed surface. Patches are measured in parallel and added up in order.
+/// Area and volume of the exposed surface. Patches are integrated in parallel and summed in order.
 pub(crate) fn measure(surface: &dyn Surface) -> Measure {
     let patches: Vec<Measure> = (0..surface.patches())
         .into_par_iter()
@@ -72,19 +72,14 @@ fn measure_patch(surface: &dyn Surface, patch: usize) -> Measure {
         side,
     });
     let measures = squares.map(|square| match surface.is_union() {
-        true => over_cut_square(surface, patch, square, HALVINGS),
+        true => over_cut_square(surface, patch, square, LEVELS),
         false => over_square(surface, patch, square, |_| true),
     });
     measures.fold(Measure::default(), Measure::plus)
 }
 
-/// One square of a union: divided while it is partly buried.
-fn over_cut_square(
-    surface: &dyn Surface,
-    patch: usize,
-    square: Square,
-    halvings: usize,
-) -> Measure {
+/// Integrates over a square of a union, subdivided while only a part of it is exposed.
+fn over_cut_square(surface: &dyn Surface, patch: usize, square: Square, levels: usize) -> Measure {
     let exposed = exposed_of_nine(surface, patch, square);
     if exposed == 0 {
         return Measure::default();
@@ -92,7 +87,7 @@ fn over_cut_square(
     if exposed == 9 {
         return over_square(surface, patch, square, |_| true);
     }
-    if halvings == 0 {
+    if levels == 0 {
         return over_square(surface, patch, square, |x| surface.exposed(patch, x));
     }
     let side = 0.5 * square.side;
@@ -103,23 +98,24 @@ fn over_cut_square(
             v: square.v + side * (quarter % 2) as f64,
             side,
         };
-        total = total.plus(over_cut_square(surface, patch, part, halvings - 1));
+        total = total.plus(over_cut_square(surface, patch, part, levels - 1));
     }
     total
 }
 
-/// How many of a square's corners, middles of sides and center are exposed.
+/// Number of exposed points among the corners, edge midpoints and center of a square.
 fn exposed_of_nine(surface: &dyn Surface, patch: usize, square: Square) -> usize {
-    // Off the very edge of the patch, where a map may not be smooth.
-    let place = |low: f64, k: usize| (low + 0.5 * square.side * k as f64).clamp(1e-9, 1.0 - 1e-9);
+    // Away from the edge of the patch, where a map may not be smooth.
+    let coordinate =
+        |low: f64, k: usize| (low + 0.5 * square.side * k as f64).clamp(1e-9, 1.0 - 1e-9);
     let exposed = |k: usize| {
-        let (u, v) = (place(square.u, k / 3), place(square.v, k % 3));
+        let (u, v) = (coordinate(square.u, k / 3), coordinate(square.v, k % 3));
         surface.exposed(patch, evaluate(surface, patch, u, v).position)
     };
     (0..9).filter(|&k| exposed(k)).count()
 }
 
-/// Gauss's rule over a square, where `counts` holds.
+/// Gauss quadrature over the points of a square for which `counts` is true.
 fn over_square(
     surface: &dyn Surface,
     patch: usize,

@@ -1,19 +1,20 @@
-//! A shape: a kind of body and the values of its parameters.
+//! Shapes: a kind of body with values of its parameters.
 
 use std::sync::Arc;
 
 use isograd_element::vector::{cross, normalized};
 
 use crate::bodies;
-use crate::jet::{Jet, PARAMETER, U, V, slopes, values};
+use crate::jet::{Jet, U, V, slopes, values};
 use crate::kind::{Kind, Parameter, ShapeError, names};
+use crate::material::at;
 use crate::measure;
 use crate::surface::Surface;
 
-/// A place on the surface that stays on the same material point when parameters or time change.
+/// Surface coordinate of a material point: it stays the same when parameters or time change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceCoordinate {
-    /// Patch, from 0.
+    /// Index of the patch, from 0.
     pub patch: u32,
     /// First coordinate, in `(0, 1)`.
     pub u: f64,
@@ -24,7 +25,7 @@ pub struct SurfaceCoordinate {
 /// A point of the surface and its first derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// The point, in the shape's unit.
+    /// Position, in the shape's unit.
     pub position: [f64; 3],
     /// `∂x/∂u`.
     pub along_u: [f64; 3],
@@ -33,12 +34,12 @@ pub struct SurfacePoint {
 }
 
 impl SurfacePoint {
-    /// `∂x/∂u × ∂x/∂v`: outward, of the length of the area element.
+    /// `∂x/∂u × ∂x/∂v`: points outward; its length is the area element.
     pub fn area_vector(&self) -> [f64; 3] {
         cross(self.along_u, self.along_v)
     }
 
-    /// Outward unit normal; `None` where the map degenerates.
+    /// Outward unit normal; `None` where the map from the square is degenerate.
     pub fn normal(&self) -> Option<[f64; 3]> {
         normalized(self.area_vector())
     }
@@ -62,17 +63,17 @@ impl std::fmt::Debug for Shape {
     }
 }
 
-/// Every shape, with its default parameters.
+/// All shapes with default parameters.
 pub fn all() -> Vec<Shape> {
-    let built = bodies::KINDS.iter().map(|&kind| Shape::new(kind));
-    // A default that its own kind refuses is a mistake of this crate; `every_default_builds` tests it.
-    built.filter_map(Result::ok).collect()
+    let shapes = bodies::KINDS.iter().map(|&kind| Shape::new(kind));
+    // No default is refused: a test compares the names.
+    shapes.filter_map(Result::ok).collect()
 }
 
-/// The shape called `name`, with its default parameters.
+/// The shape `name` with default parameters.
 ///
 /// # Errors
-/// [`ShapeError::UnknownShape`], which lists the names there are.
+/// [`ShapeError::UnknownShape`], which lists all names.
 pub fn by_name(name: &str) -> Result<Shape, ShapeError> {
     match bodies::KINDS.iter().find(|kind| kind.name == name) {
         Some(kind) => Shape::new(kind),
@@ -101,27 +102,27 @@ impl Shape {
         })
     }
 
-    /// Its name.
+    /// Name of the kind.
     pub fn name(&self) -> &'static str {
         self.kind.name
     }
 
-    /// What it is and what is known of it in closed form, in one line.
+    /// Description in one line, with the quantities known in closed form.
     pub fn summary(&self) -> &'static str {
         self.kind.summary
     }
 
-    /// Its parameters and their values, in the order of [`Shape::values`].
+    /// Parameters and their values, in the order of [`Shape::values`].
     pub fn parameters(&self) -> impl Iterator<Item = (&'static Parameter, f64)> {
         self.kind.parameters.iter().zip(self.values.iter().copied())
     }
 
-    /// The values of its parameters.
+    /// Values of the parameters.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
-    /// The value of one parameter.
+    /// Value of one parameter.
     ///
     /// # Errors
     /// An unknown name.
@@ -132,12 +133,12 @@ impl Shape {
     /// Sets one parameter. On an error nothing changes.
     ///
     /// # Errors
-    /// An unknown name, a value out of range, or one that makes no body with the other values.
+    /// An unknown name, a value out of range, or one that forms no body with the other values.
     pub fn set(&mut self, name: &str, value: f64) -> Result<(), ShapeError> {
         self.set_all([(name, value)])
     }
 
-    /// Sets several parameters at once: only the end result has to make a body. On an error nothing
+    /// Sets several parameters at once; only the final values have to form a body. On an error nothing
     /// changes.
     ///
     /// # Errors
@@ -154,38 +155,45 @@ impl Shape {
         Ok(())
     }
 
-    /// The surface made of other numbers than the values.
-    pub(crate) fn build(&self, jets: &[Jet]) -> Result<Box<dyn Surface>, ShapeError> {
-        (self.kind.build)(jets)
+    /// The surface with a derivative slot for each of the given parameters, in their order.
+    pub(crate) fn with_slots(
+        &self,
+        parameters: impl IntoIterator<Item = usize>,
+    ) -> Result<Box<dyn Surface>, ShapeError> {
+        let mut jets: Vec<Jet> = self.values.iter().map(|&x| Jet::constant(x)).collect();
+        for (slot, parameter) in parameters.into_iter().enumerate() {
+            jets[parameter] = Jet::variable(self.values[parameter], slot);
+        }
+        (self.kind.build)(&jets)
     }
 
-    /// Whether points are differentiable in the parameter at `index`; no, where there is none.
+    /// Whether points are differentiable in the parameter at `index`; false if there is none.
     pub fn is_differentiable(&self, index: usize) -> bool {
         let parameter = self.kind.parameters.get(index);
         parameter.is_some_and(|parameter| !parameter.whole)
     }
 
-    /// The name of the parameter that is time, for a shape that moves.
+    /// Name of the time parameter of a moving shape.
     pub fn time_parameter(&self) -> Option<&'static str> {
         self.kind.time.map(|index| self.kind.parameters[index].name)
     }
 
-    /// Number of patches of its surface.
+    /// Number of patches of the surface.
     pub fn patches(&self) -> usize {
         self.surface.patches()
     }
 
-    /// The surface at a coordinate; `None` where there is no such patch.
+    /// The surface at a coordinate; `None` if the shape has no such patch.
     pub fn at(&self, coordinate: SurfaceCoordinate) -> Option<SurfacePoint> {
         let SurfaceCoordinate { patch, u, v } = coordinate;
         ((patch as usize) < self.patches()).then(|| evaluate(&*self.surface, patch as usize, u, v))
     }
 
     /// `(N, 3)` derivatives of the points at fixed surface coordinates with respect to one parameter,
-    /// exact to rounding: the tangent map `∂x/∂p`. Zero at coordinates of patches that are not there.
+    /// exact to rounding: the tangent map `∂x/∂p`. Zero on patches that the shape does not have.
     ///
-    /// Not differentiable: which samples of a union are buried, and whole-number parameters (their
-    /// derivative is given as zero).
+    /// Not differentiable: which samples of a union are inside another part, and integer parameters (their
+    /// derivative is zero).
     ///
     /// # Errors
     /// An unknown name.
@@ -195,47 +203,40 @@ impl Shape {
         coordinates: &[SurfaceCoordinate],
     ) -> Result<Vec<[f64; 3]>, ShapeError> {
         let index = self.kind.index(parameter)?;
-        let mut jets: Vec<Jet> = self.values.iter().map(|&x| Jet::constant(x)).collect();
-        if !self.kind.parameters[index].whole {
-            jets[index] = Jet::variable(self.values[index], PARAMETER);
-        }
-        let surface = (self.kind.build)(&jets)?;
-        let slope = |c: &SurfaceCoordinate| {
-            if c.patch as usize >= surface.patches() {
-                return [0.0; 3];
-            }
-            let (u, v) = (Jet::constant(c.u), Jet::constant(c.v));
-            slopes(surface.map(c.patch as usize, u, v), PARAMETER)
+        let surface = self.with_slots(self.is_differentiable(index).then_some(index))?;
+        let slope = |c: &SurfaceCoordinate| match (c.patch as usize) < surface.patches() {
+            true => slopes(at(&*surface, c), 0),
+            false => [0.0; 3],
         };
         Ok(coordinates.iter().map(slope).collect())
     }
 
     /// `(N, 3)` velocity of the material points at `coordinates`, in unit length per unit time;
-    /// `None` for a shape that does not move.
+    /// `None` for a static shape.
     pub fn velocity(&self, coordinates: &[SurfaceCoordinate]) -> Option<Vec<[f64; 3]>> {
         let time = self.kind.time?;
         self.tangent(self.kind.parameters[time].name, coordinates)
             .ok()
     }
 
-    /// Exact signed distance from `point`, negative inside; `None` where it is not known.
+    /// Exact signed distance of `point`, negative inside; `None` where it is unknown.
     pub fn distance(&self, point: [f64; 3]) -> Option<f64> {
         self.surface.distance(point)
     }
 
-    /// Whether `point` is inside; `None` where that is not known.
+    /// Whether `point` is inside; `None` where that is unknown.
     pub fn contains(&self, point: [f64; 3]) -> Option<bool> {
         self.surface.contains(point)
     }
 
-    /// Volume in unit length³: closed form where the body has one, else by quadrature over its
-    /// surface, to about 1e-10 relative, or 1e-5 where the body is a union of overlapping parts.
+    /// Volume in unit length³: in closed form, or by quadrature over the surface with a relative error of
+    /// about 1e-10, or 1e-5 for a union of overlapping parts.
     pub fn volume(&self) -> f64 {
         let closed = self.surface.volume();
         closed.unwrap_or_else(|| measure::measure(&*self.surface).volume)
     }
 
-    /// Area in unit length²: as [`Shape::volume`].
+    /// Area in unit length², with the errors of [`Shape::volume`].
     pub fn area(&self) -> f64 {
         let closed = self.surface.area();
         closed.unwrap_or_else(|| measure::measure(&*self.surface).area)

@@ -1,16 +1,16 @@
-//! What a body gives: a map from surface coordinates to points, and what is known of it in closed form.
+//! Interface of a body: the map from surface coordinates to points, and quantities in closed form.
 
 use std::f64::consts::PI;
 use std::fmt::Debug;
 
 use crate::jet::{Jet, JetVector};
 
-/// A body with its parameters fixed.
+/// A body with fixed parameters.
 ///
 /// Its surface is a set of patches, each the image of the unit square under a smooth map whose
 /// `∂x/∂u × ∂x/∂v` points outward. The parameters are jets, so that the map can be differentiated in
-/// one of them as well as in `(u, v)`. Which patches there are changes only with whole-number
-/// parameters, and where the length of a part that may be left out becomes 0.
+/// them as well as in `(u, v)`. The number of patches changes only with integer parameters, and where the
+/// length of an optional part becomes 0.
 pub(crate) trait Surface: Debug + Send + Sync {
     /// Number of patches.
     fn patches(&self) -> usize;
@@ -18,12 +18,12 @@ pub(crate) trait Surface: Debug + Send + Sync {
     /// The point at `(u, v)` of a patch. At `0 < u, v < 1` it is finite and smooth.
     fn map(&self, patch: usize, u: Jet, v: Jet) -> JetVector;
 
-    /// Whether `point`, on `patch`, is on the surface of the body, not buried in another part of it.
+    /// Whether `point`, on `patch`, is on the surface of the body rather than inside another part of it.
     fn exposed(&self, _patch: usize, _point: [f64; 3]) -> bool {
         true
     }
 
-    /// Whether the patches overlap, so that [`Surface::exposed`] has to be asked.
+    /// Whether patches overlap, so that [`Surface::exposed`] must be evaluated.
     fn is_union(&self) -> bool {
         false
     }
@@ -33,7 +33,7 @@ pub(crate) trait Surface: Debug + Send + Sync {
         None
     }
 
-    /// Whether `point` is inside, where that is known.
+    /// Whether `point` is inside, if known.
     fn contains(&self, point: [f64; 3]) -> Option<bool> {
         self.distance(point).map(|d| d < 0.0)
     }

@@ -13,12 +13,12 @@ pub(crate) fn half_thickness(t: Jet, root: Jet) -> Jet {
     (root * NACA[0] + rest) * t * 5.0
 }
 
-/// The same in plain numbers.
+/// Value of [`half_thickness`] at `x`.
 pub(crate) fn half_thickness_at(t: f64, x: f64) -> f64 {
     half_thickness(Jet::constant(t), Jet::constant(x.max(0.0).sqrt())).value
 }
 
-/// Camber line of greatest height `m` at `p`: two parabolas that meet there.
+/// Camber line with its maximum `m` at `p`: two parabolas that join there.
 pub(crate) fn camber(m: Jet, p: f64, x: Jet) -> Jet {
     if x.value < p {
         m * (x * (2.0 * p) - x.squared()) / (p * p)

@@ -4,63 +4,37 @@ use std::f64::consts::PI;
 
 use super::wing::{Panel, SIDES_AND_TIP, Y, Z};
 use crate::jet::{Jet, JetVector};
-use crate::kind::{Kind, Parameter, ShapeError, length, number};
+use crate::kind::{Kind, POSITIVE, UNIT_OF_LENGTH, parameters, require};
 use crate::surface::{Surface, between, turn};
 
 /// Taper of tail and fin.
 const TAIL_TAPER: f64 = 0.45;
-
-const fn angle(name: &'static str, meaning: &'static str, default: f64, most: f64) -> Parameter {
-    number(name, meaning, "degree", default, (-most, most))
-}
 
 /// Airliner along x, nose at the origin, z up.
 pub(crate) const KIND: Kind = Kind {
     name: "airliner",
     summary: "fuselage, NACA wing, tail and fin as one union, nose at the origin, z up; inside test \
               exact; area and volume by quadrature to 1e-5",
-    parameters: &[
-        length("length", "length of the fuselage", 36.0),
-        length("radius", "radius of the fuselage", 2.0),
-        length("nose", "length of the nose", 4.5),
-        length("tail", "length of the tail cone", 13.0),
-        length("span", "wing tip to wing tip", 34.0),
-        length("root_chord", "chord of the wing at the middle", 7.0),
-        length("tip_chord", "chord of the wing at its tips", 2.4),
-        angle(
-            "sweep",
-            "sweep of the leading edges of wing, tail and fin",
-            28.0,
-            60.0,
-        ),
-        angle("dihedral", "rise of the wing toward its tips", 5.0, 30.0),
-        number(
-            "thickness",
-            "thickness of all sections",
-            "chord",
-            0.14,
-            (0.02, 0.3),
-        ),
-        number("camber", "camber of the wing", "chord", 0.02, (0.0, 0.08)),
-        number(
-            "wing_at",
-            "leading edge of the wing at the middle",
-            "length",
-            0.32,
-            (0.0, 0.9),
-        ),
-        number(
-            "wing_height",
-            "height of the wing at the middle",
-            "radius",
-            -0.5,
-            (-0.9, 0.9),
-        ),
-        length("tail_span", "tail tip to tail tip", 13.0),
-        length("tail_chord", "chord of the tail at the middle", 4.4),
-        length("fin_height", "from the axis to the tip of the fin", 7.5),
-        length("fin_chord", "chord of the fin on the axis", 6.0),
-    ],
+    parameters: &parameters! {
+        "length" = 36.0 in POSITIVE, UNIT_OF_LENGTH, "length of the fuselage";
+        "radius" = 2.0 in POSITIVE, UNIT_OF_LENGTH, "radius of the fuselage";
+        "nose" = 4.5 in POSITIVE, UNIT_OF_LENGTH, "length of the nose";
+        "tail" = 13.0 in POSITIVE, UNIT_OF_LENGTH, "length of the tail cone";
+        "span" = 34.0 in POSITIVE, UNIT_OF_LENGTH, "wing tip to wing tip";
+        "root_chord" = 7.0 in POSITIVE, UNIT_OF_LENGTH, "chord of the wing at the middle";
+        "tip_chord" = 2.4 in POSITIVE, UNIT_OF_LENGTH, "chord of the wing at its tips";
+        "sweep" = 28.0 in (-60.0, 60.0), "degree",
+            "sweep of the leading edges of wing, tail and fin";
+        "dihedral" = 5.0 in (-30.0, 30.0), "degree", "rise of the wing toward its tips";
+        "thickness" = 0.14 in (0.02, 0.3), "chord", "thickness of all sections";
+        "camber" = 0.02 in (0.0, 0.08), "chord", "camber of the wing";
+        "wing_at" = 0.32 in (0.0, 0.9), "length", "leading edge of the wing at the middle";
+        "wing_height" = -0.5 in (-0.9, 0.9), "radius", "height of the wing at the middle";
+        "tail_span" = 13.0 in POSITIVE, UNIT_OF_LENGTH, "tail tip to tail tip";
+        "tail_chord" = 4.4 in POSITIVE, UNIT_OF_LENGTH, "chord of the tail at the middle";
+        "fin_height" = 7.5 in POSITIVE, UNIT_OF_LENGTH, "from the axis to the tip of the fin";
+        "fin_chord" = 6.0 in POSITIVE, UNIT_OF_LENGTH, "chord of the fin on the axis";
+    },
     time: None,
     build: |p| {
         let fuselage = Fuselage {
@@ -69,17 +43,14 @@ pub(crate) const KIND: Kind = Kind {
             nose: p[2],
             tail: p[3],
         };
-        if p[2].value + p[3].value > p[0].value {
-            return Err(ShapeError::Combination(
-                "airliner: nose and tail together are longer than the fuselage; raise length"
-                    .into(),
-            ));
-        }
-        if p[14].value.max(p[16].value) > 0.5 * p[0].value {
-            return Err(ShapeError::Combination(
-                "airliner: tail_chord and fin_chord must be at most half the length".into(),
-            ));
-        }
+        require(
+            p[2].value + p[3].value <= p[0].value,
+            "airliner: nose and tail together are longer than the fuselage; raise length",
+        )?;
+        require(
+            p[14].value.max(p[16].value) <= 0.5 * p[0].value,
+            "airliner: tail_chord and fin_chord must be at most half the length",
+        )?;
         let (wing, tail, fin) = (wing(p), tail(p), fin(p));
         Ok(Box::new(Airliner {
             fuselage,
@@ -141,7 +112,8 @@ struct Fuselage {
 const FUSELAGE_PATCHES: usize = 3;
 
 impl Fuselage {
-    /// Half an ellipse, a straight line, half a parabola, turned round x. `u` from nose to tail.
+    /// Surface of revolution around x: half an ellipse, a straight line, half a parabola. `u` runs from nose to
+    /// tail.
     fn map(&self, patch: usize, u: Jet, v: Jet) -> JetVector {
         let tail_start = self.length - self.tail;
         let (x, radius) = match patch {
@@ -176,13 +148,13 @@ impl Fuselage {
 #[derive(Debug)]
 struct Airliner {
     fuselage: Fuselage,
-    /// Wing right and left, tail right and left, fin. Right and left meet at their roots; the fin has
-    /// a root patch of its own.
+    /// Right and left wing, right and left tail, fin. Right and left share their roots; the fin has a
+    /// root patch of its own.
     panels: [Panel; 5],
 }
 
 impl Airliner {
-    /// Panel and its patch; `None` for the fuselage.
+    /// Panel of a patch and the patch within it; `None` for the fuselage.
     fn panel_of(patch: usize) -> Option<(usize, usize)> {
         let index = patch.checked_sub(FUSELAGE_PATCHES)?;
         // The last patch is the root of the fin.

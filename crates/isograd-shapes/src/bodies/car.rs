@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::jet::{Jet, JetVector};
-use crate::kind::{Kind, ShapeError, UNIT_OF_LENGTH, length, number};
+use crate::kind::{Kind, POSITIVE, ShapeError, UNIT_OF_LENGTH, parameters, require};
 use crate::surface::{Surface, between, flat, turn};
 
 /// Ahmed body along x, front at x = 0, floor at z = 0.
@@ -11,28 +11,16 @@ pub(crate) const KIND: Kind = Kind {
     name: "car",
     summary: "Ahmed body along x, floor at z = 0, front edges rounded, all others sharp, slanted rear; \
               inside test exact, volume in closed form, area by quadrature",
-    parameters: &[
-        length("length", "length", 1.044),
-        length("width", "width", 0.389),
-        length("height", "height", 0.288),
-        length("front_radius", "radius of the four front edges", 0.1),
-        number(
-            "slant",
-            "angle of the rear slant with the horizontal",
-            "degree",
-            25.0,
-            (0.0, 60.0),
-        ),
-        length("slant_length", "length of the slant along itself", 0.222),
-        number(
-            "stilts",
-            "length of the four stilts; 0 for none",
-            UNIT_OF_LENGTH,
-            0.0,
-            (0.0, 1e6),
-        ),
-        length("stilt_radius", "radius of the stilts", 0.015),
-    ],
+    parameters: &parameters! {
+        "length" = 1.044 in POSITIVE, UNIT_OF_LENGTH, "length";
+        "width" = 0.389 in POSITIVE, UNIT_OF_LENGTH, "width";
+        "height" = 0.288 in POSITIVE, UNIT_OF_LENGTH, "height";
+        "front_radius" = 0.1 in POSITIVE, UNIT_OF_LENGTH, "radius of the four front edges";
+        "slant" = 25.0 in (0.0, 60.0), "degree", "angle of the rear slant with the horizontal";
+        "slant_length" = 0.222 in POSITIVE, UNIT_OF_LENGTH, "length of the slant along itself";
+        "stilts" = 0.0 in (0.0, 1e6), UNIT_OF_LENGTH, "length of the four stilts; 0 for none";
+        "stilt_radius" = 0.015 in POSITIVE, UNIT_OF_LENGTH, "radius of the stilts";
+    },
     time: None,
     build: |p| {
         let car = Car::new(p);
@@ -51,7 +39,7 @@ struct Car {
     slant: [Jet; 2],
     stilts: Jet,
     stilt_radius: Jet,
-    /// Axes of the stilts, at the places of the wind-tunnel model.
+    /// `(x, y)` of the axes of the stilts, in the proportions of the wind-tunnel model.
     stilt_axes: [[Jet; 2]; 4],
 }
 
@@ -63,7 +51,7 @@ enum Part {
     Rear,
 }
 
-/// The rectangle that the body is at one place along x.
+/// Rectangular cross-section of the body at `x`.
 struct Section {
     x: Jet,
     half_width: Jet,
@@ -75,7 +63,7 @@ const PARTS: [Part; 3] = [Part::Front, Part::Middle, Part::Rear];
 
 /// Patches of the body: 3 on each side, 3 above, 3 below, front and base.
 const BODY: usize = 14;
-/// The patches below that are flat, where the stilts are.
+/// The flat patches of the underside, where the stilts are.
 const FLOOR: std::ops::Range<usize> = 10..12;
 
 impl Car {
@@ -100,23 +88,25 @@ impl Car {
     }
 
     fn check(&self) -> Result<(), ShapeError> {
-        let refused = |reason: &str| Err(ShapeError::Combination(format!("car: {reason}")));
         let front = self.front.value;
-        if front > self.half_width.value || 2.0 * front > self.height.value {
-            return refused("front_radius must be at most half of width and height");
-        }
-        if front + self.slant[0].value > self.length.value {
-            return refused("the slant reaches the rounded front; lower slant_length");
-        }
-        if self.slant[1].value >= self.height.value {
-            return refused("the slant reaches the floor; lower slant or slant_length");
-        }
+        require(
+            front <= self.half_width.value && 2.0 * front <= self.height.value,
+            "car: front_radius must be at most half of width and height",
+        )?;
+        require(
+            front + self.slant[0].value <= self.length.value,
+            "car: the slant reaches the rounded front; lower slant_length",
+        )?;
+        require(
+            self.slant[1].value < self.height.value,
+            "car: the slant reaches the floor; lower slant or slant_length",
+        )?;
         let [x, y] = self.stilt_axes[0].map(|axis| axis.value);
         let room = (x - front).min(self.half_width.value - y);
-        if self.has_stilts() && self.stilt_radius.value >= room {
-            return refused("the stilts do not fit under the flat floor; lower stilt_radius");
-        }
-        Ok(())
+        require(
+            !self.has_stilts() || self.stilt_radius.value < room,
+            "car: the stilts do not fit under the flat floor; lower stilt_radius",
+        )
     }
 
     fn has_stilts(&self) -> bool {
@@ -242,7 +232,7 @@ impl Surface for Car {
         Some(in_stilt || self.body_contains(point))
     }
 
-    /// The sections of the rounded front integrated, a box, a wedge cut off it, four cylinders.
+    /// Integral over the sections of the rounded front, a box less a wedge, four cylinders.
     fn volume(&self) -> Option<f64> {
         let (w, h, r) = (
             2.0 * self.half_width.value,

@@ -6,23 +6,22 @@ use isograd_element::vector::norm;
 
 use super::sphere::unit_sphere;
 use crate::jet::{Jet, JetVector};
-use crate::kind::{Kind, length};
+use crate::kind::{Kind, POSITIVE, UNIT_OF_LENGTH, parameters};
 use crate::surface::Surface;
 
-/// Ellipsoid round the origin.
+/// Ellipsoid centered at the origin.
 pub(crate) const KIND: Kind = Kind {
     name: "ellipsoid",
-    summary: "ellipsoid round the origin; exact distance by a bracketed root, area by quadrature",
-    parameters: &[
-        length("a", "half-axis along x", 0.8),
-        length("b", "half-axis along y", 0.5),
-        length("c", "half-axis along z", 0.3),
-    ],
+    summary: "ellipsoid centered at the origin; exact distance by a bracketed root, area by quadrature",
+    parameters: &parameters! {
+        "a" = 0.8 in POSITIVE, UNIT_OF_LENGTH, "half-axis along x";
+        "b" = 0.5 in POSITIVE, UNIT_OF_LENGTH, "half-axis along y";
+        "c" = 0.3 in POSITIVE, UNIT_OF_LENGTH, "half-axis along z";
+    },
     time: None,
     build: |p| {
-        Ok(Box::new(Ellipsoid {
-            axes: [p[0], p[1], p[2]],
-        }))
+        let axes = [p[0], p[1], p[2]];
+        Ok(Box::new(Ellipsoid { axes }))
     },
 };
 
@@ -56,7 +55,7 @@ impl Surface for Ellipsoid {
 /// The closest point to `q` is `a_k² q_k/(t + a_k²)` with `t` the largest root of
 /// `Σ (a_k q_k/(t + a_k²))² = 1`, a decreasing function right of its last pole (D. Eberly, "Distance
 /// from a point to an ellipse, an ellipsoid, or a hyperellipsoid"). Bisection down to neighboring
-/// numbers cannot fail to converge.
+/// floating-point numbers always converges.
 fn distance(axes: [f64; 3], point: [f64; 3]) -> f64 {
     let mut order = [0, 1, 2];
     order.sort_by(|&i, &j| axes[j].total_cmp(&axes[i]));
@@ -74,15 +73,12 @@ fn distance(axes: [f64; 3], point: [f64; 3]) -> f64 {
 fn closest_point(a: [f64; 3], q: [f64; 3]) -> [f64; 3] {
     // t = s − 1, so that the last pole is at s = 0 and nothing cancels next to it.
     let gap = a.map(|x| x * x - 1.0);
-    let term = |s: f64, k: usize| {
-        if q[k] == 0.0 {
-            0.0
-        } else {
-            a[k] * q[k] / (s + gap[k])
-        }
+    let term = |s: f64, k: usize| match q[k] {
+        0.0 => 0.0,
+        _ => a[k] * q[k] / (s + gap[k]),
     };
     let excess = |s: f64| (0..3).map(|k| term(s, k).powi(2)).sum::<f64>() - 1.0;
-    // The root lies between where the last term alone is 1 and where no term can be.
+    // Bracket: the last term alone is 1 at `low`, and the sum is at most 1 at `high`.
     let (mut low, mut high) = (q[2], norm([a[0] * q[0], a[1] * q[1], a[2] * q[2]]));
     if q[2] == 0.0 && !(excess(0.0) > 0.0) {
         return on_the_medial_disc(a, gap, q);
@@ -99,17 +95,14 @@ fn closest_point(a: [f64; 3], q: [f64; 3]) -> [f64; 3] {
         }
     }
     let s = 0.5 * (low + high);
-    std::array::from_fn(|k| {
-        if q[k] == 0.0 {
-            0.0
-        } else {
-            a[k] * a[k] * q[k] / (s + gap[k])
-        }
+    std::array::from_fn(|k| match q[k] {
+        0.0 => 0.0,
+        _ => a[k] * a[k] * q[k] / (s + gap[k]),
     })
 }
 
-/// Closest point for a point of the plane of the two larger axes, close to the center: there the
-/// closest point leaves the plane.
+/// Closest point for a point in the plane of the two larger axes and near the center, where the closest
+/// point is not in that plane.
 fn on_the_medial_disc(a: [f64; 3], gap: [f64; 3], q: [f64; 3]) -> [f64; 3] {
     let mut closest = [0.0; 3];
     let mut rest = 1.0;

@@ -3,26 +3,23 @@
 use isograd_element::vector::{norm, sub};
 
 use crate::jet::{Jet, JetVector, add_scaled, cross};
-use crate::kind::{Kind, ShapeError, length};
+use crate::kind::{Kind, POSITIVE, UNIT_OF_LENGTH, parameters, require};
 use crate::surface::{Surface, turn};
 
-/// Turns of the center line round the z axis, and through the hole.
+/// Turns of the center line around the z axis, and through the hole.
 const WINDINGS: [f64; 2] = [2.0, 3.0];
 
-/// Trefoil: a tube whose center line winds twice round the z axis and three times through the hole of a
+/// Trefoil: a tube whose center line winds twice around the z axis and three times through the hole of a
 /// torus.
 pub(crate) const KIND: Kind = Kind {
     name: "knot",
-    summary: "trefoil: a tube of round section, knotted on a torus round the z axis",
-    parameters: &[
-        length("major", "radius of the center line of the torus", 0.7),
-        length(
-            "minor",
-            "distance of the knot's center line from that of the torus",
-            0.3,
-        ),
-        length("tube", "radius of the tube", 0.15),
-    ],
+    summary: "trefoil: a tube of round section, knotted on a torus around the z axis",
+    parameters: &parameters! {
+        "major" = 0.7 in POSITIVE, UNIT_OF_LENGTH, "radius of the center line of the torus";
+        "minor" = 0.3 in POSITIVE, UNIT_OF_LENGTH,
+            "distance of the knot's center line from that of the torus";
+        "tube" = 0.15 in POSITIVE, UNIT_OF_LENGTH, "radius of the tube";
+    },
     time: None,
     build: |p| {
         let knot = Knot {
@@ -30,16 +27,14 @@ pub(crate) const KIND: Kind = Kind {
             minor: p[1],
             tube: p[2],
         };
-        if !(knot.minor.value < knot.major.value) {
-            return Err(ShapeError::Combination(
-                "knot: minor must be below major, or the center line cuts itself".into(),
-            ));
-        }
-        if !(knot.tube.value < knot.widest_tube()) {
-            return Err(ShapeError::Combination(
-                "knot: the tube meets itself; lower tube, or raise minor and major".into(),
-            ));
-        }
+        require(
+            knot.minor.value < knot.major.value,
+            "knot: the center line intersects itself; minor must be below major",
+        )?;
+        require(
+            knot.tube.value < knot.max_tube_radius(),
+            "knot: the tube intersects itself; lower tube, or raise minor and major",
+        )?;
         Ok(Box::new(knot))
     },
 };
@@ -51,12 +46,11 @@ struct Knot {
     tube: Jet,
 }
 
-/// Places on the center line that are compared to find where it comes nearest to itself.
+/// Samples of the center line for its smallest distance from itself.
 const STATIONS: usize = 360;
 
 impl Knot {
-    /// The center line, its direction (not of unit length), and the unit normal there of the torus that it
-    /// lies on.
+    /// The center line, its tangent (not of unit length), and the unit normal of the torus that it lies on.
     fn center_line(&self, u: Jet) -> [JetVector; 3] {
         let [round, through] = WINDINGS;
         let (x, y) = turn(u * round);
@@ -75,9 +69,9 @@ impl Knot {
         ]
     }
 
-    /// Half the least distance between parts of the center line that are not next to each other, and no
-    /// more than the least radius of its curvature: any tube below that does not cut itself.
-    fn widest_tube(&self) -> f64 {
+    /// Upper bound of the radius of a tube that does not intersect itself: half the smallest distance between
+    /// strands of the center line, and at most its smallest radius of curvature.
+    fn max_tube_radius(&self) -> f64 {
         let stations: Vec<[f64; 3]> = (0..STATIONS)
             .map(|k| {
                 let at = Jet::constant(k as f64 / STATIONS as f64);
@@ -85,20 +79,20 @@ impl Knot {
             })
             .collect();
         let distance = |a: usize, b: usize| norm(sub(stations[a], stations[b % STATIONS]));
-        let mut widest = f64::INFINITY;
+        let mut radius = f64::INFINITY;
         for a in 0..STATIONS {
             let next = (a + 1) % STATIONS;
-            widest = widest.min(circumradius([
+            radius = radius.min(circumradius([
                 distance(a, a + 1),
                 distance(next, a + 2),
                 distance(a, a + 2),
             ]));
-            // A tenth of the line away, it is another strand.
+            // Points a tenth of the line apart are on different strands.
             for b in a + STATIONS / 10..=a + STATIONS / 2 {
-                widest = widest.min(0.5 * distance(a, b));
+                radius = radius.min(0.5 * distance(a, b));
             }
         }
-        widest
+        radius
     }
 }
 

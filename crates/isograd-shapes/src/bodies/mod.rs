@@ -15,7 +15,7 @@ pub(crate) mod wing;
 
 use crate::kind::Kind;
 
-/// Every kind of body, in the order in which they are listed.
+/// All kinds of bodies, in the order of their list.
 pub(crate) static KINDS: [&Kind; 11] = [
     &sphere::KIND,
     &ellipsoid::KIND,

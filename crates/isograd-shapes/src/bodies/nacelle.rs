@@ -1,39 +1,25 @@
-//! Nacelle: an airfoil turned round the x axis, a thin ring with a hole.
+//! Nacelle: an airfoil section revolved around the x axis, a thin ring.
 
 use std::f64::consts::PI;
 
 use super::airfoil::{area_and_centroid, half_thickness, half_thickness_at};
 use crate::jet::{Jet, JetVector, U};
-use crate::kind::{Kind, ShapeError, length, number};
+use crate::kind::{Kind, POSITIVE, UNIT_OF_LENGTH, parameters, require};
 use crate::surface::{Surface, turn};
 
-/// Duct round the x axis.
+/// Duct around the x axis.
 pub(crate) const KIND: Kind = Kind {
     name: "nacelle",
-    summary: "engine duct: a NACA section turned round the x axis; distance exact to 1e-12 by its \
+    summary: "engine duct: a NACA section revolved around the x axis; distance exact to 1e-12 by its \
               section, volume in closed form (Pappus), area by quadrature",
-    parameters: &[
-        length("chord", "length of the section", 1.0),
-        number(
-            "thickness",
-            "thickness of the section",
-            "chord",
-            0.15,
-            (0.01, 0.4),
-        ),
-        length(
-            "radius",
-            "radius of the circle through the middle of the chord",
-            0.4,
-        ),
-        number(
-            "incidence",
-            "angle of the chord with the axis; positive opens toward the front",
-            "degree",
-            4.0,
-            (-45.0, 45.0),
-        ),
-    ],
+    parameters: &parameters! {
+        "chord" = 1.0 in POSITIVE, UNIT_OF_LENGTH, "length of the section";
+        "thickness" = 0.15 in (0.01, 0.4), "chord", "thickness of the section";
+        "radius" = 0.4 in POSITIVE, UNIT_OF_LENGTH,
+            "radius of the circle through the middle of the chord";
+        "incidence" = 4.0 in (-45.0, 45.0), "degree",
+            "angle of the chord with the axis; positive opens toward the front";
+    },
     time: None,
     build: |p| {
         let (sin, cos) = p[3].radians().sin_cos();
@@ -44,13 +30,10 @@ pub(crate) const KIND: Kind = Kind {
             sin,
             cos,
         };
-        if nacelle.inner_radius() <= 0.0 {
-            return Err(ShapeError::Combination(
-                "nacelle: the section reaches the axis; raise radius, or lower chord, thickness or \
-                 incidence"
-                    .into(),
-            ));
-        }
+        require(
+            nacelle.inner_radius() > 0.0,
+            "nacelle: the section reaches the axis; raise radius, or lower chord, thickness or incidence",
+        )?;
         Ok(Box::new(nacelle))
     },
 };
@@ -66,8 +49,8 @@ struct Nacelle {
 }
 
 impl Nacelle {
-    /// Axial place and radius of the point `(x, y)` of the section of unit chord.
-    fn placed(&self, x: Jet, y: Jet) -> [Jet; 2] {
+    /// Axial position and radius of the point `(x, y)` of the section of unit chord.
+    fn cylindrical(&self, x: Jet, y: Jet) -> [Jet; 2] {
         let x = x - 0.5;
         [
             self.chord * (x * self.cos + y * self.sin) + self.chord * 0.5,
@@ -75,16 +58,16 @@ impl Nacelle {
         ]
     }
 
-    /// A radius below that of every point of the surface.
+    /// Lower bound of the radius of the surface.
     fn inner_radius(&self) -> f64 {
-        let least = (0..=400).map(|k| {
+        let radii = (0..=400).map(|k| {
             let root = Jet::constant(f64::from(k) / 400.0);
             let y = half_thickness(self.thickness, root);
-            self.placed(root.squared(), -y)[1]
+            self.cylindrical(root.squared(), -y)[1]
                 .value
-                .min(self.placed(root.squared(), y)[1].value)
+                .min(self.cylindrical(root.squared(), y)[1].value)
         });
-        least.fold(f64::INFINITY, f64::min) - 1e-3 * self.chord.value
+        radii.fold(f64::INFINITY, f64::min) - 1e-3 * self.chord.value
     }
 }
 
@@ -94,18 +77,17 @@ impl Surface for Nacelle {
         2
     }
 
-    /// `u` from the leading edge to the trailing edge, `v` round the axis.
+    /// `u` from the leading edge to the trailing edge, `v` around the axis.
     fn map(&self, patch: usize, u: Jet, v: Jet) -> JetVector {
         let root = (u * (0.5 * PI)).sin_cos().0;
         let y = half_thickness(self.thickness, root);
         let (side, v) = if patch == 0 { (1.0, -v) } else { (-1.0, v) };
-        let [x, radius] = self.placed(root.squared(), y * side);
+        let [x, radius] = self.cylindrical(root.squared(), y * side);
         let (cos, sin) = turn(v);
         [x, radius * cos, radius * sin]
     }
 
-    /// By revolution, the distance in the half-plane `(x, r)` to the section: exact, as the section
-    /// stays off the axis.
+    /// Distance to the section in the half-plane `(x, r)`: exact, since the section does not reach the axis.
     fn distance(&self, [x, y, z]: [f64; 3]) -> Option<f64> {
         let (a, b) = (x - 0.5 * self.chord.value, y.hypot(z) - self.radius.value);
         let (sin, cos) = (self.sin.value, self.cos.value);
@@ -116,19 +98,19 @@ impl Surface for Nacelle {
         )
     }
 
-    /// Pappus: area of the section times the way of its centroid.
+    /// Pappus: area of the section times the path length of its centroid.
     fn volume(&self) -> Option<f64> {
         let (area, centroid) = area_and_centroid();
         let area = area * self.thickness.value * self.chord.value.powi(2);
-        let radius = self.placed(Jet::constant(centroid), Jet::constant(0.0))[1].value;
+        let radius = self.cylindrical(Jet::constant(centroid), Jet::constant(0.0))[1].value;
         Some(2.0 * PI * radius * area)
     }
 }
 
 /// Signed distance in the plane to a symmetric section of unit chord, to 1e-12.
 ///
-/// A scan of the upper side finds the local minima, bisection of `(x(θ) − p)·x'(θ)` closes in on each to
-/// rounding. The lower side mirrors the upper, so the point is taken to the upper half-plane first.
+/// A scan of the upper side finds the local minima; bisection of `(x(θ) − p)·x'(θ)` refines each to
+/// rounding. By symmetry the point is mirrored to the upper half-plane first.
 fn distance_to_section(thickness: f64, [x, y]: [f64; 2]) -> f64 {
     const SCAN: usize = 96;
     let step = 0.5 * PI / SCAN as f64;
@@ -157,7 +139,7 @@ fn half_square(thickness: f64, point: [f64; 2], angle: f64) -> Jet {
 
 /// Where the slope of [`half_square`] goes from negative to positive.
 fn stationary(thickness: f64, point: [f64; 2], mut low: f64, mut high: f64) -> f64 {
-    // One halving for each bit of a number.
+    // One bisection per bit of the mantissa.
     for _ in 0..f64::MANTISSA_DIGITS {
         let middle = 0.5 * (low + high);
         if half_square(thickness, point, middle).slope[U] < 0.0 {

@@ -5,33 +5,27 @@ use std::f64::consts::PI;
 use isograd_element::vector::norm;
 
 use crate::jet::{Jet, JetVector};
-use crate::kind::{Kind, ShapeError, UNIT_OF_LENGTH, length, number};
+use crate::kind::{Kind, POSITIVE, UNIT_OF_LENGTH, parameters, require};
 use crate::surface::Surface;
 
-/// Box round the origin, its edges and corners rounded.
+/// Box centered at the origin with rounded edges and corners.
 pub(crate) const KIND: Kind = Kind {
     name: "box",
-    summary: "box with rounded edges, round the origin; distance, area and volume in closed form",
-    parameters: &[
-        length("x", "whole length along x", 1.2),
-        length("y", "whole length along y", 0.8),
-        length("z", "whole length along z", 0.6),
-        number(
-            "radius",
-            "radius of the edges and corners; 0 leaves them sharp",
-            UNIT_OF_LENGTH,
-            0.1,
-            (0.0, 1e6),
-        ),
-    ],
+    summary: "box with rounded edges, centered at the origin; distance, area and volume in closed form",
+    parameters: &parameters! {
+        "x" = 1.2 in POSITIVE, UNIT_OF_LENGTH, "whole length along x";
+        "y" = 0.8 in POSITIVE, UNIT_OF_LENGTH, "whole length along y";
+        "z" = 0.6 in POSITIVE, UNIT_OF_LENGTH, "whole length along z";
+        "radius" = 0.1 in (0.0, 1e6), UNIT_OF_LENGTH,
+            "radius of the edges and corners; 0 leaves them sharp";
+    },
     time: None,
     build: |p| {
         let half = [p[0] * 0.5, p[1] * 0.5, p[2] * 0.5];
-        if half.iter().any(|h| p[3].value > h.value) {
-            return Err(ShapeError::Combination(
-                "box: radius must be at most half of x, y and z; lower it".into(),
-            ));
-        }
+        require(
+            half.iter().all(|h| p[3].value <= h.value),
+            "box: radius must be at most half of x, y and z; lower it",
+        )?;
         Ok(Box::new(RoundedBox { half, radius: p[3] }))
     },
 };
@@ -48,7 +42,7 @@ const EDGES: usize = 12;
 const CORNERS: usize = 8;
 
 impl RoundedBox {
-    /// Half-sides of the box that the rounded one is a fixed distance from.
+    /// Half-sides of the core: the surface is at distance `radius` from this box.
     fn core(&self) -> [Jet; 3] {
         self.half.map(|h| h - self.radius)
     }

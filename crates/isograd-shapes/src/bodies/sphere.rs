@@ -5,14 +5,16 @@ use std::f64::consts::PI;
 use isograd_element::vector::norm;
 
 use crate::jet::{Jet, JetVector};
-use crate::kind::{Kind, length};
+use crate::kind::{Kind, POSITIVE, UNIT_OF_LENGTH, parameters};
 use crate::surface::{Surface, turn};
 
-/// Sphere round the origin.
+/// Sphere centered at the origin.
 pub(crate) const KIND: Kind = Kind {
     name: "sphere",
-    summary: "sphere round the origin; distance, area and volume in closed form",
-    parameters: &[length("radius", "radius", 0.5)],
+    summary: "sphere centered at the origin; distance, area and volume in closed form",
+    parameters: &parameters! {
+        "radius" = 0.5 in POSITIVE, UNIT_OF_LENGTH, "radius";
+    },
     time: None,
     build: |p| Ok(Box::new(Sphere { radius: p[0] })),
 };
@@ -22,7 +24,7 @@ struct Sphere {
     radius: Jet,
 }
 
-/// The unit sphere: `u` from the north pole to the south, `v` round the axis.
+/// The unit sphere: `u` from the north pole to the south, `v` around the axis.
 pub(crate) fn unit_sphere(u: Jet, v: Jet) -> JetVector {
     let (sin, cos) = (u * PI).sin_cos();
     let (x, y) = turn(v);

@@ -3,28 +3,25 @@
 use std::f64::consts::PI;
 
 use crate::jet::{Jet, JetVector};
-use crate::kind::{Kind, ShapeError, length};
+use crate::kind::{Kind, POSITIVE, UNIT_OF_LENGTH, parameters, require};
 use crate::surface::{Surface, turn};
 
-/// Ring torus round the z axis.
+/// Ring torus around the z axis.
 pub(crate) const KIND: Kind = Kind {
     name: "torus",
-    summary: "ring torus round the z axis; distance, area and volume in closed form",
-    parameters: &[
-        length("major", "radius of the center line", 0.7),
-        length("minor", "radius of the tube", 0.25),
-    ],
+    summary: "ring torus around the z axis; distance, area and volume in closed form",
+    parameters: &parameters! {
+        "major" = 0.7 in POSITIVE, UNIT_OF_LENGTH, "radius of the center line";
+        "minor" = 0.25 in POSITIVE, UNIT_OF_LENGTH, "radius of the tube";
+    },
     time: None,
     build: |p| {
-        if !(p[1].value < p[0].value) {
-            return Err(ShapeError::Combination(
-                "torus: minor must be below major, or the surface cuts itself".into(),
-            ));
-        }
-        Ok(Box::new(Torus {
-            major: p[0],
-            minor: p[1],
-        }))
+        let (major, minor) = (p[0], p[1]);
+        require(
+            minor.value < major.value,
+            "torus: the surface intersects itself; minor must be below major",
+        )?;
+        Ok(Box::new(Torus { major, minor }))
     },
 };
 

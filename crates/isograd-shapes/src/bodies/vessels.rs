@@ -1,13 +1,27 @@
-//! Vessel tree: branches of round cones that divide by Murray's law.
+//! Vessel tree: branches of round cones that split by Murray's law.
 
 mod branch;
 
 use isograd_element::vector::{add, scale};
 
 use crate::jet::{Jet, JetVector, add_scaled, cross, scaled};
-use crate::kind::{Kind, Parameter, length, number};
+use crate::kind::{Kind, POSITIVE, Parameter, UNIT_OF_LENGTH, parameters};
 use crate::surface::Surface;
 use branch::{Branch, PATCHES};
+
+const PARAMETERS: [Parameter; 6] = {
+    let mut table = parameters! {
+        "radius" = 0.1 in POSITIVE, UNIT_OF_LENGTH, "radius at the root";
+        "branch_length" = 6.0 in (2.0, 50.0), "its radius at its root", "length of a branch";
+        "generations" = 4.0 in (1.0, 8.0), "", "generations of branches; each doubles their number";
+        "asymmetry" = 0.8 in (0.3, 1.0), "radius of the larger",
+            "radius of the smaller of two daughters";
+        "taper" = 0.95 in (0.6, 1.0), "radius at its root", "radius at the end of a branch";
+        "twist" = 80.0 in (-360.0, 360.0), "degree", "turn of the plane of branching at each joint";
+    };
+    table[2].whole = true;
+    table
+};
 
 /// Tree from the origin up the z axis.
 pub(crate) const KIND: Kind = Kind {
@@ -15,71 +29,32 @@ pub(crate) const KIND: Kind = Kind {
     summary: "tree of vessels from the origin up z: branches by Murray's law, ends closed by spheres, \
               sharp joints; distance exact outside, and inside away from joints; area and volume by \
               quadrature to 1e-5",
-    parameters: &[
-        length("radius", "radius at the root", 0.1),
-        number(
-            "branch_length",
-            "length of a branch",
-            "its radius at its root",
-            6.0,
-            (2.0, 50.0),
-        ),
-        Parameter {
-            name: "generations",
-            meaning: "generations of branches; each doubles their number",
-            unit: "",
-            default: 4.0,
-            min: 1.0,
-            max: 8.0,
-            whole: true,
-        },
-        number(
-            "asymmetry",
-            "radius of the smaller of two daughters",
-            "radius of the larger",
-            0.8,
-            (0.3, 1.0),
-        ),
-        number(
-            "taper",
-            "radius at the end of a branch",
-            "radius at its root",
-            0.95,
-            (0.6, 1.0),
-        ),
-        number(
-            "twist",
-            "turn of the plane of branching at each joint",
-            "degree",
-            80.0,
-            (-360.0, 360.0),
-        ),
-    ],
+    parameters: &PARAMETERS,
     time: None,
     build: |p| {
         let (sin, cos) = p[5].radians().sin_cos();
-        let rules = Rules {
+        let growth = Growth {
             length: p[1],
             asymmetry: p[3],
             taper: p[4],
             twist: [cos, sin],
         };
         let [zero, one] = [0.0, 1.0].map(Jet::constant);
-        let seed = Seed {
+        let root = Root {
             start: [zero; 3],
             along: [zero, zero, one],
             side: [one, zero, zero],
             radius: p[0],
         };
         let mut branches = Vec::new();
-        rules.grow(seed, p[2].value as u32, &mut branches);
+        growth.grow(root, p[2].value as u32, &mut branches);
         Ok(Box::new(Vessels { branches }))
     },
 };
 
-/// How a tree grows.
-struct Rules {
-    /// Length of a branch in radii of its root.
+/// Parameters of the tree's growth.
+struct Growth {
+    /// Length of a branch, in radii at its root.
     length: Jet,
     asymmetry: Jet,
     taper: Jet,
@@ -87,28 +62,28 @@ struct Rules {
     twist: [Jet; 2],
 }
 
-/// Where a branch starts.
-struct Seed {
+/// Root of a branch.
+struct Root {
     start: JetVector,
     along: JetVector,
-    /// Unit, at right angles to `along`: its daughters leave in the plane of the two.
+    /// Unit vector perpendicular to `along`; the daughters leave in the plane of the two.
     side: JetVector,
     radius: Jet,
 }
 
-impl Rules {
-    fn grow(&self, seed: Seed, generations: u32, branches: &mut Vec<Branch>) {
-        let end = add_scaled(seed.start, seed.radius * self.length, seed.along);
-        let end_radius = seed.radius * self.taper;
+impl Growth {
+    fn grow(&self, root: Root, generations: u32, branches: &mut Vec<Branch>) {
+        let end = add_scaled(root.start, root.radius * self.length, root.along);
+        let end_radius = root.radius * self.taper;
         branches.push(Branch::new(
-            seed.start,
+            root.start,
             end,
-            [seed.radius, end_radius],
-            seed.along,
-            seed.side,
+            [root.radius, end_radius],
+            root.along,
+            root.side,
         ));
         if generations > 1 {
-            for daughter in self.daughters(&seed, end, end_radius) {
+            for daughter in self.daughters(&root, end, end_radius) {
                 self.grow(daughter, generations - 1, branches);
             }
         }
@@ -116,7 +91,7 @@ impl Rules {
 
     /// Murray (1926): `r₀³ = r₁³ + r₂³`, and the angles of least volume,
     /// `cos θ₁ = (r₀⁴ + r₁⁴ − r₂⁴)/(2 r₀² r₁²)`.
-    fn daughters(&self, mother: &Seed, start: JetVector, radius: Jet) -> [Seed; 2] {
+    fn daughters(&self, mother: &Root, start: JetVector, radius: Jet) -> [Root; 2] {
         let ratio = self.asymmetry;
         let larger = Jet::constant(1.0) / (ratio * ratio.squared() + 1.0).cbrt();
         let shares = [larger, larger * ratio];
@@ -128,7 +103,7 @@ impl Rules {
             let along = add_scaled(scaled(mother.along, cos), sin, mother.side);
             let in_plane = add_scaled(scaled(mother.side, cos), -sin, mother.along);
             let side = add_scaled(scaled(in_plane, self.twist[0]), self.twist[1], across);
-            Seed {
+            Root {
                 start,
                 along,
                 side,
@@ -157,18 +132,19 @@ impl Surface for Vessels {
     }
 
     fn exposed(&self, patch: usize, point: [f64; 3]) -> bool {
-        self.is_bare(patch / PATCHES, point)
+        self.is_outside_others(patch / PATCHES, point)
     }
 
-    /// Outside, the least over the branches. Inside, the depth in the deepest branch, where the point
-    /// of its surface that is closest is not buried in another branch.
+    /// Outside: the smallest distance over the branches. Inside: the depth in the deepest branch, if the
+    /// closest point of its surface is not inside another branch.
     fn distance(&self, point: [f64; 3]) -> Option<f64> {
         let distances = self.branches.iter().map(|b| b.distance(point));
         let (nearest, closest) = distances
             .enumerate()
             .min_by(|a, b| a.1.distance.total_cmp(&b.1.distance))?;
         let foot = add(point, scale(closest.outward, -closest.distance));
-        (closest.distance >= 0.0 || self.is_bare(nearest, foot)).then_some(closest.distance)
+        (closest.distance >= 0.0 || self.is_outside_others(nearest, foot))
+            .then_some(closest.distance)
     }
 
     fn contains(&self, point: [f64; 3]) -> Option<bool> {
@@ -181,8 +157,8 @@ impl Surface for Vessels {
 }
 
 impl Vessels {
-    /// Whether `point` is in none of the branches but, at most, `own`.
-    fn is_bare(&self, own: usize, point: [f64; 3]) -> bool {
+    /// Whether `point` is inside no branch other than `own`.
+    fn is_outside_others(&self, own: usize, point: [f64; 3]) -> bool {
         let mut others = self.branches.iter().enumerate().filter(|(i, _)| *i != own);
         !others.any(|(_, b)| b.contains(point))
     }

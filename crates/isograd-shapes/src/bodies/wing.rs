@@ -6,7 +6,7 @@ use super::airfoil::{camber, half_thickness};
 use crate::jet::{Jet, JetVector};
 use crate::surface::between;
 
-/// Where the camber is greatest, in chords.
+/// Position of the maximum camber, in chords.
 const CAMBER_AT: f64 = 0.4;
 
 /// Axes of the body's frame.
@@ -14,8 +14,8 @@ pub(crate) const Y: usize = 1;
 /// The upward axis.
 pub(crate) const Z: usize = 2;
 
-/// A panel. Its chord is along x; thickness and camber are laid off along `lift`, straight from the
-/// chord (the four-digit definition lays thickness off at right angles to the camber line).
+/// A panel with its chord along x. Thickness and camber are measured along `lift_axis` from the chord (the
+/// four-digit definition measures thickness perpendicular to the camber line).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Panel {
     /// Leading edge of the root section.
@@ -33,7 +33,7 @@ pub(crate) struct Panel {
     /// Camber in chords.
     pub camber: Jet,
     pub span_axis: usize,
-    /// 1 or −1: which way the span runs.
+    /// Direction of the span: 1 or −1.
     pub span_sign: f64,
     pub lift_axis: usize,
 }
@@ -49,7 +49,7 @@ struct Section {
 }
 
 impl Panel {
-    /// The panel mirrored in the plane that its root lies in.
+    /// The panel mirrored at the plane of its root.
     pub fn mirrored(self) -> Self {
         Self {
             span_sign: -self.span_sign,
@@ -68,7 +68,7 @@ impl Panel {
     /// Patch 0: upper side, 1: lower side, 2: tip, 3: root. `u` along the chord, `v` along the span, or
     /// across the thickness on tip and root.
     pub fn map(&self, patch: usize, u: Jet, v: Jet) -> JetVector {
-        // x × span points along lift for one hand, against it for the other.
+        // x × span points along the lift axis or against it, depending on the handedness.
         let right_handed = (self.lift_axis == Z) == (self.span_sign > 0.0);
         let v = if right_handed == matches!(patch, 0 | 3) {
             v
@@ -85,7 +85,7 @@ impl Panel {
         self.point(eta, root, share)
     }
 
-    /// At `x = root²` of the section at `eta`; `share` is −1 on the lower side and 1 on the upper.
+    /// The point at `x = root²` of the section at `eta`; `share` is −1 on the lower side and 1 on the upper.
     fn point(&self, eta: Jet, root: Jet, share: Jet) -> JetVector {
         let section = self.section(eta);
         let x = root.squared();

@@ -1,4 +1,4 @@
-//! Random points of a surface, each place as likely as its area (times the density wanted).
+//! Random points of a surface, distributed by area (times the density) by rejection sampling.
 
 use isograd_element::vector::{norm, normalized};
 use rand_pcg::Pcg64;
@@ -8,19 +8,19 @@ use super::{Density, SampleError};
 use crate::shape::{SurfaceCoordinate, evaluate};
 use crate::surface::Surface;
 
-/// Cells of the table, all patches together: about one for each draw, at least and at most.
+/// Range of the number of cells of all patches, about one per draw.
 const CELLS: (usize, usize) = (4_000, 40_000);
 
-/// Cells along each side of a patch, at most and at least.
+/// Largest and smallest number of cells along each side of a patch.
 const SIDE: (usize, usize) = (60, 6);
 
-/// How far the area element may exceed the greatest that was seen at the corners and the center of a
-/// cell. Where a draw exceeds it all the same, the margin is raised and all begins again.
+/// Factor from the largest area element at the corners and the center of a cell to the bound for the cell.
+/// If a draw exceeds the bound, the sampling is repeated with a larger factor.
 const MARGIN: f64 = 1.2;
 
-/// The surface is given up when fewer than one in `PATIENCE` of this many draws or more are taken.
-const TRIAL: usize = 1 << 20;
-const PATIENCE: usize = 1000;
+/// Sampling fails if, after `MIN_DRAWS` draws, fewer than one in `MAX_REJECTION` is accepted.
+const MIN_DRAWS: usize = 1 << 20;
+const MAX_REJECTION: usize = 1000;
 
 /// A random point of the surface.
 #[derive(Clone, Copy, Debug)]
@@ -28,29 +28,30 @@ pub(super) struct Candidate {
     pub coordinate: SurfaceCoordinate,
     pub position: [f64; 3],
     pub normal: [f64; 3],
-    /// Density wanted here, relative to the greatest.
+    /// Density relative to its maximum.
     pub density: f64,
 }
 
-/// Random points of a surface and what was learned by drawing them.
+/// Random points of a surface and the estimated area.
 #[derive(Clone, Debug)]
-pub(super) struct Drawn {
+pub(super) struct Candidates {
     pub candidates: Vec<Candidate>,
     /// Estimate of `∫ density dA`.
     pub weighted_area: f64,
 }
 
-/// A surface cut into cells, with a bound of the area element in each.
+/// A surface divided into cells, with a bound of the area element in each.
 ///
-/// A draw takes a cell as often as its bound says and a point in it, and accepts it as often as its
-/// area element says: unbiased as long as the bounds hold, which is checked at every draw.
-pub(super) struct Source<'a> {
+/// A draw selects a cell with a probability proportional to its bound, and a uniform point in it, which is
+/// accepted with the ratio of its area element to the bound. This is unbiased if the bounds hold, which is
+/// checked at every draw.
+pub(super) struct RejectionSampler<'a> {
     surface: &'a dyn Surface,
     density: Density,
     /// Cells along each side of a patch.
     side: usize,
-    /// Greatest area element seen in each cell.
-    greatest: Vec<f64>,
+    /// Largest sampled area element of each cell.
+    maxima: Vec<f64>,
     lower: [f64; 3],
     upper: [f64; 3],
 }
@@ -58,23 +59,23 @@ pub(super) struct Source<'a> {
 /// A bound of an area element did not hold.
 struct BoundExceeded;
 
-impl<'a> Source<'a> {
-    /// A table that suits `n` draws.
+impl<'a> RejectionSampler<'a> {
+    /// Tabulates a surface for `n` draws.
     pub fn new(surface: &'a dyn Surface, density: Density, n: usize) -> Self {
         let patches = surface.patches();
         let side = ((n.clamp(CELLS.0, CELLS.1) / patches.max(1)) as f64).sqrt() as usize;
-        let mut source = Self {
+        let mut sampler = Self {
             surface,
             density,
             side: side.clamp(SIDE.1, SIDE.0),
-            greatest: Vec::new(),
+            maxima: Vec::new(),
             lower: [f64::INFINITY; 3],
             upper: [f64::NEG_INFINITY; 3],
         };
         for patch in 0..patches {
-            source.tabulate(patch);
+            sampler.tabulate(patch);
         }
-        source
+        sampler
     }
 
     /// Adds the cells of a patch to the table.
@@ -82,28 +83,31 @@ impl<'a> Source<'a> {
         let side = self.side;
         let corners = self.elements(patch, side + 1, 0.0);
         let centers = self.elements(patch, side, 0.5);
-        let first = self.greatest.len();
+        let first = self.maxima.len();
         for cell in 0..side * side {
             let corner = cell / side * (side + 1) + cell % side;
             let around = [corner, corner + 1, corner + side + 1, corner + side + 2];
-            let seen = around
-                .map(|k| corners[k])
-                .into_iter()
-                .fold(centers[cell], f64::max);
-            self.greatest.push(seen);
+            let elements = around.map(|k| corners[k]).into_iter();
+            self.maxima.push(elements.fold(centers[cell], f64::max));
         }
-        // A cell where the map degenerates at all five points still has some area.
-        let floor = 1e-3 * self.greatest[first..].iter().copied().fold(0.0, f64::max);
-        self.greatest[first..].iter_mut().for_each(|g| *g += floor);
+        // A cell whose five points are degenerate may still have some area.
+        let floor = 1e-3 * self.maxima[first..].iter().copied().fold(0.0, f64::max);
+        self.maxima[first..].iter_mut().for_each(|g| *g += floor);
     }
 
     /// Area elements on a lattice of `count²` points, `offset` cells from the corner of the patch.
     fn elements(&mut self, patch: usize, count: usize, offset: f64) -> Vec<f64> {
-        // Off the very edge of the patch, where a map may not be smooth.
-        let place = |k: usize| ((k as f64 + offset) / self.side as f64).clamp(1e-9, 1.0 - 1e-9);
+        // Away from the edge of the patch, where a map may not be smooth.
+        let coordinate =
+            |k: usize| ((k as f64 + offset) / self.side as f64).clamp(1e-9, 1.0 - 1e-9);
         let mut elements = Vec::with_capacity(count * count);
         for k in 0..count * count {
-            let point = evaluate(self.surface, patch, place(k / count), place(k % count));
+            let point = evaluate(
+                self.surface,
+                patch,
+                coordinate(k / count),
+                coordinate(k % count),
+            );
             for a in 0..3 {
                 self.lower[a] = self.lower[a].min(point.position[a]);
                 self.upper[a] = self.upper[a].max(point.position[a]);
@@ -115,10 +119,10 @@ impl<'a> Source<'a> {
     }
 
     /// `n` random points.
-    pub fn draw(&self, n: usize, seed: u64) -> Result<Drawn, SampleError> {
+    pub fn draw(&self, n: usize, seed: u64) -> Result<Candidates, SampleError> {
         let mut margin = MARGIN;
-        // Beyond that next to no draw is taken.
-        while margin < PATIENCE as f64 {
+        // Beyond that almost all draws are rejected.
+        while margin < MAX_REJECTION as f64 {
             match self.draw_with(n, seed, margin) {
                 Err(BoundExceeded) => margin *= 2.0,
                 Ok(drawn) if drawn.candidates.len() == n => return Ok(drawn),
@@ -128,56 +132,56 @@ impl<'a> Source<'a> {
         Err(SampleError::NoSurface)
     }
 
-    fn draw_with(&self, n: usize, seed: u64, margin: f64) -> Result<Drawn, BoundExceeded> {
+    fn draw_with(&self, n: usize, seed: u64, margin: f64) -> Result<Candidates, BoundExceeded> {
         let mut random = Pcg64::seed_from_u64(seed);
-        let mut below = Vec::with_capacity(self.greatest.len());
+        let mut cumulative = Vec::with_capacity(self.maxima.len());
         let mut total = 0.0;
-        for bound in &self.greatest {
+        for bound in &self.maxima {
             total += bound * margin;
-            below.push(total);
+            cumulative.push(total);
         }
         let (mut candidates, mut draws) = (Vec::with_capacity(n), 0usize);
         while candidates.len() < n && total > 0.0 {
-            if draws >= TRIAL && candidates.len() < draws / PATIENCE {
+            if draws >= MIN_DRAWS && candidates.len() < draws / MAX_REJECTION {
                 break;
             }
             draws += 1;
             let target = uniform(&mut random) * total;
-            let cell = below.partition_point(|&b| b <= target).min(below.len() - 1);
+            let cell = cumulative
+                .partition_point(|&b| b <= target)
+                .min(cumulative.len() - 1);
             candidates.extend(self.attempt(cell, margin, &mut random)?);
         }
-        let share = candidates.len() as f64 / draws.max(1) as f64;
+        let acceptance = candidates.len() as f64 / draws.max(1) as f64;
         let cell_area = 1.0 / (self.side * self.side) as f64;
-        Ok(Drawn {
+        Ok(Candidates {
             candidates,
-            weighted_area: share * total * cell_area,
+            weighted_area: acceptance * total * cell_area,
         })
     }
 
-    /// One random point of a cell, or none if it is turned down.
+    /// Draws a random point of a cell; `None` if it is rejected.
     fn attempt(
         &self,
         cell: usize,
         margin: f64,
         random: &mut Pcg64,
     ) -> Result<Option<Candidate>, BoundExceeded> {
-        let (patch, place) = (
-            cell / (self.side * self.side),
-            cell % (self.side * self.side),
-        );
+        let cells = self.side * self.side;
+        let (patch, cell_of_patch) = (cell / cells, cell % cells);
         let side = self.side as f64;
-        let u = ((place / self.side) as f64 + uniform(random)) / side;
-        let v = ((place % self.side) as f64 + uniform(random)) / side;
-        let lot = uniform(random);
+        let u = ((cell_of_patch / self.side) as f64 + uniform(random)) / side;
+        let v = ((cell_of_patch % self.side) as f64 + uniform(random)) / side;
+        let threshold = uniform(random);
         let point = evaluate(self.surface, patch, u, v);
-        let bound = self.greatest[cell] * margin;
+        let bound = self.maxima[cell] * margin;
         let element = norm(point.area_vector());
         if element > bound {
             return Err(BoundExceeded);
         }
         let density = self.density_at(point.position);
         let (accepted, normal) = (
-            lot * bound < element * density,
+            threshold * bound < element * density,
             normalized(point.area_vector()),
         );
         let Some(normal) = normal.filter(|_| accepted) else {
@@ -198,7 +202,7 @@ impl<'a> Source<'a> {
         }))
     }
 
-    /// Density wanted at a point, relative to the greatest.
+    /// Density at a point, relative to its maximum.
     fn density_at(&self, point: [f64; 3]) -> f64 {
         let Density::Gradient { axis, ratio } = self.density else {
             return 1.0;
@@ -213,7 +217,7 @@ impl<'a> Source<'a> {
     }
 }
 
-/// A number in the open interval from 0 to 1.
+/// Uniform random number in the open interval (0, 1).
 fn uniform(random: &mut Pcg64) -> f64 {
     ((random.next_u64() >> 12) as f64 + 0.5) / (1u64 << 52) as f64
 }

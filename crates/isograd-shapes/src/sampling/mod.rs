@@ -1,4 +1,4 @@
-//! Samples of the surface of a shape.
+//! Sampling of the surface of a shape.
 
 mod candidates;
 mod even;
@@ -9,32 +9,32 @@ use isograd::{PointCloud, PointCloudError, Real, data::Attribute};
 use isograd_element::vector::of_f64;
 
 use crate::shape::{Shape, SurfaceCoordinate};
-use candidates::{Candidate, Source};
+use candidates::{Candidate, RejectionSampler};
 
-/// The most samples that are drawn at once; even sampling takes some 700 bytes for each.
+/// Largest number of samples; even sampling takes some 700 bytes for each.
 pub const MAX_SAMPLES: usize = 10_000_000;
 
-/// Candidates for each sample that even sampling keeps.
+/// Candidates per sample of an even sampling.
 const OVERSAMPLING: usize = 4;
 
-/// How samples are laid out.
+/// Arrangement of samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Layout {
-    /// Independent, each place as likely as its area: clumps and holes.
+    /// Independent samples, uniform by area: clumps and holes.
     Random,
-    /// Even: none much closer to its neighbors than the mean spacing (blue noise), by weighted sample
-    /// elimination from four times as many (Yuksel 2015).
+    /// Blue noise: no sample is much closer to its neighbors than the mean spacing. Weighted sample
+    /// elimination from four times as many candidates (Yuksel 2015).
     #[default]
     Even,
 }
 
-/// How many samples go where.
+/// Density of samples over the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Density {
-    /// The same number per area everywhere.
+    /// Constant number per area.
     #[default]
     Uniform,
-    /// Number per area as a power law along an axis of the bounding box: `ratio` times as many at its
+    /// Number per area varying exponentially along an axis of the bounding box: `ratio` times as many at its
     /// high end as at its low end.
     Gradient {
         /// 0, 1 or 2.
@@ -44,69 +44,67 @@ pub enum Density {
     },
 }
 
-/// What samples are wanted.
+/// Settings of a sampling.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sampling {
-    /// How they are laid out.
+    /// Arrangement of the samples.
     pub layout: Layout,
-    /// How many go where.
+    /// Density over the surface.
     pub density: Density,
 }
 
-/// Why no samples were drawn.
+/// Errors of a sampling.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SampleError {
-    /// More samples than are drawn at once.
-    #[error("{count} samples are more than the {max} that are drawn at once; ask for fewer")]
+    /// More than [`MAX_SAMPLES`].
+    #[error("{count} samples exceed the limit of {max}; request fewer")]
     TooMany {
-        /// What was asked for.
+        /// Requested number.
         count: usize,
         /// The limit.
         max: usize,
     },
-    /// A density that means nothing.
+    /// An invalid density gradient.
     #[error(
         "a density gradient along axis {axis} of ratio {ratio}; the axis must be 0, 1 or 2 and the \
          ratio from 0.001 to 1000"
     )]
     Density {
-        /// What was given.
+        /// Axis.
         axis: usize,
-        /// What was given.
+        /// Ratio.
         ratio: f64,
     },
-    /// Next to nothing of the surface was hit.
-    #[error("the shape has no surface that could be sampled; change its parameters")]
+    /// Almost all candidates were rejected.
+    #[error("the shape has no surface to sample; change its parameters")]
     NoSurface,
-    /// The samples do not fit the number type.
+    /// The samples are not finite in the number type.
     #[error(transparent)]
     Cloud(#[from] PointCloudError),
 }
 
-/// Samples and where on the surface each of them is.
+/// Samples and their surface coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Samples<T> {
-    /// Points, outward unit normals, and, for a shape that moves, the attribute `velocity` of three
-    /// components.
+    /// Points, outward unit normals, and for a moving shape the attribute `velocity` of three components.
     pub cloud: PointCloud<T>,
-    /// `(N,)` surface coordinates: the same material points after a change of parameters or time.
+    /// `(N,)` surface coordinates, which follow the material points when parameters or time change.
     pub coordinates: Vec<SurfaceCoordinate>,
 }
 
 impl Shape {
-    /// `n` samples of the surface, and no fewer. The same seed gives the same samples.
+    /// Draws exactly `n` samples of the surface. Equal seeds give equal samples.
     ///
     /// Everything is computed in double precision and rounded to `T` at the end. Normals are exact to
-    /// rounding. On a union only the outer surface is sampled: no sample is inside another part. Parts
-    /// thinner than a few spacings keep the samples of both their sides, which a grid has to resolve:
-    /// take at least 3 cells across the thinnest part that matters (the tail fin of the default fish is
-    /// 0.034 lengths thick at its root, and 0 at its edge).
+    /// rounding. On a union only the outer surface is sampled: no sample is inside another part. Both sides
+    /// of thin parts are sampled; a grid should have at least 3 cells across the thinnest part of interest
+    /// (the tail fin of the default fish is 0.034 lengths thick at its root, and 0 at its edge).
     ///
     /// The stream of random numbers is the same on every platform; the last bits of a point depend on
     /// the platform's sine and cosine.
     ///
     /// # Errors
-    /// Too many samples, a bad density, or coordinates out of the range of `T`.
+    /// Too many samples, an invalid density, or coordinates out of the range of `T`.
     pub fn sample<T: Real>(
         &self,
         n: usize,
@@ -149,10 +147,11 @@ impl Shape {
             Layout::Random => n,
             Layout::Even => n * OVERSAMPLING,
         };
-        let drawn = Source::new(&*self.surface, sampling.density, draws).draw(draws, seed)?;
+        let sampler = RejectionSampler::new(&*self.surface, sampling.density, draws);
+        let drawn = sampler.draw(draws, seed)?;
         Ok(match sampling.layout {
             Layout::Random => drawn.candidates,
-            Layout::Even => even::thinned(drawn, n),
+            Layout::Even => even::eliminate(drawn, n),
         })
     }
 }

@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use crate::jet::{Jet, U};
 use crate::measure::GAUSS;
 
-/// Pieces over which `x(s)` is integrated once and for all.
+/// Pieces of the precomputed integral `x(s)`.
 const PIECES: usize = 60;
 
 /// A point of the midline and the direction of the line there.
@@ -30,7 +30,7 @@ pub(super) struct Midline {
     carangiform: Jet,
     /// `t/T`.
     phase: Jet,
-    /// `x` at the ends of the pieces; empty where the line is straight and stays so.
+    /// `x` at the ends of the pieces; empty if the line is straight.
     nodes: Vec<Jet>,
 }
 
@@ -40,7 +40,7 @@ impl Midline {
             amplitude,
             wave_number: Jet::constant(2.0 * PI) / wavelength,
             carangiform,
-            // Whole periods are dropped first: far from t = 0 the sine would lose its digits.
+            // Whole periods are removed: far from t = 0 the sine would lose precision.
             phase: phase - phase.value.floor(),
             nodes: Vec::new(),
         };
@@ -54,7 +54,7 @@ impl Midline {
         self.amplitude.value == 0.0
     }
 
-    /// The point at `station`, in `[0, 1]` along the body.
+    /// The point at arc length `station`, in `[0, 1]`.
     pub fn at(&self, station: Jet) -> MidlinePoint {
         if self.nodes.is_empty() {
             let (zero, one) = (Jet::constant(0.0), Jet::constant(1.0));
@@ -88,7 +88,7 @@ impl Midline {
         ]
     }
 
-    /// `∫ √(1 − y'²) ds` by Gauss's rule: to rounding over one piece.
+    /// `∫ √(1 − y'²) ds` by Gauss quadrature, exact to rounding over one piece.
     fn advance(&self, from: Jet, to: Jet) -> Jet {
         let half = (to - from) * 0.5;
         let terms = GAUSS.map(|(node, weight)| {
@@ -112,12 +112,12 @@ impl Midline {
         nodes
     }
 
-    /// Greatest `|dy/ds|` and greatest curvature over the body and the period: whether the fish can
-    /// swim does not depend on the time at which it is asked for.
-    pub fn steepest_and_sharpest(&self) -> (f64, f64) {
-        let (mut steepest, mut sharpest) = (0.0f64, 0.0f64);
+    /// Largest `|dy/ds|` and largest curvature over the body and the period: whether a motion is valid
+    /// does not depend on the time.
+    pub fn max_slope_and_curvature(&self) -> (f64, f64) {
+        let (mut max_slope, mut max_curvature) = (0.0f64, 0.0f64);
         for phase in 0..24 {
-            // Constants, so that the slope in U is along the body and nothing else.
+            // Constants, so that the derivative in slot U is that along the body.
             let at = Self {
                 amplitude: Jet::constant(self.amplitude.value),
                 wave_number: Jet::constant(self.wave_number.value),
@@ -127,11 +127,11 @@ impl Midline {
             };
             for station in 0..=200 {
                 let [_, slope] = at.wave(Jet::variable(f64::from(station) / 200.0, U));
-                steepest = steepest.max(slope.value.abs());
+                max_slope = max_slope.max(slope.value.abs());
                 let cos = (1.0 - slope.value.powi(2)).max(1e-12).sqrt();
-                sharpest = sharpest.max((slope.slope[U] / cos).abs());
+                max_curvature = max_curvature.max((slope.slope[U] / cos).abs());
             }
         }
-        (steepest, sharpest)
+        (max_slope, max_curvature)
     }
 }

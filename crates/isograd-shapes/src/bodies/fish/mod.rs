@@ -9,86 +9,56 @@ mod tests;
 pub use profile::EEL_HEIGHTS;
 
 use crate::jet::{Jet, JetVector};
-use crate::kind::{Kind, Parameter, ShapeError, length, number};
+use crate::kind::{
+    Kind, POSITIVE, Parameter, ShapeError, UNIT_OF_LENGTH, concat, parameters, require,
+};
 use crate::surface::{Surface, turn};
 use midline::Midline;
 use profile::{Eel, Profile, Spline};
 
-/// Share of the body's length.
+/// Unit of lengths relative to the body.
 const OF_LENGTH: &str = "length of the body";
-
-/// A half-width or half-height.
-const fn half(name: &'static str, meaning: &'static str, default: f64) -> Parameter {
-    number(name, meaning, OF_LENGTH, default, (1e-4, 0.4))
-}
 
 const WIDTH: &str = "control value of the half-widths, from the nose to the tail";
 const HEIGHT: &str = "control value of the half-heights, from the nose to the tail";
 
-const LENGTH: Parameter = length("length", "length along the midline", 1.0);
-const AMPLITUDE: Parameter = number(
-    "amplitude",
-    "amplitude of the tail; 0 is straight, 0.125 swims as Carling's eel",
-    OF_LENGTH,
-    0.0,
-    (0.0, 0.5),
-);
-const WAVELENGTH: Parameter = number(
-    "wavelength",
-    "wavelength of the body wave",
-    OF_LENGTH,
-    1.0,
-    (0.2, 10.0),
-);
-const CARANGIFORM: Parameter = number(
-    "carangiform",
-    "amplitude envelope: 0 is Carling's eel, 1 is carangiform, between is a mixture",
-    "",
-    0.0,
-    (0.0, 1.0),
-);
-const PERIOD: Parameter = number(
-    "period",
-    "period of the tail beat",
-    "unit time",
-    1.0,
-    (1e-6, 1e6),
-);
-const TIME: Parameter = number(
-    "time",
-    "time at which the body is drawn",
-    "unit time",
-    0.0,
-    (-1e9, 1e9),
-);
+const LENGTH: [Parameter; 1] = parameters! {
+    "length" = 1.0 in POSITIVE, UNIT_OF_LENGTH, "length along the midline";
+};
+
+const MOTION: [Parameter; 5] = parameters! {
+    "amplitude" = 0.0 in (0.0, 0.5), OF_LENGTH,
+        "amplitude of the tail; 0 is straight, 0.125 swims as Carling's eel";
+    "wavelength" = 1.0 in (0.2, 10.0), OF_LENGTH, "wavelength of the body wave";
+    "carangiform" = 0.0 in (0.0, 1.0), "",
+        "amplitude envelope: 0 is Carling's eel, 1 is carangiform, between is a mixture";
+    "period" = 1.0 in (1e-6, 1e6), "unit time", "period of the tail beat";
+    "time" = 0.0 in (-1e9, 1e9), "unit time", "time at which the body is drawn";
+};
+
+const FISH_BODY: [Parameter; 14] = parameters! {
+    "width1" = 0.0303 in (1e-4, 0.4), OF_LENGTH, WIDTH;
+    "width2" = 0.0450 in (1e-4, 0.4), OF_LENGTH, WIDTH;
+    "width3" = 0.0371 in (1e-4, 0.4), OF_LENGTH, WIDTH;
+    "width4" = 0.0374 in (1e-4, 0.4), OF_LENGTH, WIDTH;
+    "width5" = 0.0226 in (1e-4, 0.4), OF_LENGTH, WIDTH;
+    "width6" = 0.0174 in (1e-4, 0.4), OF_LENGTH, WIDTH;
+    "height1" = 0.0132 in (1e-4, 0.4), OF_LENGTH, HEIGHT;
+    "height2" = 0.0338 in (1e-4, 0.4), OF_LENGTH, HEIGHT;
+    "height3" = 0.0668 in (1e-4, 0.4), OF_LENGTH, HEIGHT;
+    "height4" = 0.0761 in (1e-4, 0.4), OF_LENGTH, HEIGHT;
+    "height5" = 0.0906 in (1e-4, 0.4), OF_LENGTH, HEIGHT;
+    "height6" = 0.0158 in (1e-4, 0.4), OF_LENGTH, HEIGHT;
+    "height7" = 0.0333 in (1e-4, 0.4), OF_LENGTH, HEIGHT;
+    "height8" = 0.1052 in (1e-4, 0.4), OF_LENGTH, HEIGHT;
+};
 
 /// Fish with 6 widths and 8 heights as control values of cubic B-splines.
 pub(crate) const FISH: Kind = Kind {
     name: "fish",
     summary: "swimming fish along x: 6 widths and 8 heights on B-splines, a tail fin that closes in a \
               sharp edge; velocity; area and volume by quadrature",
-    parameters: &[
-        LENGTH,
-        half("width1", WIDTH, 0.0303),
-        half("width2", WIDTH, 0.0450),
-        half("width3", WIDTH, 0.0371),
-        half("width4", WIDTH, 0.0374),
-        half("width5", WIDTH, 0.0226),
-        half("width6", WIDTH, 0.0174),
-        half("height1", HEIGHT, 0.0132),
-        half("height2", HEIGHT, 0.0338),
-        half("height3", HEIGHT, 0.0668),
-        half("height4", HEIGHT, 0.0761),
-        half("height5", HEIGHT, 0.0906),
-        half("height6", HEIGHT, 0.0158),
-        half("height7", HEIGHT, 0.0333),
-        half("height8", HEIGHT, 0.1052),
-        AMPLITUDE,
-        WAVELENGTH,
-        CARANGIFORM,
-        PERIOD,
-        TIME,
-    ],
+    parameters: &concat::<20>(&[&LENGTH, &FISH_BODY, &MOTION]),
     time: Some(19),
     build: |p| {
         let profile = Profile::Spline(Box::new(Spline {
@@ -99,52 +69,20 @@ pub(crate) const FISH: Kind = Kind {
     },
 };
 
+const EEL_BODY: [Parameter; 5] = parameters! {
+    "head" = 0.04 in (0.005, 0.2), OF_LENGTH, "half-width of the head, and where it is reached";
+    "tail_start" = 0.95 in (0.5, 0.99), OF_LENGTH, "where the tail begins to close";
+    "tail_width" = 0.01 in (1e-4, 0.4), OF_LENGTH, "half-width where the tail begins to close";
+    "height" = 0.08 in (1e-3, 0.4), OF_LENGTH, "greatest half-height";
+    "height_at" = 0.51 in (0.505, 0.9), OF_LENGTH, "where the body is highest";
+};
+
 /// The anguilliform swimmer of Kern & Koumoutsakos (2006).
 pub(crate) const EEL: Kind = Kind {
     name: "eel",
     summary: "swimming eel of Kern & Koumoutsakos 2006 along x, thin tail that closes in a sharp edge; \
               velocity; area and volume by quadrature",
-    parameters: &[
-        LENGTH,
-        number(
-            "head",
-            "half-width of the head, and where it is reached",
-            OF_LENGTH,
-            0.04,
-            (0.005, 0.2),
-        ),
-        number(
-            "tail_start",
-            "where the tail begins to close",
-            OF_LENGTH,
-            0.95,
-            (0.5, 0.99),
-        ),
-        half(
-            "tail_width",
-            "half-width where the tail begins to close",
-            0.01,
-        ),
-        number(
-            "height",
-            "greatest half-height",
-            OF_LENGTH,
-            0.08,
-            (1e-3, 0.4),
-        ),
-        number(
-            "height_at",
-            "where the body is highest",
-            OF_LENGTH,
-            0.51,
-            (0.505, 0.9),
-        ),
-        AMPLITUDE,
-        WAVELENGTH,
-        CARANGIFORM,
-        PERIOD,
-        TIME,
-    ],
+    parameters: &concat::<11>(&[&LENGTH, &EEL_BODY, &MOTION]),
     time: Some(10),
     build: |p| {
         let profile = Profile::Eel(Box::new(Eel {
@@ -175,20 +113,22 @@ impl Fish {
     ) -> Result<Box<dyn Surface>, ShapeError> {
         let phase = time / period;
         let midline = Midline::new(amplitude, wavelength, carangiform, phase);
-        let widest = profile.widest();
-        match midline.steepest_and_sharpest() {
-            (steepest, _) if steepest > 0.95 => Err(ShapeError::Combination(format!(
-                "{name}: the midline is too steep for its length; lower amplitude or raise wavelength"
-            ))),
-            (_, sharpest) if sharpest * widest > 0.95 => Err(ShapeError::Combination(format!(
-                "{name}: the body folds into itself; lower amplitude or the widths, or raise wavelength"
-            ))),
-            _ => Ok(Box::new(Self {
-                length,
-                profile,
-                midline,
-            })),
-        }
+        let widest = profile.max_half_width();
+        let (slope, curvature) = midline.max_slope_and_curvature();
+        let refuse = |problem: &str| format!("{name}: {problem}, or raise wavelength");
+        require(
+            slope <= 0.95,
+            &refuse("the midline is too steep for its length; lower amplitude"),
+        )?;
+        require(
+            curvature * widest <= 0.95,
+            &refuse("the body folds into itself; lower amplitude or the widths"),
+        )?;
+        Ok(Box::new(Self {
+            length,
+            profile,
+            midline,
+        }))
     }
 }
 
@@ -197,7 +137,7 @@ impl Surface for Fish {
         self.profile.patches()
     }
 
-    /// `u` round the section, `v` along the body.
+    /// `u` around the section, `v` along the body.
     fn map(&self, patch: usize, u: Jet, v: Jet) -> JetVector {
         let section = self.profile.section(patch, v);
         let (sideways, up) = turn(u);

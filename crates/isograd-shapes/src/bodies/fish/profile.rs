@@ -54,7 +54,7 @@ impl Profile {
         }
     }
 
-    /// The section at `q` in `[0, 1]` of a piece, from its end at the nose to that at the tail.
+    /// The section at `q` in `[0, 1]` of a patch, from nose to tail.
     pub fn section(&self, patch: usize, q: Jet) -> Section {
         match self {
             Profile::Spline(spline) => spline.section(q),
@@ -62,7 +62,7 @@ impl Profile {
         }
     }
 
-    /// Half-width and half-height at a distance from the nose; `None` off the body.
+    /// Half-width and half-height at a distance from the nose; `None` outside the body.
     pub fn at_station(&self, station: f64) -> Option<(f64, f64)> {
         if !(station > 0.0 && station < 1.0) {
             return None;
@@ -70,7 +70,7 @@ impl Profile {
         let at = |patch, q| self.section(patch, Jet::constant(q));
         let patch = (0..self.patches()).find(|&patch| station <= at(patch, 1.0).station.value)?;
         let (mut low, mut high) = (0.0, 1.0);
-        // One halving for each bit of a number.
+        // One bisection per bit of the mantissa.
         for _ in 0..f64::MANTISSA_DIGITS {
             let middle = 0.5 * (low + high);
             if at(patch, middle).station.value < station {
@@ -83,8 +83,8 @@ impl Profile {
         Some((section.half_width.value, section.half_height.value))
     }
 
-    /// The greatest half-width.
-    pub fn widest(&self) -> f64 {
+    /// Largest half-width.
+    pub fn max_half_width(&self) -> f64 {
         let along = (0..self.patches()).flat_map(|patch| (0..=100).map(move |k| (patch, k)));
         let width = |(patch, k)| {
             self.section(patch, Jet::constant(f64::from(k) / 100.0))
@@ -128,7 +128,7 @@ impl Eel {
                 tail_width * (1.0 - q),
             ),
         };
-        // √s is taken as √head·q on the head: it is not smooth at the nose, q is.
+        // On the head √s is written as √head·q, which is smooth at the nose.
         let root = if patch == 0 {
             q * head.sqrt()
         } else {

@@ -2,8 +2,8 @@
 
 use crate::jet::Jet;
 
-/// The spline with control values `controls` at `q` in `[0, 1]`; knots in equal steps, the first and
-/// last control value are met. At least 4 control values. De Boor's algorithm.
+/// Evaluates the spline at `q` in `[0, 1]` by De Boor's algorithm: at least 4 control values, uniform knots; the
+/// spline interpolates the first and last control value.
 pub(super) fn cubic(controls: &[Jet], q: Jet) -> Jet {
     let spans = controls.len() - 3;
     let knot = |i: usize| (i.saturating_sub(3) as f64 / spans as f64).min(1.0);

@@ -12,16 +12,16 @@ pub(super) const PATCHES: usize = 3;
 pub(super) struct Branch {
     start: JetVector,
     end: JetVector,
-    /// Of the spheres at the start and at the end.
+    /// Radii of the spheres at the start and at the end.
     radii: [Jet; 2],
-    /// Unit vectors: along the axis, and two across it; right-handed in the order across, along.
+    /// Unit vectors along the axis and two perpendicular to it; right-handed in the order across, along.
     along: JetVector,
     across: [JetVector; 2],
     /// Sine and cosine of the half-angle of the cone; the sine is positive where it narrows.
     sin: Jet,
     cos: Jet,
     length: Jet,
-    /// A sphere round it: center and squared radius.
+    /// Bounding sphere: center and squared radius.
     bound: ([f64; 3], f64),
 }
 
@@ -33,7 +33,7 @@ pub(super) struct Closest {
 }
 
 impl Branch {
-    /// From `start` to `end`; `side` is a unit vector at right angles to `along`. The radii differ by
+    /// A branch from `start` to `end`; `side` is a unit vector perpendicular to `along`. The radii differ by
     /// less than the length.
     pub fn new(
         start: JetVector,
@@ -55,7 +55,7 @@ impl Branch {
             sin,
             cos: (1.0 - sin.squared()).sqrt(),
             length,
-            // A little larger: rounding must not let it cut the branch.
+            // Slightly larger, so that it encloses the branch despite rounding.
             bound: (
                 scale(add(values(start), values(end)), 0.5),
                 (1.01 * reach).powi(2),
@@ -63,7 +63,7 @@ impl Branch {
         }
     }
 
-    /// `u` along the axis or from the pole of a cap, `v` round it.
+    /// `u` along the axis or from the pole of a cap, `v` around it.
     pub fn map(&self, patch: usize, u: Jet, v: Jet) -> JetVector {
         let [first, last] = self.radii;
         match patch {
@@ -83,7 +83,7 @@ impl Branch {
         }
     }
 
-    /// The point at `turns` of a ring round the axis, `axial` beyond `center`.
+    /// The point at `turns` of a ring around the axis, `axial` beyond `center`.
     fn ring(&self, center: JetVector, axial: Jet, radius: Jet, turns: Jet) -> JetVector {
         let (cos, sin) = turn(turns);
         let axis = add_scaled(center, axial, self.along);
@@ -97,15 +97,15 @@ impl Branch {
         norm_squared(sub(point, center)) < reach && self.distance(point).distance < 0.0
     }
 
-    /// Exact inside and outside: the closest point is on the cap whose cone of normals holds the point,
-    /// else on the wall.
+    /// Exact inside and outside: the closest point is on the cap whose cone of normals contains the point,
+    /// otherwise on the wall.
     pub fn distance(&self, point: [f64; 3]) -> Closest {
         let along = values(self.along);
         let from_start = sub(point, values(self.start));
         let axial = dot(from_start, along);
         let spoke = sub(from_start, scale(along, axial));
         let radial = norm(spoke);
-        // On the axis every direction across it is as close.
+        // On the axis all perpendicular directions are equally close.
         let across = if radial > 0.0 {
             scale(spoke, 1.0 / radial)
         } else {

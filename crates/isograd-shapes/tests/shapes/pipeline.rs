@@ -1,32 +1,30 @@
-//! The pullback of the whole pipeline on bodies: against finite differences, and against closed forms.
+//! Pullback of the whole pipeline: against finite differences, and against closed forms.
 
 use std::f64::consts::PI;
 
 use isograd::gradcheck::{Motion, Options, gradcheck};
 use isograd::isosurface::measure_pullback;
 use isograd::{Cotangent, Grid, PointCloud, Reconstructor, Resolution};
-use isograd_shapes::{Layout, Sampling, by_name};
+use isograd_shapes::Sampling;
+
+use super::{RANDOM, shape};
 
 fn cloud(name: &str, n: usize) -> PointCloud<f64> {
-    let sampling = Sampling {
-        layout: Layout::Random,
-        ..Sampling::default()
-    };
-    let shape = by_name(name).expect("a shape");
-    let samples = shape.sample::<f64>(n, &sampling, 3).expect("samples");
+    let samples = shape(name).sample::<f64>(n, &RANDOM, 3).expect("samples");
     PointCloud::new(samples.cloud.points().to_vec()).expect("finite")
 }
 
 #[test]
 fn whole_pullback_is_the_transpose_of_the_derivative() {
-    for (name, points, cells) in [
+    for (name, n, cells) in [
         ("torus", 5000, 48),
         ("fish", 8000, 96),
         ("airliner", 8000, 96),
     ] {
-        let cloud = cloud(name, points);
+        let cloud = cloud(name, n);
         let grid = Grid::fit(&cloud, Resolution::Cells(cells), 0.1).expect("a grid");
-        // The bodies' planes of symmetry are not those of the cells, where a sample has the slope of one side.
+        // Shifted, so that the planes of symmetry of the bodies do not pass through cell centers, where the
+        // derivative is one-sided.
         let shift = [0.137, -0.211, 0.071].map(|s| s * grid.spacing());
         let lower = std::array::from_fn(|a| grid.lower()[a] + shift[a]);
         let grid = Grid::new(lower, grid.spacing(), grid.shape()).expect("a grid");
@@ -58,9 +56,8 @@ fn whole_pullback_is_the_transpose_of_the_derivative() {
 /// is `shift` cells from that of the grid.
 fn sphere_errors(cells: usize, shift: [f64; 3]) -> [f64; 3] {
     let radius = 0.5;
-    let sphere = by_name("sphere").expect("a sphere");
-    // As many samples for each cell on every grid.
-    let samples = sphere.sample::<f64>(cells * cells * 4, &Sampling::default(), 1);
+    // The number of samples per cell is the same on every grid.
+    let samples = shape("sphere").sample::<f64>(cells * cells * 4, &Sampling::default(), 1);
     let points = samples.expect("samples").cloud.points().to_vec();
     let outward: Vec<[f64; 3]> = points.iter().map(|p| p.map(|x| x / radius)).collect();
     let cloud = PointCloud::new(points).expect("finite");
@@ -98,7 +95,7 @@ fn sphere_errors(cells: usize, shift: [f64; 3]) -> [f64; 3] {
 
 #[test]
 fn a_growing_sphere_follows_its_closed_forms_and_converges() {
-    // Where the surface passes the cell centers makes a difference: several places.
+    // Errors depend on the position of the surface between cell centers: average over several shifts.
     let shifts = [
         [0.0; 3],
         [0.3, 0.1, 0.4],
@@ -122,7 +119,7 @@ fn a_growing_sphere_follows_its_closed_forms_and_converges() {
     });
     println!("means: {mean:.5?}");
     let [coarse, _, fine] = mean;
-    // That of the area is so small from the beginning that chance moves it.
+    // The error of the area is too small for a clear trend.
     assert!(mean.iter().all(|errors| errors[0] < 2e-3), "{mean:?}");
     assert!(
         fine[1] < 0.8 * coarse[1] && fine[2] < 0.8 * coarse[2],

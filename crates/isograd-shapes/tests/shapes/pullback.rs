@@ -1,14 +1,11 @@
 //! The map from parameters to points and its pullback, on every shape.
 
 use isograd_element::vector::{dot, norm, sub};
-use isograd_shapes::{Layout, Sampling, Shape, SurfaceCoordinate, all, by_name};
+use isograd_shapes::{Shape, SurfaceCoordinate, all};
 
-const RANDOM: Sampling = Sampling {
-    layout: Layout::Random,
-    density: isograd_shapes::Density::Uniform,
-};
+use super::{RANDOM, shape, with};
 
-/// Every shape at its defaults, and with every parameter that can be moved by a tenth of itself, moved.
+/// Every shape at its defaults, and with every parameter changed by up to a tenth where possible.
 fn shapes() -> Vec<Shape> {
     let mut shapes = Vec::new();
     for shape in all() {
@@ -17,18 +14,15 @@ fn shapes() -> Vec<Shape> {
         for (i, (parameter, value)) in parameters.into_iter().enumerate() {
             let factor = 1.0 + 0.1 * (1.7 * (i + 1) as f64).sin();
             if !parameter.whole {
-                // A value that makes no body with the others stays as it was.
+                // A refused value leaves the shape unchanged.
                 let _ = other.set(parameter.name, value * factor);
             }
         }
         assert_ne!(shape.values(), other.values());
         shapes.extend([shape, other]);
     }
-    let mut swimming = by_name("fish").expect("a shape");
-    swimming
-        .set_all([("amplitude", 0.1), ("time", 0.3), ("carangiform", 0.4)])
-        .expect("good values");
-    shapes.push(swimming);
+    let swimming = [("amplitude", 0.1), ("time", 0.3), ("carangiform", 0.4)];
+    shapes.push(with("fish", &swimming));
     shapes
 }
 
@@ -37,12 +31,19 @@ fn coordinates(shape: &Shape, n: usize) -> Vec<SurfaceCoordinate> {
     samples.coordinates
 }
 
-/// Numbers of order one that have no pattern.
+/// Numbers of order one without a pattern.
 fn weights(n: usize) -> Vec<[f64; 3]> {
     let number = |k: usize| (12.9898 * k as f64 + 0.3).sin();
     (0..n)
         .map(|i| [0, 1, 2].map(|a| number(3 * i + a)))
         .collect()
+}
+
+/// `Σ x·x̄`, and the sum of the sizes of its terms: the sum may cancel.
+fn product(x: &[[f64; 3]], bars: &[[f64; 3]]) -> (f64, f64) {
+    let pairs = x.iter().zip(bars);
+    let sum = pairs.clone().map(|(x, bar)| dot(*x, *bar)).sum();
+    (sum, pairs.map(|(x, bar)| norm(*x) * norm(*bar)).sum())
 }
 
 fn step(value: f64) -> f64 {
@@ -91,22 +92,12 @@ fn the_pullback_is_the_transpose_of_the_finite_difference_on_every_shape() {
             let Some(moved) = difference(&shape, index, &c) else {
                 continue;
             };
-            let pushed: f64 = moved.iter().zip(&bars).map(|(x, bar)| dot(*x, *bar)).sum();
-            // The sum may cancel: what it is compared with is the sum of the sizes.
-            let size: f64 = moved
-                .iter()
-                .zip(&bars)
-                .map(|(x, bar)| norm(*x) * norm(*bar))
-                .sum();
-            let off = (pulled - pushed).abs();
+            let (pushed, size) = product(&moved, &bars);
             // Truncation is the square of a step of 1e-6; rounding is that of the points over the step.
-            let rounding: f64 = points
-                .iter()
-                .zip(&bars)
-                .map(|(x, bar)| norm(*x) * norm(*bar))
-                .sum();
+            let (_, rounding) = product(&points, &bars);
             let tolerance = 1e-6 * size + 1e-15 * rounding / step(shape.values()[index]);
-            assert!(off <= tolerance, "{shape:?} {index}: {pulled} {pushed}");
+            let error = (pulled - pushed).abs();
+            assert!(error <= tolerance, "{shape:?} {index}: {pulled} {pushed}");
             checked += 1;
         }
         assert!(checked > 0, "{shape:?}");
@@ -121,16 +112,10 @@ fn the_pullback_is_the_transpose_of_the_tangent() {
         let gradient = shape.pullback(&c, &bars).expect("a pullback");
         for (index, (parameter, _)) in shape.parameters().enumerate() {
             let tangent = shape.tangent(parameter.name, &c).expect("a tangent");
-            let terms = tangent.iter().zip(&bars);
-            let pushed: f64 = terms.clone().map(|(x, bar)| dot(*x, *bar)).sum();
-            let size: f64 = terms.map(|(x, bar)| norm(*x) * norm(*bar)).sum();
-            // The same jets; only the order of the sum differs.
-            assert!(
-                (gradient[index] - pushed).abs() <= 1e-12 * size,
-                "{} {}",
-                shape.name(),
-                parameter.name
-            );
+            let (pushed, size) = product(&tangent, &bars);
+            // The jets are equal; only the order of the sum differs.
+            let error = (gradient[index] - pushed).abs();
+            assert!(error <= 1e-12 * size, "{shape:?} {}", parameter.name);
         }
     }
 }
@@ -139,20 +124,20 @@ fn the_pullback_is_the_transpose_of_the_tangent() {
 fn points_and_normals_at_the_coordinates_of_samples_are_the_samples() {
     for shape in shapes() {
         let samples = shape.sample::<f64>(300, &RANDOM, 2).expect("samples");
-        let points = shape
-            .points_at::<f64>(&samples.coordinates)
-            .expect("points");
-        assert_eq!(points, samples.cloud.points(), "{shape:?}");
-        let normals = shape
-            .normals_at::<f64>(&samples.coordinates)
-            .expect("normals");
-        assert_eq!(Some(&*normals), samples.cloud.normals(), "{shape:?}");
+        let points = shape.points_at::<f64>(&samples.coordinates);
+        assert_eq!(points.as_deref(), Ok(samples.cloud.points()), "{shape:?}");
+        let normals = shape.normals_at::<f64>(&samples.coordinates);
+        assert_eq!(
+            normals.ok().as_deref(),
+            samples.cloud.normals(),
+            "{shape:?}"
+        );
     }
 }
 
 #[test]
-fn the_bits_do_not_depend_on_the_threads_and_some_parameters_are_as_all() {
-    let shape = by_name("fish").expect("a shape");
+fn the_bits_do_not_depend_on_the_number_of_threads_or_parameters() {
+    let shape = shape("fish");
     let c = coordinates(&shape, 7000);
     let bars = weights(c.len());
     let with = |threads: usize| {
@@ -170,8 +155,8 @@ fn the_bits_do_not_depend_on_the_threads_and_some_parameters_are_as_all() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused() {
-    let mut vessels = by_name("vessels").expect("a shape");
+fn mismatched_cotangents_and_patches_are_refused() {
+    let mut vessels = shape("vessels");
     let c = coordinates(&vessels, 500);
     let message = vessels
         .pullback(&c, &weights(3))

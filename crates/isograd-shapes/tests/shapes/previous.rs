@@ -1,10 +1,12 @@
-//! Signs that follow a moving body from step to step.
+//! Orientation of a moving body from step to step.
 
 use isograd::neighbors::Radius;
 use isograd::orient::{Method, MethodUsed};
 use isograd::{Orienter, PointCloud};
 use isograd_element::vector::dot;
-use isograd_shapes::{Layout, Sampling, by_name};
+use isograd_shapes::Sampling;
+
+use super::shape;
 
 /// Samples of the fish.
 const SAMPLES: usize = 12_000;
@@ -14,14 +16,11 @@ const STEPS: usize = 20;
 
 #[test]
 fn the_fish_keeps_its_signs_through_a_beat_of_its_tail() {
-    let mut fish = by_name("fish").expect("a shape");
+    let mut fish = shape("fish");
     fish.set("amplitude", 0.12).expect("in range");
     let period = fish.get("period").expect("a parameter");
-    let sampling = Sampling {
-        layout: Layout::Even,
-        ..Sampling::default()
-    };
-    let samples = fish.sample::<f64>(SAMPLES, &sampling, 3).expect("samples");
+    let samples = fish.sample::<f64>(SAMPLES, &Sampling::default(), 3);
+    let samples = samples.expect("samples");
     let mut plan = Orienter::<f64>::new(Radius::Auto, Method::Previous);
     let mut first = Vec::new();
     for step in 0..=STEPS {
