@@ -17,10 +17,13 @@ use crate::errors::value;
 use crate::settings::Settings;
 use crate::shape::Shape;
 
-/// What `isograd._fit` writes.
+/// The options that `isograd._fit` writes.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct FitSettings {
+    /// Grid, options and backend of the reconstructions.
+    settings: Settings,
+    kind: Kind,
     optimizer: Method,
     rate: Option<f64>,
     epochs: usize,
@@ -42,15 +45,24 @@ enum Method {
     Adam,
 }
 
-/// What is to be matched.
-enum Wanted {
+/// Kind of the target.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Kind {
+    Sdf,
+    Mesh,
+    Cloud,
+}
+
+/// Arrays of the target.
+enum TargetArrays {
     Sdf(Vec<f64>),
     Mesh(Mesh<f64>),
     Cloud(Vec<[f64; 3]>),
 }
 
-/// Outcome, who computed, why the CPU where that was left to the package, history as JSON, names and values of the
-/// shape, points, φ, vertices, faces.
+/// Outcome, name of the backend, why `auto` selected the CPU, history as JSON, names and values of the shape, points, φ,
+/// vertices, faces.
 type Fitted<'py> = (
     &'static str,
     String,
@@ -63,49 +75,46 @@ type Fitted<'py> = (
     Bound<'py, PyAny>,
 );
 
-/// Runs a fit to its end: of `shape`, or of `points` where there is none. `target` is φ, `(vertices, faces)` or
-/// points, as `kind` says. `callback` gets each epoch as JSON, and stops the fit by returning `False`.
+/// Fits `shape`, or `points` without one, to `target`: φ, `(vertices, faces)` or points, according to the kind in
+/// `options`. `callback` is called with each epoch as JSON, and stops the fit by returning `False`.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "one call from isograd._fit")]
 pub fn run_fit<'py>(
     py: Python<'py>,
-    settings: &str,
-    how: &str,
-    kind: &str,
+    options: &str,
     target: Vec<Bound<'py, PyAny>>,
     shape: Option<&Shape>,
     points: Option<&Bound<'py, PyAny>>,
     callback: Option<Py<PyAny>>,
 ) -> PyResult<Fitted<'py>> {
-    let settings = Settings::parse(settings).map_err(value)?;
-    let how: FitSettings =
-        serde_json::from_str(how).map_err(|error| value(format!("fit: {error}")))?;
-    let grid = settings.grid::<f64>().map_err(value)?;
-    let wanted = match (kind, target.as_slice()) {
-        ("sdf", [sdf]) => Wanted::Sdf(arrays::values(sdf, "the target")?),
-        ("mesh", [vertices, faces]) => Wanted::Mesh(arrays::mesh(vertices, faces)?),
-        ("cloud", [cloud]) => Wanted::Cloud(arrays::vectors(cloud, "the target")?),
-        _ => return Err(value(format!("a target of the kind '{kind}'"))),
+    let fit: FitSettings =
+        serde_json::from_str(options).map_err(|error| value(format!("fit: {error}")))?;
+    let grid = fit.settings.grid::<f64>().map_err(value)?;
+    let arrays = match (fit.kind, target.as_slice()) {
+        (Kind::Sdf, [sdf]) => TargetArrays::Sdf(arrays::values(sdf, "the target")?),
+        (Kind::Mesh, [vertices, faces]) => TargetArrays::Mesh(arrays::mesh(vertices, faces)?),
+        (Kind::Cloud, [cloud]) => TargetArrays::Cloud(arrays::vectors(cloud, "the target")?),
+        _ => {
+            return Err(value(
+                "the target has another number of arrays than its kind",
+            ));
+        }
     };
     let variables = match (shape, points) {
-        (Some(shape), _) => Variables::Shape(how.shape(&shape.0)),
+        (Some(shape), _) => Variables::Shape(fit.shape(&shape.0)),
         (None, Some(points)) => {
             let cloud = PointCloud::new(arrays::vectors(points, "points")?).map_err(value)?;
             let mut points = Points::new(cloud);
-            points.smoothness = how.smoothness;
+            points.smoothness = fit.smoothness;
             Variables::Points(points)
         }
         (None, None) => return Err(value("give a shape or points to fit")),
     };
     let done = background::run(py, move |stop| {
-        let target = wanted.target(grid, &settings.options)?;
-        let options = Options {
-            backend: settings.backend,
-            ..how.options(settings.options.clone()).map_err(value)?
-        };
+        let target = arrays.target(grid, &fit.settings.options)?;
+        let options = fit.options().map_err(value)?;
         let mut fit = Fit::new(&target, variables, options).map_err(Failure::from)?;
         let outcome = descend(&mut fit, callback.as_ref(), stop)?;
-        Ok::<_, PyErr>(Done::new(&mut fit, outcome).map_err(Failure::from)?)
+        Ok::<_, PyErr>(FitResult::new(&mut fit, outcome).map_err(Failure::from)?)
     })??;
     done.arrays(py)
 }
@@ -127,7 +136,7 @@ impl FitSettings {
         }
     }
 
-    fn options(&self, reconstruction: isograd::Options) -> Result<Options, String> {
+    fn options(&self) -> Result<Options, String> {
         let optimizer = match self.optimizer {
             Method::Lbfgs => Optimizer::lbfgs(self.rate),
             Method::Adam => Optimizer::adam(self.rate, Decay::Cosine { steps: self.epochs }),
@@ -137,13 +146,14 @@ impl FitSettings {
             optimizer,
             epochs: self.epochs,
             tolerance: self.tolerance,
-            reconstruction,
+            reconstruction: self.settings.options.clone(),
+            backend: self.settings.backend,
             ..Options::default()
         })
     }
 }
 
-impl Wanted {
+impl TargetArrays {
     fn target(self, grid: Grid<f64>, options: &isograd::Options) -> PyResult<Target> {
         match self {
             Self::Sdf(values) => {
@@ -159,7 +169,7 @@ impl Wanted {
     }
 }
 
-/// Epochs until the fit is done, the callback says so, or Ctrl-C is pressed.
+/// Runs epochs until the fit ends, the callback stops it, or Ctrl-C is pressed.
 fn descend(fit: &mut Fit, callback: Option<&Py<PyAny>>, stop: &Stop) -> PyResult<Outcome> {
     let mut raised = None;
     let outcome = fit.run(&mut |fit| {
@@ -169,7 +179,7 @@ fn descend(fit: &mut Fit, callback: Option<&Py<PyAny>>, stop: &Stop) -> PyResult
         let Some(callback) = callback else {
             return ControlFlow::Continue(());
         };
-        match Python::attach(|py| goes_on(py, callback, fit)) {
+        match Python::attach(|py| call_back(py, callback, fit)) {
             Ok(true) => ControlFlow::Continue(()),
             Ok(false) => ControlFlow::Break(()),
             Err(error) => {
@@ -184,14 +194,14 @@ fn descend(fit: &mut Fit, callback: Option<&Py<PyAny>>, stop: &Stop) -> PyResult
     }
 }
 
-fn goes_on(py: Python<'_>, callback: &Py<PyAny>, fit: &Fit) -> PyResult<bool> {
+fn call_back(py: Python<'_>, callback: &Py<PyAny>, fit: &Fit) -> PyResult<bool> {
     let epoch = serde_json::to_string(&fit.history().last()).map_err(value)?;
     let answer = callback.call1(py, (epoch,))?;
     Ok(answer.extract::<Option<bool>>(py)? != Some(false))
 }
 
-/// All that is left of a fit.
-struct Done {
+/// Result of a fit.
+struct FitResult {
     outcome: Outcome,
     backend: String,
     note: Option<String>,
@@ -202,7 +212,7 @@ struct Done {
     mesh: Mesh<f64>,
 }
 
-impl Done {
+impl FitResult {
     fn new(fit: &mut Fit, outcome: Outcome) -> Result<Self, Error> {
         let shape = fit.shape();
         let values = shape

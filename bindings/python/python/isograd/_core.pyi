@@ -45,12 +45,12 @@ __version__: str
 # Grids.
 
 def check_grid(lower: _Vector, spacing: float, shape: _Cells) -> None:
-    """Raises ValueError where the numbers make no grid."""
+    """Raises ValueError if the grid is invalid."""
 
 def fit_grid(
     points: _Floats, resolution: int | None, spacing: float | None, padding: float
 ) -> tuple[_Vector, float, _Cells]:
-    """Lower corner, spacing and shape of the grid round ``(N, 3)`` points."""
+    """Lower corner, spacing and shape of a grid around ``(N, 3)`` points."""
 
 # Reconstruction.
 
@@ -64,23 +64,23 @@ class _Cotangents(TypedDict):
 
 @final
 class Extension:
-    """An attribute on the surface and round it."""
+    """An attribute on the surface and around it."""
 
     def array(self, name: str) -> NDArray[Any]:
-        """``vertices``, ``cells`` or ``values``: a new array at each call."""
+        """A new copy of ``vertices``, ``cells`` or ``values``."""
 
 @final
 class Result:
-    """A cloud and what was made of it."""
+    """Reconstruction of a cloud."""
 
     def array(self, name: str) -> NDArray[Any]:
-        """One of the arrays, by name: a new one at each call."""
+        """A new copy of one of the arrays, by name."""
 
     def iso_value(self) -> float:
-        """The level of the surface."""
+        """The iso-value of the surface."""
 
     def backend(self) -> str:
-        """Who computed."""
+        """Name of the backend."""
 
     def report(self) -> str:
         """The report as JSON."""
@@ -111,7 +111,7 @@ class Plan:
         """Reconstructs a cloud: ``points``, ``normals`` and ``sensors`` of one type."""
 
     def take_note(self) -> str | None:
-        """Why the CPU computes, where that was left to the package; once."""
+        """Why ``"auto"`` selected the CPU; once."""
 
 def orient(
     points: _Floats,
@@ -136,11 +136,11 @@ def query_mesh_pullback(
 ) -> list[_Floats]:
     """Cotangents of vertices and queries from those of the distances."""
 
-# Bodies.
+# Shapes.
 
 @final
 class Shape:
-    """A body with its parameters."""
+    """A shape with its parameters."""
 
     def __new__(cls, name: str, values: list[tuple[str, float]]) -> Shape: ...
     def name(self) -> str: ...
@@ -166,14 +166,12 @@ class Shape:
         """Cotangents of all parameters, in order."""
 
 def shapes() -> list[tuple[str, str]]:
-    """Names and summaries of all bodies."""
+    """Names and summaries of all shapes."""
 
 # Fits.
 
 def run_fit(
-    settings: str,
-    how: str,
-    kind: str,
+    options: str,
     target: Sequence[NDArray[Any]],
     shape: Shape | None,
     points: _Floats | None,
@@ -181,10 +179,10 @@ def run_fit(
 ) -> tuple[
     str, str, str | None, str, list[tuple[str, float]], _Floats, _Floats, _Floats, _Indices
 ]:
-    """Outcome, who computed, why the CPU where that was left to the package, history as JSON, names and values of the
-    shape, points, φ, vertices, faces.
+    """Outcome, name of the backend, why ``"auto"`` selected the CPU, history as JSON, names and values of the shape,
+    points, φ, vertices, faces.
 
-    ``target`` is φ, ``(vertices, faces)`` or points, as ``kind`` says."""
+    ``options`` is a JSON text; ``target`` is φ, ``(vertices, faces)`` or points, according to its ``kind``."""
 
 # XLA.
 
@@ -211,10 +209,10 @@ def run_command(arguments: Sequence[str]) -> int:
 def read_geometry(
     path: _Path,
 ) -> tuple[_Floats, _Floats | None, list[tuple[str, _Floats]], _Indices]:
-    """Points, normals, attributes by name, and faces of a file, in the type that it is stored in."""
+    """Points, normals, attributes by name, and faces of a file, in its number type."""
 
 def read_field(path: _Path) -> tuple[_Vector, float, _Cells, _Floats]:
-    """Lower corner, spacing, shape and values of a field, in the type that it is stored in."""
+    """Lower corner, spacing, shape and values of a field, in its number type."""
 
 def write_points(
     path: _Path, points: _Floats, normals: _Floats | None, attributes: _Attributes

@@ -98,7 +98,11 @@ def fit(
         raise TypeError(f"shape is a {type(shape).__name__}; give an isograd.Shape")
     if optimizer not in ("lbfgs", "adam"):
         raise ValueError(f"optimizer is {optimizer!r}; give 'lbfgs' or 'adam'")
+    check_pure(options or Options())
+    target_kind, arrays = _target(target, grid, kind)
     how = {
+        "settings": json.loads(encode(grid, options, check_backend(backend))),
+        "kind": target_kind,
         "optimizer": optimizer,
         "rate": None if rate is None else number(rate, "rate"),
         "epochs": _count(epochs, "epochs"),
@@ -111,13 +115,9 @@ def fit(
         "random_start": None if random_start is None else number(random_start, "random_start"),
         "smoothness": number(smoothness, "smoothness"),
     }
-    check_pure(options or Options())
-    found_kind, arrays = _target(target, grid, kind)
     start = None if points is None else floats(points, "points", (None, 3), np.float64)
     outcome, who, note, history, values, found, sdf, vertices, faces = _core.run_fit(
-        encode(grid, options, check_backend(backend)),
         json.dumps(how, allow_nan=False),
-        found_kind,
         arrays,
         None if shape is None else shape._core,
         start,

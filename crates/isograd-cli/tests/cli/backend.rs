@@ -1,23 +1,16 @@
 //! `isograd reconstruct --backend`.
 
-mod common;
+use crate::sandbox::Sandbox;
 
-use common::Bench;
-use serde_json::Value;
-
-fn sphere() -> Bench {
-    let bench = Bench::new();
-    bench.done("sample sphere -n 2000 -o cloud.ply");
-    bench
-}
-
-fn report(bench: &Bench, name: &str) -> Value {
-    serde_json::from_slice(&bench.read(name)).expect("JSON")
+fn sphere() -> Sandbox {
+    let sandbox = Sandbox::new();
+    sandbox.done("sample sphere -n 2000 -o cloud.ply");
+    sandbox
 }
 
 #[test]
 fn a_backend_that_was_left_out_says_how_to_build_with_it() {
-    let bench = sphere();
+    let sandbox = sphere();
     let lines = [
         #[cfg(not(feature = "cuda"))]
         ("cuda", "built without CUDA"),
@@ -31,11 +24,11 @@ fn a_backend_that_was_left_out_says_how_to_build_with_it() {
     let lines: &[(&str, &str)] = &lines;
     for (backend, part) in lines {
         let line = format!("reconstruct cloud.ply --mesh m.ply --backend {backend}");
-        bench.run(&line).says(1, &[part, "--backend cpu"]);
+        sandbox.run(&line).says(1, &[part, "--backend cpu"]);
         let line = format!("fit --target cloud.ply --shape sphere -o fit --backend {backend}");
-        bench.run(&line).says(1, &[part, "--backend cpu"]);
+        sandbox.run(&line).says(1, &[part, "--backend cpu"]);
     }
-    assert_eq!(bench.files(), ["cloud.ply"]);
+    assert_eq!(sandbox.files(), ["cloud.ply"]);
 }
 
 #[test]
@@ -46,19 +39,19 @@ fn a_backend_that_is_none_is_a_wrong_command_line() {
 
 #[test]
 fn the_report_says_that_the_cpu_did_it() {
-    let bench = sphere();
-    bench.done("reconstruct cloud.ply --report r.json --resolution 24 -q");
-    assert_eq!(report(&bench, "r.json")["backend"], "cpu");
+    let sandbox = sphere();
+    sandbox.done("reconstruct cloud.ply --report r.json --resolution 24 -q");
+    assert_eq!(sandbox.json("r.json")["backend"], "cpu");
 }
 
 #[test]
 fn a_fit_says_who_computed() {
-    let bench = sphere();
+    let sandbox = sphere();
     let line = "fit --target cloud.ply --shape sphere --param radius=0.9 -n 1000 --resolution 20 --epochs 1 -o";
-    bench.done(&format!("{line} cpu --pictures-at 0"));
-    assert_eq!(report(&bench, "cpu/fit.json")["backend"], "cpu");
-    let run = bench.done(&format!("{line} auto --pictures-at 0 --backend auto"));
-    match report(&bench, "auto/fit.json")["backend"]
+    sandbox.done(&format!("{line} cpu --pictures-at 0"));
+    assert_eq!(sandbox.json("cpu/fit.json")["backend"], "cpu");
+    let run = sandbox.done(&format!("{line} auto --pictures-at 0 --backend auto"));
+    match sandbox.json("auto/fit.json")["backend"]
         .as_str()
         .expect("a text")
     {
@@ -69,10 +62,10 @@ fn a_fit_says_who_computed() {
 
 #[test]
 fn auto_takes_a_gpu_or_the_cpu_and_then_says_why() {
-    let bench = sphere();
+    let sandbox = sphere();
     let line = "reconstruct cloud.ply --report r.json --resolution 24 --backend auto";
-    let run = bench.done(line);
-    let report = report(&bench, "r.json");
+    let run = sandbox.done(line);
+    let report = sandbox.json("r.json");
     match report["backend"].as_str().expect("a text") {
         "cpu" => run.says(0, &["computed on the CPU: ", "built into this program"]),
         device => println!("there is a GPU: {device}"),
@@ -81,7 +74,9 @@ fn auto_takes_a_gpu_or_the_cpu_and_then_says_why() {
 
 #[cfg(feature = "vulkan")]
 mod vulkan {
-    use super::{Bench, Value, report, sphere};
+    use serde_json::Value;
+
+    use super::{Sandbox, sphere};
 
     const METHOD: &str = "--resolution 32";
 
@@ -98,8 +93,8 @@ mod vulkan {
         }
     }
 
-    fn numbers(bench: &Bench, name: &str) -> Vec<f64> {
-        let field = isograd_io::read_field(&bench.path(name)).expect("reads");
+    fn numbers(sandbox: &Sandbox, name: &str) -> Vec<f64> {
+        let field = isograd_io::read_field(&sandbox.path(name)).expect("reads");
         field.field.values().to_vec()
     }
 
@@ -108,36 +103,36 @@ mod vulkan {
         if !is_here() {
             return;
         }
-        let bench = sphere();
-        bench.done(&format!("reconstruct cloud.ply -o cpu {METHOD}"));
-        let run = bench.done(&format!(
+        let sandbox = sphere();
+        sandbox.done(&format!("reconstruct cloud.ply -o cpu {METHOD}"));
+        let run = sandbox.done(&format!(
             "reconstruct cloud.ply -o gpu {METHOD} --backend vulkan"
         ));
         // Mesa's layers may have something to say of the session.
         assert!(!run.stderr.contains("warning"), "{run:?}");
-        let files = bench.files();
+        let files = sandbox.files();
         let of = |folder: &str| {
             let names = files.iter().filter_map(|f| f.strip_prefix(folder));
             names.map(String::from).collect::<Vec<_>>()
         };
         assert_eq!(of("gpu/"), of("cpu/"));
         let (cpu, gpu) = (
-            numbers(&bench, "cpu/sdf.vti"),
-            numbers(&bench, "gpu/sdf.vti"),
+            numbers(&sandbox, "cpu/sdf.vti"),
+            numbers(&sandbox, "gpu/sdf.vti"),
         );
         let largest = cpu.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         let pairs = cpu.iter().zip(&gpu);
         let difference = pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
         assert!(difference < 2e-4 * largest, "{difference:e}");
-        let mesh = |name: &str| isograd_io::read_mesh(&bench.path(name)).expect("reads");
+        let mesh = |name: &str| isograd_io::read_mesh(&sandbox.path(name)).expect("reads");
         assert_eq!(mesh("gpu/mesh.ply").faces, mesh("cpu/mesh.ply").faces);
-        let points = |name: &str| isograd_io::read_geometry(&bench.path(name)).expect("reads");
+        let points = |name: &str| isograd_io::read_geometry(&sandbox.path(name)).expect("reads");
         let (cpu, gpu) = (points("cpu/points.ply"), points("gpu/points.ply"));
         assert_eq!((gpu.points, gpu.attributes), (cpu.points, cpu.attributes));
         assert!(gpu.normals.is_some());
         same_report(
-            &report(&bench, "cpu/report.json"),
-            &report(&bench, "gpu/report.json"),
+            &sandbox.json("cpu/report.json"),
+            &sandbox.json("gpu/report.json"),
         );
     }
 
@@ -174,14 +169,14 @@ mod vulkan {
         if !is_here() {
             return;
         }
-        let bench = sphere();
+        let sandbox = sphere();
         let line = "reconstruct cloud.ply --report r.json --resolution 24 --orient given";
-        bench.done(&format!("{line} --backend vulkan"));
-        let found = report(&bench, "r.json");
+        sandbox.done(&format!("{line} --backend vulkan"));
+        let found = sandbox.json("r.json");
         assert_eq!(found["orientation"]["method"], "given");
         assert!(found["backend"].as_str().unwrap().starts_with("vulkan: "));
-        let run = bench.done(&format!("{line} --backend auto"));
-        if report(&bench, "r.json")["backend"] == "cpu" {
+        let run = sandbox.done(&format!("{line} --backend auto"));
+        if sandbox.json("r.json")["backend"] == "cpu" {
             run.says(0, &["computed on the CPU: "]);
         }
     }
@@ -191,12 +186,12 @@ mod vulkan {
         if !is_here() {
             return;
         }
-        let bench = sphere();
+        let sandbox = sphere();
         let line = "reconstruct cloud.ply --mesh m.ply --resolution 24 --bounds 0 0 0 1 1 1";
-        bench
+        sandbox
             .run(line)
             .says(1, &["cloud.ply: ", "use more padding"]);
-        let run = bench.run(&format!("{line} --backend vulkan"));
+        let run = sandbox.run(&format!("{line} --backend vulkan"));
         run.says(1, &["cloud.ply: ", "use more padding"]);
     }
 }

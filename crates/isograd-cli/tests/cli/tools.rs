@@ -1,19 +1,17 @@
 //! `isograd sample`, `query` and `info`, run as a user runs them.
 
-mod common;
-
-use common::Bench;
+use crate::sandbox::Sandbox;
 
 #[test]
 fn samples_depend_on_the_seed_alone() {
-    let bench = Bench::new();
+    let sandbox = Sandbox::new();
     for (name, seed) in [("a.ply", 1), ("b.ply", 1), ("c.ply", 2)] {
-        bench.done(&format!("sample torus -n 400 -o {name} --seed {seed}"));
+        sandbox.done(&format!("sample torus -n 400 -o {name} --seed {seed}"));
     }
-    assert_eq!(bench.read("a.ply"), bench.read("b.ply"));
-    assert_ne!(bench.read("a.ply"), bench.read("c.ply"));
-    bench.done("sample torus -n 400 -o d.csv --param major=2 --param minor=0.5 --precision f64");
-    let file = isograd_io::read_geometry(&bench.path("d.csv")).expect("reads");
+    assert_eq!(sandbox.read("a.ply"), sandbox.read("b.ply"));
+    assert_ne!(sandbox.read("a.ply"), sandbox.read("c.ply"));
+    sandbox.done("sample torus -n 400 -o d.csv --param major=2 --param minor=0.5 --precision f64");
+    let file = isograd_io::read_geometry(&sandbox.path("d.csv")).expect("reads");
     for [x, y, z] in &file.points {
         // Seventeen digits stand in the file.
         assert!(((x.hypot(*y) - 2.0).hypot(*z) - 0.5).abs() < 1e-12);
@@ -23,7 +21,7 @@ fn samples_depend_on_the_seed_alone() {
 
 #[test]
 fn the_list_names_every_shape_and_its_parameters() {
-    let list = Bench::new().done("sample --list").stdout;
+    let list = Sandbox::new().done("sample --list").stdout;
     for shape in isograd_shapes::all() {
         assert!(list.contains(&format!("{}: ", shape.name())));
         for (parameter, _) in shape.parameters() {
@@ -34,9 +32,9 @@ fn the_list_names_every_shape_and_its_parameters() {
 
 #[test]
 fn density_grows_along_the_axis_that_was_named() {
-    let bench = Bench::new();
-    bench.done("sample sphere -n 2000 -o a.npz --density z:10 --layout random");
-    let points = isograd_io::read_geometry(&bench.path("a.npz"))
+    let sandbox = Sandbox::new();
+    sandbox.done("sample sphere -n 2000 -o a.npz --density z:10 --layout random");
+    let points = isograd_io::read_geometry(&sandbox.path("a.npz"))
         .expect("reads")
         .points;
     let upper = points.iter().filter(|p| p[2] > 0.0).count();
@@ -45,15 +43,16 @@ fn density_grows_along_the_axis_that_was_named() {
 
 #[test]
 fn queries_of_a_mesh_and_of_its_field_agree_with_the_sphere() {
-    let bench = Bench::new();
-    bench.done("sample sphere -n 3000 -o cloud.ply");
-    bench.done("reconstruct cloud.ply -q --mesh m.ply --sdf s.vti --resolution 48 --precision f64");
-    bench.write("at.xyz", "0 0 0\n0.4 0 0\n0.55 0 0\n0 0.2 -0.3\n5 0 0\n");
-    bench.done("query m.ply --at at.xyz -o mesh.npz");
-    let run = bench.run("query s.vti --at at.xyz -o field.npz");
+    let sandbox = Sandbox::new();
+    sandbox.done("sample sphere -n 3000 -o cloud.ply");
+    sandbox
+        .done("reconstruct cloud.ply -q --mesh m.ply --sdf s.vti --resolution 48 --precision f64");
+    sandbox.write("at.xyz", "0 0 0\n0.4 0 0\n0.55 0 0\n0 0.2 -0.3\n5 0 0\n");
+    sandbox.done("query m.ply --at at.xyz -o mesh.npz");
+    let run = sandbox.run("query s.vti --at at.xyz -o field.npz");
     run.says(0, &["warning: 1 of 5 points lie outside the grid"]);
     let [mesh, field] = ["mesh.npz", "field.npz"]
-        .map(|name| isograd_io::read_geometry(&bench.path(name)).expect("reads"));
+        .map(|name| isograd_io::read_geometry(&sandbox.path(name)).expect("reads"));
     let names = |of: &isograd_io::Geometry| -> Vec<String> {
         of.attributes.iter().map(|a| a.name.clone()).collect()
     };
@@ -76,22 +75,22 @@ fn queries_of_a_mesh_and_of_its_field_agree_with_the_sphere() {
             );
         }
     }
-    bench.write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-    bench
+    sandbox.write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    sandbox
         .run("query open.obj --at at.xyz -o open.ply")
         .says(0, &["not closed"]);
-    bench
+    sandbox
         .run("query at.xyz --at at.xyz -o bad.ply")
         .says(1, &["at.xyz"]);
 }
 
 #[test]
 fn info_says_what_a_file_holds() {
-    let bench = Bench::new();
-    bench.done("sample sphere -n 1000 -o cloud.ply");
-    bench.done("reconstruct cloud.ply -q --mesh m.obj --sdf s.npz --resolution 24");
+    let sandbox = Sandbox::new();
+    sandbox.done("sample sphere -n 1000 -o cloud.ply");
+    sandbox.done("reconstruct cloud.ply -q --mesh m.obj --sdf s.npz --resolution 24");
     let says = |file: &str, parts: &[&str]| {
-        let text = bench.done(&format!("info {file}")).stdout;
+        let text = sandbox.done(&format!("info {file}")).stdout;
         let plain: String = text.split_whitespace().collect::<Vec<_>>().join(" ");
         for part in parts {
             assert!(plain.contains(part), "'{part}' is missing: {plain}");

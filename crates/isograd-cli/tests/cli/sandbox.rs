@@ -1,18 +1,18 @@
-//! Runs the real binary in a folder of its own.
-#![allow(dead_code)] // each test takes what it needs
+//! Runs the program in a temporary folder.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
+use serde_json::Value;
 use tempfile::TempDir;
 
-/// A folder to run in.
-pub struct Bench {
+/// A temporary folder to run in.
+pub struct Sandbox {
     folder: TempDir,
 }
 
-/// What came out of a run.
+/// Result of a run.
 #[derive(Debug)]
 pub struct Run {
     pub status: Option<i32>,
@@ -20,7 +20,7 @@ pub struct Run {
     pub stderr: String,
 }
 
-impl Bench {
+impl Sandbox {
     pub fn new() -> Self {
         Self {
             folder: tempfile::tempdir().expect("temporary folder"),
@@ -39,6 +39,10 @@ impl Bench {
         std::fs::read(self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
     }
 
+    pub fn json(&self, name: &str) -> Value {
+        serde_json::from_slice(&self.read(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+
     pub fn command(&self, line: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_isograd"));
         command
@@ -50,10 +54,10 @@ impl Bench {
 
     /// Runs `isograd LINE`.
     pub fn run(&self, line: &str) -> Run {
-        Run::of(self.command(line).output().expect("the binary starts"))
+        Run::new(self.command(line).output().expect("the binary starts"))
     }
 
-    /// Runs `isograd LINE` and hands it `input`.
+    /// Runs `isograd LINE` with `input` on standard input.
     pub fn run_with_input(&self, line: &str, input: &[u8]) -> Run {
         let mut command = self.command(line);
         command
@@ -61,9 +65,9 @@ impl Bench {
             .stdout(Stdio::piped())
             .stderr(Stdio::piped());
         let mut child = command.spawn().expect("the binary starts");
-        // It may stop reading on an error: then the pipe is closed, which is its right.
+        // The program may stop reading on an error, which closes the pipe.
         let _ = child.stdin.take().expect("a pipe").write_all(input);
-        Run::of(child.wait_with_output().expect("it ends"))
+        Run::new(child.wait_with_output().expect("it ends"))
     }
 
     /// Runs `isograd LINE` and expects it to succeed.
@@ -83,7 +87,7 @@ impl Bench {
 }
 
 impl Run {
-    fn of(output: Output) -> Self {
+    fn new(output: Output) -> Self {
         Self {
             status: output.status.code(),
             stdout: String::from_utf8_lossy(&output.stdout).into_owned(),

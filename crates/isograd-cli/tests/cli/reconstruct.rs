@@ -1,16 +1,14 @@
 //! `isograd reconstruct`, run as a user runs it.
 
-mod common;
-
-use common::Bench;
+use crate::sandbox::Sandbox;
 use isograd_io::Dtype;
 use serde_json::Value;
 
-/// A bench with a cloud of a sphere of radius 0.5.
-fn sphere() -> Bench {
-    let bench = Bench::new();
-    bench.done("sample sphere -n 3000 -o cloud.ply");
-    bench
+/// A sandbox with a cloud of a sphere of radius 0.5.
+fn sphere() -> Sandbox {
+    let sandbox = Sandbox::new();
+    sandbox.done("sample sphere -n 3000 -o cloud.ply");
+    sandbox
 }
 
 fn keys(value: &Value) -> Vec<String> {
@@ -30,8 +28,8 @@ fn assert_keys(value: &Value, wanted: &str) {
 
 #[test]
 fn the_folder_gets_its_five_files_and_the_report_its_fields() {
-    let bench = sphere();
-    let run = bench.done("reconstruct cloud.ply -o out/new --resolution 40");
+    let sandbox = sphere();
+    let run = sandbox.done("reconstruct cloud.ply -o out/new --resolution 40");
     assert!(run.stdout.contains("wrote out/new/mesh.ply"), "{run:?}");
     assert!(
         run.stderr.is_empty(),
@@ -46,8 +44,8 @@ fn the_folder_gets_its_five_files_and_the_report_its_fields() {
     ];
     let mut files = names.map(|name| format!("out/new/{name}")).to_vec();
     files.insert(0, "cloud.ply".into());
-    assert_eq!(bench.files(), files);
-    let report: Value = serde_json::from_slice(&bench.read("out/new/report.json")).expect("JSON");
+    assert_eq!(sandbox.files(), files);
+    let report = sandbox.json("out/new/report.json");
     assert_keys(
         &report,
         "version backend input grid normals orientation smoothing iso_value surface sdf seconds peak_memory_bytes warnings",
@@ -89,11 +87,11 @@ fn the_folder_gets_its_five_files_and_the_report_its_fields() {
 
 #[test]
 fn the_points_keep_their_order_and_their_attributes() {
-    let bench = Bench::new();
-    bench.done("sample fish -n 1500 -o cloud.npz --param amplitude=0.1");
-    bench.done("reconstruct cloud.npz --points p.npz --resolution 32 -q");
-    let before = isograd_io::read_geometry(&bench.path("cloud.npz")).expect("reads");
-    let after = isograd_io::read_geometry(&bench.path("p.npz")).expect("reads");
+    let sandbox = Sandbox::new();
+    sandbox.done("sample fish -n 1500 -o cloud.npz --param amplitude=0.1");
+    sandbox.done("reconstruct cloud.npz --points p.npz --resolution 32 -q");
+    let before = isograd_io::read_geometry(&sandbox.path("cloud.npz")).expect("reads");
+    let after = isograd_io::read_geometry(&sandbox.path("p.npz")).expect("reads");
     assert_eq!(after.points, before.points);
     let names: Vec<&str> = after.attributes.iter().map(|a| a.name.as_str()).collect();
     assert_eq!(names, ["confidence", "velocity"]);
@@ -108,17 +106,17 @@ fn the_points_keep_their_order_and_their_attributes() {
 
 #[test]
 fn every_format_of_every_output_is_written() {
-    let bench = sphere();
+    let sandbox = sphere();
     for line in [
         "--mesh m.ply --sdf s.vti --points p.ply",
         "--mesh m.obj --sdf s.npz --points p.npz --plot a.png --picture b.png --view -30 10",
         "--mesh m.stl --precision f64",
         "--mesh m.vtp --report r.json",
     ] {
-        bench.done(&format!("reconstruct cloud.ply --resolution 24 -q {line}"));
+        sandbox.done(&format!("reconstruct cloud.ply --resolution 24 -q {line}"));
     }
     let faces = |name: &str| {
-        isograd_io::read_mesh(&bench.path(name))
+        isograd_io::read_mesh(&sandbox.path(name))
             .expect("reads")
             .faces
             .len()
@@ -128,44 +126,48 @@ fn every_format_of_every_output_is_written() {
     assert_eq!(faces("m.obj"), faces("m.vtp"));
     assert!(faces("m.stl") > 100);
     let [vti, npz] =
-        ["s.vti", "s.npz"].map(|s| isograd_io::read_field(&bench.path(s)).expect("reads"));
+        ["s.vti", "s.npz"].map(|s| isograd_io::read_field(&sandbox.path(s)).expect("reads"));
     assert_eq!(vti.field.values(), npz.field.values());
     for name in ["a.png", "b.png"] {
-        assert!(bench.read(name).starts_with(b"\x89PNG"), "{name}");
+        assert!(sandbox.read(name).starts_with(b"\x89PNG"), "{name}");
     }
 }
 
 #[test]
 fn a_cloud_can_come_through_a_pipe() {
-    let bench = sphere();
-    let ply = bench.read("cloud.ply");
+    let sandbox = sphere();
+    let ply = sandbox.read("cloud.ply");
     let line = "reconstruct - --mesh m.ply --report r.json --resolution 24";
-    assert_eq!(bench.run_with_input(line, &ply).status, Some(0));
-    let from_ply = bench.read("m.ply");
-    let geometry = isograd_io::read_geometry(&bench.path("cloud.ply")).expect("reads");
+    assert_eq!(sandbox.run_with_input(line, &ply).status, Some(0));
+    let from_ply = sandbox.read("m.ply");
+    let geometry = isograd_io::read_geometry(&sandbox.path("cloud.ply")).expect("reads");
     let text: String = geometry
         .points
         .iter()
         .map(|[x, y, z]| format!("{x:?} {y:?} {z:?}\n"))
         .collect();
-    assert_eq!(bench.run_with_input(line, text.as_bytes()).status, Some(0));
-    assert_eq!(bench.read("m.ply"), from_ply);
-    bench
+    assert_eq!(
+        sandbox.run_with_input(line, text.as_bytes()).status,
+        Some(0)
+    );
+    assert_eq!(sandbox.read("m.ply"), from_ply);
+    sandbox
         .run_with_input(line, b"")
         .says(1, &["standard input", "empty"]);
-    bench
+    sandbox
         .run_with_input(line, b"1 2 3\n4 x 6\n")
         .says(1, &["standard input", "line 2", "'x'"]);
 }
 
 #[test]
 fn any_number_of_threads_gives_the_same_bytes() {
-    let bench = sphere();
+    let sandbox = sphere();
     let outputs = |threads: usize| {
-        bench.done(&format!(
+        sandbox.done(&format!(
             "reconstruct cloud.ply -o out --resolution 48 -q --threads {threads}"
         ));
-        ["mesh.ply", "sdf.vti", "points.ply", "slices.png"].map(|f| bench.read(&format!("out/{f}")))
+        ["mesh.ply", "sdf.vti", "points.ply", "slices.png"]
+            .map(|f| sandbox.read(&format!("out/{f}")))
     };
     let one = outputs(1);
     for threads in [2, 5] {
@@ -175,10 +177,10 @@ fn any_number_of_threads_gives_the_same_bytes() {
 
 #[test]
 fn the_grid_is_the_one_that_was_asked_for() {
-    let bench = sphere();
+    let sandbox = sphere();
     let grid = |line: &str| {
-        bench.done(&format!("reconstruct cloud.ply -q --sdf s.npz {line}"));
-        *isograd_io::read_field(&bench.path("s.npz"))
+        sandbox.done(&format!("reconstruct cloud.ply -q --sdf s.npz {line}"));
+        *isograd_io::read_field(&sandbox.path("s.npz"))
             .expect("reads")
             .field
             .grid()
@@ -192,9 +194,9 @@ fn the_grid_is_the_one_that_was_asked_for() {
     let given = grid("--bounds -1 -0.9 -0.8 1 0.9 0.8 --spacing 0.05");
     assert_eq!(given.shape(), [40, 36, 32]);
     assert!((given.lower()[1] + 0.9).abs() < 1e-6);
-    let banded = bench.done("reconstruct cloud.ply -q --sdf b.npz --resolution 32 --band 0.1");
+    let banded = sandbox.done("reconstruct cloud.ply -q --sdf b.npz --resolution 32 --band 0.1");
     assert_eq!(banded.status, Some(0));
-    let field = isograd_io::read_field(&bench.path("b.npz"))
+    let field = isograd_io::read_field(&sandbox.path("b.npz"))
         .expect("reads")
         .field;
     let greatest = field.values().iter().fold(0.0f64, |m, v| m.max(*v));
@@ -203,22 +205,22 @@ fn the_grid_is_the_one_that_was_asked_for() {
 
 #[test]
 fn coordinates_far_from_the_origin_are_computed_in_double_and_it_says_so() {
-    let bench = sphere();
-    let near = isograd_io::read_geometry(&bench.path("cloud.ply")).expect("reads");
+    let sandbox = sphere();
+    let near = isograd_io::read_geometry(&sandbox.path("cloud.ply")).expect("reads");
     let far: String = near
         .points
         .iter()
         .map(|[x, y, z]| format!("{:?} {:?} {:?}\n", x + 1e6, y - 1e6, z + 1e6))
         .collect();
-    bench.write("far.xyz", far);
+    sandbox.write("far.xyz", far);
     let run =
-        bench.run("reconstruct far.xyz --mesh m.ply --sdf s.npz --report r.json --resolution 32");
+        sandbox.run("reconstruct far.xyz --mesh m.ply --sdf s.npz --report r.json --resolution 32");
     run.says(0, &["computed in f64", "1.000e6"]);
-    let field = isograd_io::read_field(&bench.path("s.npz")).expect("reads");
+    let field = isograd_io::read_field(&sandbox.path("s.npz")).expect("reads");
     assert_eq!(field.dtype, Dtype::F64);
-    let report = String::from_utf8(bench.read("r.json")).expect("text");
+    let report = String::from_utf8(sandbox.read("r.json")).expect("text");
     assert!(report.contains("computed in f64"));
-    let mesh = isograd_io::read_mesh(&bench.path("m.ply")).expect("reads");
+    let mesh = isograd_io::read_mesh(&sandbox.path("m.ply")).expect("reads");
     let radius = |v: &[f64; 3]| isograd_element::vector::norm([v[0] - 1e6, v[1] + 1e6, v[2] - 1e6]);
     // A tenth of a cell, which is 1.25/32.
     assert!(mesh.points.iter().all(|v| (radius(v) - 0.5).abs() < 4e-3));
@@ -226,27 +228,28 @@ fn coordinates_far_from_the_origin_are_computed_in_double_and_it_says_so() {
 
 #[test]
 fn a_mesh_can_be_sampled_instead_of_its_vertices() {
-    let bench = sphere();
-    bench.done("reconstruct cloud.ply --mesh m.obj --resolution 24 -q");
-    bench.done("reconstruct m.obj --sample 4000 --points p.npz --resolution 24 -q --orient given");
-    let points = isograd_io::read_geometry(&bench.path("p.npz"))
+    let sandbox = sphere();
+    sandbox.done("reconstruct cloud.ply --mesh m.obj --resolution 24 -q");
+    sandbox
+        .done("reconstruct m.obj --sample 4000 --points p.npz --resolution 24 -q --orient given");
+    let points = isograd_io::read_geometry(&sandbox.path("p.npz"))
         .expect("reads")
         .points;
     assert_eq!(points.len(), 4000);
-    bench
+    sandbox
         .run("reconstruct cloud.ply --sample 10")
         .says(1, &["cloud.ply", "no faces"]);
 }
 
 #[test]
 fn quiet_says_nothing_and_verbose_says_each_stage() {
-    let bench = sphere();
-    let quiet = bench.done("reconstruct cloud.ply --resolution 24 -q");
+    let sandbox = sphere();
+    let quiet = sandbox.done("reconstruct cloud.ply --resolution 24 -q");
     assert!(
         quiet.stdout.is_empty() && quiet.stderr.is_empty(),
         "{quiet:?}"
     );
-    let verbose = bench.done("reconstruct cloud.ply --resolution 24 -v");
+    let verbose = sandbox.done("reconstruct cloud.ply --resolution 24 -v");
     for stage in [
         "read",
         "normals",
@@ -265,9 +268,9 @@ fn quiet_says_nothing_and_verbose_says_each_stage() {
 
 #[test]
 fn warnings_are_on_standard_error_and_in_the_report() {
-    let bench = Bench::new();
-    bench.done("sample sphere -n 3000 -o a.xyz");
-    let text = String::from_utf8(bench.read("a.xyz")).expect("text");
+    let sandbox = Sandbox::new();
+    sandbox.done("sample sphere -n 3000 -o a.xyz");
+    let text = String::from_utf8(sandbox.read("a.xyz")).expect("text");
     // The upper half alone: open.
     let half: String = text
         .lines()
@@ -278,10 +281,10 @@ fn warnings_are_on_standard_error_and_in_the_report() {
         })
         .map(|l| format!("{l}\n"))
         .collect();
-    bench.write("half.xyz", half);
-    let run = bench.run("reconstruct half.xyz -o out --resolution 32");
+    sandbox.write("half.xyz", half);
+    let run = sandbox.run("reconstruct half.xyz -o out --resolution 32");
     run.says(0, &["warning: ", "open"]);
-    let report: Value = serde_json::from_slice(&bench.read("out/report.json")).expect("JSON");
+    let report = sandbox.json("out/report.json");
     let warnings = report["warnings"].as_array().expect("a list");
     assert!(
         warnings

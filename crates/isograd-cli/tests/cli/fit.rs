@@ -1,19 +1,13 @@
 //! `isograd fit`, run as a user runs it.
 
-mod common;
-
-use common::Bench;
+use crate::sandbox::Sandbox;
 use serde_json::Value;
 
-/// A bench with a cloud of a sphere of radius 0.5, and one of a smaller, dented one.
-fn bench() -> Bench {
-    let bench = Bench::new();
-    bench.done("sample sphere -n 2500 -o sphere.ply --precision f64 --seed 9");
-    bench
-}
-
-fn json(bench: &Bench, name: &str) -> Value {
-    serde_json::from_slice(&bench.read(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+/// A sandbox with a cloud of a sphere of radius 0.5, and one of a smaller, dented one.
+fn sandbox() -> Sandbox {
+    let sandbox = Sandbox::new();
+    sandbox.done("sample sphere -n 2500 -o sphere.ply --precision f64 --seed 9");
+    sandbox
 }
 
 fn number(value: &Value) -> f64 {
@@ -26,8 +20,8 @@ const SPHERE: &str = "fit --shape sphere --param radius=0.4 -n 2000";
 
 #[test]
 fn the_radius_of_a_sphere_is_found_from_a_cloud_a_mesh_and_a_field() {
-    let bench = bench();
-    bench.done("reconstruct sphere.ply --mesh mesh.ply --sdf sdf.vti --resolution 28 --padding 0.2 --precision f64 -q");
+    let sandbox = sandbox();
+    sandbox.done("reconstruct sphere.ply --mesh mesh.ply --sdf sdf.vti --resolution 28 --padding 0.2 --precision f64 -q");
     for (target, more) in [
         (
             "sphere.ply",
@@ -46,9 +40,9 @@ fn the_radius_of_a_sphere_is_found_from_a_cloud_a_mesh_and_a_field() {
             "--resolution 28 --target-kind cloud --random-start 0.2 --tolerance 0.01",
         ),
     ] {
-        let run = bench.done(&format!("{SPHERE} --target {target} {more} -o out"));
+        let run = sandbox.done(&format!("{SPHERE} --target {target} {more} -o out"));
         assert!(run.stderr.is_empty(), "no bar in a pipe: {run:?}");
-        let fit = json(&bench, "out/fit.json");
+        let fit = sandbox.json("out/fit.json");
         let radius = number(&fit["parameters"]["radius"]);
         // 17 cells across: the error of the reconstruction, a few hundredths of a cell. Adam is not done yet.
         let (off, error) = match more.contains("adam") {
@@ -62,8 +56,8 @@ fn the_radius_of_a_sphere_is_found_from_a_cloud_a_mesh_and_a_field() {
 
 #[test]
 fn the_folder_gets_its_files_and_the_history_its_fields() {
-    let bench = bench();
-    let run = bench.done(&format!(
+    let sandbox = sandbox();
+    let run = sandbox.done(&format!(
         "{SPHERE} --epochs 3 --tolerance 0 --target sphere.ply --resolution 24 --pictures-at 0,2 -o out --checkpoint out/state.json"
     ));
     assert!(
@@ -85,8 +79,8 @@ fn the_folder_gets_its_files_and_the_history_its_fields() {
         "state.json",
     ];
     wanted.splice(0..0, files.map(|name| format!("out/{name}")));
-    assert_eq!(bench.files(), wanted);
-    let history = json(&bench, "out/history.json");
+    assert_eq!(sandbox.files(), wanted);
+    let history = sandbox.json("out/history.json");
     assert_eq!(history["outcome"], "epochs");
     assert_eq!(history["parameters"][0], "radius");
     let epochs = history["epochs"].as_array().expect("a list");
@@ -108,23 +102,23 @@ fn the_folder_gets_its_files_and_the_history_its_fields() {
     }
     assert_eq!(epochs[0]["parameters"][0], 0.4);
     assert!(number(&epochs[3]["loss"]) < number(&epochs[0]["loss"]));
-    let cloud = isograd_io::read_geometry(&bench.path("out/cloud.ply")).expect("reads");
+    let cloud = isograd_io::read_geometry(&sandbox.path("out/cloud.ply")).expect("reads");
     assert_eq!(cloud.points.len(), 2000);
 }
 
 #[test]
 fn both_radii_of_a_torus_are_found_and_others_can_be_held() {
-    let bench = Bench::new();
-    bench.done("sample torus -n 3000 -o torus.ply --precision f64");
+    let sandbox = Sandbox::new();
+    sandbox.done("sample torus -n 3000 -o torus.ply --precision f64");
     let start = "--param major=0.9 --param minor=0.3";
     let fit = |more: &str| {
-        bench.done(&format!(
+        sandbox.done(&format!(
             "fit --shape torus --target torus.ply {start} -n 2500 --resolution 32 --tolerance 0.01 --pictures-at 0 -o out -q {more}"
         ));
-        let fit = json(&bench, "out/fit.json");
+        let fit = sandbox.json("out/fit.json");
         ["major", "minor"].map(|name| number(&fit["parameters"][name]))
     };
-    bench.done("sample torus -n 20 -o defaults.ply");
+    sandbox.done("sample torus -n 20 -o defaults.ply");
     let defaults = isograd_shapes::by_name("torus").expect("a shape");
     let [major, minor] = fit("--seed 4");
     for (name, value) in [("major", major), ("minor", minor)] {
@@ -140,13 +134,14 @@ fn both_radii_of_a_torus_are_found_and_others_can_be_held() {
 
 #[test]
 fn the_points_of_an_ellipsoid_become_a_sphere() {
-    let bench = bench();
-    bench.done("sample ellipsoid -n 800 -o start.ply --param a=0.45 --param b=0.5 --param c=0.58");
+    let sandbox = sandbox();
+    sandbox
+        .done("sample ellipsoid -n 800 -o start.ply --param a=0.45 --param b=0.5 --param c=0.58");
     for smoothness in ["off", "0.01"] {
-        bench.done(&format!(
+        sandbox.done(&format!(
             "fit --points start.ply --target sphere.ply --smoothness {smoothness} --resolution 22 --tolerance 0.04 --epochs 40 --pictures-at 0 -o out -q"
         ));
-        let fit = json(&bench, "out/fit.json");
+        let fit = sandbox.json("out/fit.json");
         let error = number(&fit["epoch"]["mean_error"]);
         assert!(error < 0.05, "{error}");
         assert_eq!(fit["shape"], Value::Null);
@@ -159,16 +154,16 @@ fn the_points_of_an_ellipsoid_become_a_sphere() {
 
 #[test]
 fn a_run_that_is_resumed_ends_in_the_same_bits() {
-    let bench = bench();
+    let sandbox = sandbox();
     for method in ["lbfgs", "adam --decay constant"] {
         let line = format!(
             "fit --shape ellipsoid --target sphere.ply --random-start 0.2 --seed 3 -n 1500 --resample 2 --resolution 22 --tolerance 0 --pictures-at 0 -q --optimizer {method}"
         );
-        bench.done(&format!("{line} --epochs 7 -o whole --threads 1"));
-        bench.done(&format!(
+        sandbox.done(&format!("{line} --epochs 7 -o whole --threads 1"));
+        sandbox.done(&format!(
             "{line} --epochs 3 -o parts --threads 2 --checkpoint a.json"
         ));
-        bench.done(&format!(
+        sandbox.done(&format!(
             "{line} --epochs 7 -o parts --threads 2 --resume a.json"
         ));
         for file in [
@@ -178,7 +173,7 @@ fn a_run_that_is_resumed_ends_in_the_same_bits() {
             "mesh.ply",
             "loss.png",
         ] {
-            let [whole, parts] = ["whole", "parts"].map(|f| bench.read(&format!("{f}/{file}")));
+            let [whole, parts] = ["whole", "parts"].map(|f| sandbox.read(&format!("{f}/{file}")));
             assert!(whole == parts, "{method}: {file}");
         }
     }
@@ -186,9 +181,9 @@ fn a_run_that_is_resumed_ends_in_the_same_bits() {
 
 #[test]
 fn what_can_not_be_fitted_is_refused_with_a_remedy() {
-    let bench = bench();
+    let sandbox = sandbox();
     let says = |line: &str, status: i32, parts: &[&str]| {
-        bench.run(&format!("fit {line}")).says(status, parts);
+        sandbox.run(&format!("fit {line}")).says(status, parts);
     };
     says("--target sphere.ply -o out", 2, &["--shape"]);
     says(
@@ -220,7 +215,7 @@ fn what_can_not_be_fitted_is_refused_with_a_remedy() {
         &["whole"],
     );
     says("--shape sphere --target none.ply -o out", 1, &["none.ply"]);
-    bench.write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    sandbox.write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     says(
         "--shape sphere --target open.obj -o out",
         1,
@@ -232,7 +227,7 @@ fn what_can_not_be_fitted_is_refused_with_a_remedy() {
         1,
         &["sphere.ply"],
     );
-    bench.done("reconstruct sphere.ply --sdf sdf.vti --resolution 20 -q");
+    sandbox.done("reconstruct sphere.ply --sdf sdf.vti --resolution 20 -q");
     says(
         "--shape sphere --target sdf.vti --resolution 30 -o out",
         2,
@@ -243,7 +238,7 @@ fn what_can_not_be_fitted_is_refused_with_a_remedy() {
         1,
         &["the start can't be used", "larger grid"],
     );
-    bench.write("bad.json", "{\"state\": 1}");
+    sandbox.write("bad.json", "{\"state\": 1}");
     says(
         &format!("{sphere} -o out --resume bad.json"),
         1,
@@ -254,7 +249,7 @@ fn what_can_not_be_fitted_is_refused_with_a_remedy() {
         1,
         &["none.json"],
     );
-    bench.done(&format!(
+    sandbox.done(&format!(
         "fit {sphere} -o other --epochs 1 --checkpoint state.json -q --pictures-at 9"
     ));
     says(
@@ -263,7 +258,7 @@ fn what_can_not_be_fitted_is_refused_with_a_remedy() {
         &["state.json", "another fit"],
     );
     assert!(
-        !bench.path("out").exists(),
+        !sandbox.path("out").exists(),
         "nothing is left of what failed"
     );
 }
@@ -272,16 +267,16 @@ fn what_can_not_be_fitted_is_refused_with_a_remedy() {
 #[test]
 fn a_run_that_is_interrupted_keeps_its_state_and_can_go_on() {
     use std::process::{Command, Stdio};
-    let bench = bench();
+    let sandbox = sandbox();
     let line = "fit --shape ellipsoid --target sphere.ply --param a=0.4 --param b=0.6 -n 1500 --resolution 22 --tolerance 0 --optimizer adam --rate 0.001 --decay constant --pictures-at 0";
-    let mut child = bench
+    let mut child = sandbox
         .command(&format!("{line} --epochs 100000 -o out"))
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .expect("the binary starts");
     // The first picture is written just before the first epoch.
-    while !bench.path("out/epoch_0000.png").exists() {
+    while !sandbox.path("out/epoch_0000.png").exists() {
         std::thread::sleep(std::time::Duration::from_millis(20));
         assert!(
             child.try_wait().expect("a status").is_none(),
@@ -297,14 +292,14 @@ fn a_run_that_is_interrupted_keeps_its_state_and_can_go_on() {
     assert_eq!(output.status.code(), Some(130), "{output:?}");
     let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(stderr.contains("--resume out/checkpoint.json"), "{stderr}");
-    let done = json(&bench, "out/history.json")["epochs"]
+    let done = sandbox.json("out/history.json")["epochs"]
         .as_array()
         .map_or(0, Vec::len);
-    bench.done(&format!(
+    sandbox.done(&format!(
         "{line} --epochs {} -o out --resume out/checkpoint.json",
         done + 1
     ));
-    let epochs = json(&bench, "out/history.json")["epochs"]
+    let epochs = sandbox.json("out/history.json")["epochs"]
         .as_array()
         .map_or(0, Vec::len);
     assert_eq!(epochs, done + 2, "the start, those before, and two more");

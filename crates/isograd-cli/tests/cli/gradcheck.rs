@@ -1,14 +1,12 @@
 //! `isograd gradcheck`, run as a user runs it.
 
-mod common;
-
-use common::Bench;
+use crate::sandbox::Sandbox;
 
 #[test]
 fn the_pullback_of_a_torus_agrees_with_small_steps() {
-    let bench = Bench::new();
-    bench.done("sample torus -n 6000 -o torus.ply");
-    let run = bench
+    let sandbox = Sandbox::new();
+    sandbox.done("sample torus -n 6000 -o torus.ply");
+    let run = sandbox
         .run("gradcheck torus.ply --resolution 48 --tolerance 1e-6 --report check.json --seed 2");
     run.says(0, &[]);
     let table = run.stdout;
@@ -29,8 +27,7 @@ fn the_pullback_of_a_torus_agrees_with_small_steps() {
         table.contains("pullback and large step part most for"),
         "{table}"
     );
-    let report: serde_json::Value =
-        serde_json::from_slice(&bench.read("check.json")).expect("JSON");
+    let report = sandbox.json("check.json");
     assert_eq!(report["guarded"], 0);
     let motions = report["motions"].as_array().expect("a list");
     assert_eq!(motions.len(), 10);
@@ -46,35 +43,35 @@ fn the_pullback_of_a_torus_agrees_with_small_steps() {
 
 #[test]
 fn a_gradient_that_is_off_fails_where_a_tolerance_is_given() {
-    let bench = Bench::new();
-    bench.done("sample torus -n 3000 -o torus.ply --seed 4");
+    let sandbox = Sandbox::new();
+    sandbox.done("sample torus -n 3000 -o torus.ply --seed 4");
     // No rounding is as small as this.
-    let run = bench.run("gradcheck torus.ply --resolution 32 --tolerance 1e-30 -q");
+    let run = sandbox.run("gradcheck torus.ply --resolution 32 --tolerance 1e-30 -q");
     run.says(1, &["torus.ply: the pullback is off", "more than 1.0e-30"]);
     assert_eq!(run.stdout, "");
 }
 
 #[test]
 fn bad_input_is_refused_with_a_reason() {
-    let bench = Bench::new();
-    bench.done("sample torus -n 3000 -o torus.ply");
-    bench.write("one.xyz", "1 2 3\n");
-    bench.run("gradcheck none.ply").says(1, &["none.ply"]);
-    bench
+    let sandbox = Sandbox::new();
+    sandbox.done("sample torus -n 3000 -o torus.ply");
+    sandbox.write("one.xyz", "1 2 3\n");
+    sandbox.run("gradcheck none.ply").says(1, &["none.ply"]);
+    sandbox
         .run("gradcheck one.xyz")
         .says(1, &["one.xyz", "can't be fitted"]);
-    let run = bench.run("gradcheck torus.ply --resolution 32 --step 9");
+    let run = sandbox.run("gradcheck torus.ply --resolution 32 --step 9");
     run.says(
         1,
         &["torus.ply: the cloud moved by 9 cells", "2 cells inside"],
     );
-    bench
+    sandbox
         .run("gradcheck torus.ply --step -1")
         .says(2, &["--step"]);
-    bench
+    sandbox
         .run("gradcheck torus.ply --report a.txt")
         .says(2, &["a.txt", ".json"]);
-    bench
+    sandbox
         .run("gradcheck torus.ply --resolution 32 --orient given --report no/such/a.json")
         .says(1, &["no/such"]);
 }

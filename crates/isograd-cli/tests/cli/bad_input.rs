@@ -1,20 +1,18 @@
 //! Bad input and bad command lines: the exit status, the message, and nothing half-written.
 
-mod common;
-
-use common::Bench;
+use crate::sandbox::Sandbox;
 
 const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
 
 #[test]
 fn damaged_files_end_with_1_and_name_the_place() {
-    let bench = Bench::new();
+    let sandbox = Sandbox::new();
     let refused = |name: &str, bytes: &[u8], parts: &[&str]| {
-        bench.write(name, bytes);
-        let run = bench.run(&format!("reconstruct {name} -o out"));
+        sandbox.write(name, bytes);
+        let run = sandbox.run(&format!("reconstruct {name} -o out"));
         run.says(1, &[&["error: ", name], parts].concat());
-        assert_eq!(bench.files(), [name], "nothing is written");
-        std::fs::remove_file(bench.path(name)).expect("removes");
+        assert_eq!(sandbox.files(), [name], "nothing is written");
+        std::fs::remove_file(sandbox.path(name)).expect("removes");
     };
     refused("a.ply", b"", &["empty"]);
     refused("a.ply", PLY.as_bytes(), &["line 3", "cut short"]);
@@ -48,13 +46,13 @@ fn damaged_files_end_with_1_and_name_the_place() {
 
 #[test]
 fn clouds_that_no_surface_goes_through_end_with_1() {
-    let bench = Bench::new();
+    let sandbox = Sandbox::new();
     let refused = |name: &str, text: String, parts: &[&str]| {
-        bench.write(name, text);
-        bench
+        sandbox.write(name, text);
+        sandbox
             .run(&format!("reconstruct {name} -o out"))
             .says(1, &[&[name], parts].concat());
-        assert!(!bench.path("out").exists());
+        assert!(!sandbox.path("out").exists());
     };
     refused("none.xyz", "# nothing\n".into(), &["0 points"]);
     refused("one.xyz", "1 2 3\n".into(), &[]);
@@ -65,33 +63,33 @@ fn clouds_that_no_surface_goes_through_end_with_1() {
 
 #[test]
 fn zero_normals_that_were_given_are_refused() {
-    let bench = Bench::new();
-    bench.done("sample sphere -n 500 -o a.npz");
-    let geometry = isograd_io::read_geometry(&bench.path("a.npz")).expect("reads");
+    let sandbox = Sandbox::new();
+    sandbox.done("sample sphere -n 500 -o a.npz");
+    let geometry = isograd_io::read_geometry(&sandbox.path("a.npz")).expect("reads");
     let text: String = geometry
         .points
         .iter()
         .map(|[x, y, z]| format!("{x} {y} {z} 0 0 0\n"))
         .collect();
-    bench.write("zero.xyz", text);
-    bench
+    sandbox.write("zero.xyz", text);
+    sandbox
         .run("reconstruct zero.xyz -o out --orient given")
         .says(1, &["zero.xyz", "normal"]);
-    bench.write("bare.xyz", "0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n");
-    bench
+    sandbox.write("bare.xyz", "0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n");
+    sandbox
         .run("reconstruct bare.xyz -o out --orient given")
         .says(1, &["bare.xyz", "normal"]);
-    assert!(!bench.path("out").exists());
+    assert!(!sandbox.path("out").exists());
 }
 
 #[test]
 fn a_flat_cloud_is_no_panic() {
-    let bench = Bench::new();
+    let sandbox = Sandbox::new();
     let text: String = (0..900)
         .map(|i| format!("{} {} 0.5\n", i % 30, i / 30))
         .collect();
-    bench.write("flat.xyz", text);
-    let run = bench.run("reconstruct flat.xyz -o out --resolution 32");
+    sandbox.write("flat.xyz", text);
+    let run = sandbox.run("reconstruct flat.xyz -o out --resolution 32");
     assert!(matches!(run.status, Some(0 | 1)), "{run:?}");
     assert!(
         run.stderr.contains("open") || run.status == Some(1),
@@ -102,40 +100,40 @@ fn a_flat_cloud_is_no_panic() {
 
 #[test]
 fn folders_and_missing_files_are_named() {
-    let bench = Bench::new();
-    std::fs::create_dir(bench.path("folder.ply")).expect("creates");
-    bench
+    let sandbox = Sandbox::new();
+    std::fs::create_dir(sandbox.path("folder.ply")).expect("creates");
+    sandbox
         .run("reconstruct folder.ply")
         .says(1, &["folder.ply is a folder"]);
-    bench
+    sandbox
         .run("reconstruct none.ply")
         .says(1, &["none.ply", "check the path"]);
-    bench.run("info none.ply").says(1, &["none.ply"]);
-    bench
+    sandbox.run("info none.ply").says(1, &["none.ply"]);
+    sandbox
         .run("query none.ply --at none.xyz -o a.ply")
         .says(1, &["none.ply"]);
 }
 
 #[test]
 fn outputs_that_can_not_be_written_fail_before_the_work() {
-    let bench = Bench::new();
-    bench.done("sample sphere -n 500 -o a.ply");
-    bench
+    let sandbox = Sandbox::new();
+    sandbox.done("sample sphere -n 500 -o a.ply");
+    sandbox
         .run("reconstruct a.ply --mesh no/m.ply")
         .says(1, &["no/m.ply", "create its folder"]);
-    bench
+    sandbox
         .run("sample sphere -n 5 -o no/a.ply")
         .says(1, &["no/a.ply", "create its folder"]);
-    bench
+    sandbox
         .run("reconstruct a.ply -o a.ply")
         .says(2, &["a.ply is a file"]);
-    assert_eq!(bench.files(), ["a.ply"]);
+    assert_eq!(sandbox.files(), ["a.ply"]);
 }
 
 #[test]
 fn wrong_command_lines_end_with_2() {
-    let bench = Bench::new();
-    bench.done("sample sphere -n 500 -o a.ply");
+    let sandbox = Sandbox::new();
+    sandbox.done("sample sphere -n 500 -o a.ply");
     for (line, part) in [
         ("", "Usage"),
         ("reconstruct", "CLOUD"),
@@ -155,18 +153,18 @@ fn wrong_command_lines_end_with_2() {
         ("sample fish -n 0 -o b.ply", "-n"),
         ("query a.ply --at a.ply -o b.doc", "must end in"),
     ] {
-        bench.run(line).says(2, &[part]);
+        sandbox.run(line).says(2, &[part]);
     }
-    assert_eq!(bench.files(), ["a.ply"]);
+    assert_eq!(sandbox.files(), ["a.ply"]);
 }
 
 #[test]
 fn help_and_version_end_with_0() {
-    let bench = Bench::new();
-    let help = bench.done("reconstruct --help");
+    let sandbox = Sandbox::new();
+    let help = sandbox.done("reconstruct --help");
     assert!(help.stdout.contains("--resolution") && help.stdout.contains("Exit status"));
     assert!(
-        bench
+        sandbox
             .done("--version")
             .stdout
             .contains(env!("CARGO_PKG_VERSION"))
@@ -175,35 +173,35 @@ fn help_and_version_end_with_0() {
 
 #[test]
 fn grids_that_no_memory_holds_are_refused() {
-    let bench = Bench::new();
-    bench.done("sample sphere -n 500 -o a.ply");
-    bench
+    let sandbox = Sandbox::new();
+    sandbox.done("sample sphere -n 500 -o a.ply");
+    sandbox
         .run("reconstruct a.ply --resolution 65535")
         .says(1, &["coarser"]);
     // 69 GiB.
     if isograd::available_memory().is_some_and(|free| free < 64e9) {
-        bench
+        sandbox
             .run("reconstruct a.ply --resolution 1600")
             .says(1, &["a.ply", "GiB are free; use a lower resolution"]);
     }
-    bench
+    sandbox
         .run("reconstruct a.ply --spacing 1e-30")
         .says(1, &["a.ply"]);
-    bench
+    sandbox
         .run("reconstruct a.ply --bounds 0 0 0 0 1 1")
         .says(1, &["enclose no volume"]);
 }
 
 #[test]
 fn an_input_is_not_overwritten_by_the_folder() {
-    let bench = Bench::new();
-    bench.done("sample sphere -n 500 -o points.ply");
-    let before = bench.read("points.ply");
-    bench
+    let sandbox = Sandbox::new();
+    sandbox.done("sample sphere -n 500 -o points.ply");
+    let before = sandbox.read("points.ply");
+    sandbox
         .run("reconstruct points.ply -o .")
         .says(2, &["points.ply is the input"]);
-    assert_eq!(bench.read("points.ply"), before);
-    assert_eq!(bench.files(), ["points.ply"]);
+    assert_eq!(sandbox.read("points.ply"), before);
+    assert_eq!(sandbox.files(), ["points.ply"]);
 }
 
 #[cfg(target_os = "linux")]
@@ -212,14 +210,14 @@ mod on_linux {
     use std::process::{Command, Stdio};
     use std::time::Duration;
 
-    use super::common::Bench;
+    use crate::sandbox::Sandbox;
 
     #[test]
     fn a_full_disk_ends_with_1() {
-        let bench = Bench::new();
-        bench.done("sample sphere -n 500 -o a.ply");
-        std::os::unix::fs::symlink("/dev/full", bench.path("m.ply")).expect("links");
-        bench
+        let sandbox = Sandbox::new();
+        sandbox.done("sample sphere -n 500 -o a.ply");
+        std::os::unix::fs::symlink("/dev/full", sandbox.path("m.ply")).expect("links");
+        sandbox
             .run("reconstruct a.ply --mesh m.ply --resolution 24")
             .says(1, &["m.ply", "free some space"]);
     }
@@ -227,15 +225,15 @@ mod on_linux {
     /// A limit on the size of files stands in for a disk that fills up in the middle of one.
     #[test]
     fn a_disk_that_fills_up_leaves_no_half_written_file() {
-        let bench = Bench::new();
-        bench.done("sample sphere -n 500 -o a.ply");
-        bench.done("reconstruct a.ply --sdf s.npz --resolution 24 -q");
-        let before = bench.read("s.npz");
+        let sandbox = Sandbox::new();
+        sandbox.done("sample sphere -n 500 -o a.ply");
+        sandbox.done("reconstruct a.ply --sdf s.npz --resolution 24 -q");
+        let before = sandbox.read("s.npz");
         let script =
             "trap '' XFSZ; ulimit -f 64; exec \"$0\" reconstruct a.ply --sdf s.npz --resolution 64";
         let output = Command::new("bash")
             .args(["-c", script, env!("CARGO_BIN_EXE_isograd")])
-            .current_dir(bench.path("."))
+            .current_dir(sandbox.path("."))
             .output()
             .expect("bash starts");
         let message = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -244,16 +242,16 @@ mod on_linux {
             message.contains("s.npz") && message.contains("free some space"),
             "{message}"
         );
-        assert_eq!(bench.files(), ["a.ply", "s.npz"]);
-        assert_eq!(bench.read("s.npz"), before, "the old file stays");
+        assert_eq!(sandbox.files(), ["a.ply", "s.npz"]);
+        assert_eq!(sandbox.read("s.npz"), before, "the old file stays");
     }
 
     #[test]
     fn an_interrupt_leaves_whole_files_or_none() {
-        let bench = Bench::new();
-        bench.done("sample sphere -n 20000 -o a.npz --layout random");
+        let sandbox = Sandbox::new();
+        sandbox.done("sample sphere -n 20000 -o a.npz --layout random");
         for milliseconds in [5, 40, 120, 250, 400, 600] {
-            let mut command = bench.command("reconstruct a.npz -o out --resolution 96");
+            let mut command = sandbox.command("reconstruct a.npz -o out --resolution 96");
             command.stdout(Stdio::null()).stderr(Stdio::piped());
             let mut child = command.spawn().expect("starts");
             std::thread::sleep(Duration::from_millis(milliseconds));
@@ -270,22 +268,22 @@ mod on_linux {
                 matches!(status.code(), Some(0 | 130) | None),
                 "{status:?}: {message}"
             );
-            for name in bench.files() {
-                let path = bench.path(&name);
+            for name in sandbox.files() {
+                let path = sandbox.path(&name);
                 match path.extension().and_then(|e| e.to_str()) {
                     Some("ply" | "vti" | "npz") => drop(isograd_io::read(&path).expect("whole")),
                     Some("json" | "png") => {}
                     _ => panic!("{name} was left behind after {milliseconds} ms"),
                 }
             }
-            let _ = std::fs::remove_dir_all(bench.path("out"));
+            let _ = std::fs::remove_dir_all(sandbox.path("out"));
         }
     }
 
     #[test]
     fn an_interrupt_while_waiting_for_input_ends_with_130() {
-        let bench = Bench::new();
-        let mut command = bench.command("reconstruct - -o out");
+        let sandbox = Sandbox::new();
+        let mut command = sandbox.command("reconstruct - -o out");
         command
             .stdin(Stdio::piped())
             .stderr(Stdio::piped())
@@ -300,16 +298,16 @@ mod on_linux {
         kill.expect("kill is there");
         assert_eq!(child.wait().expect("it ends").code(), Some(130));
         drop(input);
-        assert!(bench.files().is_empty());
+        assert!(sandbox.files().is_empty());
     }
 
     #[test]
     fn a_reader_that_goes_away_is_no_panic() {
-        let bench = Bench::new();
+        let sandbox = Sandbox::new();
         let script = "set -o pipefail; \"$0\" sample --list | head -1";
         let output = Command::new("bash")
             .args(["-c", script, env!("CARGO_BIN_EXE_isograd")])
-            .current_dir(bench.path("."))
+            .current_dir(sandbox.path("."))
             .output()
             .expect("bash starts");
         assert_eq!(output.status.code(), Some(0));

@@ -1,6 +1,6 @@
 //! Gradients of real clouds, clean and degraded (`../shared/data`): finite, in both number types.
 //!
-//! `cargo test -p isograd-cli --test real_gradients -- --nocapture` prints the table.
+//! `cargo test -p isograd-cli --test cli real_gradients -- --nocapture` prints the table.
 
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,6 @@
 //! Real clouds against the meshes that they were sampled from (`../shared/data`).
 //!
-//! `cargo test -p isograd-cli --test real_clouds -- --nocapture` prints the table.
+//! `cargo test -p isograd-cli --test cli real_clouds -- --nocapture` prints the table.
 
 use std::path::{Path, PathBuf};
 

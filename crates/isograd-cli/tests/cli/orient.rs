@@ -1,14 +1,12 @@
 //! `isograd orient`, run as a user runs it.
 
-mod common;
-
-use common::Bench;
+use crate::sandbox::Sandbox;
 use isograd_element::vector::{dot, norm};
 use isograd_io::{Dtype, Geometry};
 use serde_json::Value;
 
-fn read(bench: &Bench, name: &str) -> Geometry {
-    isograd_io::read_geometry(&bench.path(name)).expect("reads")
+fn read(sandbox: &Sandbox, name: &str) -> Geometry {
+    isograd_io::read_geometry(&sandbox.path(name)).expect("reads")
 }
 
 fn names(geometry: &Geometry) -> Vec<&str> {
@@ -18,15 +16,15 @@ fn names(geometry: &Geometry) -> Vec<&str> {
 
 #[test]
 fn points_come_out_with_outward_normals_confidence_and_all_that_they_had() {
-    let bench = Bench::new();
-    bench.done("sample fish -n 3000 -o cloud.npz --param amplitude=0.1");
-    let before = read(&bench, "cloud.npz");
+    let sandbox = Sandbox::new();
+    sandbox.done("sample fish -n 3000 -o cloud.npz --param amplitude=0.1");
+    let before = read(&sandbox, "cloud.npz");
     for out in ["out.npz", "out.ply"] {
-        let run = bench.done(&format!("orient cloud.npz -o {out}"));
+        let run = sandbox.done(&format!("orient cloud.npz -o {out}"));
         for part in ["wrote ", "3000 points", "orientation: auto", "doubtful: "] {
             assert!(run.stdout.contains(part), "'{part}' is missing: {run:?}");
         }
-        let after = read(&bench, out);
+        let after = read(&sandbox, out);
         assert_eq!(after.points, before.points, "{out}");
         assert_eq!((after.dtype, names(&after)[0]), (Dtype::F32, "confidence"));
         let normals = after.normals.expect("normals");
@@ -37,18 +35,21 @@ fn points_come_out_with_outward_normals_confidence_and_all_that_they_had() {
         assert!(wrong < 90, "{wrong}");
         assert!(normals.iter().all(|&n| (norm(n) - 1.0).abs() < 1e-5));
     }
-    assert_eq!(names(&read(&bench, "out.npz")), ["confidence", "velocity"]);
-    let rerun = bench.done("orient out.ply -o again.ply -q");
+    assert_eq!(
+        names(&read(&sandbox, "out.npz")),
+        ["confidence", "velocity"]
+    );
+    let rerun = sandbox.done("orient out.ply -o again.ply -q");
     assert_eq!(rerun.stdout, "");
-    assert_eq!(bench.read("again.ply"), bench.read("out.ply"));
+    assert_eq!(sandbox.read("again.ply"), sandbox.read("out.ply"));
 }
 
 #[test]
 fn numbers_keep_the_type_that_holds_them() {
-    let bench = Bench::new();
-    bench.done("sample sphere -n 500 -o double.ply --precision f64");
-    bench.done("orient double.ply -o out.ply");
-    assert_eq!(read(&bench, "out.ply").dtype, Dtype::F64);
+    let sandbox = Sandbox::new();
+    sandbox.done("sample sphere -n 500 -o double.ply --precision f64");
+    sandbox.done("orient double.ply -o out.ply");
+    assert_eq!(read(&sandbox, "out.ply").dtype, Dtype::F64);
     // Coordinates in single precision, but a time that is not.
     let mut file = b"ply\nformat binary_little_endian 1.0\nelement vertex 200\n".to_vec();
     for property in ["float x", "float y", "float z", "double time"] {
@@ -63,23 +64,20 @@ fn numbers_keep_the_type_that_holds_them() {
         }
         file.extend((1.7e9 + f64::from(i) / 1024.0).to_le_bytes());
     }
-    bench.write("times.ply", file);
-    bench.done("orient times.ply -o times.npz");
-    let after = read(&bench, "times.npz");
+    sandbox.write("times.ply", file);
+    sandbox.done("orient times.ply -o times.npz");
+    let after = read(&sandbox, "times.npz");
     assert_eq!(after.dtype, Dtype::F64);
     assert_eq!(after.attributes[1].values[199], 1.7e9 + 199.0 / 1024.0);
 }
 
 #[test]
 fn the_report_has_the_names_of_a_reconstruction() {
-    let bench = Bench::new();
-    bench.done("sample torus -n 2000 -o cloud.ply");
-    bench.done("orient cloud.ply -o o.ply --report o.json --orient parity --parity-gamma 3");
-    bench.done("reconstruct cloud.ply --resolution 24 --report r.json --orient parity");
-    let [orient, whole] = ["o.json", "r.json"].map(|name| {
-        let report: Value = serde_json::from_slice(&bench.read(name)).expect("JSON");
-        report
-    });
+    let sandbox = Sandbox::new();
+    sandbox.done("sample torus -n 2000 -o cloud.ply");
+    sandbox.done("orient cloud.ply -o o.ply --report o.json --orient parity --parity-gamma 3");
+    sandbox.done("reconstruct cloud.ply --resolution 24 --report r.json --orient parity");
+    let [orient, whole] = ["o.json", "r.json"].map(|name| sandbox.json(name));
     for (key, value) in orient.as_object().expect("an object") {
         let other = &whole[key];
         assert!(!other.is_null(), "{key}");
@@ -95,7 +93,7 @@ fn the_report_has_the_names_of_a_reconstruction() {
 
 #[test]
 fn sensors_come_from_the_command_line_or_from_columns() {
-    let bench = Bench::new();
+    let sandbox = Sandbox::new();
     // A flat sheet, of which nobody can tell the side.
     let mut rows = String::from("x,y,z,sensor_x,sensor_y,sensor_z\n");
     let mut bare = String::new();
@@ -104,11 +102,11 @@ fn sensors_come_from_the_command_line_or_from_columns() {
         rows += &format!("{x},{y},0,{x},5,-30\n");
         bare += &format!("{x} {y} 0\n");
     }
-    bench.write("seen.csv", rows);
-    bench.write("bare.xyz", bare);
+    sandbox.write("seen.csv", rows);
+    sandbox.write("bare.xyz", bare);
     let sides = |line: &str| {
-        bench.done(&format!("orient {line} -o out.npz --orient sensors"));
-        let normals = read(&bench, "out.npz").normals.expect("normals");
+        sandbox.done(&format!("orient {line} -o out.npz --orient sensors"));
+        let normals = read(&sandbox, "out.npz").normals.expect("normals");
         let up = normals.iter().filter(|n| n[2] > 0.0).count();
         assert!(up == 0 || up == 400, "{up}");
         up > 0
@@ -119,30 +117,30 @@ fn sensors_come_from_the_command_line_or_from_columns() {
     assert!(!sides("bare.xyz --sensor 0,0,-9"));
     assert_eq!(
         names(&{
-            bench.done("orient seen.csv -o kept.npz");
-            read(&bench, "kept.npz")
+            sandbox.done("orient seen.csv -o kept.npz");
+            read(&sandbox, "kept.npz")
         }),
         ["confidence", "sensor_x", "sensor_y", "sensor_z"]
     );
-    bench
+    sandbox
         .run("orient bare.xyz -o out.ply --orient sensors")
         .says(1, &["bare.xyz", "no sensor positions"]);
-    bench
+    sandbox
         .run("orient bare.xyz -o out.ply --orient sensors --sensor 3,0,0")
         .says(1, &["point 3 lies exactly at a sensor"]);
-    bench.write(
+    sandbox.write(
         "nan.csv",
         "x,y,z,sensor_x,sensor_y,sensor_z\n1,2,3,nan,0,0\n",
     );
-    bench
+    sandbox
         .run("orient nan.csv -o out.ply --orient sensors")
         .says(1, &["nan.csv", "sensor position 0 is not finite"]);
 }
 
 #[test]
 fn a_wrong_command_line_is_refused_before_the_work() {
-    let bench = Bench::new();
-    bench.done("sample torus -n 400 -o cloud.ply");
+    let sandbox = Sandbox::new();
+    sandbox.done("sample torus -n 400 -o cloud.ply");
     for (line, says) in [
         ("orient cloud.ply -o cloud.ply", "is the input"),
         ("orient cloud.ply -o out.obj", "must end in .ply or"),
@@ -160,28 +158,28 @@ fn a_wrong_command_line_is_refused_before_the_work() {
             "without --orient parity",
         ),
     ] {
-        bench.run(line).says(2, &[says]);
+        sandbox.run(line).says(2, &[says]);
     }
-    assert_eq!(bench.files(), ["cloud.ply"]);
-    bench
+    assert_eq!(sandbox.files(), ["cloud.ply"]);
+    sandbox
         .run("orient missing.ply -o out.ply")
         .says(1, &["missing.ply"]);
-    bench.write(
+    sandbox.write(
         "line.xyz",
         (0..50).map(|i| format!("{i} 0 0\n")).collect::<String>(),
     );
-    bench
+    sandbox
         .run("orient line.xyz -o out.ply")
         .says(1, &["line.xyz", "so there is no surface"]);
 }
 
 #[test]
 fn a_reconstruction_takes_sensors_too() {
-    let bench = Bench::new();
-    bench.done("sample sphere -n 2000 -o cloud.ply");
-    bench.done(
+    let sandbox = Sandbox::new();
+    sandbox.done("sample sphere -n 2000 -o cloud.ply");
+    sandbox.done(
         "reconstruct cloud.ply --resolution 24 --orient sensors --sensor 0,0,5 --report r.json",
     );
-    let report: Value = serde_json::from_slice(&bench.read("r.json")).expect("JSON");
+    let report = sandbox.json("r.json");
     assert_eq!(report["orientation"]["method"], "sensors");
 }

@@ -1,0 +1,4 @@
+//! Whole fits, on the CPU and on a device.
+
+mod device;
+mod fits;
