@@ -1,29 +1,21 @@
-//! What `--backend` can't do, and what to do then.
+//! Errors of `--backend`, with what to do.
+
+use std::path::Path;
 
 use isograd::Backend;
 
 use crate::error::Error;
 
-/// Why there is no plan for the cloud of `file`.
-pub fn plan_error(backend: Backend, error: isograd_backend::Error, file: &str) -> Error {
-    let file = file.into();
+/// Error of a plan for the cloud of the file `path`.
+pub fn plan_error(backend: Backend, error: isograd_backend::Error, path: &Path) -> Error {
     match error {
         isograd_backend::Error::NotBuilt(backend) => not_built(backend),
-        isograd_backend::Error::Reconstruct(source) => Error::Reconstruct { file, source },
+        isograd_backend::Error::Reconstruct(source) => Error::input(path)(source),
         error => Error::Backend { backend, error },
     }
 }
 
-/// Why a plan makes nothing of the cloud of `file`.
-pub fn run_error(error: isograd_backend::Error, file: &str) -> Error {
-    let file = file.into();
-    match error {
-        isograd_backend::Error::Reconstruct(source) => Error::Reconstruct { file, source },
-        source => Error::Device { file, source },
-    }
-}
-
-/// Why there is no fit.
+/// Error of a fit.
 pub fn fit_error(backend: Backend, error: isograd_fit::Error) -> Error {
     match error {
         isograd_fit::Error::Backend(isograd_backend::Error::NotBuilt(backend)) => {

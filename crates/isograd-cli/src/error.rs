@@ -1,60 +1,29 @@
-//! Why a command failed, and the exit status that says so.
+//! Errors of the commands, and their exit status.
 
-use isograd::{GridError, MeshError, PointCloudError};
+use std::path::Path;
+
 use isograd_shapes::{SampleError, ShapeError};
 
-/// Why a command failed.
+/// Error of a command.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The command line asks for something that makes no sense.
+    /// The command line is invalid.
     #[error("{0}")]
     Usage(String),
     /// A file could not be read or written.
     #[error(transparent)]
     File(#[from] isograd_io::Error),
-    /// The cloud in a file can't be used.
+    /// The content of a file can't be used, or the work on it failed.
     #[error("{file}: {source}")]
-    Cloud {
+    Input {
         /// The file.
         file: String,
         /// What is wrong.
-        source: PointCloudError,
+        source: Box<dyn std::error::Error>,
     },
-    /// The mesh in a file can't be used.
-    #[error("{file}: {source}")]
-    Mesh {
-        /// The file.
-        file: String,
-        /// What is wrong.
-        source: MeshError,
-    },
-    /// No grid can be laid round the cloud.
-    #[error("{file}: {source}")]
-    Grid {
-        /// The file.
-        file: String,
-        /// What is wrong.
-        source: GridError,
-    },
-    /// A stage failed.
-    #[error("{file}: {source}")]
-    Reconstruct {
-        /// The file.
-        file: String,
-        /// What is wrong.
-        source: isograd::Error,
-    },
-    /// Gradients could not be compared.
-    #[error("{file}: {source}")]
-    Gradcheck {
-        /// The file.
-        file: String,
-        /// What is wrong.
-        source: isograd::gradcheck::CheckError,
-    },
-    /// Gradients are not what they should be.
+    /// Gradients differ from finite differences by more than the tolerance.
     #[error(
-        "{file}: the pullback is off from a small step by {off:.1e} ({motion}), more than {tolerance:.1e}; look at the counts of that row: what changed on the way has no derivative"
+        "{file}: the pullback differs from a small step by {off:.1e} ({motion}), more than {tolerance:.1e}; see the counts of that row: what changed has no derivative"
     )]
     Gradients {
         /// The file.
@@ -66,43 +35,19 @@ pub enum Error {
         /// What was allowed.
         tolerance: f64,
     },
-    /// Distances to a mesh can't be taken.
-    #[error("{file}: {source}")]
-    Distance {
-        /// The file.
-        file: String,
-        /// What is wrong.
-        source: isograd::distance::Error,
-    },
-    /// The shape is not there, or not with these parameters.
+    /// Unknown shape, or invalid parameters.
     #[error(transparent)]
     Shape(#[from] ShapeError),
     /// A shape could not be sampled.
     #[error(transparent)]
     Sample(#[from] SampleError),
-    /// A target can't be used.
-    #[error("{file}: {source}")]
-    Target {
-        /// The file.
-        file: String,
-        /// What is wrong.
-        source: isograd_fit::TargetError,
-    },
     /// A fit failed.
     #[error(transparent)]
     Fit(#[from] isograd_fit::Error),
-    /// A checkpoint can't be used.
-    #[error("{file}: {problem}")]
-    Checkpoint {
-        /// The file.
-        file: String,
-        /// What is wrong, and what to do.
-        problem: String,
-    },
-    /// Ctrl-C, and all that is to be kept is kept.
+    /// Ctrl-C; the state is in a checkpoint.
     #[error("stopped after epoch {epoch}; go on with --resume {file}")]
     Stopped {
-        /// The last epoch that was done.
+        /// The last completed epoch.
         epoch: usize,
         /// The checkpoint.
         file: String,
@@ -117,21 +62,13 @@ pub enum Error {
         /// The feature of Cargo that builds it.
         feature: &'static str,
     },
-    /// A backend that can't be had, or not with these options.
+    /// A backend that is unavailable, or not with these options.
     #[error("--backend {backend}: {error}")]
     Backend {
-        /// What was asked for.
+        /// The requested backend.
         backend: isograd::Backend,
         /// What is wrong.
         error: isograd_backend::Error,
-    },
-    /// A device failed.
-    #[error("{file}: {source}")]
-    Device {
-        /// The file.
-        file: String,
-        /// What is wrong.
-        source: isograd_backend::Error,
     },
     /// The threads could not be started.
     #[error("the threads could not be started: {0}; use fewer")]
@@ -139,6 +76,15 @@ pub enum Error {
 }
 
 impl Error {
+    /// Turns an error in the content of the file `path`, or in the work on it, into one that names the file.
+    pub fn input<E: Into<Box<dyn std::error::Error>>>(path: &Path) -> impl FnOnce(E) -> Self {
+        let file = file_name(path);
+        move |source| Self::Input {
+            file,
+            source: source.into(),
+        }
+    }
+
     /// 2 where the command line is wrong, 130 after Ctrl-C, else 1.
     pub fn status(&self) -> u8 {
         use isograd_fit::Error as Fit;
@@ -149,5 +95,13 @@ impl Error {
             Self::Stopped { .. } => crate::interrupt::STATUS as u8,
             _ => 1,
         }
+    }
+}
+
+/// Name of a file in messages.
+pub fn file_name(path: &Path) -> String {
+    match path == Path::new("-") {
+        true => "standard input".into(),
+        false => path.display().to_string(),
     }
 }

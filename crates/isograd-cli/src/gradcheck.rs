@@ -8,36 +8,28 @@ use serde::Serialize;
 
 use crate::args;
 use crate::error::Error;
-use crate::outputs::{check_ending, write_report};
+use crate::outputs::{check_extension, write_report};
 use crate::progress::{Progress, to_stdout};
 
-/// Share of the derivative of a body that grows all over below which a derivative counts as nothing: its ratio
-/// is not shown.
-const NOTHING: f64 = 0.005;
+/// Fraction of the derivative of uniform growth below which a derivative is negligible, and its ratio is not shown.
+const NEGLIGIBLE: f64 = 0.005;
 
 /// Runs the command, in double precision.
 ///
 /// # Errors
-/// See [`Error`]; [`Error::Gradients`] where a tolerance is given and not kept.
+/// See [`Error`]; [`Error::Gradients`] if the tolerance is exceeded.
 pub fn run(args: &args::Gradcheck) -> Result<(), Error> {
     let file = args.cloud.display().to_string();
     if let Some(report) = &args.report {
-        check_ending(report, &["json"])?;
+        check_extension(report, &["json"])?;
         isograd_io::check_output(report, &["json"])?;
     }
-    let cloud_error = |source| Error::Cloud {
-        file: file.clone(),
-        source,
-    };
     let geometry = isograd_io::read_geometry(&args.cloud)?;
     args.method.normals.check()?;
     let cloud = geometry.cloud();
     let cloud = cloud.and_then(|cloud| args.method.normals.with_sensors(cloud));
-    let cloud: PointCloud<f64> = cloud.map_err(cloud_error)?;
-    let grid = args.grid.grid(&cloud).map_err(|source| Error::Grid {
-        file: file.clone(),
-        source,
-    })?;
+    let cloud: PointCloud<f64> = cloud.map_err(Error::input(&args.cloud))?;
+    let grid = args.grid.grid(&cloud).map_err(Error::input(&args.cloud))?;
     let options = Options {
         reconstruction: args.method.options(),
         step: args.step,
@@ -48,10 +40,7 @@ pub fn run(args: &args::Gradcheck) -> Result<(), Error> {
     let mut observer = |motion: Motion| progress.step(motion.name());
     let check = gradcheck(&cloud, grid, &options, &mut observer);
     progress.finish();
-    let check = check.map_err(|source| Error::Gradcheck {
-        file: file.clone(),
-        source,
-    })?;
+    let check = check.map_err(Error::input(&args.cloud))?;
     if !args.running.quiet {
         let [nx, ny, nz] = grid.shape();
         to_stdout(&format!(
@@ -64,28 +53,28 @@ pub fn run(args: &args::Gradcheck) -> Result<(), Error> {
     if let Some(report) = &args.report {
         write(report, &file, &check)?;
     }
-    judge(&check, args.tolerance, file)
+    check_tolerance(&check, args.tolerance, file)
 }
 
-/// The table and what it means.
+/// The table and its notes.
 fn table(check: &GradientCheck, step: f64) -> String {
     let mut lines = vec![format!(
         "{:<14} {:>12} {:>12} {:>9} {:>12} {:>7}   {}",
         "motion",
         "pullback",
         "small step",
-        "off by",
+        "error",
         format!("±{step} cell"),
         "ratio",
-        "what changed over ± that step"
+        "changes over ± that step"
     )];
     lines.extend(check.rows.iter().map(line));
-    let far = check.rows.iter().filter(|row| counts(row));
+    let far = check.rows.iter().filter(|row| is_relevant(row));
     let far = far.max_by(|a, b| off(a.large_ratio()).total_cmp(&off(b.large_ratio())));
     if let Some(row) = far {
         let [x, y, z] = row.parting.place;
         lines.push(format!(
-            "pullback and large step part most for {} ({:+.1} %), there most near ({x:.4}, {y:.4}, {z:.4}): {:.0} % of what differs",
+            "pullback and large step differ most for {} ({:+.1} %), mainly near ({x:.4}, {y:.4}, {z:.4}): {:.0} % of the difference",
             row.motion.name(),
             100.0 * (row.large_ratio() - 1.0),
             100.0 * row.parting.share
@@ -95,22 +84,22 @@ fn table(check: &GradientCheck, step: f64) -> String {
     lines.join("\n")
 }
 
-/// What else there is to know.
+/// Notes below the table.
 fn notes(check: &GradientCheck) -> Vec<String> {
     let mut lines = Vec::new();
     if check.rows.iter().any(|row| !row.small.is_smooth()) {
-        let tells = "* the small step, too, changes a neighborhood, a sign or the cell of a sample: no derivative there";
-        lines.push(tells.into());
+        let note = "* the small step also changes a neighborhood, a sign or the cell of a sample: there is no derivative";
+        lines.push(note.into());
     }
     let ridges = check.rows.iter().map(|row| row.ridges).max().unwrap_or(0);
     if ridges > 0 {
         lines.push(format!(
-            "up to {ridges} cells of a row are left out: the small step takes them across the medial axis, where φ has no derivative"
+            "up to {ridges} cells of a row are ignored: the small step moves them across the medial axis, where φ has no derivative"
         ));
     }
     if check.guarded > 0 {
         lines.push(format!(
-            "{} places have no derivative or one without bound; a bounded one was taken",
+            "{} derivatives are undefined or unbounded and were replaced by bounded ones",
             check.guarded
         ));
     }
@@ -124,7 +113,7 @@ fn line(row: &Row) -> String {
         cells,
         ..
     } = row.large;
-    let ratio = match counts(row) {
+    let ratio = match is_relevant(row) {
         true => format!("{:.4}", row.large_ratio()),
         false => "≈ 0".into(),
     };
@@ -139,25 +128,29 @@ fn line(row: &Row) -> String {
     )
 }
 
-/// Whether the derivative is more than what is left where the surface moves along itself.
-fn counts(row: &Row) -> bool {
-    row.pullback.abs() > NOTHING * row.scale
+/// Whether the derivative is more than that of a surface that moves along itself.
+fn is_relevant(row: &Row) -> bool {
+    row.pullback.abs() > NEGLIGIBLE * row.scale
 }
 
 fn off(ratio: f64) -> f64 {
     (ratio - 1.0).abs()
 }
 
-/// Pullback against the small step, relative to the derivative, or to what counts as nothing.
+/// Error of the pullback against the small step, relative to the derivative or to the negligible one.
 fn error(row: &Row) -> f64 {
-    let size = row.pullback.abs().max(NOTHING * row.scale);
+    let size = row.pullback.abs().max(NEGLIGIBLE * row.scale);
     match size > 0.0 {
         true => (row.pullback - row.small.value).abs() / size,
         false => 0.0,
     }
 }
 
-fn judge(check: &GradientCheck, tolerance: Option<f64>, file: String) -> Result<(), Error> {
+fn check_tolerance(
+    check: &GradientCheck,
+    tolerance: Option<f64>,
+    file: String,
+) -> Result<(), Error> {
     let worst = check
         .rows
         .iter()

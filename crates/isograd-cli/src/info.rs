@@ -1,4 +1,4 @@
-//! `isograd info`: what a file holds.
+//! `isograd info`: description of a file.
 
 use isograd::differential::{EikonalOptions, Spread, eikonal};
 use isograd::isosurface::measure;
@@ -27,11 +27,7 @@ fn line(name: &str, text: impl std::fmt::Display) {
 }
 
 fn describe_geometry(args: &args::Info, geometry: &Geometry) -> Result<(), Error> {
-    let file = || args.file.display().to_string();
-    let cloud = geometry.cloud::<f64>().map_err(|source| Error::Cloud {
-        file: file(),
-        source,
-    })?;
+    let cloud = geometry.cloud::<f64>().map_err(Error::input(&args.file))?;
     line("format", geometry.format.name());
     line("stored as", geometry.dtype.name());
     line("points", cloud.len());
@@ -56,10 +52,7 @@ fn describe_geometry(args: &args::Info, geometry: &Geometry) -> Result<(), Error
     if geometry.faces.is_empty() {
         return Ok(());
     }
-    let mesh = geometry.mesh::<f64>().map_err(|source| Error::Mesh {
-        file: file(),
-        source,
-    })?;
+    let mesh = geometry.mesh::<f64>().map_err(Error::input(&args.file))?;
     let measures = measure::measure(&mesh, &mut measure::Scratch::default());
     line("faces", measures.faces);
     line("closed", if measures.closed { "yes" } else { "no" });

@@ -1,21 +1,21 @@
-//! Ctrl-C, and a polite kill: no half-written file stays behind, and a long run may end an epoch first.
+//! Ctrl-C and SIGTERM: partially written files are removed, and a fit may complete its epoch.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::progress::to_stderr;
 
-/// What a shell expects of a program that Ctrl-C stopped: 128 + SIGINT.
+/// Exit status after Ctrl-C: 128 + SIGINT, by convention.
 pub const STATUS: i32 = 130;
 
-/// Whether the work asked to be told instead of being stopped.
+/// Whether a signal only sets [`REQUESTED`].
 static DEFERRED: AtomicBool = AtomicBool::new(false);
-/// Whether it has been told.
-static ASKED: AtomicBool = AtomicBool::new(false);
+/// Whether a stop was requested.
+static REQUESTED: AtomicBool = AtomicBool::new(false);
 
-/// From now on Ctrl-C stops the program cleanly.
+/// Installs the signal handler.
 pub fn handle() {
     let handled = ctrlc::set_handler(|| {
-        if DEFERRED.load(Ordering::SeqCst) && !ASKED.swap(true, Ordering::SeqCst) {
+        if DEFERRED.load(Ordering::SeqCst) && !REQUESTED.swap(true, Ordering::SeqCst) {
             to_stderr("stopping after this epoch; once more to stop at once");
             return;
         }
@@ -28,19 +28,19 @@ pub fn handle() {
     }
 }
 
-/// While this lives, the first Ctrl-C only makes [`Deferred::asked`] true.
+/// While this value exists, the first Ctrl-C only makes [`Deferred::is_requested`] true.
 pub struct Deferred(());
 
 impl Deferred {
-    /// From now on.
+    /// Starts deferring.
     pub fn new() -> Self {
         DEFERRED.store(true, Ordering::SeqCst);
         Self(())
     }
 
     /// Whether Ctrl-C was pressed.
-    pub fn asked(&self) -> bool {
-        ASKED.load(Ordering::SeqCst)
+    pub fn is_requested(&self) -> bool {
+        REQUESTED.load(Ordering::SeqCst)
     }
 }
 

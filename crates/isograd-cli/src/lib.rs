@@ -1,22 +1,22 @@
 //! The command line of isograd as a library: the program and the Python package call [`run`].
 #![warn(missing_docs)]
 
-pub mod args;
-pub mod backend;
-pub mod error;
-pub mod fit;
-pub mod gradcheck;
-pub mod info;
+mod args;
+mod backend;
+mod error;
+mod fit;
+mod gradcheck;
+mod info;
 mod interrupt;
-pub mod orient;
-pub mod outputs;
-pub mod plot;
-pub mod progress;
-pub mod query;
-pub mod reconstruct;
+mod orient;
+mod outputs;
+mod plot;
+mod progress;
+mod query;
+mod reconstruct;
 mod report;
 mod resample;
-pub mod sample;
+mod sample;
 
 use std::ffi::OsString;
 

@@ -1,6 +1,5 @@
 //! `isograd orient`: adds outward normals and their confidence to a cloud.
 
-use std::path::Path;
 use std::time::Instant;
 
 use isograd::orient::doubt::Doubt;
@@ -9,7 +8,7 @@ use isograd_io::{CLOUD_EXTENSIONS, Dtype, Geometry};
 
 use crate::args;
 use crate::error::Error;
-use crate::outputs::{check_ending, check_not_input, write_report};
+use crate::outputs::{check_extension, check_not_input, write_report};
 use crate::progress::Progress;
 use crate::report::{Report, Times};
 
@@ -43,7 +42,7 @@ fn check(args: &args::OrientCloud) -> Result<(), Error> {
     args.normals.check()?;
     let report = args.report.iter().map(|path| (path, &["json"][..]));
     for (path, endings) in [(&args.output, CLOUD_EXTENSIONS)].into_iter().chain(report) {
-        check_ending(path, endings)?;
+        check_extension(path, endings)?;
         check_not_input(path, &args.cloud)?;
         isograd_io::check_output(path, endings)?;
     }
@@ -55,14 +54,6 @@ fn is_single(geometry: &Geometry) -> bool {
     let fits = |&value: &f64| f64::from(value as f32) == value || value.is_nan();
     let mut attributes = geometry.attributes.iter();
     geometry.dtype == Dtype::F32 && attributes.all(|attribute| attribute.values.iter().all(fits))
-}
-
-/// Name of a file in messages.
-pub(crate) fn file_name(path: &Path) -> String {
-    match path {
-        path if path == Path::new("-") => "standard input".into(),
-        path => path.display().to_string(),
-    }
 }
 
 /// A cloud with estimated normals, their confidence, and the attributes of `cloud`.
@@ -96,29 +87,23 @@ struct Job<'a> {
 
 impl Job<'_> {
     fn run<T: Real>(&self, geometry: &Geometry, progress: &mut Progress) -> Result<(), Error> {
-        let refused = |source| Error::Cloud {
-            file: file_name(&self.args.cloud),
-            source,
-        };
         let cloud = geometry.cloud::<T>();
         let cloud = cloud.and_then(|cloud| self.args.normals.with_sensors(cloud));
-        let cloud = cloud.map_err(refused)?;
+        let cloud = cloud.map_err(Error::input(&self.args.cloud))?;
         progress.step("orient");
         let mut plan = Orienter::new(self.args.normals.radius, self.args.normals.method());
-        plan.orient(&cloud).map_err(|source| Error::Reconstruct {
-            file: file_name(&self.args.cloud),
-            source,
-        })?;
+        plan.orient(&cloud)
+            .map_err(Error::input(&self.args.cloud))?;
         let (orientation, report) = plan.into_parts();
         for warning in &report.warnings {
             progress.warn(&warning.to_string());
         }
         progress.step("write");
         let begin = Instant::now();
-        let out =
-            oriented(&cloud, &orientation.normals, &orientation.confidence).map_err(refused)?;
+        let out = oriented(&cloud, &orientation.normals, &orientation.confidence)
+            .map_err(Error::input(&self.args.cloud))?;
         isograd_io::write_cloud(&self.args.output, &out)?;
-        progress.say(&format!("wrote {}", self.args.output.display()));
+        progress.print(&format!("wrote {}", self.args.output.display()));
         if let Some(path) = &self.args.report {
             let times = Times {
                 read: self.read_seconds,
@@ -127,7 +112,7 @@ impl Job<'_> {
             };
             let report = JsonReport::samples(&report);
             write_report(path, &Report::new(&self.args.cloud, report, times))?;
-            progress.say(&format!("wrote {}", path.display()));
+            progress.print(&format!("wrote {}", path.display()));
         }
         progress.finish();
         self.summarize(progress, &report);
@@ -136,18 +121,18 @@ impl Job<'_> {
 
     /// Prints a summary.
     fn summarize(&self, progress: &Progress, report: &isograd::Report) {
-        progress.say(&format!(
+        progress.print(&format!(
             "{} points, radius {:.4e} with {} neighbors at the median, {:.2} s",
             report.points,
             report.radius,
             report.neighbors[1],
             self.start.elapsed().as_secs_f64()
         ));
-        progress.say(&format!(
+        progress.print(&format!(
             "orientation: {}, {} axes flipped, confidence {:.2} at the median and {:.2} at 5 %",
             report.orientation, report.flipped, report.confidence_median, report.confidence_p05
         ));
-        progress.say(&doubtful(&report.doubt));
+        progress.print(&doubtful(&report.doubt));
     }
 }
 

@@ -1,4 +1,4 @@
-//! Which files a reconstruction writes, checked before the work begins.
+//! Output files of a reconstruction, checked before the work begins.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -9,10 +9,10 @@ use serde::Serialize;
 use crate::args;
 use crate::error::Error;
 
-/// What `points` may be called.
-const POINTS_ENDINGS: &[&str] = &["ply", "npz"];
+/// Extensions of the points file.
+const POINTS_EXTENSIONS: &[&str] = &["ply", "npz"];
 
-/// Paths of the files to write; the flag of one overrules the folder's.
+/// Paths of the output files; the flag of a file takes precedence over the folder.
 #[derive(Debug)]
 pub struct Outputs {
     folder: Option<PathBuf>,
@@ -31,11 +31,11 @@ pub struct Outputs {
 }
 
 impl Outputs {
-    /// The outputs that the command line asks for.
+    /// The outputs of the command line.
     ///
     /// # Errors
-    /// A name with the wrong ending, one name twice, the input's own name: the command line is wrong. A
-    /// folder that is not there: the work can't be done.
+    /// [`Error::Usage`] for a wrong extension, a repeated name, or the name of the input; [`Error::File`] for a missing
+    /// folder.
     pub fn new(args: &args::Reconstruct) -> Result<Self, Error> {
         let pick = |given: &Option<PathBuf>, name: &str| {
             let in_folder = || args.output.as_ref().map(|folder| folder.join(name));
@@ -59,7 +59,7 @@ impl Outputs {
         let files: [(&Option<PathBuf>, &'static [&'static str]); 6] = [
             (&self.mesh, MESH_EXTENSIONS),
             (&self.sdf, FIELD_EXTENSIONS),
-            (&self.points, POINTS_ENDINGS),
+            (&self.points, POINTS_EXTENSIONS),
             (&self.report, &["json"]),
             (&self.plot, &["png"]),
             (&self.picture, &["png"]),
@@ -72,12 +72,12 @@ impl Outputs {
     fn check_names(&self, input: &Path) -> Result<(), Error> {
         let mut seen: Vec<PathBuf> = Vec::new();
         for (path, endings) in self.all() {
-            check_ending(path, endings)?;
+            check_extension(path, endings)?;
             check_not_input(path, input)?;
-            let name = same_name(path);
+            let name = canonical(path);
             if seen.contains(&name) {
                 return Err(Error::Usage(format!(
-                    "{} is to be written twice; give each output its own name",
+                    "{} is the name of two outputs; give each its own",
                     path.display()
                 )));
             }
@@ -86,7 +86,7 @@ impl Outputs {
         Ok(())
     }
 
-    /// A folder that `-o` names may be missing; any other must be there.
+    /// Checks the folders: that of `-o` may be missing, any other must exist.
     fn check_folders(&self) -> Result<(), Error> {
         if let Some(folder) = &self.folder
             && folder.exists()
@@ -99,8 +99,8 @@ impl Outputs {
         }
         let missing = self.folder.as_ref().filter(|folder| !folder.exists());
         for (path, endings) in self.all() {
-            let is_to_come = missing.is_some_and(|folder| path.parent() == Some(folder));
-            if !is_to_come {
+            let is_created = missing.is_some_and(|folder| path.parent() == Some(folder));
+            if !is_created {
                 check_output(path, endings)?;
             }
         }
@@ -110,7 +110,7 @@ impl Outputs {
     /// Creates the folder of `-o`.
     ///
     /// # Errors
-    /// What the operating system says.
+    /// Errors of the operating system.
     pub fn create_folder(&self) -> Result<(), Error> {
         let Some(folder) = &self.folder else {
             return Ok(());
@@ -124,8 +124,8 @@ impl Outputs {
     }
 }
 
-/// Refuses a name with an ending that stands for another format, or for none.
-pub fn check_ending(path: &Path, endings: &[&str]) -> Result<(), Error> {
+/// Checks the extension of a name.
+pub fn check_extension(path: &Path, endings: &[&str]) -> Result<(), Error> {
     let known = |e: &str| endings.iter().any(|ending| e.eq_ignore_ascii_case(ending));
     if path.extension().and_then(|e| e.to_str()).is_some_and(known) {
         return Ok(());
@@ -137,9 +137,9 @@ pub fn check_ending(path: &Path, endings: &[&str]) -> Result<(), Error> {
     )))
 }
 
-/// Refuses to write over the input.
+/// Checks that an output is not the input.
 pub fn check_not_input(path: &Path, input: &Path) -> Result<(), Error> {
-    if same_name(path) != same_name(input) {
+    if canonical(path) != canonical(input) {
         return Ok(());
     }
     Err(Error::Usage(format!(
@@ -148,8 +148,8 @@ pub fn check_not_input(path: &Path, input: &Path) -> Result<(), Error> {
     )))
 }
 
-/// A path that is equal for equal files, also through links and `..`.
-fn same_name(path: &Path) -> PathBuf {
+/// The canonical path of a file, which may not exist yet.
+fn canonical(path: &Path) -> PathBuf {
     let resolve = |path: &Path| std::fs::canonicalize(path).ok();
     let in_folder = || {
         let folder = path
@@ -162,10 +162,10 @@ fn same_name(path: &Path) -> PathBuf {
         .unwrap_or_else(|| path.to_path_buf())
 }
 
-/// Writes a report as JSON that people read too; the file appears whole or not at all.
+/// Writes a report as indented JSON, atomically.
 ///
 /// # Errors
-/// What the operating system says.
+/// Errors of the operating system.
 pub fn write_report(path: &Path, report: &impl Serialize) -> Result<(), Error> {
     isograd_io::atomic::write(path, |out| {
         serde_json::to_writer_pretty(&mut *out, report)?;

@@ -1,4 +1,4 @@
-//! What the user sees while the work goes on: a bar on a terminal, nothing in a pipe.
+//! Progress of the work: a bar on a terminal, nothing in a pipe.
 
 use std::io::{self, IsTerminal, Write};
 use std::time::{Duration, Instant};
@@ -7,17 +7,17 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::args::Running;
 
-/// A line on standard output. A reader that went away (`| head`) is no reason to stop.
+/// Prints a line to standard output. A closed pipe (`| head`) is no error.
 pub fn to_stdout(text: &str) {
     let _ = writeln!(io::stdout(), "{text}");
 }
 
-/// A line on standard error.
+/// Prints a line to standard error.
 pub fn to_stderr(text: &str) {
     let _ = writeln!(io::stderr(), "{text}");
 }
 
-/// A bar with one step for each part of the work.
+/// A bar with one step per part of the work.
 pub struct Progress {
     bar: ProgressBar,
     quiet: bool,
@@ -68,26 +68,26 @@ impl Progress {
         }
     }
 
-    /// A warning, on standard error whatever the flags say.
+    /// Prints a warning to standard error, also with `-q`.
     pub fn warn(&self, text: &str) {
         self.bar.suspend(|| to_stderr(&format!("warning: {text}")));
     }
 
-    /// A detail that only `-v` asks for.
+    /// Prints a detail with `-v`.
     pub fn detail(&self, text: &str) {
         if self.verbose {
             to_stderr(text);
         }
     }
 
-    /// A line about what was done, on standard output unless `-q`.
-    pub fn say(&self, text: &str) {
+    /// Prints a result to standard output, unless `-q`.
+    pub fn print(&self, text: &str) {
         if !self.quiet {
             self.bar.suspend(|| to_stdout(text));
         }
     }
 
-    /// Ends the last part and takes the bar away.
+    /// Ends the last part and removes the bar.
     pub fn finish(&mut self) {
         self.end_step();
         self.bar.finish_and_clear();

@@ -7,7 +7,7 @@ use isograd_io::{CLOUD_EXTENSIONS, Content, FieldFile, Geometry};
 
 use crate::args;
 use crate::error::Error;
-use crate::outputs::check_ending;
+use crate::outputs::check_extension;
 use crate::progress::{to_stderr, to_stdout};
 
 /// Runs the command. Everything is computed and written in double precision.
@@ -15,23 +15,20 @@ use crate::progress::{to_stderr, to_stdout};
 /// # Errors
 /// See [`Error`].
 pub fn run(args: &args::Query) -> Result<(), Error> {
-    check_ending(&args.output, CLOUD_EXTENSIONS)?;
+    check_extension(&args.output, CLOUD_EXTENSIONS)?;
     isograd_io::check_output(&args.output, CLOUD_EXTENSIONS)?;
     let source = isograd_io::read(&args.source)?;
     let points = isograd_io::read_geometry(&args.at)?.points;
     let attributes = match source {
-        Content::Field(field) => ask_field(&field, &points),
-        Content::Geometry(geometry) => ask_mesh(args, &geometry, &points)?,
+        Content::Field(field) => query_field(&field, &points),
+        Content::Geometry(geometry) => query_mesh(args, &geometry, &points)?,
     };
     let cloud = attributes
         .into_iter()
         .fold(PointCloud::new(points), |cloud, attribute| {
             cloud?.with_attribute(attribute)
         })
-        .map_err(|source| Error::Cloud {
-            file: args.at.display().to_string(),
-            source,
-        })?;
+        .map_err(Error::input(&args.at))?;
     isograd_io::write_cloud(&args.output, &cloud)?;
     if !args.running.quiet {
         to_stdout(&format!("wrote {}", args.output.display()));
@@ -47,8 +44,8 @@ fn attribute<const N: usize>(name: &str, rows: Vec<[f64; N]>) -> Attribute<f64> 
     }
 }
 
-/// Trilinear values and gradients; NaN at points outside the grid, where the field says nothing.
-fn ask_field(file: &FieldFile, points: &[[f64; 3]]) -> Vec<Attribute<f64>> {
+/// Trilinear values and gradients; NaN at points outside the grid.
+fn query_field(file: &FieldFile, points: &[[f64; 3]]) -> Vec<Attribute<f64>> {
     let (lower, upper) = (file.field.grid().lower(), file.field.grid().upper());
     let inside = |p: [f64; 3]| (0..3).all(|a| p[a] >= lower[a] && p[a] <= upper[a]);
     let (distances, gradients): (Vec<[f64; 1]>, Vec<[f64; 3]>) = points
@@ -74,28 +71,20 @@ fn ask_field(file: &FieldFile, points: &[[f64; 3]]) -> Vec<Attribute<f64>> {
     ]
 }
 
-/// Exact distances with what they were measured to: gradient, closest point, triangle and its
-/// barycentric coordinates.
-fn ask_mesh(
+/// Exact distances, gradients, closest points, and their triangles and barycentric coordinates.
+fn query_mesh(
     args: &args::Query,
     geometry: &Geometry,
     points: &[[f64; 3]],
 ) -> Result<Vec<Attribute<f64>>, Error> {
-    let file = || args.source.display().to_string();
-    let mesh = geometry.mesh::<f64>().map_err(|source| Error::Mesh {
-        file: file(),
-        source,
-    })?;
+    let mesh = geometry.mesh::<f64>().map_err(Error::input(&args.source))?;
     if !measure::measure(&mesh, &mut measure::Scratch::default()).closed {
         to_stderr(&format!(
             "warning: the mesh in {} is not closed; the sign can't be trusted",
-            file()
+            args.source.display()
         ));
     }
-    let query = Query::new(mesh).map_err(|source| Error::Distance {
-        file: file(),
-        source,
-    })?;
+    let query = Query::new(mesh).map_err(Error::input(&args.source))?;
     let hits = query.query(points, None);
     Ok(vec![
         attribute("distance", hits.iter().map(|hit| [hit.distance]).collect()),

@@ -1,4 +1,4 @@
-//! `isograd reconstruct`: from a file to files.
+//! `isograd reconstruct`: field, surface and normals of a cloud.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -17,8 +17,7 @@ use crate::progress::Progress;
 use crate::report::{Report, Times};
 use crate::{orient, resample};
 
-/// Rounding of the coordinates, in cells, that single precision may add: above it the computation runs in
-/// double precision.
+/// Rounding of the coordinates to single precision, in cells, above which the computation uses double precision.
 const TOLERATED_ROUNDING: f64 = 1e-2;
 
 /// Runs the command.
@@ -68,20 +67,20 @@ fn read(args: &args::Reconstruct) -> Result<Geometry, Error> {
     })
 }
 
-/// What the command writes and says, wherever it was made.
+/// Results of a reconstruction on any backend.
 struct Results<'a, T> {
     sdf: &'a Field<T>,
     mesh: &'a Mesh<T>,
     normals: &'a [[T; 3]],
     confidence: &'a [T],
     report: &'a isograd::Report,
-    /// Who computed.
+    /// Name of the backend.
     backend: &'a str,
 }
 
 impl<'a, T: Number> Results<'a, T> {
-    /// Copied from a device, where one computed.
-    fn of(view: View<'a, T>, cloud: &PointCloud<T>) -> Result<Self, isograd_backend::Error> {
+    /// Copies the results of a device.
+    fn new(view: View<'a, T>, cloud: &PointCloud<T>) -> Result<Self, isograd_backend::Error> {
         Ok(Self {
             sdf: view.sdf()?,
             mesh: view.mesh()?,
@@ -93,7 +92,7 @@ impl<'a, T: Number> Results<'a, T> {
     }
 }
 
-/// One reconstruction, apart from its number type.
+/// A reconstruction, independent of its number type.
 struct Job<'a> {
     args: &'a args::Reconstruct,
     outputs: &'a Outputs,
@@ -102,28 +101,19 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    fn file(&self) -> String {
-        orient::file_name(&self.args.cloud)
-    }
-
     fn cloud<T: Real>(&self, geometry: &Geometry) -> Result<PointCloud<T>, Error> {
         let cloud = geometry.cloud();
         let cloud = cloud.and_then(|cloud| self.args.method.normals.with_sensors(cloud));
-        cloud.map_err(|source| Error::Cloud {
-            file: self.file(),
-            source,
-        })
+        cloud.map_err(Error::input(&self.args.cloud))
     }
 
-    /// What to say where single precision was asked for and can't hold the coordinates.
+    /// The warning if single precision was requested and can't represent the coordinates.
     fn needs_double(&self, geometry: &Geometry) -> Result<Option<String>, Error> {
         if self.args.precision == Precision::F64 {
             return Ok(None);
         }
-        let cloud = PointCloud::new(geometry.points.clone()).map_err(|source| Error::Cloud {
-            file: self.file(),
-            source,
-        })?;
+        let cloud =
+            PointCloud::new(geometry.points.clone()).map_err(Error::input(&self.args.cloud))?;
         let grid = self.grid(&cloud)?;
         let corners = grid.lower().into_iter().chain(grid.upper());
         let largest = corners.fold(0.0f64, |m, x| m.max(x.abs()));
@@ -138,10 +128,7 @@ impl Job<'_> {
 
     fn grid<T: Real>(&self, cloud: &PointCloud<T>) -> Result<Grid<T>, Error> {
         let grid = self.args.grid.grid(cloud);
-        grid.map_err(|source| Error::Grid {
-            file: self.file(),
-            source,
-        })
+        grid.map_err(Error::input(&self.args.cloud))
     }
 
     fn run<T: Number>(
@@ -159,7 +146,8 @@ impl Job<'_> {
         ));
         let options = self.args.method.options();
         let plan = Plan::new(self.args.backend, grid, options);
-        let mut plan = plan.map_err(|e| backend::plan_error(self.args.backend, e, &self.file()))?;
+        let mut plan =
+            plan.map_err(|e| backend::plan_error(self.args.backend, e, &self.args.cloud))?;
         progress.detail(&format!("on {}", plan.name()));
         if let Some(note) = plan.note() {
             progress.warn(note);
@@ -172,12 +160,12 @@ impl Job<'_> {
             .reconstruct_observed(&cloud, &mut observer)
             .and_then(|view| {
                 if view.backend() != "cpu" {
-                    // There they are made with the report.
+                    // On a device the checks run with the report.
                     progress.step(Stage::Checks.name());
                 }
-                Results::of(view, &cloud)
+                Results::new(view, &cloud)
             })
-            .map_err(|e| backend::run_error(e, &self.file()))?;
+            .map_err(Error::input(&self.args.cloud))?;
         let mut report = JsonReport::new(result.report);
         for warning in &report.warnings {
             progress.warn(warning);
@@ -186,7 +174,7 @@ impl Job<'_> {
         progress.step("write");
         self.write(&cloud, &result, report, progress)?;
         progress.finish();
-        self.say(progress, &result);
+        self.summarize(progress, &result);
         Ok(())
     }
 
@@ -200,7 +188,7 @@ impl Job<'_> {
         let begin = Instant::now();
         let outputs = self.outputs;
         outputs.create_folder()?;
-        let wrote = |path: &Path| progress.say(&format!("wrote {}", path.display()));
+        let wrote = |path: &Path| progress.print(&format!("wrote {}", path.display()));
         if let Some(path) = &outputs.mesh {
             isograd_io::write_mesh(path, result.mesh)?;
             wrote(path);
@@ -235,16 +223,14 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// The cloud with the normals that were found and the confidence of each.
+    /// The cloud with estimated normals and their confidence.
     fn oriented<T: Real>(
         &self,
         cloud: &PointCloud<T>,
         result: &Results<'_, T>,
     ) -> Result<PointCloud<T>, Error> {
-        orient::oriented(cloud, result.normals, result.confidence).map_err(|source| Error::Cloud {
-            file: self.file(),
-            source,
-        })
+        orient::oriented(cloud, result.normals, result.confidence)
+            .map_err(Error::input(&self.args.cloud))
     }
 
     fn write_picture<T: Real>(
@@ -262,18 +248,18 @@ impl Job<'_> {
         Ok(plot::write(path, &picture)?)
     }
 
-    /// The result in a few lines.
-    fn say<T: Real>(&self, progress: &Progress, result: &Results<'_, T>) {
+    /// Prints a summary.
+    fn summarize<T: Real>(&self, progress: &Progress, result: &Results<'_, T>) {
         let report = result.report;
         let (surface, grid) = (&report.surface, result.sdf.grid());
         let [nx, ny, nz] = grid.shape();
-        progress.say(&format!(
+        progress.print(&format!(
             "{} points, {nx} × {ny} × {nz} cells of {:.4e}, {:.2} s",
             report.points,
             grid.spacing(),
             self.start.elapsed().as_secs_f64()
         ));
-        progress.say(&format!(
+        progress.print(&format!(
             "surface: {} faces, {}, {} piece{}, area {:.6}, volume {:.6}",
             surface.faces,
             if surface.closed {

@@ -1,4 +1,4 @@
-//! `isograd sample`: a parametric body as a point cloud.
+//! `isograd sample`: samples a parametric shape.
 
 use isograd::Real;
 use isograd_io::CLOUD_EXTENSIONS;
@@ -6,7 +6,7 @@ use isograd_shapes::{Density, Sampling, Shape, all, by_name};
 
 use crate::args::{self, Layout, Precision};
 use crate::error::Error;
-use crate::outputs::check_ending;
+use crate::outputs::check_extension;
 use crate::progress::to_stdout;
 
 /// Runs the command.
@@ -24,7 +24,7 @@ pub fn run(args: &args::Sample) -> Result<(), Error> {
     }
 }
 
-/// The body `name` with the parameters that `--param` set.
+/// The shape `name` with the parameters of `--param`.
 pub(crate) fn shape(name: &str, parameters: &[(String, f64)]) -> Result<Shape, Error> {
     let mut shape = by_name(name)?;
     let values = parameters
@@ -39,7 +39,7 @@ fn sample<T: Real>(args: &args::Sample) -> Result<(), Error> {
     let (Some(name), Some(number), Some(output)) = (&args.shape, args.number, &args.output) else {
         return Err(Error::Usage("give SHAPE, -n N and -o CLOUD".into()));
     };
-    check_ending(output, CLOUD_EXTENSIONS)?;
+    check_extension(output, CLOUD_EXTENSIONS)?;
     isograd_io::check_output(output, CLOUD_EXTENSIONS)?;
     let shape = shape(name, &args.parameters)?;
     let sampling = Sampling {

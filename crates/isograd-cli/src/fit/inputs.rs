@@ -1,9 +1,7 @@
 //! Target, variables and options of a fit from the command line.
 
-use isograd::{Grid, GridError, PointCloud};
-use isograd_fit::{
-    Decay, Optimizer, Options, Points, ShapeParameters, Start, Target, TargetError, Variables,
-};
+use isograd::{Grid, PointCloud};
+use isograd_fit::{Decay, Optimizer, Options, Points, ShapeParameters, Start, Target, Variables};
 use isograd_io::{Content, Geometry};
 use isograd_shapes::{Sampling, Shape};
 
@@ -61,11 +59,7 @@ fn options(args: &args::Fit) -> Options {
 fn variables(args: &args::Fit) -> Result<Variables, Error> {
     if let Some(path) = &args.points {
         let geometry = isograd_io::read_geometry(path)?;
-        let file = || path.display().to_string();
-        let cloud = PointCloud::new(geometry.points).map_err(|source| Error::Cloud {
-            file: file(),
-            source,
-        })?;
+        let cloud = PointCloud::new(geometry.points).map_err(Error::input(path))?;
         let mut points = Points::new(cloud);
         if let Some(weight) = args.smoothness {
             points.smoothness = weight;
@@ -120,18 +114,11 @@ fn only(args: &args::Fit, shape: &Shape) -> Result<Option<Vec<String>>, Error> {
 
 /// Checks that the grid fits into memory, before anything of its size is allocated.
 fn check_memory(args: &args::Fit, grid: &Grid<f64>) -> Result<(), Error> {
-    isograd::check_memory(grid).map_err(|source| Error::Reconstruct {
-        file: args.target.display().to_string(),
-        source,
-    })
+    isograd::check_memory(grid).map_err(Error::input(&args.target))
 }
 
 fn target(args: &args::Fit, variables: &Variables) -> Result<Target, Error> {
-    let file = || args.target.display().to_string();
-    let refused = |source: TargetError| Error::Target {
-        file: file(),
-        source,
-    };
+    let path = &args.target;
     let content = match args.target_kind {
         TargetKind::Sdf => Content::Field(isograd_io::read_field(&args.target)?),
         TargetKind::Mesh => Content::Geometry(isograd_io::read_mesh(&args.target)?),
@@ -143,27 +130,21 @@ fn target(args: &args::Fit, variables: &Variables) -> Result<Target, Error> {
             let [nx, ny, nz] = field.field.grid().shape();
             return Err(Error::Usage(format!(
                 "{} is a field and brings its grid of {nx} × {ny} × {nz} cells; leave --resolution, --spacing, --padding and --bounds out",
-                file()
+                path.display()
             )));
         }
-        Content::Field(field) => return Target::from_sdf(field.field).map_err(refused),
+        Content::Field(field) => return Target::from_sdf(field.field).map_err(Error::input(path)),
         Content::Geometry(geometry) => geometry,
     };
     let grid = grid(args, &geometry, variables)?;
     check_memory(args, &grid)?;
     let as_cloud = args.target_kind == TargetKind::Cloud || geometry.faces.is_empty();
     if as_cloud {
-        let cloud = geometry.cloud::<f64>().map_err(|source| Error::Cloud {
-            file: file(),
-            source,
-        })?;
-        Target::from_cloud(&cloud, grid, &isograd::Options::default()).map_err(refused)
+        let cloud = geometry.cloud::<f64>().map_err(Error::input(path))?;
+        Target::from_cloud(&cloud, grid, &isograd::Options::default()).map_err(Error::input(path))
     } else {
-        let mesh = geometry.mesh::<f64>().map_err(|source| Error::Mesh {
-            file: file(),
-            source,
-        })?;
-        Target::from_mesh(mesh, grid).map_err(refused)
+        let mesh = geometry.mesh::<f64>().map_err(Error::input(path))?;
+        Target::from_mesh(mesh, grid).map_err(Error::input(path))
     }
 }
 
@@ -179,10 +160,7 @@ fn has_grid(args: &args::Fit) -> bool {
 
 /// The grid of the command line, by default around the target and the start.
 fn grid(args: &args::Fit, target: &Geometry, variables: &Variables) -> Result<Grid<f64>, Error> {
-    let refused = |source: GridError| Error::Grid {
-        file: args.target.display().to_string(),
-        source,
-    };
+    let path = &args.target;
     let mut points = target.points.clone();
     match variables {
         Variables::Points(start) => points.extend(start.cloud.points()),
@@ -192,9 +170,6 @@ fn grid(args: &args::Fit, target: &Geometry, variables: &Variables) -> Result<Gr
             points.extend(samples.cloud.points());
         }
     }
-    let all = PointCloud::new(points).map_err(|source| Error::Cloud {
-        file: args.target.display().to_string(),
-        source,
-    })?;
-    args.grid.grid(&all).map_err(refused)
+    let all = PointCloud::new(points).map_err(Error::input(path))?;
+    args.grid.grid(&all).map_err(Error::input(path))
 }

@@ -1,4 +1,4 @@
-//! `isograd fit`: a body, or points, changed until their field matches a target.
+//! `isograd fit`: fits a shape, or points, to a target.
 
 mod inputs;
 mod outputs;
@@ -46,30 +46,26 @@ pub fn run(args: &args::Fit) -> Result<(), Error> {
     run.end(&mut fit, &mut pictures, outcome, &progress)
 }
 
-/// The fit at its start, or where the checkpoint left it.
+/// The fit at its start, or resumed from the checkpoint.
 fn begin(args: &args::Fit, inputs: &Inputs) -> Result<Fit, Error> {
     let (variables, options) = (inputs.variables.clone(), inputs.options.clone());
     let Some(path) = &args.resume else {
         let fit = Fit::new(&inputs.target, variables, options);
         return fit.map_err(|error| backend::fit_error(args.backend, error));
     };
-    let unusable = |problem: String| Error::Checkpoint {
-        file: path.display().to_string(),
-        problem,
-    };
-    let bytes = std::fs::read(path).map_err(|e| unusable(e.to_string()))?;
+    let bytes = std::fs::read(path).map_err(Error::input(path))?;
     let checkpoint: Checkpoint = serde_json::from_slice(&bytes).map_err(|error| {
-        unusable(format!(
+        Error::input(path)(format!(
             "it is not a checkpoint ({error}); give a file that --checkpoint wrote, or begin anew without --resume"
         ))
     })?;
     Fit::resume(&inputs.target, variables, options, checkpoint).map_err(|error| match error {
-        isograd_fit::Error::Resume { .. } => unusable(error.to_string()),
+        isograd_fit::Error::Resume { .. } => Error::input(path)(error),
         other => backend::fit_error(args.backend, other),
     })
 }
 
-/// What one run needs all the time.
+/// Context of a run.
 struct Run<'a> {
     args: &'a args::Fit,
     folder: &'a Folder,
@@ -77,7 +73,7 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// All epochs, with pictures and checkpoints on the way.
+    /// Runs all epochs, with pictures and checkpoints.
     fn descend(
         &self,
         fit: &mut Fit,
@@ -89,7 +85,7 @@ impl Run<'_> {
         let mut observer = |fit: &mut Fit| {
             if let Some(last) = fit.history().last() {
                 progress.step(&format!(
-                    "loss {:.3e}, {:.4} cells off",
+                    "loss {:.3e}, mean error {:.4} cells",
                     last.loss, last.mean_error
                 ));
             }
@@ -101,7 +97,7 @@ impl Run<'_> {
                 _ => Ok(()),
             };
             failure = result.and_then(|()| self.draw(fit, pictures)).err();
-            match failure.is_some() || interrupt.asked() {
+            match failure.is_some() || interrupt.is_requested() {
                 true => ControlFlow::Break(()),
                 false => ControlFlow::Continue(()),
             }
@@ -110,7 +106,7 @@ impl Run<'_> {
         failure.map_or(Ok(outcome?), Err)
     }
 
-    /// Draws the epoch, if it is asked for.
+    /// Draws the current epoch, if it is in `--pictures-at`.
     fn draw(&self, fit: &mut Fit, pictures: &mut Pictures) -> Result<(), Error> {
         let epoch = fit.epoch();
         if !self.args.pictures_at.contains(&(epoch as u32)) {
@@ -138,8 +134,8 @@ impl Run<'_> {
         }
         let seconds = self.start.elapsed().as_secs_f64();
         self.folder.write_results(fit, outcome, seconds)?;
-        outputs::say(fit, outcome, seconds, self.args, progress);
-        progress.say(&format!("wrote {}", self.folder.path("").display()));
+        outputs::summarize(fit, outcome, seconds, self.args, progress);
+        progress.print(&format!("wrote {}", self.folder.path("").display()));
         match checkpoint {
             Some(path) if stopped => Err(Error::Stopped {
                 epoch: fit.epoch(),

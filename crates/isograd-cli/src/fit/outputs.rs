@@ -1,4 +1,4 @@
-//! The files of a fit, and what is said of it.
+//! The files of a fit and its summary.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::args;
 use crate::error::Error;
-use crate::outputs::check_ending;
+use crate::outputs::check_extension;
 use crate::plot;
 use crate::progress::Progress;
 
@@ -31,24 +31,24 @@ struct History<'a> {
     epochs: &'a [Epoch],
 }
 
-/// `fit.json`: where the fit ended.
+/// `fit.json`: the end of the fit.
 #[derive(Serialize)]
 struct Result<'a> {
     version: &'static str,
     outcome: Outcome,
-    /// Where it was computed: `cpu`, or a backend and its device.
+    /// Name of the backend: `cpu`, or a backend and its device.
     backend: &'a str,
     seconds: f64,
     /// The last epoch, without its parameters' names.
     epoch: Option<&'a Epoch>,
     /// The shape; `null` for raw points.
     shape: Option<&'static str>,
-    /// Every parameter of the shape, the fitted ones and the others.
+    /// All parameters of the shape.
     parameters: BTreeMap<&'static str, f64>,
 }
 
 impl Folder {
-    /// Checks all names before the work begins.
+    /// Checks all paths before the work begins.
     pub fn new(args: &args::Fit) -> std::result::Result<Self, Error> {
         if args.output.exists() && !args.output.is_dir() {
             return Err(Error::Usage(format!(
@@ -57,8 +57,8 @@ impl Folder {
             )));
         }
         if let Some(path) = &args.checkpoint {
-            check_ending(path, &["json"])?;
-            // Its folder may be the one that is to come.
+            check_extension(path, &["json"])?;
+            // Its folder may be the one that is created later.
             if path.parent() != Some(&args.output) {
                 isograd_io::check_output(path, &["json"])?;
             }
@@ -68,7 +68,7 @@ impl Folder {
         })
     }
 
-    /// Makes it.
+    /// Creates it.
     pub fn create(&self) -> std::result::Result<(), Error> {
         std::fs::create_dir_all(&self.path).map_err(|source| {
             Error::File(isograd_io::Error::Write {
@@ -136,19 +136,19 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> std::result::Result<()
     Ok(())
 }
 
-/// The result in a few lines.
-pub fn say(fit: &Fit, outcome: Outcome, seconds: f64, args: &args::Fit, progress: &Progress) {
+/// Prints a summary.
+pub fn summarize(fit: &Fit, outcome: Outcome, seconds: f64, args: &args::Fit, progress: &Progress) {
     let Some(last) = fit.history().last() else {
         return;
     };
     let why = match outcome {
         Outcome::Met => "the fields agree",
         Outcome::Minimum => "no lower point was found",
-        Outcome::Epochs => "all epochs are done",
+        Outcome::Epochs => "maximum number of epochs",
         Outcome::Stopped => "stopped",
     };
-    progress.say(&format!(
-        "epoch {}: loss {:.4e}, {:.5} cells off in the mean; {why} ({seconds:.1} s)",
+    progress.print(&format!(
+        "epoch {}: loss {:.4e}, mean error {:.5} cells; {why} ({seconds:.1} s)",
         last.epoch, last.loss, last.mean_error
     ));
     if args.running.quiet {
@@ -157,6 +157,6 @@ pub fn say(fit: &Fit, outcome: Outcome, seconds: f64, args: &args::Fit, progress
     let first = &fit.history()[0];
     let names = fit.parameter_names();
     for ((name, start), end) in names.iter().zip(&first.parameters).zip(&last.parameters) {
-        progress.say(&format!("    {name:<14} {start:<12.6} → {end:.6}"));
+        progress.print(&format!("    {name:<14} {start:<12.6} → {end:.6}"));
     }
 }

@@ -7,7 +7,7 @@ use crate::args;
 use crate::error::Error;
 use crate::plot::{self, Camera, Canvas, Comparison};
 
-/// What has been drawn so far.
+/// Pictures drawn so far.
 pub struct Pictures {
     comparison: Comparison,
     drawn: Vec<(usize, Canvas)>,
@@ -25,14 +25,14 @@ impl Pictures {
         }
     }
 
-    /// Draws the epoch that the fit is at, unless it is drawn already.
+    /// Draws the current epoch, unless it is drawn already.
     pub fn draw(&mut self, fit: &mut Fit, folder: &Folder) -> Result<(), Error> {
         let epoch = fit.epoch();
         if self.drawn.last().is_some_and(|(last, _)| *last == epoch) {
             return Ok(());
         }
         let error = fit.history().last().map_or(0.0, |last| last.mean_error);
-        let title = format!("epoch {epoch}: {} cells off in the mean", rounded(error));
+        let title = format!("epoch {epoch}: mean error {} cells", rounded(error));
         let result = fit.reconstruction()?;
         let mesh = result.mesh().map_err(isograd_fit::Error::from)?;
         let sdf = result.sdf().map_err(isograd_fit::Error::from)?;
@@ -50,7 +50,7 @@ impl Pictures {
     }
 }
 
-/// Two digits that count.
+/// Two significant digits.
 fn rounded(value: f64) -> String {
     match value {
         v if v >= 0.1 => format!("{v:.2}"),

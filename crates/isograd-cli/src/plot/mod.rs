@@ -4,7 +4,7 @@
 //! no system fonts, the same pixels on every machine.
 
 mod axis;
-pub mod canvas;
+mod canvas;
 mod color;
 mod comparison;
 mod losses;
@@ -20,7 +20,7 @@ pub use canvas::Canvas;
 pub use comparison::{Comparison, side_by_side};
 pub use losses::losses;
 pub use overview::overview;
-pub use scene::{Camera, Scene, View};
+pub use scene::Camera;
 pub use slices::slices;
 
 /// Writes a picture as PNG; the file appears whole or not at all.
