@@ -1,5 +1,5 @@
-//! NumPy arrays to slices and back. `isograd._arrays` has made them float32 or float64, C-contiguous, aligned
-//! and of the native byte order; what is not so is refused here, and never read as something else.
+//! NumPy arrays to slices and back. `isograd._arrays` makes them float32 or float64, C-contiguous, aligned and of the
+//! native byte order; other arrays are errors here, and never reinterpreted.
 
 use isograd::{Mesh, Real};
 use numpy::{
@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 
 use crate::errors::value;
 
-/// A number type on both sides.
+/// Number type of the library and of NumPy.
 pub trait Number: Real + isograd_backend::Number + Element {}
 impl Number for f32 {}
 impl Number for f64 {}
@@ -25,7 +25,7 @@ pub enum Dtype {
     F64,
 }
 
-/// Something in one of the two number types.
+/// A value for one of the two number types.
 pub enum Either<S, D> {
     /// `float32`
     F32(S),
@@ -36,10 +36,11 @@ pub enum Either<S, D> {
 /// The number type of an array.
 ///
 /// # Errors
-/// Anything else.
+/// Another type.
 pub fn dtype(array: &Bound<'_, PyAny>, name: &str) -> PyResult<Dtype> {
     let untyped = array.cast::<PyUntypedArray>();
-    let untyped = untyped.map_err(|_| PyTypeError::new_err(format!("{name} is no NumPy array")))?;
+    let untyped =
+        untyped.map_err(|_| PyTypeError::new_err(format!("{name} is not a NumPy array")))?;
     let (py, dtype) = (array.py(), untyped.dtype());
     if dtype.is_equiv_to(&numpy::dtype::<f32>(py)) {
         Ok(Dtype::F32)
@@ -58,18 +59,18 @@ pub fn dtype(array: &Bound<'_, PyAny>, name: &str) -> PyResult<Dtype> {
 /// Another type or shape.
 pub fn vectors<T: Number>(array: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<[T; 3]>> {
     let array = array.extract::<PyReadonlyArray2<'_, T>>();
-    let array = array.map_err(|_| wrong(name, "(N, 3)", T::NAME))?;
+    let array = array.map_err(|_| wrong_type(name, "(N, 3)", T::NAME))?;
     if array.shape()[1] != 3 {
         return Err(PyValueError::new_err(format!(
             "{name} has the shape {:?} and must have (N, 3)",
             array.shape()
         )));
     }
-    let values = array.as_slice().map_err(|_| scattered(name))?;
+    let values = array.as_slice().map_err(|_| not_contiguous(name))?;
     Ok(values.as_chunks::<3>().0.to_vec())
 }
 
-/// The same in double precision, whatever the type of the array.
+/// A copy of an `(N, 3)` array of either type, in double precision.
 ///
 /// # Errors
 /// Another type or shape.
@@ -86,7 +87,7 @@ pub fn widened(array: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<[f64; 3]>> 
 /// A mesh from `(V, 3)` vertices and `(F, 3)` faces.
 ///
 /// # Errors
-/// Another type or shape, and faces of vertices that are not there.
+/// Another type or shape, and faces with invalid vertex indices.
 pub fn mesh<T: Number>(vertices: &Bound<'_, PyAny>, faces: &Bound<'_, PyAny>) -> PyResult<Mesh<T>> {
     let corners = indices(faces, "faces")?;
     let faces = corners.as_chunks::<3>().0.to_vec();
@@ -99,8 +100,8 @@ pub fn mesh<T: Number>(vertices: &Bound<'_, PyAny>, faces: &Bound<'_, PyAny>) ->
 /// Another type, or memory in another order.
 pub fn values<T: Number>(array: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<T>> {
     let array = array.extract::<PyReadonlyArrayDyn<'_, T>>();
-    let array = array.map_err(|_| wrong(name, "any shape", T::NAME))?;
-    Ok(array.as_slice().map_err(|_| scattered(name))?.to_vec())
+    let array = array.map_err(|_| wrong_type(name, "any shape", T::NAME))?;
+    Ok(array.as_slice().map_err(|_| not_contiguous(name))?.to_vec())
 }
 
 /// A copy of `(N,)` indices.
@@ -109,20 +110,20 @@ pub fn values<T: Number>(array: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<T
 /// Another type or shape.
 pub fn indices(array: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<u32>> {
     if let Ok(flat) = array.extract::<PyReadonlyArray1<'_, u32>>() {
-        return Ok(flat.as_slice().map_err(|_| scattered(name))?.to_vec());
+        return Ok(flat.as_slice().map_err(|_| not_contiguous(name))?.to_vec());
     }
     let array = array.extract::<PyReadonlyArrayDyn<'_, u32>>();
-    let array = array.map_err(|_| wrong(name, "any shape", "uint32"))?;
-    Ok(array.as_slice().map_err(|_| scattered(name))?.to_vec())
+    let array = array.map_err(|_| wrong_type(name, "any shape", "uint32"))?;
+    Ok(array.as_slice().map_err(|_| not_contiguous(name))?.to_vec())
 }
 
-fn wrong(name: &str, shape: &str, type_name: &str) -> PyErr {
+fn wrong_type(name: &str, shape: &str, type_name: &str) -> PyErr {
     PyValueError::new_err(format!(
         "{name} must be an array of shape {shape} and type {type_name}, as the points are"
     ))
 }
 
-fn scattered(name: &str) -> PyErr {
+fn not_contiguous(name: &str) -> PyErr {
     PyValueError::new_err(format!(
         "{name} is not C-contiguous; pass numpy.ascontiguousarray({name})"
     ))
@@ -131,7 +132,7 @@ fn scattered(name: &str) -> PyErr {
 /// A new array of the given shape from its values in C order.
 ///
 /// # Errors
-/// More or fewer values than the shape has places.
+/// Another number of values than the shape has.
 pub fn shaped<'py, T: Element>(
     py: Python<'py>,
     values: Vec<T>,
@@ -141,11 +142,14 @@ pub fn shaped<'py, T: Element>(
 }
 
 /// A new `(N, 3)` array.
-pub fn of_vectors<'py, E: Element + Copy>(py: Python<'py>, values: &[[E; 3]]) -> Bound<'py, PyAny> {
+pub fn from_vectors<'py, E: Element + Copy>(
+    py: Python<'py>,
+    values: &[[E; 3]],
+) -> Bound<'py, PyAny> {
     let flat = PyArray1::from_slice(py, values.as_flattened());
     match flat.reshape([values.len(), 3]) {
         Ok(array) => array.into_any(),
-        // As many values as places: can't happen, and an empty array says so.
+        // The numbers of values are equal, so this is unreachable.
         Err(_) => PyArray2::<E>::zeros(py, [0, 3], false).into_any(),
     }
 }

@@ -1,4 +1,4 @@
-//! What can't be computed where `backend` says, as exceptions.
+//! Failures of the computation, as exceptions.
 
 use isograd::Backend;
 use isograd_backend::{Error, Plan};
@@ -8,17 +8,17 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use crate::arrays::Number;
 use crate::settings::Settings;
 
-/// Why there is no result.
+/// Failure of a computation.
 #[derive(Debug)]
 pub enum Failure {
-    /// What was given makes none.
+    /// Invalid input.
     Value(String),
-    /// A device can't be had, or fails.
+    /// A device that is unavailable or fails.
     Device(String),
 }
 
 impl Failure {
-    /// The same kind of failure, with `context` before its text.
+    /// This failure with `context` before its text.
     pub fn with_context(self, context: &str) -> Self {
         match self {
             Self::Value(text) => Self::Value(format!("{context}: {text}")),
@@ -78,7 +78,7 @@ impl From<isograd_fit::Error> for Failure {
 /// A plan for grid, options and backend.
 ///
 /// # Errors
-/// What the grid, the options or the device say.
+/// Errors of the grid, the options and the device.
 pub fn plan<T: Number>(settings: &Settings) -> Result<Plan<T>, Failure> {
     let grid = settings.grid::<T>();
     let grid = grid.map_err(|error| Failure::Value(error.to_string()))?;

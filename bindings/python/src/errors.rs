@@ -5,12 +5,12 @@ use std::io::ErrorKind;
 use pyo3::exceptions::{PyFileNotFoundError, PyIsADirectoryError, PyOSError, PyValueError};
 use pyo3::prelude::*;
 
-/// Bad values.
+/// A `ValueError`.
 pub fn value(error: impl std::fmt::Display) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-/// What is wrong with a file: the operating system's errors stay what they are, bad content is a `ValueError`.
+/// The exception for a file: that of the operating system, or a `ValueError` for invalid content.
 pub fn file(error: isograd_io::Error) -> PyErr {
     let text = error.to_string();
     match error {

@@ -18,40 +18,40 @@ type Geometry<'py> = (
     Bound<'py, PyAny>,
 );
 
-/// What a file of points or of a mesh holds, in the type that it is stored in.
+/// Reads points or a mesh, in the number type of the file.
 #[pyfunction]
 pub fn read_geometry(py: Python<'_>, path: PathBuf) -> PyResult<Geometry<'_>> {
     let geometry = py.detach(|| isograd_io::read_geometry(&path));
     let geometry = geometry.map_err(file)?;
     match geometry.dtype {
-        Stored::F32 => of_geometry::<f32>(py, &geometry),
-        _ => of_geometry::<f64>(py, &geometry),
+        Stored::F32 => geometry_arrays::<f32>(py, &geometry),
+        _ => geometry_arrays::<f64>(py, &geometry),
     }
 }
 
-fn of_geometry<'py, T: Number>(
+fn geometry_arrays<'py, T: Number>(
     py: Python<'py>,
     geometry: &isograd_io::Geometry,
 ) -> PyResult<Geometry<'py>> {
     let cloud = geometry.cloud::<T>().map_err(value)?;
     let mut attributes = Vec::new();
-    for of in cloud.attributes() {
-        let shape = [cloud.len(), of.components];
-        let array = arrays::shaped(py, of.values.clone(), shape)?;
-        attributes.push((of.name.clone(), array));
+    for attribute in cloud.attributes() {
+        let shape = [cloud.len(), attribute.components];
+        let array = arrays::shaped(py, attribute.values.clone(), shape)?;
+        attributes.push((attribute.name.clone(), array));
     }
     Ok((
-        arrays::of_vectors(py, cloud.points()),
-        cloud.normals().map(|n| arrays::of_vectors(py, n)),
+        arrays::from_vectors(py, cloud.points()),
+        cloud.normals().map(|n| arrays::from_vectors(py, n)),
         attributes,
-        arrays::of_vectors(py, &geometry.faces),
+        arrays::from_vectors(py, &geometry.faces),
     ))
 }
 
 /// Lower corner, spacing, shape and values of a field.
 type FieldParts<'py> = ([f64; 3], f64, [usize; 3], Bound<'py, PyAny>);
 
-/// A field, in the type that it is stored in.
+/// Reads a field, in the number type of the file.
 #[pyfunction]
 pub fn read_field(py: Python<'_>, path: PathBuf) -> PyResult<FieldParts<'_>> {
     let read = py.detach(|| isograd_io::read_field(&path)).map_err(file)?;

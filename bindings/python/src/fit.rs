@@ -250,10 +250,10 @@ impl FitResult {
             self.note,
             self.history,
             self.values,
-            arrays::of_vectors(py, &self.points),
+            arrays::from_vectors(py, &self.points),
             arrays::shaped(py, self.sdf.into_values(), shape)?,
-            arrays::of_vectors(py, self.mesh.vertices()),
-            arrays::of_vectors(py, self.mesh.faces()),
+            arrays::from_vectors(py, self.mesh.vertices()),
+            arrays::from_vectors(py, self.mesh.faces()),
         ))
     }
 }

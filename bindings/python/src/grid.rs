@@ -1,4 +1,4 @@
-//! Grids: their checks, and the one round a cloud.
+//! Grids: checks, and grids around clouds.
 
 use isograd::{Grid, PointCloud, Resolution};
 use pyo3::prelude::*;
@@ -6,10 +6,10 @@ use pyo3::prelude::*;
 use crate::arrays;
 use crate::errors::value;
 
-/// A grid as `isograd.Grid` takes it.
+/// Lower corner, spacing and shape.
 type Parts = ([f64; 3], f64, [usize; 3]);
 
-/// Raises where the numbers make no grid.
+/// Raises ValueError if the grid is invalid.
 #[pyfunction]
 pub fn check_grid(lower: [f64; 3], spacing: f64, shape: [i64; 3]) -> PyResult<()> {
     let shape = cells(shape)?;
@@ -24,7 +24,7 @@ fn cells(shape: [i64; 3]) -> PyResult<[usize; 3]> {
     Ok(shape.map(|n| n as usize))
 }
 
-/// Lower corner, spacing and shape of the grid round `(N, 3)` points.
+/// Lower corner, spacing and shape of a grid around `(N, 3)` points.
 #[pyfunction]
 #[pyo3(signature = (points, resolution, spacing, padding))]
 pub fn fit_grid(

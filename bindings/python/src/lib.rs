@@ -40,7 +40,7 @@ mod _core {
     #[pymodule_export]
     use query::{query_mesh, query_mesh_pullback};
     #[pymodule_export]
-    use result::{Extension, Outcome};
+    use result::{Extension, ReconstructionArrays};
     #[pymodule_export]
     use shape::{Shape, shapes};
     #[pymodule_export]

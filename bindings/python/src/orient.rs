@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use crate::arrays::{self, Dtype, Number};
 use crate::background;
 use crate::errors::value;
-use crate::plan::{cloud, seen};
+use crate::plan::{cloud, with_sensors};
 
 /// Normals, confidence, and the report as JSON.
 type Oriented<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, String);
@@ -35,7 +35,7 @@ fn run<'py, T: Number>(
     sensors: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Oriented<'py>> {
     let py = points.py();
-    let cloud = seen(cloud::<T>(points, normals, Vec::new())?, sensors)?;
+    let cloud = with_sensors(cloud::<T>(points, normals, Vec::new())?, sensors)?;
     let mut plan = Orienter::<T>::new(options.radius, options.orient);
     let result = background::run(py, move |_| {
         plan.orient(&cloud).map_err(|e| e.to_string())?;
@@ -44,7 +44,7 @@ fn run<'py, T: Number>(
     let (orientation, report) = result.map_err(value)?;
     let count = orientation.confidence.len();
     Ok((
-        arrays::of_vectors(py, &orientation.normals),
+        arrays::from_vectors(py, &orientation.normals),
         arrays::shaped(py, orientation.confidence, count)?,
         serde_json::to_string(&JsonReport::samples(&report)).map_err(value)?,
     ))

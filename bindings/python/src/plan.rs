@@ -11,7 +11,7 @@ use crate::arrays::{self, Dtype, Either, Number};
 use crate::backend::{self, Failure};
 use crate::background;
 use crate::errors::value;
-use crate::result::{Kept, Outcome};
+use crate::result::{Reconstruction, ReconstructionArrays};
 use crate::settings::Settings;
 
 /// A plan for one grid and one set of options, in either number type.
@@ -20,7 +20,7 @@ pub struct Plan {
     settings: Settings,
     single: Mutex<Option<isograd_backend::Plan<f32>>>,
     double: Mutex<Option<isograd_backend::Plan<f64>>>,
-    /// Why the CPU computes, where that was left to the package.
+    /// Why `auto` selected the CPU.
     note: Mutex<Option<String>>,
 }
 
@@ -43,12 +43,12 @@ impl Plan {
             // An unavailable device is an error now.
             let settings = plan.settings.clone();
             let single = background::run(py, move |_| backend::plan(&settings))??;
-            plan.keep(&plan.single, single);
+            plan.store(&plan.single, single);
         }
         Ok(plan)
     }
 
-    /// Why the CPU computes, where that was left to the package; to be said once.
+    /// Why `auto` selected the CPU; once.
     fn take_note(&self) -> Option<String> {
         lock(&self.note).take()
     }
@@ -61,35 +61,35 @@ impl Plan {
         normals: Option<&Bound<'_, PyAny>>,
         sensors: Option<&Bound<'_, PyAny>>,
         attributes: Vec<AttributeArray<'_>>,
-    ) -> PyResult<Outcome> {
+    ) -> PyResult<ReconstructionArrays> {
         match arrays::dtype(points, "points")? {
             Dtype::F32 => {
-                let cloud = seen(cloud(points, normals, attributes)?, sensors)?;
-                let kept = self.run(&self.single, points.py(), cloud)?;
-                Ok(Outcome(Either::F32(Arc::new(kept))))
+                let cloud = with_sensors(cloud(points, normals, attributes)?, sensors)?;
+                let result = self.run(&self.single, points.py(), cloud)?;
+                Ok(ReconstructionArrays(Either::F32(Arc::new(result))))
             }
             Dtype::F64 => {
-                let cloud = seen(cloud(points, normals, attributes)?, sensors)?;
-                let kept = self.run(&self.double, points.py(), cloud)?;
-                Ok(Outcome(Either::F64(Arc::new(kept))))
+                let cloud = with_sensors(cloud(points, normals, attributes)?, sensors)?;
+                let result = self.run(&self.double, points.py(), cloud)?;
+                Ok(ReconstructionArrays(Either::F64(Arc::new(result))))
             }
         }
     }
 }
 
 impl Plan {
-    /// With the plan that waits in `place`, or a new one where there is none: no lock is held meanwhile, and an
-    /// interrupt leaves none behind.
+    /// Reconstructs with the idle plan in `place`, or a new one. No lock is held during the work, and an interrupt drops
+    /// the plan.
     fn run<T: Number>(
         &self,
         place: &Mutex<Option<isograd_backend::Plan<T>>>,
         py: Python<'_>,
         cloud: PointCloud<T>,
-    ) -> PyResult<Kept<T>> {
-        let waiting = lock(place).take();
+    ) -> PyResult<Reconstruction<T>> {
+        let idle = lock(place).take();
         let settings = self.settings.clone();
         let (plan, result) = background::run(py, move |stop| {
-            let mut plan = match waiting {
+            let mut plan = match idle {
                 Some(plan) => plan,
                 None => backend::plan(&settings)?,
             };
@@ -98,13 +98,13 @@ impl Plan {
                 false => ControlFlow::Continue(()),
             };
             let result = plan.make(&cloud, &mut observer);
-            Ok::<_, Failure>((plan, result.map(|result| Kept { cloud, result })))
+            Ok::<_, Failure>((plan, result.map(|result| Reconstruction { cloud, result })))
         })??;
-        self.keep(place, plan);
+        self.store(place, plan);
         Ok(result.map_err(Failure::from)?)
     }
 
-    fn keep<T: Number>(
+    fn store<T: Number>(
         &self,
         place: &Mutex<Option<isograd_backend::Plan<T>>>,
         mut plan: isograd_backend::Plan<T>,
@@ -123,7 +123,7 @@ fn lock<V>(place: &Mutex<V>) -> MutexGuard<'_, V> {
 /// A cloud from its arrays: `points` and `normals` `(N, 3)`.
 ///
 /// # Errors
-/// Arrays of another type or shape, and values that make no cloud.
+/// Arrays of another type or shape, and invalid clouds.
 pub fn cloud<T: Number>(
     points: &Bound<'_, PyAny>,
     normals: Option<&Bound<'_, PyAny>>,
@@ -146,22 +146,21 @@ pub fn cloud<T: Number>(
     Ok(cloud)
 }
 
-/// The cloud with where it was seen from: `(N, 3)` is a place for each point, any other number of places is that
-/// of all.
+/// The cloud with the positions of its sensors: `(N, 3)` is one for each point, any other number is for all points.
 ///
 /// # Errors
-/// Arrays of another type or shape, and places that are not finite.
-pub fn seen<T: Number>(
+/// Arrays of another type or shape, and positions that are not finite.
+pub fn with_sensors<T: Number>(
     cloud: PointCloud<T>,
     sensors: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<PointCloud<T>> {
     let Some(sensors) = sensors else {
         return Ok(cloud);
     };
-    let places = arrays::vectors(sensors, "sensors")?;
-    let sensors = match places.len() == cloud.len() {
-        true => Sensors::Each(places),
-        false => Sensors::Any(places),
+    let positions = arrays::vectors(sensors, "sensors")?;
+    let sensors = match positions.len() == cloud.len() {
+        true => Sensors::Each(positions),
+        false => Sensors::Any(positions),
     };
     cloud.with_sensors(sensors).map_err(value)
 }

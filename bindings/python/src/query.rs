@@ -10,7 +10,7 @@ use crate::errors::value;
 /// Distance, gradient, closest point, face and barycentric coordinates of each query.
 type Hits<'py> = [Bound<'py, PyAny>; 5];
 
-/// What the mesh says about `(M, 3)` queries of the type of its vertices.
+/// Distances of `(M, 3)` queries, of the type of the vertices, to a mesh.
 #[pyfunction]
 pub fn query_mesh<'py>(
     vertices: &Bound<'py, PyAny>,
@@ -37,7 +37,7 @@ fn query<'py, T: Number>(
     let hits: Vec<Hit<T>> = hits.map_err(value)?;
     let vectors = |of: fn(&Hit<T>) -> [T; 3]| {
         let all: Vec<[T; 3]> = hits.iter().map(of).collect();
-        arrays::of_vectors(py, &all)
+        arrays::from_vectors(py, &all)
     };
     let distance: Vec<T> = hits.iter().map(|hit| hit.distance).collect();
     let face: Vec<u32> = hits.iter().map(|hit| hit.triangle).collect();
@@ -90,7 +90,7 @@ fn pullback<'py, T: Number>(
     })?;
     let (vertices_bar, points_bar) = result.map_err(value)?;
     Ok([
-        arrays::of_vectors(py, &vertices_bar),
-        arrays::of_vectors(py, &points_bar),
+        arrays::from_vectors(py, &vertices_bar),
+        arrays::from_vectors(py, &points_bar),
     ])
 }

@@ -14,62 +14,62 @@ use crate::backend::Failure;
 use crate::background;
 use crate::errors::value;
 
-/// A cloud and what was made of it.
-pub struct Kept<T: Number> {
+/// A cloud and its reconstruction.
+pub struct Reconstruction<T: Number> {
     /// The cloud.
     pub cloud: PointCloud<T>,
-    /// What was made of it.
+    /// The reconstruction.
     pub result: Made<T>,
 }
 
-/// In one of the two number types.
+/// A reconstruction in one of the two number types.
 #[pyclass(frozen, name = "Result")]
-pub struct Outcome(pub Either<Arc<Kept<f32>>, Arc<Kept<f64>>>);
+pub struct ReconstructionArrays(pub Either<Arc<Reconstruction<f32>>, Arc<Reconstruction<f64>>>);
 
-/// An attribute on the surface and round it.
+/// An attribute on the surface and around it.
 #[pyclass(frozen)]
 pub struct Extension(Either<Arc<Extended<f32>>, Arc<Extended<f64>>>);
 
-/// What came out, and what was kept for the pullback.
+/// An extended attribute and the residual of its pullback.
 pub struct Extended<T> {
     attribute: isograd::Attribute<T>,
     extension: extend::Extension<T>,
     residual: extend::Residual<T>,
 }
 
-/// The same expression for both types.
+/// Expands an expression for both number types.
 macro_rules! each {
-    ($of:expr, $kept:ident => $body:expr) => {
+    ($of:expr, $this:ident => $body:expr) => {
         match $of {
-            Either::F32($kept) => $body,
-            Either::F64($kept) => $body,
+            Either::F32($this) => $body,
+            Either::F64($this) => $body,
         }
     };
 }
 
 #[pymethods]
-impl Outcome {
-    /// One of the arrays, by name: a new one at each call.
+impl ReconstructionArrays {
+    /// A new copy of one of the arrays, by name.
     fn array<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-        each!(&self.0, kept => array(py, kept, name))
+        each!(&self.0, this => array(py, this, name))
     }
 
-    /// The level of the surface.
+    /// The iso-value of the surface.
     fn iso_value(&self) -> PyResult<f64> {
-        Ok(each!(&self.0, kept => Real::f64(there(kept.result.view().iso_value())?)))
+        Ok(each!(&self.0, this => Real::f64(failure(this.result.view().iso_value())?)))
     }
 
-    /// Who computed: `cpu`, or a backend and its device.
+    /// Name of the backend: `cpu`, or a backend and its device.
     fn backend(&self) -> &str {
-        each!(&self.0, kept => kept.result.view().backend())
+        each!(&self.0, this => this.result.view().backend())
     }
 
     /// The report as JSON.
     fn report(&self, py: Python<'_>) -> PyResult<String> {
-        each!(&self.0, kept => {
-            let kept = kept.clone();
+        each!(&self.0, this => {
+            let this = this.clone();
             let text = background::run(py, move |_| {
-                let report = JsonReport::new(kept.result.view().report(&kept.cloud)?);
+                let report = JsonReport::new(this.result.view().report(&this.cloud)?);
                 serde_json::to_string(&report).map_err(|e| Failure::Value(e.to_string()))
             })?;
             Ok(text?)
@@ -86,16 +86,16 @@ impl Outcome {
         extensions: Vec<ExtensionBar<'py>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         match &self.0 {
-            Either::F32(kept) => pull(py, kept, bars, iso_value as f32, extensions),
-            Either::F64(kept) => pull(py, kept, bars, iso_value, extensions),
+            Either::F32(this) => pullback(py, this, bars, iso_value as f32, extensions),
+            Either::F64(this) => pullback(py, this, bars, iso_value, extensions),
         }
     }
 
     /// The attribute `name` of the cloud up to the distance `band` from the surface.
     fn extend(&self, py: Python<'_>, name: String, band: f64) -> PyResult<Extension> {
         let extension = match &self.0 {
-            Either::F32(kept) => Either::F32(extended(py, kept, name, band)?),
-            Either::F64(kept) => Either::F64(extended(py, kept, name, band)?),
+            Either::F32(this) => Either::F32(extended(py, this, name, band)?),
+            Either::F64(this) => Either::F64(extended(py, this, name, band)?),
         };
         Ok(Extension(extension))
     }
@@ -126,28 +126,28 @@ impl<T: Number> Extended<T> {
     }
 }
 
-/// One of the results, or why there is none.
-fn there<V>(result: Result<V, isograd_backend::Error>) -> Result<V, Failure> {
+/// Converts the error.
+fn failure<V>(result: Result<V, isograd_backend::Error>) -> Result<V, Failure> {
     Ok(result?)
 }
 
 fn array<'py, T: Number>(
     py: Python<'py>,
-    kept: &Arc<Kept<T>>,
+    this: &Arc<Reconstruction<T>>,
     name: &str,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let result = kept.result.view();
-    let (shape, count) = (result.grid().shape(), kept.cloud.len());
+    let result = this.result.view();
+    let (shape, count) = (result.grid().shape(), this.cloud.len());
     match name {
-        "sdf" => arrays::shaped(py, there(result.sdf())?.values().to_vec(), shape),
-        "indicator" => arrays::shaped(py, there(result.indicator())?.values().to_vec(), shape),
-        "closest" => arrays::shaped(py, there(result.closest())?.to_vec(), shape),
-        "vertices" => Ok(arrays::of_vectors(py, there(result.mesh())?.vertices())),
-        "faces" => Ok(arrays::of_vectors(py, there(result.mesh())?.faces())),
-        "normals" => Ok(arrays::of_vectors(py, there(result.normals())?)),
-        "confidence" => arrays::shaped(py, there(result.confidence())?.to_vec(), [count]),
-        "areas" => arrays::shaped(py, there(result.areas())?.to_vec(), [count]),
-        "neighbors" => arrays::shaped(py, there(result.neighbor_counts())?.to_vec(), [count]),
+        "sdf" => arrays::shaped(py, failure(result.sdf())?.values().to_vec(), shape),
+        "indicator" => arrays::shaped(py, failure(result.indicator())?.values().to_vec(), shape),
+        "closest" => arrays::shaped(py, failure(result.closest())?.to_vec(), shape),
+        "vertices" => Ok(arrays::from_vectors(py, failure(result.mesh())?.vertices())),
+        "faces" => Ok(arrays::from_vectors(py, failure(result.mesh())?.faces())),
+        "normals" => Ok(arrays::from_vectors(py, failure(result.normals())?)),
+        "confidence" => arrays::shaped(py, failure(result.confidence())?.to_vec(), [count]),
+        "areas" => arrays::shaped(py, failure(result.areas())?.to_vec(), [count]),
+        "neighbors" => arrays::shaped(py, failure(result.neighbor_counts())?.to_vec(), [count]),
         _ => Err(PyKeyError::new_err(name.to_owned())),
     }
 }
@@ -159,13 +159,13 @@ type ExtensionBar<'py> = (
     Option<Bound<'py, PyAny>>,
 );
 
-/// An extension in the type of the reconstruction.
-trait Typed: Number {
-    fn typed(extension: &Extension) -> Option<Arc<Extended<Self>>>;
+/// A number type of extensions.
+trait ExtensionType: Number {
+    fn of_type(extension: &Extension) -> Option<Arc<Extended<Self>>>;
 }
 
-impl Typed for f32 {
-    fn typed(extension: &Extension) -> Option<Arc<Extended<Self>>> {
+impl ExtensionType for f32 {
+    fn of_type(extension: &Extension) -> Option<Arc<Extended<Self>>> {
         match &extension.0 {
             Either::F32(of) => Some(of.clone()),
             Either::F64(_) => None,
@@ -173,8 +173,8 @@ impl Typed for f32 {
     }
 }
 
-impl Typed for f64 {
-    fn typed(extension: &Extension) -> Option<Arc<Extended<Self>>> {
+impl ExtensionType for f64 {
+    fn of_type(extension: &Extension) -> Option<Arc<Extended<Self>>> {
         match &extension.0 {
             Either::F64(of) => Some(of.clone()),
             Either::F32(_) => None,
@@ -185,7 +185,7 @@ impl Typed for f64 {
 /// An extension with the cotangents of its values at vertices and cells.
 type ExtendedBar<T> = (Arc<Extended<T>>, Option<Vec<T>>, Option<Vec<T>>);
 
-/// Copies of all cotangents, for the thread that works on them.
+/// Copies of all cotangents, for the thread of the work.
 struct Bars<T> {
     sdf: Option<Vec<T>>,
     indicator: Option<Vec<T>>,
@@ -196,9 +196,9 @@ struct Bars<T> {
     extensions: Vec<ExtendedBar<T>>,
 }
 
-fn pull<'py, T: Typed>(
+fn pullback<'py, T: ExtensionType>(
     py: Python<'py>,
-    kept: &Arc<Kept<T>>,
+    this: &Arc<Reconstruction<T>>,
     bars: &Bound<'py, PyDict>,
     iso_value: T,
     extensions: Vec<ExtensionBar<'py>>,
@@ -211,15 +211,17 @@ fn pull<'py, T: Typed>(
         let given = bars.get_item(name)?;
         given.map(|a| arrays::vectors::<T>(&a, name)).transpose()
     };
-    let mut found = Vec::with_capacity(extensions.len());
+    let mut extended_bars = Vec::with_capacity(extensions.len());
     for (extension, at_vertices, in_band) in extensions {
-        let of = T::typed(extension.get());
-        let of = of.ok_or_else(|| value("an extension is of another reconstruction's type"))?;
+        let of = T::of_type(extension.get());
+        let of = of.ok_or_else(|| {
+            value("an extension is of another number type than the reconstruction")
+        })?;
         let numbers = |a: Option<Bound<'py, PyAny>>| {
             a.map(|a| arrays::values::<T>(&a, "an extension's cotangent"))
                 .transpose()
         };
-        found.push((of, numbers(at_vertices)?, numbers(in_band)?));
+        extended_bars.push((of, numbers(at_vertices)?, numbers(in_band)?));
     }
     let bars = Bars {
         sdf: values("sdf")?,
@@ -228,15 +230,15 @@ fn pull<'py, T: Typed>(
         vertices: vectors("vertices")?,
         normals: vectors("normals")?,
         iso_value,
-        extensions: found,
+        extensions: extended_bars,
     };
-    let kept = kept.clone();
-    let out = background::run(py, move |_| bars.pull(&kept))?;
+    let this = this.clone();
+    let out = background::run(py, move |_| bars.pullback(&this))?;
     out_dict(py, &out?)
 }
 
 impl<T: Number> Bars<T> {
-    fn pull(&self, kept: &Kept<T>) -> Result<CloudCotangent<T>, Failure> {
+    fn pullback(&self, this: &Reconstruction<T>) -> Result<CloudCotangent<T>, Failure> {
         let extensions: Vec<ExtensionCotangent<'_, T>> = self
             .extensions
             .iter()
@@ -257,7 +259,7 @@ impl<T: Number> Bars<T> {
             areas: self.areas.as_deref(),
             extensions: &extensions,
         };
-        Ok(kept.result.view().pullback(&kept.cloud, &cotangent)?)
+        Ok(this.result.view().pullback(&this.cloud, &cotangent)?)
     }
 }
 
@@ -266,8 +268,8 @@ fn out_dict<'py, T: Number>(
     out: &CloudCotangent<T>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
-    dict.set_item("points", arrays::of_vectors(py, &out.points))?;
-    let normals = (!out.normals.is_empty()).then(|| arrays::of_vectors(py, &out.normals));
+    dict.set_item("points", arrays::from_vectors(py, &out.points))?;
+    let normals = (!out.normals.is_empty()).then(|| arrays::from_vectors(py, &out.normals));
     dict.set_item("normals", normals)?;
     let mut attributes = Vec::new();
     for values in &out.attributes {
@@ -284,19 +286,19 @@ fn out_dict<'py, T: Number>(
 
 fn extended<T: Number>(
     py: Python<'_>,
-    kept: &Arc<Kept<T>>,
+    this: &Arc<Reconstruction<T>>,
     name: String,
     band: f64,
 ) -> PyResult<Arc<Extended<T>>> {
-    let kept = kept.clone();
+    let this = this.clone();
     let out = background::run(py, move |_| {
-        let attributes = kept.cloud.attributes();
+        let attributes = this.cloud.attributes();
         let attribute = attributes.iter().find(|a| a.name == name).cloned();
         let attribute = attribute.ok_or_else(|| {
             let known = attributes.iter().map(|a| a.name.clone()).collect();
             Failure::Value(extend::Error::Missing { name, known }.to_string())
         })?;
-        let (extension, residual) = kept.result.view().extend(&attribute, band)?;
+        let (extension, residual) = this.result.view().extend(&attribute, band)?;
         Ok::<_, Failure>(Extended {
             attribute,
             extension,

@@ -1,4 +1,4 @@
-//! Parametric bodies, behind `isograd.Shape`.
+//! Parametric shapes, behind `isograd.Shape`.
 
 use isograd_element::vector::of_f64;
 use isograd_shapes::{Density, Layout, Sampling, SurfaceCoordinate, by_name};
@@ -8,18 +8,18 @@ use crate::arrays::{self, Number};
 use crate::background;
 use crate::errors::value;
 
-/// Names and summaries of all bodies.
+/// Names and summaries of all shapes.
 #[pyfunction]
 pub fn shapes() -> Vec<(&'static str, &'static str)> {
     let all = isograd_shapes::all();
     all.iter().map(|s| (s.name(), s.summary())).collect()
 }
 
-/// A body with its parameters.
+/// A shape with its parameters.
 #[pyclass(frozen)]
 pub struct Shape(pub isograd_shapes::Shape);
 
-/// Name, meaning, unit, default, least, greatest, whether whole: of one parameter.
+/// Name, meaning, unit, default, minimum, maximum, and whether it is a whole number: one parameter.
 type Parameter = (
     &'static str,
     &'static str,
@@ -107,8 +107,8 @@ impl Shape {
         let points = self.0.points_at::<f64>(&coordinates).map_err(value)?;
         let normals = self.0.normals_at::<f64>(&coordinates).map_err(value)?;
         Ok((
-            arrays::of_vectors(py, &points),
-            arrays::of_vectors(py, &normals),
+            arrays::from_vectors(py, &points),
+            arrays::from_vectors(py, &normals),
         ))
     }
 
@@ -141,15 +141,15 @@ fn sample<'py, T: Number>(
     .map_err(value)?;
     let velocity = velocity.map(|velocity| {
         let velocity: Vec<[T; 3]> = velocity.into_iter().map(of_f64).collect();
-        arrays::of_vectors(py, &velocity)
+        arrays::from_vectors(py, &velocity)
     });
     let coordinates = &samples.coordinates;
     let patch: Vec<u32> = coordinates.iter().map(|c| c.patch).collect();
     let uv: Vec<f64> = coordinates.iter().flat_map(|c| [c.u, c.v]).collect();
     let count = patch.len();
     Ok((
-        arrays::of_vectors(py, samples.cloud.points()),
-        arrays::of_vectors(py, samples.cloud.normals().unwrap_or_default()),
+        arrays::from_vectors(py, samples.cloud.points()),
+        arrays::from_vectors(py, samples.cloud.normals().unwrap_or_default()),
         velocity,
         arrays::shaped(py, patch, [count])?,
         arrays::shaped(py, uv, [count, 2])?,

@@ -1,4 +1,4 @@
-"""``backend=``: where it is computed, and what is said where that can't be."""
+"""``backend=``: results on devices, and errors for unavailable ones."""
 
 import warnings
 

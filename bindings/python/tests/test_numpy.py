@@ -1,4 +1,4 @@
-"""The NumPy interface: what comes out, what goes back, what is refused."""
+"""The NumPy interface: results, gradients, errors."""
 
 import dataclasses
 import os
@@ -320,7 +320,7 @@ def test_files_keep_every_bit(tmp_path, dtype):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="signals and forks as on Linux")
-def test_ctrl_c_is_heard_at_once_and_leaves_no_lock():
+def test_ctrl_c_interrupts_at_once_and_leaves_no_lock():
     plan = isograd.Reconstructor(isograd.Grid.fit(SPHERE, 128))
     timer = threading.Timer(0.1, lambda: os.kill(os.getpid(), signal.SIGINT))
     timer.start()
@@ -328,15 +328,15 @@ def test_ctrl_c_is_heard_at_once_and_leaves_no_lock():
     with pytest.raises(KeyboardInterrupt):
         while True:
             plan(SPHERE)
-    heard = time.monotonic() - start - 0.1
-    print(f"heard after {heard:.3f} s")
+    delay = time.monotonic() - start - 0.1
+    print(f"interrupted after {delay:.3f} s")
     small = isograd.Reconstructor(GRID)
     assert bits(small(SPHERE).sdf) == bits(isograd.reconstruct(SPHERE, GRID).sdf)
     assert plan(SPHERE).sdf.shape == plan.grid.shape
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="signals and forks as on Linux")
-def test_a_forked_process_is_told_what_to_do():
+def test_a_forked_process_gets_an_error_with_the_remedy():
     code = """
 import os, isograd
 points = isograd.sample("sphere", 500).points
