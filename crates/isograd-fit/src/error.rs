@@ -1,83 +1,83 @@
-//! Why a fit failed.
+//! Errors of a fit.
 
 use isograd::{PointCloudError, PullbackError};
 use isograd_shapes::{SampleError, ShapeError};
 
 use crate::target::TargetError;
 
-/// Why a fit failed.
+/// Error of a fit.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The target.
+    /// Invalid target.
     #[error(transparent)]
     Target(#[from] TargetError),
-    /// The shape, or values of its parameters.
+    /// Invalid shape or parameter values.
     #[error(transparent)]
     Shape(#[from] ShapeError),
-    /// The shape could not be sampled.
+    /// Sampling of the shape failed.
     #[error(transparent)]
     Sample(#[from] SampleError),
-    /// The points make no cloud.
+    /// The points form no valid cloud.
     #[error(transparent)]
     Cloud(#[from] PointCloudError),
-    /// The points make no field.
+    /// The reconstruction failed.
     #[error(transparent)]
     Reconstruct(#[from] isograd::Error),
-    /// The pullback.
+    /// The pullback failed.
     #[error(transparent)]
     Pullback(#[from] PullbackError),
-    /// The backend.
+    /// The backend failed.
     #[error(transparent)]
     Backend(isograd_backend::Error),
-    /// Nothing may change.
-    #[error("no parameter is left to fit; name at least one that is not a whole number")]
+    /// No parameter to fit.
+    #[error("there is no parameter to fit; name at least one that is not a whole number")]
     NoParameters,
-    /// A whole number can't be fitted.
-    #[error("{name} is a whole number, in which nothing is differentiable; leave it out")]
+    /// An integer parameter cannot be fitted.
+    #[error("{name} is a whole number, which has no derivative; leave it out")]
     Whole {
         /// The parameter.
         name: String,
     },
-    /// An option that makes no sense.
+    /// Invalid value of an option.
     #[error("{what} is {value}; it must be {range}")]
     Option {
         /// The option.
         what: &'static str,
-        /// What was given.
+        /// The refused value.
         value: f64,
-        /// What is allowed.
+        /// Allowed range.
         range: &'static str,
     },
-    /// No random start makes a body.
+    /// No random start is a valid shape.
     #[error(
-        "none of {tries} random starts makes a body, the last because: {source}; use a smaller spread or another seed"
+        "none of {tries} random starts is a valid shape (last error: {source}); use a smaller spread or another seed"
     )]
     NoStart {
-        /// How many were tried.
+        /// Number of starts.
         tries: usize,
-        /// Why the last one does not.
+        /// Error of the last one.
         source: ShapeError,
     },
-    /// The loss at the start can't be taken.
+    /// The loss at the start cannot be evaluated.
     #[error("the start can't be used: {0}; start nearer to the target, or use a larger grid")]
     Start(#[source] Box<Error>),
-    /// Every step ends in a point without a field.
+    /// Even the shortest step ends in points that cannot be reconstructed.
     #[error(
-        "epoch {epoch}: no step, however short, leads to a body that can be reconstructed: {source}; use a smaller rate, a larger grid, or another start"
+        "epoch {epoch}: even the shortest step leads to a body that cannot be reconstructed: {source}; use a smaller rate, a larger grid, or another start"
     )]
     Stuck {
         /// The epoch that failed.
         epoch: usize,
-        /// Why the last one failed.
+        /// Error of the last step.
         source: Box<Error>,
     },
-    /// The state is of another fit.
+    /// The checkpoint belongs to another fit.
     #[error(
-        "the state to resume is of another fit: its {what} differ; give the same as in the run that wrote it"
+        "the checkpoint belongs to another fit: its {what} differ; use those of the run that wrote it"
     )]
     Resume {
-        /// What differs.
+        /// The part that differs.
         what: &'static str,
     },
 }

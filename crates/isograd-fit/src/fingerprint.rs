@@ -1,5 +1,5 @@
-//! A hash that is the same on every machine and in every version of Rust: FNV-1a, 64 bits. It tells a state of
-//! another fit by mistake from one of this; it guards against nothing else.
+//! FNV-1a hash of 64 bits, equal on every machine and in every version of Rust. It detects a checkpoint of another
+//! fit; it does not protect against manipulation.
 
 pub(crate) struct Fingerprint(u64);
 
@@ -10,7 +10,7 @@ impl Default for Fingerprint {
 }
 
 impl Fingerprint {
-    /// Adds a number. The whole word at once, where FNV takes bytes: as good here, and eight times as fast.
+    /// Adds a number, by whole words instead of the bytes of FNV: sufficient here, and eight times as fast.
     pub fn number(&mut self, word: u64) {
         self.0 = (self.0 ^ word).wrapping_mul(0x0000_0100_0000_01b3);
         // A product carries upwards alone.

@@ -12,14 +12,14 @@ use crate::optimize::Evaluation;
 use crate::target::Target;
 use crate::variables::{Degrees, Variables};
 
-/// What the loss is made of, at one point.
+/// Terms of the loss at one point.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Parts {
     /// Mean squared difference of φ, in cells².
     pub data: f64,
     /// The smoothness term of raw points.
     pub smoothness: f64,
-    /// What parameters beyond their bounds cost.
+    /// Penalty of parameters beyond their bounds.
     pub bounds: f64,
     /// Mean absolute difference of φ, in cells.
     pub mean_error: f64,
@@ -86,7 +86,7 @@ impl Problem {
         Ok(self.plan.reconstruct(&cloud)?)
     }
 
-    /// Draws new samples of a shape at `x`, the `turn`-th ones.
+    /// Draws new samples of a shape at `x`; `turn` counts the sets of samples.
     pub fn sample(&mut self, x: &[f64], turn: u64) -> Result<(), Error> {
         match &mut self.degrees {
             Degrees::Shape(shape) => shape.sample(x, turn),
@@ -94,7 +94,7 @@ impl Problem {
         }
     }
 
-    /// Every how many epochs new samples are drawn.
+    /// Number of epochs between new samples.
     pub fn resample(&self) -> Option<usize> {
         match &self.degrees {
             Degrees::Shape(shape) => shape.resample,
@@ -103,7 +103,7 @@ impl Problem {
     }
 }
 
-/// Hashes of what a state belongs to.
+/// Hashes of the inputs of a fit, stored in its checkpoints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Fingerprints {
     pub target: u64,
@@ -135,7 +135,7 @@ impl Fingerprints {
         }
     }
 
-    /// What differs from `other`, if anything does.
+    /// The first input that differs from that of `other`.
     pub fn difference(&self, other: &Self) -> Option<&'static str> {
         if self.target != other.target {
             Some("target or grid")

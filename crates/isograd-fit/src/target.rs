@@ -1,10 +1,10 @@
-//! What is to be matched: a signed distance field, from a field, a mesh or a cloud.
+//! Target of a fit: a signed distance field, given as a field, a mesh or a cloud.
 
 use isograd::distance::Query;
 use isograd::isosurface::{self, measure};
 use isograd::{Field, Grid, Mesh, PointCloud, Reconstructor};
 
-/// Points asked of a mesh at once: whole planes of a grid need not fit into memory twice.
+/// Query points per call, to bound memory.
 const BATCH: usize = 1 << 18;
 
 /// A field and its zero surface.
@@ -14,17 +14,17 @@ pub struct Target {
     surface: Mesh<f64>,
 }
 
-/// Why a target was refused.
+/// Errors of a target.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TargetError {
     /// A value is NaN or infinite.
-    #[error("the target's value {index} is not finite; mend the field")]
+    #[error("the target's value {index} is not finite; correct the field")]
     NotFinite {
-        /// Place of the first such value.
+        /// Index of the first such value.
         index: usize,
     },
-    /// No cell, or every cell, is inside.
+    /// No cell or every cell is inside.
     #[error(
         "the target has no surface: all its {cells} cells are on one side of 0; φ must be negative inside"
     )]
@@ -32,24 +32,24 @@ pub enum TargetError {
         /// Number of cells.
         cells: usize,
     },
-    /// The region has no cells.
+    /// The band has no cells.
     #[error("no cell lies within {cells} cells of the target's surface; make the band wider")]
     EmptyBand {
-        /// What was given.
+        /// Half the width of the band, in cells.
         cells: f64,
     },
     /// The mesh has holes.
     #[error(
-        "the target mesh is not closed, so that its inside is not known; close it, or give its vertices as a cloud"
+        "the target mesh is not closed, so its inside is undefined; close it, or give its vertices as a cloud"
     )]
     Open,
-    /// Distances to the mesh.
+    /// The distances to the mesh failed.
     #[error(transparent)]
     Distance(#[from] isograd::distance::Error),
-    /// The surface of the field.
+    /// The surface of the field failed.
     #[error(transparent)]
     Isosurface(#[from] isosurface::Error),
-    /// The cloud could not be reconstructed.
+    /// The reconstruction of the cloud failed.
     #[error("the target cloud: {0}")]
     Reconstruct(#[from] isograd::Error),
 }
@@ -96,10 +96,10 @@ impl Target {
         Self::from_sdf(field)
     }
 
-    /// The reconstruction of a cloud on `grid`: what a fit with the same options can match best.
+    /// The reconstruction of a cloud on `grid`: the best match for a fit with the same options.
     ///
     /// # Errors
-    /// Those of the pipeline.
+    /// Errors of the reconstruction.
     pub fn from_cloud(
         cloud: &PointCloud<f64>,
         grid: Grid<f64>,

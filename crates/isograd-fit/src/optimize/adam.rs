@@ -7,15 +7,15 @@ use super::{Evaluation, Function, HALVINGS, Step, is_finite, moved};
 /// Options of Adam.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Adam {
-    /// Length of the first steps, in each variable.
+    /// Step length in each variable, before the schedule.
     pub rate: f64,
-    /// How the rate falls.
+    /// Schedule of the rate.
     pub decay: Decay,
-    /// Memory of the mean gradient, `β₁`.
+    /// Decay of the mean gradient, `β₁`.
     pub beta1: f64,
-    /// Memory of the mean square, `β₂`.
+    /// Decay of the mean square, `β₂`.
     pub beta2: f64,
-    /// What is added to the root of the mean square.
+    /// Constant `ε` added to the root of the mean square.
     pub epsilon: f64,
 }
 
@@ -31,19 +31,19 @@ impl Default for Adam {
     }
 }
 
-/// How the rate falls from step to step.
+/// Decrease of the rate from step to step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Decay {
-    /// It does not.
+    /// Constant rate.
     #[default]
     Constant,
-    /// As half a cosine, from 1 to nothing after `steps`, where it stays at a hundredth.
+    /// Half a cosine from 1 toward 0 over `steps`, with a lower bound of 0.01.
     Cosine {
         /// Number of steps.
         steps: usize,
     },
-    /// By half in every `half_life` steps.
+    /// Halved every `half_life` steps.
     Exponential {
         /// Number of steps.
         half_life: f64,
@@ -51,7 +51,7 @@ pub enum Decay {
 }
 
 impl Decay {
-    /// What the rate is multiplied with at step `t`, from 0.
+    /// Factor of the rate at step `t`, from 0.
     fn factor(self, t: u64) -> f64 {
         match self {
             Self::Constant => 1.0,
@@ -110,7 +110,7 @@ impl Memory {
         Ok(Step::Stalled)
     }
 
-    /// The step, and the means that lead to it.
+    /// The step and the updated means.
     fn direction(&mut self, options: &Adam, gradient: &[f64]) -> Vec<f64> {
         let Adam { beta1, beta2, .. } = *options;
         let rate = options.rate * options.decay.factor(self.steps);

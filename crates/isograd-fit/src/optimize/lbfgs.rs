@@ -7,14 +7,14 @@ use serde::{Deserialize, Serialize};
 use super::line_search::{Found, search};
 use super::{Evaluation, Function, Step, dot, largest, norm};
 
-/// Options of L-BFGS. Lengths are those of the largest change of a variable.
+/// Options of L-BFGS. The length of a step is its largest change of a variable.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Lbfgs {
-    /// Steps that are remembered.
+    /// Number of stored steps.
     pub memory: usize,
-    /// Length of the first step that is tried, while nothing is remembered.
+    /// Length of the first trial step, without stored steps.
     pub first_step: f64,
-    /// Length of the longest step.
+    /// Maximum length of a step.
     pub longest_step: f64,
 }
 
@@ -28,18 +28,18 @@ impl Default for Lbfgs {
     }
 }
 
-/// A pair is kept only where the function curves upwards along the step: by more than this share of what
-/// the lengths of the two allow. Else the next direction might point uphill.
+/// A pair `(s, y)` is stored only if `s·y` exceeds this fraction of `|s| |y|` (positive curvature along the step);
+/// otherwise the next direction might not be one of descent.
 const CURVED: f64 = 1e-8;
 
-/// A step and how the gradient changed along it.
+/// A step and the change of the gradient along it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Pair {
     step: Vec<f64>,
     change: Vec<f64>,
 }
 
-/// The last steps, the latest last.
+/// The stored steps, latest last.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Memory {
     pairs: VecDeque<Pair>,
@@ -78,7 +78,7 @@ impl Memory {
         }
     }
 
-    /// `−H g` with the two-loop recursion; no longer than the longest step.
+    /// `−H g` by the two-loop recursion, limited to the maximum length.
     fn direction(&self, options: &Lbfgs, gradient: &[f64]) -> Vec<f64> {
         let steepest = |length: f64| {
             let size = length / largest(gradient);

@@ -1,28 +1,28 @@
-//! A search along a direction for the strong Wolfe conditions (Nocedal and Wright 2006, algorithms 3.5 and
-//! 3.6), of a function that need not have a value everywhere.
+//! Line search for the strong Wolfe conditions (Nocedal and Wright 2006, algorithms 3.5 and 3.6), for functions that
+//! may fail at some points.
 
 use super::{Evaluation, Function, HALVINGS, dot, is_finite, moved};
 
-/// The value must fall by this share of what the slope promises …
+/// Sufficient decrease `c₁`: the value must fall by this fraction of the decrease that the slope predicts.
 const FALL: f64 = 1e-4;
-/// … and the slope to this share of what it was.
+/// Curvature condition `c₂`: the slope must fall to this fraction of the initial one.
 const FLATTEN: f64 = 0.9;
-/// Growth of the step while the function still falls steeply.
+/// Growth of the step while the slope is still steep.
 const GROWTH: f64 = 2.5;
-/// Points tried, those without a value apart.
+/// Maximum number of evaluations, failed ones not counted.
 const TRIALS: usize = 12;
 
-/// What a search found.
+/// Result of a line search.
 pub(super) enum Found<D, E> {
-    /// A lower point, and the function there.
+    /// A lower point and its evaluation.
     Lower(Vec<f64>, Evaluation<D>),
-    /// No point lower than the start by what the slope promises.
+    /// No point with sufficient decrease.
     Nothing,
-    /// No point with a value, however near.
+    /// The function failed even at the shortest step.
     Failing(E),
 }
 
-/// A point on the line.
+/// A point of the line.
 #[derive(Clone, Copy)]
 struct Place {
     at: f64,
@@ -30,16 +30,15 @@ struct Place {
     slope: f64,
 }
 
-/// The interval in which the conditions can be met: its low end, and its other end with the value there,
-/// where there is one.
+/// Interval that contains a point with the conditions: its end of lower value, and its other end with the value there,
+/// if there is one.
 struct Bracket {
     low: Place,
     high: Option<(f64, Option<f64>)>,
 }
 
 impl Bracket {
-    /// Narrows the bracket by a place; whether it is the lowest so far, and by what the slope of `start`
-    /// promises.
+    /// Narrows the bracket by a point; returns whether it is the lowest so far with sufficient decrease from `start`.
     fn take(&mut self, place: Place, start: &Place) -> bool {
         // Strictly lower also where the promised fall is lost in rounding.
         let falls = place.value <= start.value + FALL * place.at * start.slope;
@@ -56,7 +55,7 @@ impl Bracket {
         true
     }
 
-    /// Where to look next; at most at `reach`.
+    /// Next trial step, at most `reach`.
     fn next(&self, reach: f64) -> f64 {
         let low = self.low;
         match self.high {
@@ -75,7 +74,7 @@ impl Bracket {
     }
 }
 
-/// Searches from `x`, where the function is `here`, along `d`, from a step of 1 on and as far as `reach`.
+/// Searches from `x`, with the evaluation `here`, along `d`, with steps from 1 to at most `reach`.
 pub(super) fn search<D, E>(
     x: &[f64],
     here: &Evaluation<D>,

@@ -1,7 +1,7 @@
-//! What is changed: the parameters of a shape, or the positions of points.
+//! Variables of a fit: the parameters of a shape, or the positions of points.
 //!
-//! Either way the descent sees a vector `x` of numbers of order one; here it becomes points, and cotangents of
-//! points become those of `x`.
+//! The optimizer works on a vector `x` of numbers of order one. It is mapped to points here, and cotangents of the
+//! points are mapped to cotangents of `x`.
 
 mod points;
 mod shape;
@@ -15,7 +15,7 @@ use crate::error::Error;
 pub use points::Points;
 pub use shape::{ShapeParameters, Start};
 
-/// What is changed.
+/// Variables of a fit.
 #[derive(Clone, Debug)]
 pub enum Variables {
     /// Parameters of a shape.
@@ -24,12 +24,12 @@ pub enum Variables {
     Points(Points),
 }
 
-/// What is added to the mismatch, at one `x`.
+/// Regularization terms of the loss.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Extra {
     /// Roughness of the displacement of the points.
     pub smoothness: f64,
-    /// How far parameters are beyond their bounds.
+    /// Penalty of parameters beyond their bounds.
     pub bounds: f64,
 }
 
@@ -65,8 +65,8 @@ impl Degrees {
         }
     }
 
-    /// How the normals get their signs, where `asked` is asked for. A shape knows its outside: its own normals
-    /// decide instead of guesses, which change abruptly at sharp edges and make the loss jump.
+    /// Orientation method, given the one of the options. Instead of automatic orientation, which may change
+    /// discontinuously at sharp edges, a shape gives the signs of its own normals.
     pub fn orientation(&self, asked: orient::Method) -> orient::Method {
         match (self, asked) {
             (Self::Shape(_), orient::Method::Auto) => orient::Method::Signs,
@@ -82,7 +82,7 @@ impl Degrees {
         }
     }
 
-    /// What is added to the mismatch at `x`; its gradient is added to `gradient`.
+    /// Regularization terms at `x`; their gradient is added to `gradient`.
     pub fn extra(&self, x: &[f64], gradient: &mut [f64]) -> Extra {
         match self {
             Self::Shape(shape) => Extra {
@@ -96,7 +96,7 @@ impl Degrees {
         }
     }
 
-    /// A hash of all that makes these variables what they are.
+    /// Hash of the variables and their settings.
     pub fn fingerprint(&self) -> u64 {
         match self {
             Self::Shape(shape) => shape.fingerprint(),

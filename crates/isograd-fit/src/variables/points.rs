@@ -1,10 +1,9 @@
 //! Positions of the points of a cloud.
 //!
-//! Each variable is a coordinate of a displacement `u_i` from where the point was at the start, in cells. So
-//! many variables are hardly held by the field: what no cell feels is free. A term
-//! `w/|E| Σ_(i,j)∈E |u_i − u_j|²/s²` over the pairs `E` of neighbors in the cloud at the start (`s` is its
-//! spacing) asks that neighbors move alike. It is 0 for any displacement of the whole, and does not shrink
-//! the body, as a penalty on the positions would.
+//! Each variable is a coordinate of the displacement `u_i` of a point from its start, in cells. The field does not
+//! determine so many variables. The term `w/|E| Σ_(i,j)∈E |u_i − u_j|²/s²` over the pairs `E` of neighbors in the cloud
+//! at the start (`s` is its spacing) favors equal displacements of neighbors. It is 0 for a translation of the whole
+//! cloud, and does not shrink the body, as a penalty on the positions would.
 
 use isograd::PointCloud;
 use isograd::neighbors::CellIndex;
@@ -13,13 +12,13 @@ use rayon::prelude::*;
 use crate::error::Error;
 use crate::fingerprint::Fingerprint;
 
-/// Points in one task: a fixed number, so that sums have the same bits for any number of threads.
+/// Points per task, fixed so that sums have the same bits for any number of threads.
 const CHUNK: usize = 2048;
 
 /// The coordinates of every point of a cloud.
 #[derive(Clone, Debug)]
 pub struct Points {
-    /// Where they are at the start. Normals and attributes are left aside.
+    /// Points at the start. Normals and attributes are ignored.
     pub cloud: PointCloud<f64>,
     /// Weight `w` of the smoothness of the displacement; 0 for none.
     pub smoothness: f64,
@@ -38,16 +37,16 @@ impl Points {
     }
 }
 
-/// Pairs of neighbors, as the list of each point's.
+/// Neighbors of each point, as concatenated lists.
 #[derive(Clone, Debug, Default)]
 struct Graph {
-    /// Where each point's neighbors begin in `neighbors`, and their end.
+    /// Start of each point's list in `neighbors`, and the end of the last.
     starts: Vec<usize>,
     neighbors: Vec<u32>,
 }
 
 impl Graph {
-    /// `i` and `j` are neighbors where one is among the `k` nearest of the other.
+    /// `i` and `j` are neighbors if one is among the `k` nearest of the other.
     fn new(points: &[[f64; 3]], k: usize) -> Self {
         let index = CellIndex::new(points);
         let nearest: Vec<Vec<u32>> = (0..points.len())
@@ -86,7 +85,7 @@ pub(crate) struct Degrees {
     /// Unit length per unit of a variable.
     cell: f64,
     graph: Graph,
-    /// What `|u_i − u_j|²`, in cells², is multiplied with.
+    /// Factor of `|u_i − u_j|²`, in cells².
     weight: f64,
     smoothness: f64,
 }

@@ -1,9 +1,8 @@
 //! Parameters of a shape, through material points of its surface.
 //!
-//! Each variable is a parameter in units of its size at the start. Parameters have bounds, and the descent
-//! knows of none: the points are those of the parameters clamped to their bounds, and a variable beyond a
-//! bound costs the square of how far beyond it is. So there is always a shape to evaluate, and nothing to be
-//! gained beyond a bound.
+//! Each variable is a parameter in units of its size at the start. Bounds of parameters are enforced by clamping them
+//! before the points are evaluated, and by a penalty of the squared distance of a variable beyond a bound: there is
+//! always a shape to evaluate, and no decrease of the loss beyond a bound.
 
 use isograd::PointCloud;
 use isograd_shapes::{Parameter, Sampling, Shape, ShapeError, SurfaceCoordinate};
@@ -13,32 +12,32 @@ use rand_pcg::rand_core::{Rng, SeedableRng};
 use crate::error::Error;
 use crate::fingerprint::Fingerprint;
 
-/// Random starts that are tried before none is found.
+/// Maximum number of random starts.
 const TRIES: usize = 100;
 
-/// Parameters of a shape that are to be found.
+/// Parameters of a shape as variables.
 #[derive(Clone, Debug)]
 pub struct ShapeParameters {
     /// The shape; the parameters that are not fitted keep its values.
     pub shape: Shape,
-    /// Names of those that are fitted; `None` for all but whole numbers and time.
+    /// Names of the fitted parameters; `None` for all but integers and time.
     pub only: Option<Vec<String>>,
-    /// Surface coordinates of the points; `None` to sample the shape at its start. The coordinates that a
-    /// target cloud was sampled at make a fit without the error of sampling.
+    /// Surface coordinates of the points; `None` to sample the shape at its start. With the coordinates of the target
+    /// cloud's samples the fit has no sampling error.
     pub coordinates: Option<Vec<SurfaceCoordinate>>,
-    /// Number of samples of its surface, where they are drawn.
+    /// Number of samples, if they are drawn.
     pub samples: usize,
     /// Seed of the samples.
     pub seed: u64,
-    /// Whether, and every how many epochs, new samples are drawn: parameters that change much draw the old
-    /// ones apart, and uncover parts of a union that had none.
+    /// Number of epochs between new samples; `None` for never. Large changes of parameters make the old samples uneven
+    /// and expose parts of a union without samples.
     pub resample: Option<usize>,
-    /// Where to begin.
+    /// Start values.
     pub start: Start,
 }
 
 impl ShapeParameters {
-    /// All parameters of `shape` but whole numbers and time, from its own values, through 20,000 samples.
+    /// All parameters of `shape` but integers and time, from its own values, with 20,000 samples.
     pub fn new(shape: Shape) -> Self {
         Self {
             shape,
@@ -54,20 +53,20 @@ impl ShapeParameters {
     /// The shape at the start.
     ///
     /// # Errors
-    /// A parameter that is not there or can't be fitted; no random start that makes a body.
+    /// A parameter that is unknown or cannot be fitted; no random start that is a valid shape.
     pub fn started(&self) -> Result<Shape, Error> {
         started(&self.shape, &chosen(self)?, self.start)
     }
 }
 
-/// Where a fit of parameters begins.
+/// Start values of fitted parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Start {
-    /// At the values that the shape has.
+    /// Values of the shape.
     #[default]
     Given,
-    /// At these values, each times a random number between `1/(1+spread)` and `1+spread`, uniform in the
-    /// logarithm; drawn again where they make no body.
+    /// Values of the shape, each times a random number between `1/(1+spread)` and `1+spread`, uniform in the
+    /// logarithm; drawn again if they form no valid shape.
     Random {
         /// Seed of the random numbers.
         seed: u64,
@@ -76,10 +75,10 @@ pub enum Start {
     },
 }
 
-/// One parameter that is fitted.
+/// A fitted parameter.
 #[derive(Clone, Copy, Debug)]
 struct Degree {
-    /// Place in the values of the shape.
+    /// Index in the values of the shape.
     index: usize,
     parameter: Parameter,
     /// Change of the parameter per unit of the variable.
@@ -92,7 +91,7 @@ impl Degree {
         (self.scale * x).clamp(self.parameter.min, self.parameter.max)
     }
 
-    /// How far the variable is beyond a bound, with its sign.
+    /// Signed distance of the variable beyond a bound, 0 within.
     fn overshoot(&self, x: f64) -> f64 {
         (self.scale * x - self.value(x)) / self.scale
     }
@@ -141,7 +140,7 @@ impl Degrees {
         self.degrees.iter().map(value).collect()
     }
 
-    /// Draws samples of the shape at `x`, the `turn`-th ones.
+    /// Draws samples of the shape at `x`; `turn` counts the sets of samples.
     pub fn sample(&mut self, x: &[f64], turn: u64) -> Result<(), Error> {
         let shape = self.at(x)?;
         let seed = self.seed.wrapping_add(turn);
@@ -188,7 +187,7 @@ impl Degrees {
         Ok(bar)
     }
 
-    /// `Σ` of the squared overshoots.
+    /// Sum of the squared distances beyond bounds.
     pub fn overshoot(&self, x: &[f64], gradient: &mut [f64]) -> f64 {
         let mut total = 0.0;
         for ((degree, &x), gradient) in self.degrees.iter().zip(x).zip(gradient) {
@@ -217,7 +216,7 @@ impl Degrees {
     }
 }
 
-/// Places of the parameters that are fitted, each once.
+/// Indices of the fitted parameters, each once.
 fn chosen(options: &ShapeParameters) -> Result<Vec<usize>, Error> {
     let shape = &options.shape;
     let place = |name: &str| shape.parameters().position(|(p, _)| p.name == name);
@@ -279,7 +278,7 @@ fn started(shape: &Shape, chosen: &[usize], start: Start) -> Result<Shape, Error
     }
 }
 
-/// The size of a parameter: its value, else its default, else a tenth of its range (of 10 at most).
+/// Size of a parameter: its value, or its default if that is 0, or a tenth of its range (of 10 at most).
 fn scale(parameter: &Parameter, value: f64) -> f64 {
     let tenth = 0.1 * (parameter.max - parameter.min).min(10.0);
     let sizes = [value.abs(), parameter.default.abs(), tenth];
