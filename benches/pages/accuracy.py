@@ -255,7 +255,7 @@ def draw_convergence(results: Results, path) -> None:
             for power in (1, 2):
                 line = [5e-3 * (cells[0] / n) ** power for n in cells]
                 panel.plot(cells, line, ":", color=charts.GRAY, linewidth=1)
-                panel.annotate(f"order {power}", (cells[-1], line[-1]), color=charts.GRAY, ha="right", va="bottom")
+                panel.annotate(f"order {power}", (cells[-2], line[-2]), (3, 3), textcoords="offset points", color=charts.GRAY)
             panel.set(ylim=(1.5e-6, 1e-2), ylabel="mean |error of the zero set| / longest side")
         fixed.set_title(f"{thousands(results.samples)} random samples")
         scaled.set_title("constant number of random samples per cell")
@@ -271,6 +271,7 @@ def draw_convergence(results: Results, path) -> None:
         for panel in axes[0]:
             charts.log_axes(panel, cells)
             panel.set_xlabel("cells on the longest side")
+        charts.label(per_cell.yaxis, [0.004, 0.006, 0.01, 0.02])
 
 
 def draw_weights(results: Results, path) -> None:
@@ -282,7 +283,7 @@ def draw_weights(results: Results, path) -> None:
                     label = f"{splat}, area {'on' if area else 'off'}"
                     panel.plot(results.cells, values, style, color=charts.COLORS[color], label=label)
             charts.log_axes(panel, results.cells)
-            panel.set(title=f"{results.first}, {name} samples", xlabel="cells on the longest side")
+            panel.set(title=f"{results.first}, samples: {name}", xlabel="cells on the longest side")
         axes[0][0].set_ylabel("mean |error of the zero set|, cells")
         axes[0][0].legend()
 

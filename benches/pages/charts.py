@@ -45,11 +45,16 @@ def log_axes(panel, ticks=None, vertical: str = "log") -> None:
     """A logarithmic x axis with labels at `ticks`, and a y axis."""
     panel.set_xscale("log")
     panel.set_yscale(vertical)
-    if ticks:
-        panel.xaxis.set_major_locator(FixedLocator(ticks))
-        panel.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-        panel.xaxis.set_minor_locator(NullLocator())
     panel.xaxis.set_minor_formatter(NullFormatter())
+    if ticks:
+        label(panel.xaxis, ticks)
+
+
+def label(axis, ticks: list[float]) -> None:
+    """Replaces the ticks of an axis."""
+    axis.set_major_locator(FixedLocator(ticks))
+    axis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.set_minor_locator(NullLocator())
 
 
 def grouped_bars(panel, groups: list[str], series: list[list[float]], notes: list[str]) -> list:

@@ -15,7 +15,7 @@ def cells(size: dict) -> int:
 
 def context(data: dict) -> dict:
     large = [size for size in data["cells"] if cells(size) >= 128**3 and size["both"]]
-    return {"driver": None, "conformance": None} | data | {
+    return {"driver": None, "conformance": None, "sanitizer": None, "wheel": None} | data | {
         "cell_count": cells(data["fish"]),
         "power": exponent(large, cells, lambda size: size["both"]) if len(large) > 1 else None,
         "tables": {

@@ -2,18 +2,18 @@
 
 use crate::process::{self, Outcome};
 
-/// Runs all benchmarks, or those of the stage named first; other arguments go to criterion.
+/// Runs all benchmarks, or those whose names begin with the stage named first; other arguments go to criterion.
 pub fn run(arguments: &[String]) -> Outcome {
-    let mut command = process::cargo(["bench", "--package", "isograd-benches"]);
-    let rest = match arguments.split_first() {
+    let mut command =
+        process::cargo(["bench", "--package", "isograd-benches", "--bench", "stages"]);
+    command.arg("--");
+    match arguments.split_first() {
         Some((stage, rest)) if !stage.starts_with('-') => {
-            command.args(["--bench", stage]);
-            rest
+            command.arg(format!("^{stage}")).args(rest);
         }
         _ => {
-            command.arg("--benches");
-            arguments
+            command.args(arguments);
         }
-    };
-    process::run(command.arg("--").args(rest))
+    }
+    process::run(&mut command)
 }

@@ -1,11 +1,10 @@
-//! The Poisson solve over grid size, number type and threads.
+//! The Poisson solve against grid size, number type and threads.
 
-mod common;
-
-use common::{for_threads, group};
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, criterion_group};
 use isograd::{Real, poisson};
 use isograd_benches::{CELLS, torus};
+
+use crate::common::{for_threads, group};
 
 fn solve<T: Real>(criterion: &mut Criterion) {
     let mut group = group(criterion, "poisson");
@@ -21,4 +20,3 @@ fn solve<T: Real>(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, solve::<f32>, solve::<f64>);
-criterion_main!(benches);

@@ -1,15 +1,14 @@
-//! The whole, cloud to field and report, with the default options, and its pullback from φ: over grid size at
-//! 50,000 points, and over number of points at 128³ cells.
+//! The whole pipeline with default options, cloud to field and report, and its pullback from φ: against grid size with
+//! 50,000 points, and against number of points with 128³ cells.
 
-mod common;
-
-use common::{for_threads, group};
 use criterion::measurement::WallTime;
-use criterion::{BenchmarkGroup, Criterion, criterion_group, criterion_main};
+use criterion::{BenchmarkGroup, Criterion, criterion_group};
 use isograd::{
     CloudCotangent, Cotangent, Options, PointCloud, PullbackScratch, Real, Reconstructor,
 };
 use isograd_benches::{CELLS, POINTS, torus};
+
+use crate::common::{for_threads, group};
 
 fn over_cells<T: Real>(criterion: &mut Criterion) {
     let mut group = group(criterion, "pipeline-cells");
@@ -32,14 +31,14 @@ fn over_points<T: Real>(criterion: &mut Criterion) {
 }
 
 fn pullback_over_cells<T: Real>(criterion: &mut Criterion) {
-    let mut group = group(criterion, "pullback-cells");
+    let mut group = group(criterion, "pipeline-pullback-cells");
     for cells in CELLS {
         pull::<T>(&mut group, cells.pow(3), "cells", setting(50_000, cells));
     }
 }
 
 fn pullback_over_points<T: Real>(criterion: &mut Criterion) {
-    let mut group = group(criterion, "pullback-points");
+    let mut group = group(criterion, "pipeline-pullback-points");
     for count in POINTS {
         pull::<T>(&mut group, count, "points", setting(count, 128));
     }
@@ -83,4 +82,3 @@ criterion_group!(
     pullback_over_points::<f32>,
     pullback_over_points::<f64>
 );
-criterion_main!(benches);

@@ -1,12 +1,11 @@
-//! The splat over number of points, for each kind of weights, number type and threads, onto 128³ cells.
+//! The splat against number of points, for each kind of weights, number type and threads, onto 128³ cells.
 
-mod common;
-
-use common::{for_threads, group};
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, criterion_group};
 use isograd::splat::{self, Weights};
 use isograd::{Field, Real};
 use isograd_benches::{POINTS, torus};
+
+use crate::common::{for_threads, group};
 
 const CELLS: usize = 128;
 
@@ -32,4 +31,3 @@ fn spread<T: Real>(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, spread::<f32>, spread::<f64>);
-criterion_main!(benches);

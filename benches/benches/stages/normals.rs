@@ -1,14 +1,13 @@
-//! D-PCA axes and area weights over number of points, number type and threads; the neighbors are found
+//! D-PCA axes and area weights against number of points, number type and threads; the neighbors are found
 //! before.
 
-mod common;
-
-use common::{for_threads, group};
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, criterion_group};
 use isograd::neighbors::{self, Neighborhoods, Radius};
 use isograd::splat::area;
 use isograd::{Real, normals};
 use isograd_benches::{POINTS, torus};
+
+use crate::common::{for_threads, group};
 
 fn axes<T: Real>(criterion: &mut Criterion) {
     let mut group = group(criterion, "normals");
@@ -46,4 +45,3 @@ criterion_group!(
     areas::<f32>,
     areas::<f64>
 );
-criterion_main!(benches);

@@ -1,12 +1,11 @@
-//! The distance at every cell center over grid size, number type and threads: full, and in a band.
+//! The distance at every cell center against grid size, number type and threads: full, and in a band.
 
-mod common;
-
-use common::{for_threads, group};
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, criterion_group};
 use isograd::distance::{Band, Scratch, lattice};
 use isograd::{Mesh, Real, isosurface};
 use isograd_benches::{CELLS, torus};
+
+use crate::common::{for_threads, group};
 
 fn measure<T: Real>(criterion: &mut Criterion) {
     for (name, band) in [
@@ -42,4 +41,3 @@ fn measure<T: Real>(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, measure::<f32>, measure::<f64>);
-criterion_main!(benches);

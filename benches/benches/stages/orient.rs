@@ -1,14 +1,13 @@
-//! The signs of the normals over number of points, for each method, number type and threads; axes and
+//! The signs of the normals against number of points, for each method, number type and threads; axes and
 //! neighbors are found before.
 
-mod common;
-
-use common::{for_threads, group};
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, criterion_group};
 use isograd::neighbors::{self, Neighborhoods, Radius};
 use isograd::orient::{self, Method};
 use isograd::{Real, normals};
 use isograd_benches::{POINTS, torus};
+
+use crate::common::{for_threads, group};
 
 fn sign<T: Real>(criterion: &mut Criterion) {
     let methods = [
@@ -41,4 +40,3 @@ fn sign<T: Real>(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, sign::<f32>, sign::<f64>);
-criterion_main!(benches);

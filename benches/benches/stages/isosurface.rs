@@ -1,11 +1,10 @@
-//! Marching cubes of a torus over grid size, number type and threads.
+//! Marching cubes of a torus against grid size, number type and threads.
 
-mod common;
-
-use common::{for_threads, group};
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, criterion_group};
 use isograd::{Mesh, Real, isosurface};
 use isograd_benches::{CELLS, torus};
+
+use crate::common::{for_threads, group};
 
 fn extract<T: Real>(criterion: &mut Criterion) {
     let mut group = group(criterion, "isosurface");
@@ -19,4 +18,3 @@ fn extract<T: Real>(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, extract::<f32>, extract::<f64>);
-criterion_main!(benches);

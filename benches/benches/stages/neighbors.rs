@@ -1,12 +1,11 @@
-//! The tree and the radii over number of points, number type and threads.
+//! The tree and the radii against number of points, number type and threads.
 
-mod common;
-
-use common::{for_threads, group};
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, criterion_group};
 use isograd::Real;
 use isograd::neighbors::{self, Neighborhoods, Radius};
 use isograd_benches::{POINTS, torus};
+
+use crate::common::{for_threads, group};
 
 fn find<T: Real>(criterion: &mut Criterion) {
     let mut group = group(criterion, "neighbors");
@@ -20,4 +19,3 @@ fn find<T: Real>(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, find::<f32>, find::<f64>);
-criterion_main!(benches);
