@@ -239,8 +239,7 @@ def draw(data: dict, images) -> None:
     results = Results(data)
     draw_convergence(results, images / "accuracy-convergence.png")
     draw_weights(results, images / "accuracy-weights.png")
-    if "histograms" in data:
-        draw_gradient(results, images / "accuracy-gradient.png")
+    draw_gradient(results, images / "accuracy-gradient.png")
 
 
 def draw_convergence(results: Results, path) -> None:

@@ -16,9 +16,6 @@ pub struct Json(Vec<String>);
 
 impl Json {
     /// Adds `"name": [rows]`.
-    ///
-    /// # Errors
-    /// Rows that cannot be serialized.
     pub fn with<V: Serialize>(mut self, name: &str, rows: &[V]) -> Outcome<Self> {
         let lines: Result<Vec<_>, _> = rows.iter().map(serde_json::to_string).collect();
         self.0

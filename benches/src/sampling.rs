@@ -91,9 +91,6 @@ pub struct Sampled {
 
 impl Body {
     /// Draws the samples and centers the grid on them.
-    ///
-    /// # Errors
-    /// An unknown shape, or an invalid grid.
     pub fn sample(&self, draw: Draw) -> Outcome<Sampled> {
         let shape = by_name(self.name)?;
         let samples = shape.sample(self.samples, &draw.sampling(), SEED)?;
@@ -108,9 +105,6 @@ impl Body {
 }
 
 /// Grid of the given shape around a bounding box, whose center it shares, with cells as small as [`AIR`] allows.
-///
-/// # Errors
-/// An invalid grid.
 pub fn centered_grid<T: Real>(
     (low, high): ([f64; 3], [f64; 3]),
     shape: [usize; 3],
@@ -123,18 +117,12 @@ pub fn centered_grid<T: Real>(
 }
 
 /// The grid in another number type.
-///
-/// # Errors
-/// Cells too small for the type.
 pub fn convert_grid<S: Real, T: Real>(grid: &Grid<S>) -> Outcome<Grid<T>> {
     let lower = vector::of_f64(vector::to_f64(grid.lower()));
     Ok(Grid::new(lower, T::of(grid.spacing().f64()), grid.shape())?)
 }
 
 /// The cloud in another number type, with its normals.
-///
-/// # Errors
-/// Values that are not finite in that type.
 pub fn convert<T: Real>(cloud: &PointCloud<f64>) -> Outcome<PointCloud<T>> {
     let points = points_only(cloud.points())?;
     Ok(match cloud.normals() {
@@ -146,9 +134,6 @@ pub fn convert<T: Real>(cloud: &PointCloud<f64>) -> Outcome<PointCloud<T>> {
 }
 
 /// A cloud without normals, in another number type.
-///
-/// # Errors
-/// Points that are not finite in that type.
 pub fn points_only<T: Real>(points: &[[f64; 3]]) -> Outcome<PointCloud<T>> {
     let points = points.iter().map(|&x| vector::of_f64(x)).collect();
     Ok(PointCloud::new(points)?)

@@ -84,9 +84,6 @@ impl Size {
 
 impl Problem {
     /// Solves it once to allocate, and `repeats` times more.
-    ///
-    /// # Errors
-    /// Errors of the pipeline.
     pub fn measure(&self, repeats: usize) -> Outcome<Size> {
         let cloud = self.cloud()?;
         let grid = self.grid(&cloud)?;
@@ -134,9 +131,6 @@ impl Problem {
 }
 
 /// Measures everything, with progress on stderr, and returns it as JSON.
-///
-/// # Errors
-/// Errors of the pipeline, or a program that does not count its memory.
 pub fn run() -> Outcome<String> {
     if PeakAlloc.peak_usage() == 0 {
         return Err("this program does not count its memory".into());

@@ -28,9 +28,6 @@ pub struct Passes {
 impl Passes {
     /// Reconstructs and pulls back in turn, so that other load on the machine affects both alike. The first pass, which
     /// allocates, is not timed. The cotangent is that of `Σ φ²/2`: nonzero at every cell.
-    ///
-    /// # Errors
-    /// Errors of the pipeline.
     pub fn measure<T: Real>(
         plan: &mut Reconstructor<T>,
         cloud: &PointCloud<T>,

@@ -20,9 +20,6 @@ pub struct Exact {
 
 impl Exact {
     /// Distance to `shape`, for the cells within `band` cells of its surface.
-    ///
-    /// # Errors
-    /// A shape without a known distance.
     pub fn new(shape: &Shape, grid: Grid<f64>, band: f64) -> Outcome<Self> {
         let origin = [0.0; 3];
         if shape.distance(origin).is_none() {
@@ -55,9 +52,6 @@ impl Exact {
     }
 
     /// Marching cubes of the exact distance: the error that remains if φ is exact at every cell center.
-    ///
-    /// # Errors
-    /// A body that no cell center lies in.
     pub fn mesh(&self) -> Outcome<Mesh<f64>> {
         let mut mesh = Mesh::default();
         isosurface::forward(

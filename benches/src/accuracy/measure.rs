@@ -91,9 +91,6 @@ pub struct Measured {
 }
 
 /// Reconstructs one case and measures its errors. `cloud` has the exact normals.
-///
-/// # Errors
-/// Errors of the pipeline.
 pub fn measure<T: Real>(
     case: &Case,
     shape: &Shape,

@@ -230,9 +230,6 @@ impl Study {
     }
 
     /// Measures all cases, with progress on stderr.
-    ///
-    /// # Errors
-    /// The first case that fails.
     pub fn run(&self) -> Outcome<Results> {
         let mut results = Results {
             rows: Vec::new(),
@@ -321,9 +318,6 @@ impl Bench {
 
 impl Results {
     /// The results as JSON.
-    ///
-    /// # Errors
-    /// A default case that was not measured.
     pub fn json(&self, study: &Study) -> Outcome<String> {
         let (mut bodies, mut histograms) = (Vec::new(), Vec::new());
         let cells = study.middle_cells();
@@ -351,9 +345,6 @@ impl Results {
     }
 
     /// Errors of a case.
-    ///
-    /// # Errors
-    /// A case that is not part of the study.
     fn row(&self, case: &Case) -> Outcome<&Measured> {
         let row = self.rows.iter().find(|row| row.case == *case);
         Ok(&row

@@ -44,9 +44,6 @@ pub struct Results {
 }
 
 /// Measures time and memory, with progress on stderr.
-///
-/// # Errors
-/// Errors of the pipeline.
 pub fn time_and_memory<R: Runtime>(device: &Device<R>, backend: &'static str) -> Outcome<Results> {
     let torus = |samples, n| Body {
         name: "torus",
@@ -67,9 +64,6 @@ pub fn time_and_memory<R: Runtime>(device: &Device<R>, backend: &'static str) ->
 }
 
 /// Measures the memory, kernels and waits of the paper's fish, which hardly depend on the device.
-///
-/// # Errors
-/// Errors of the pipeline.
 pub fn memory<R: Runtime>(device: &Device<R>) -> Outcome<Results> {
     Ok(Results {
         device: device.name().into(),

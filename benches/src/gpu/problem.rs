@@ -75,9 +75,6 @@ struct Loaded<R: Runtime> {
 
 /// Solves a problem once, which builds kernels and allocates memory, and then `repeats` times. Without repeats, only memory
 /// is measured.
-///
-/// # Errors
-/// Errors of the pipeline.
 pub fn measure<R: Runtime>(body: &Body, device: &Device<R>, repeats: usize) -> Outcome<Size> {
     let Body {
         name,

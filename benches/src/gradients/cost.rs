@@ -51,9 +51,6 @@ pub struct Memory {
 }
 
 /// Measures a body in both number types, with each number of threads.
-///
-/// # Errors
-/// Errors of the pipeline.
 pub fn measure(
     body: &Body,
     sampled: &Sampled,

@@ -61,9 +61,6 @@ impl Study {
     }
 
     /// Measures everything, with progress on stderr.
-    ///
-    /// # Errors
-    /// The first case that fails.
     pub fn run(&self) -> Outcome<Results> {
         let mut spheres = Vec::new();
         for &draw in &self.draws {
@@ -96,9 +93,6 @@ impl Study {
 
 impl Results {
     /// The results as JSON.
-    ///
-    /// # Errors
-    /// Numbers that cannot be serialized.
     pub fn json(&self) -> Outcome<String> {
         let json = Json::default().with("parameters", &self.parameters.rows)?;
         let setting = std::slice::from_ref(&self.parameters.setting);

@@ -70,9 +70,6 @@ impl Motion {
     }
 
     /// The cloud after a motion of `step`, with its normals.
-    ///
-    /// # Errors
-    /// A cloud without normals.
     pub fn moved(
         self,
         frame: &Frame,
@@ -111,9 +108,6 @@ impl Frame {
     }
 
     /// Frame of a cloud.
-    ///
-    /// # Errors
-    /// A cloud without points.
     pub fn of(cloud: &PointCloud<f64>) -> Outcome<Self> {
         let (low, high) = cloud.bounds().ok_or("a cloud without points")?;
         let middle = scale(add(low, high), 0.5);

@@ -94,9 +94,6 @@ impl Row {
 }
 
 /// `L = Σ_o (φ_o − φ̃_o)²` between a fish whose parameters are off and the fish of the same samples.
-///
-/// # Errors
-/// What the pipeline says.
 pub fn measure(body: &Body, draw: Draw) -> Outcome<Parameters> {
     let sampled = body.sample(draw)?;
     let names = varied(&sampled.shape);

@@ -115,9 +115,6 @@ impl Ratio {
 }
 
 /// Measures a body with every choice of options, motion and functional.
-///
-/// # Errors
-/// Errors of the pipeline.
 pub fn measure(body: &Body, sampled: &Sampled, draw: Draw) -> Outcome<Vec<Ratio>> {
     let frame = Frame::of(&sampled.cloud)?;
     let mut ratios = Vec::new();

@@ -28,9 +28,6 @@ pub struct Sphere {
 }
 
 /// Measures a sphere whose points move along their exact normals.
-///
-/// # Errors
-/// Errors of the pipeline.
 pub fn measure(cells: usize, samples: usize, draw: Draw) -> Outcome<Sphere> {
     let body = Body {
         name: "sphere",

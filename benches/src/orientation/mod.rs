@@ -65,9 +65,6 @@ pub struct Step {
 
 /// Measures everything, with progress on stderr, and returns it as JSON. Samples with their signs, for the picture of
 /// the page, are written to the folder `pictures`.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn run(pictures: &Path) -> Outcome<String> {
     let mut rows: Vec<Row> = clouds().iter().map(row).collect();
     let median = crate::statistics::median(rows.iter().map(|row| row.time).collect());
