@@ -101,7 +101,7 @@ def draw_cloud(panel, samples: np.ndarray) -> None:
     samples = samples[samples[:, 3:6] @ toward > 0]
     points, signs = samples[:, :3], samples[:, 6]
     for sign, (name, color, size) in enumerate(
-        [("right", "#b4bfca", 0.5), ("doubtful", "#eda81f", 1.5), ("wrong", "#cc1a29", 1.5)]
+        [("right", "#a9b6c3", 0.8), ("doubtful", "#eda81f", 1.5), ("wrong", "#cc1a29", 1.5)]
     ):
         shown = points[signs == sign]
         panel.scatter(shown @ right, shown @ up, s=size, c=color, linewidths=0, label=name, rasterized=True)
