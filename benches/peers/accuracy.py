@@ -63,8 +63,8 @@ def clouds(options, folder: Path) -> None:
         mesh = o3d.io.read_triangle_mesh(str(truth))
         body = np.asarray(mesh.vertices), np.asarray(mesh.triangles)
         spacing = SCALE * np.ptp(points, axis=0).max() / 2**options.depth
-        for name, made in surfaces(options, folder, points, normals, spacing, options.depth):
-            there = [distances(body, random_places(*made)), distances(made, random_places(*body))]
+        for name, surface in surfaces(options, folder, points, normals, spacing, options.depth):
+            there = [distances(body, random_places(*surface)), distances(surface, random_places(*body))]
             shown = [f"{np.mean(d) / spacing:.4f}, {np.quantile(d, 0.99) / spacing:.3f}" for d in there]
             print(f"{path.name.removesuffix('.points.ply'):12} {name:8} precision {shown[0]}   completeness {shown[1]}", flush=True)
 

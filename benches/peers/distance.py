@@ -96,10 +96,10 @@ def band(stack, program, folder, cells: int, threads: int) -> Case | None:
 
 def has_openvdb(python: str) -> bool:
     try:
-        found = subprocess.run([python, "-c", "import pyopenvdb"], capture_output=True)
+        result = subprocess.run([python, "-c", "import pyopenvdb"], capture_output=True)
     except OSError:
         return False
-    return found.returncode == 0
+    return result.returncode == 0
 
 
 def agreement(entry, exact: np.ndarray, spacing: float) -> str:

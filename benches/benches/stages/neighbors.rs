@@ -11,9 +11,9 @@ fn find<T: Real>(criterion: &mut Criterion) {
     let mut group = group(criterion, "neighbors");
     for count in POINTS {
         let (points, _) = torus::samples::<T>(count);
-        let mut found = Neighborhoods::default();
+        let mut neighborhoods = Neighborhoods::default();
         for_threads::<T>(&mut group, count, "points", || {
-            neighbors::forward(&points, Radius::Auto, &mut found).expect("enough points");
+            neighbors::forward(&points, Radius::Auto, &mut neighborhoods).expect("enough points");
         });
     }
 }

@@ -1,5 +1,5 @@
-//! D-PCA axes and area weights against number of points, number type and threads; the neighbors are found
-//! before.
+//! D-PCA axes and area weights against number of points, number type and threads; the neighborhoods are
+//! given.
 
 use criterion::{Criterion, criterion_group};
 use isograd::neighbors::{self, Neighborhoods, Radius};
@@ -33,9 +33,9 @@ fn areas<T: Real>(criterion: &mut Criterion) {
 
 fn neighborhoods<T: Real>(count: usize) -> Neighborhoods<T> {
     let (points, _) = torus::samples(count);
-    let mut found = Neighborhoods::default();
-    neighbors::forward(&points, Radius::Auto, &mut found).expect("enough points");
-    found
+    let mut neighborhoods = Neighborhoods::default();
+    neighbors::forward(&points, Radius::Auto, &mut neighborhoods).expect("enough points");
+    neighborhoods
 }
 
 criterion_group!(

@@ -1,5 +1,5 @@
 //! The signs of the normals against number of points, for each method, number type and threads; axes and
-//! neighbors are found before.
+//! neighborhoods are given.
 
 use criterion::{Criterion, criterion_group};
 use isograd::neighbors::{self, Neighborhoods, Radius};

@@ -11,7 +11,7 @@ use crate::sampling::Draw;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Normals {
-    /// Those of the body, in closed form.
+    /// Exact normals of the body.
     Exact,
     /// D-PCA, oriented by the default method.
     Estimated,

@@ -78,10 +78,10 @@ fn fill(
     let radius = half * grid.spacing() * 3f64.sqrt();
     for j in (0..ny).step_by(BLOCK) {
         for k in (0..nz).step_by(BLOCK) {
-            let middle = grid.from_index([first, j, k].map(|o| o as f64 + half));
-            let there = distance(middle);
+            let center = grid.from_index([first, j, k].map(|o| o as f64 + half));
+            let at_center = distance(center);
             // Outside the band, only the sign is used.
-            let searched = there.abs() < reach + radius;
+            let searched = at_center.abs() < reach + radius;
             for i in 0..planes {
                 for j in j..(j + BLOCK).min(ny) {
                     for k in k..(k + BLOCK).min(nz) {
@@ -89,7 +89,7 @@ fn fill(
                         values[(i * ny + j) * nz + k] = if searched {
                             distance(grid.center(cell))
                         } else {
-                            there
+                            at_center
                         };
                     }
                 }

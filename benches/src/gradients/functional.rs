@@ -1,12 +1,12 @@
 //! Smooth functionals of φ, and their derivatives in φ.
 
-use isograd::{Field, Grid};
+use isograd::Field;
 use serde::Serialize;
+
+use super::motion::Frame;
 
 /// Half width of the layer around the surface in which the functionals vary, in cells.
 pub const LAYER: f64 = 4.0;
-/// Change of the weight over half the body, along each axis.
-const SLOPE: [f64; 3] = [0.5, 0.4, 0.3];
 
 /// `F = h³ Σ_o w(x_o) g(φ_o/h)`.
 ///
@@ -45,41 +45,25 @@ impl Functional {
     }
 
     /// `F`.
-    pub fn of(self, weight: &Weight, phi: &Field<f64>) -> f64 {
+    pub fn of(self, frame: &Frame, phi: &Field<f64>) -> f64 {
         let (grid, h) = (phi.grid(), phi.grid().spacing());
-        let term = |(cell, &phi): (usize, &f64)| weight.at(grid, cell) * self.value(phi / h);
+        let term = |(cell, &phi): (usize, &f64)| frame.weight(grid, cell) * self.value(phi / h);
         h.powi(3) * phi.values().iter().enumerate().map(term).sum::<f64>()
     }
 
     /// `∂F/∂φ` at every cell.
-    pub fn cotangent(self, weight: &Weight, phi: &Field<f64>) -> Vec<f64> {
+    pub fn cotangent(self, frame: &Frame, phi: &Field<f64>) -> Vec<f64> {
         let (grid, h) = (phi.grid(), phi.grid().spacing());
         let term =
-            |(cell, &phi): (usize, &f64)| h * h * weight.at(grid, cell) * self.slope(phi / h);
+            |(cell, &phi): (usize, &f64)| h * h * frame.weight(grid, cell) * self.slope(phi / h);
         phi.values().iter().enumerate().map(term).collect()
-    }
-}
-
-/// `w(x) = 1 + Σ slope_a (x_a − middle_a)/half_a`, with half the extent of the body along each axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Weight {
-    /// Middle of the bounding box.
-    pub middle: [f64; 3],
-    /// Half its extent.
-    pub half: [f64; 3],
-}
-
-impl Weight {
-    fn at(&self, grid: &Grid<f64>, cell: usize) -> f64 {
-        let x = grid.center(grid.cell(cell));
-        let along = |a: usize| SLOPE[a] * (x[a] - self.middle[a]) / self.half[a];
-        1.0 + (0..3).map(along).sum::<f64>()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use isograd::Grid;
 
     #[test]
     fn slopes_agree_with_differences_of_the_values() {
@@ -101,19 +85,24 @@ mod tests {
             let [x, y, z] = grid.center(grid.cell(cell));
             phi.values_mut()[cell] = x.hypot(y).hypot(z) - 0.6;
         }
-        let weight = Weight {
-            middle: [0.0; 3],
+        let frame = Frame {
+            center: [0.0; 3],
             half: [0.6; 3],
+            reach: 0.6,
+            bending: 2,
         };
         // A ball whose radius is distributed as the slope of the step, whose variance is a seventh of the layer's.
         let variance = (LAYER * grid.spacing()).powi(2) / 7.0;
         let ball = 4.0 / 3.0 * std::f64::consts::PI;
         let volume = ball * 0.6 * (0.36 + 3.0 * variance);
-        let found = Functional::Volume.of(&weight, &phi);
+        let computed = Functional::Volume.of(&frame, &phi);
         // For a function this smooth, sums over cells converge faster than the square of the cell.
-        assert!((found / volume - 1.0).abs() < 1e-3, "{found} {volume}");
+        assert!(
+            (computed / volume - 1.0).abs() < 1e-3,
+            "{computed} {volume}"
+        );
         // Lowering φ everywhere by a length moves the surface outward by that length.
-        let slope: f64 = Functional::Volume.cotangent(&weight, &phi).iter().sum();
+        let slope: f64 = Functional::Volume.cotangent(&frame, &phi).iter().sum();
         let area = 3.0 * ball * (0.36 + variance);
         assert!((-slope / area - 1.0).abs() < 1e-3, "{slope} {area}");
     }

@@ -1,11 +1,13 @@
 //! Motions of a cloud; the fastest point has unit speed.
 
-use isograd::PointCloud;
+use isograd::{Grid, PointCloud};
 use isograd_element::vector::{add, dot, norm, normalized, scale, sub};
 use serde::Serialize;
 
-use super::functional::Weight;
 use crate::output::Outcome;
+
+/// Change of the weight over half the body, along each axis.
+const SLOPE: [f64; 3] = [0.5, 0.4, 0.3];
 
 /// A smooth motion of all samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -35,7 +37,7 @@ impl Motion {
 
     /// Velocity of a point with normal `n`.
     pub fn velocity(self, frame: &Frame, x: [f64; 3], n: [f64; 3]) -> [f64; 3] {
-        let from = sub(x, frame.middle);
+        let from = sub(x, frame.center);
         match self {
             Self::Along => [1.0, 0.0, 0.0],
             Self::Oblique => scale([3.0, 2.0, 1.0], 1.0 / 14f64.sqrt()),
@@ -62,7 +64,7 @@ impl Motion {
     fn turning_unbound(self, frame: &Frame, x: [f64; 3], n: [f64; 3]) -> [f64; 3] {
         match self {
             Self::Bending => {
-                let slope = 2.0 * (x[0] - frame.middle[0]) / frame.half[0].powi(2);
+                let slope = 2.0 * (x[0] - frame.center[0]) / frame.half[0].powi(2);
                 [-slope * dot(frame.aside(), n), 0.0, 0.0]
             }
             _ => [0.0; 3],
@@ -89,7 +91,7 @@ impl Motion {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
     /// Center of the bounding box.
-    pub middle: [f64; 3],
+    pub center: [f64; 3],
     /// Half its extent.
     pub half: [f64; 3],
     /// Largest distance of a point from the center.
@@ -99,22 +101,21 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Weight of positions in the functionals.
-    pub fn weight(&self) -> Weight {
-        Weight {
-            middle: self.middle,
-            half: self.half,
-        }
+    /// Weight of a cell in the functionals: `w(x) = 1 + Σ slope_a (x_a − center_a)/half_a`.
+    pub fn weight(&self, grid: &Grid<f64>, cell: usize) -> f64 {
+        let x = grid.center(grid.cell(cell));
+        let along = |a: usize| SLOPE[a] * (x[a] - self.center[a]) / self.half[a];
+        1.0 + (0..3).map(along).sum::<f64>()
     }
 
     /// Frame of a cloud.
     pub fn of(cloud: &PointCloud<f64>) -> Outcome<Self> {
         let (low, high) = cloud.bounds().ok_or("a cloud without points")?;
-        let middle = scale(add(low, high), 0.5);
+        let center = scale(add(low, high), 0.5);
         let extent = sub(high, low);
-        let distance = |&x: &[f64; 3]| norm(sub(x, middle));
+        let distance = |&x: &[f64; 3]| norm(sub(x, center));
         Ok(Self {
-            middle,
+            center,
             half: scale(extent, 0.5),
             reach: cloud.points().iter().map(distance).fold(0.0, f64::max),
             bending: if extent[1] < extent[2] { 1 } else { 2 },
@@ -132,7 +133,7 @@ mod tests {
     use isograd_element::vector::cross;
 
     const FRAME: Frame = Frame {
-        middle: [0.1, 0.2, 0.3],
+        center: [0.1, 0.2, 0.3],
         half: [0.7, 0.6, 0.5],
         reach: 0.9,
         bending: 2,

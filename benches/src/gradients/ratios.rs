@@ -162,9 +162,8 @@ fn local(
     let pairs = exact.points().iter();
     let pairs = || pairs.clone().zip(exact.normals().unwrap_or_default());
     let mut slopes = [Slopes::default(); Motion::ALL.len()];
-    let weight = frame.weight();
     for (k, functional) in Functional::ALL.into_iter().enumerate() {
-        let bar = functional.cotangent(&weight, base.sdf());
+        let bar = functional.cotangent(frame, base.sdf());
         let cotangent = Cotangent {
             sdf: Some(&bar),
             ..Cotangent::default()
@@ -192,10 +191,10 @@ fn path(
     sampled: &Sampled,
     frame: &Frame,
     place: usize,
-    middle: Slopes,
+    center: Slopes,
 ) -> Outcome<Slopes> {
     const SIMPSON: [(f64, f64); 4] = [(-0.5, 1.0), (-0.25, 4.0), (0.25, 4.0), (0.5, 1.0)];
-    let mut sum = middle.map(|slope| 2.0 * slope);
+    let mut sum = center.map(|slope| 2.0 * slope);
     for (cells, weight) in SIMPSON {
         let step = cells * sampled.grid.spacing();
         let moved = choice.given(Motion::ALL[place].moved(frame, &sampled.cloud, step)?)?;
@@ -243,9 +242,8 @@ struct End {
 
 impl End {
     fn of(result: &Reconstruction<f64>, frame: &Frame) -> Self {
-        let weight = frame.weight();
         Self {
-            values: Functional::ALL.map(|functional| functional.of(&weight, result.sdf())),
+            values: Functional::ALL.map(|functional| functional.of(frame, result.sdf())),
             normals: result.normals().to_vec(),
             counts: result.neighbor_counts().to_vec(),
         }

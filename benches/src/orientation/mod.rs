@@ -134,7 +134,7 @@ fn swim() -> Vec<Step> {
     fish.set("amplitude", 0.12).expect("in range");
     let period = fish.get("period").expect("a parameter");
     let samples = fish.sample::<f64>(SWIMMER, &RANDOM, 3).expect("samples");
-    let (mut plan, mut anew) = (orient::Scratch::default(), orient::Scratch::default());
+    let (mut plan, mut auto_scratch) = (orient::Scratch::default(), orient::Scratch::default());
     let mut steps = Vec::new();
     for step in 0..=STEPS {
         let time = period * step as f64 / STEPS as f64;
@@ -144,7 +144,7 @@ fn swim() -> Vec<Step> {
         let prepared = Prepared::new(&points);
         let known = || Known::from(None);
         let (out, seconds) = prepared.orient(known(), &Method::Previous, &mut plan);
-        let (_, whole) = prepared.orient(known(), &Method::Auto, &mut anew);
+        let (_, auto) = prepared.orient(known(), &Method::Auto, &mut auto_scratch);
         let cosines = out.normals.iter().zip(&truth);
         let cosines = cosines.map(|(&n, &t)| vector::dot(vector::to_f64(n), t));
         let evaluated: Vec<f64> = cosines.filter(|c: &f64| c.abs() > 0.5).collect();
@@ -156,7 +156,7 @@ fn swim() -> Vec<Step> {
                 _ => 0,
             },
             follows: matches!(out.method, MethodUsed::Previous { .. }),
-            time: seconds / whole,
+            time: seconds / auto,
         });
     }
     steps

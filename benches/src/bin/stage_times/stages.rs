@@ -89,8 +89,9 @@ impl<T: Real + Number> Isosurface<T> {
 
 impl<T: Real + Number> Stage for Isosurface<T> {
     fn run(&mut self) -> Result<(), String> {
-        let made = isosurface::forward(&self.chi, T::zero(), &mut self.scratch, &mut self.mesh);
-        made.map(drop).map_err(|error| error.to_string())
+        let extracted =
+            isosurface::forward(&self.chi, T::zero(), &mut self.scratch, &mut self.mesh);
+        extracted.map(drop).map_err(|error| error.to_string())
     }
 
     fn save(&self, folder: &Folder) -> Outcome {
@@ -166,10 +167,10 @@ impl<T: Real + Number> Whole<T> {
 
 impl<T: Real + Number> Stage for Whole<T> {
     fn run(&mut self) -> Result<(), String> {
-        let made = self.plan.reconstruct(&self.cloud);
-        let made = made.map_err(|error| error.to_string())?;
+        let result = self.plan.reconstruct(&self.cloud);
+        let result = result.map_err(|error| error.to_string())?;
         self.phi.clear();
-        self.phi.extend_from_slice(made.sdf().values());
+        self.phi.extend_from_slice(result.sdf().values());
         Ok(())
     }
 
