@@ -2,9 +2,7 @@
 
 use std::time::Instant;
 
-use isograd::{
-    CloudCotangent, Cotangent, PointCloud, PullbackScratch, Real, Reconstructor, Seconds, Stage,
-};
+use isograd::{CloudCotangent, Cotangent, Pipeline, PointCloud, Reconstructor, Seconds, Stage};
 use peak_alloc::PeakAlloc;
 
 use crate::output::Outcome;
@@ -28,13 +26,13 @@ pub struct Passes {
 impl Passes {
     /// Reconstructs and pulls back in turn, so that other load on the machine affects both alike. The first pass, which
     /// allocates, is not timed. The cotangent is that of `Σ φ²/2`: nonzero at every cell.
-    pub fn measure<T: Real>(
+    pub fn measure<T: Pipeline>(
         plan: &mut Reconstructor<T>,
         cloud: &PointCloud<T>,
         repeats: usize,
     ) -> Outcome<Self> {
         let memory = PeakAlloc;
-        let (mut scratch, mut out) = (PullbackScratch::default(), CloudCotangent::default());
+        let mut out = CloudCotangent::default();
         let mut passes = Self::default();
         memory.reset_peak_usage();
         for repeat in 0..=repeats {
@@ -50,7 +48,7 @@ impl Passes {
             let (peak, before) = (memory.peak_usage(), memory.current_usage());
             memory.reset_peak_usage();
             let start = Instant::now();
-            result.pullback_into(cloud, &cotangent, &mut scratch, &mut out)?;
+            result.pullback_into(&cotangent, &mut out)?;
             let backward = start.elapsed().as_secs_f64();
             let taken = memory.peak_usage().saturating_sub(before);
             if repeat == 0 {

@@ -3,14 +3,12 @@
 
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, criterion_group};
-use isograd::{
-    CloudCotangent, Cotangent, Options, PointCloud, PullbackScratch, Real, Reconstructor,
-};
+use isograd::{CloudCotangent, Cotangent, Options, Pipeline, PointCloud, Reconstructor};
 use isograd_benches::{CELLS, POINTS, torus};
 
 use crate::common::{for_threads, group};
 
-fn over_cells<T: Real>(criterion: &mut Criterion) {
+fn over_cells<T: Pipeline>(criterion: &mut Criterion) {
     let mut group = group(criterion, "pipeline-cells");
     for cells in CELLS {
         let (cloud, mut plan) = setting::<T>(50_000, cells);
@@ -20,7 +18,7 @@ fn over_cells<T: Real>(criterion: &mut Criterion) {
     }
 }
 
-fn over_points<T: Real>(criterion: &mut Criterion) {
+fn over_points<T: Pipeline>(criterion: &mut Criterion) {
     let mut group = group(criterion, "pipeline-points");
     for count in POINTS {
         let (cloud, mut plan) = setting::<T>(count, 128);
@@ -30,14 +28,14 @@ fn over_points<T: Real>(criterion: &mut Criterion) {
     }
 }
 
-fn pullback_over_cells<T: Real>(criterion: &mut Criterion) {
+fn pullback_over_cells<T: Pipeline>(criterion: &mut Criterion) {
     let mut group = group(criterion, "pipeline-pullback-cells");
     for cells in CELLS {
         pull::<T>(&mut group, cells.pow(3), "cells", setting(50_000, cells));
     }
 }
 
-fn pullback_over_points<T: Real>(criterion: &mut Criterion) {
+fn pullback_over_points<T: Pipeline>(criterion: &mut Criterion) {
     let mut group = group(criterion, "pipeline-pullback-points");
     for count in POINTS {
         pull::<T>(&mut group, count, "points", setting(count, 128));
@@ -45,7 +43,7 @@ fn pullback_over_points<T: Real>(criterion: &mut Criterion) {
 }
 
 /// The pullback of `Σ φ²/2`, every cell of φ.
-fn pull<T: Real>(
+fn pull<T: Pipeline>(
     group: &mut BenchmarkGroup<'_, WallTime>,
     size: usize,
     unit: &str,
@@ -56,15 +54,15 @@ fn pull<T: Real>(
         sdf: Some(result.sdf().values()),
         ..Cotangent::default()
     };
-    let (mut scratch, mut out) = (PullbackScratch::default(), CloudCotangent::default());
+    let mut out = CloudCotangent::default();
     for_threads::<T>(group, size, unit, || {
         result
-            .pullback_into(&cloud, &cotangent, &mut scratch, &mut out)
+            .pullback_into(&cotangent, &mut out)
             .expect("the same cloud");
     });
 }
 
-fn setting<T: Real>(count: usize, cells: usize) -> (PointCloud<T>, Reconstructor<T>) {
+fn setting<T: Pipeline>(count: usize, cells: usize) -> (PointCloud<T>, Reconstructor<T>) {
     let (points, _) = torus::samples(count);
     let cloud = PointCloud::new(points).expect("finite points");
     let plan = Reconstructor::new(torus::grid(cells), Options::default());

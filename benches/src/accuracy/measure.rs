@@ -2,7 +2,7 @@
 
 use isograd::differential::{self, Bins, Differential, EikonalOptions, eikonal};
 use isograd::isosurface::Measures;
-use isograd::{Field, Mesh, PointCloud, Real, Reconstruction, Reconstructor};
+use isograd::{Field, Mesh, Pipeline, PointCloud, Reconstruction, Reconstructor};
 use isograd_element::vector;
 use isograd_shapes::Shape;
 use serde::Serialize;
@@ -91,7 +91,7 @@ pub struct Measured {
 }
 
 /// Reconstructs one case and measures its errors. `cloud` has the exact normals.
-pub fn measure<T: Real>(
+pub fn measure<T: Pipeline>(
     case: &Case,
     shape: &Shape,
     exact: &Exact,
@@ -119,7 +119,7 @@ pub fn measure<T: Real>(
 }
 
 /// Errors of a mesh that approximates the surface of `shape`.
-pub fn surface_errors<T: Real>(mesh: &Mesh<T>, shape: &Shape, cell: f64) -> Surface {
+pub fn surface_errors<T: Pipeline>(mesh: &Mesh<T>, shape: &Shape, cell: f64) -> Surface {
     let distance = |x: [f64; 3]| shape.distance(x).unwrap_or(f64::NAN) / cell;
     let vertices = mesh.vertices();
     let centroid = |face: usize| {
@@ -137,7 +137,7 @@ pub fn surface_errors<T: Real>(mesh: &Mesh<T>, shape: &Shape, cell: f64) -> Surf
     }
 }
 
-fn normal_errors<T: Real>(estimated: &[[T; 3]], truth: &[[T; 3]]) -> NormalErrors {
+fn normal_errors<T: Pipeline>(estimated: &[[T; 3]], truth: &[[T; 3]]) -> NormalErrors {
     let along = |i: usize| vector::dot(estimated[i], truth[i]);
     let wrong = (0..truth.len()).filter(|&i| along(i) < T::zero()).count();
     let axis = |i: usize| {
@@ -150,14 +150,14 @@ fn normal_errors<T: Real>(estimated: &[[T; 3]], truth: &[[T; 3]]) -> NormalError
     }
 }
 
-fn band_errors<T: Real>(phi: &Field<T>, exact: &Exact) -> Spread {
+fn band_errors<T: Pipeline>(phi: &Field<T>, exact: &Exact) -> Spread {
     let (near, cell) = (exact.near(), phi.grid().spacing().f64());
     Spread::of(near.len(), |i| {
         (phi.values()[near[i]].f64() - exact.at(near[i])) / cell
     })
 }
 
-fn field_errors<T: Real>(
+fn field_errors<T: Pipeline>(
     result: &Reconstruction<T>,
     points: &[[T; 3]],
     truth: &[[T; 3]],
@@ -172,7 +172,7 @@ fn field_errors<T: Real>(
 }
 
 /// Samples lie on the exact surface, and their exact normals are `∇φ` there.
-fn gradient_errors<T: Real>(
+fn gradient_errors<T: Pipeline>(
     phi: &Field<T>,
     points: &[[T; 3]],
     truth: &[[T; 3]],
@@ -185,7 +185,7 @@ fn gradient_errors<T: Real>(
 }
 
 /// `|∇φ|` over all cells, and near the surface.
-fn slopes<T: Real>(phi: &Field<T>) -> Outcome<[Slope; 2]> {
+fn slopes<T: Pipeline>(phi: &Field<T>) -> Outcome<[Slope; 2]> {
     let spread = eikonal(
         phi,
         &EikonalOptions {

@@ -8,7 +8,7 @@ mod tests;
 
 use std::collections::HashMap;
 
-use isograd::{Grid, PointCloud, Real, Reconstructor, Resolution};
+use isograd::{Grid, Pipeline, PointCloud, Reconstructor, Resolution};
 use isograd_shapes::{Shape, by_name};
 use serde::Serialize;
 
@@ -300,7 +300,12 @@ impl Bench {
         Ok(())
     }
 
-    fn case<T: Real>(&mut self, case: &Case, exact: &Exact, grid: Grid<T>) -> Outcome<Measured> {
+    fn case<T: Pipeline>(
+        &mut self,
+        case: &Case,
+        exact: &Exact,
+        grid: Grid<T>,
+    ) -> Outcome<Measured> {
         let cloud = convert(self.cloud(case.draw, case.samples)?)?;
         let mut plan = Reconstructor::new(grid, case.options(grid.spacing().f64()))?;
         measure(case, &self.shape, exact, &mut plan, &cloud)

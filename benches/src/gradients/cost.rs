@@ -1,6 +1,6 @@
 //! Seconds and bytes of the pipeline forward and backward.
 
-use isograd::{Options, Real, Reconstructor};
+use isograd::{Options, Pipeline, Reconstructor};
 use serde::Serialize;
 
 use crate::output::Outcome;
@@ -83,7 +83,7 @@ pub fn measure(
     Ok((costs, memory))
 }
 
-fn passes<T: Real>(sampled: &Sampled, repeats: usize) -> Result<Passes, String> {
+fn passes<T: Pipeline>(sampled: &Sampled, repeats: usize) -> Result<Passes, String> {
     let passes = || {
         let cloud = points_only::<T>(sampled.cloud.points())?;
         let options = Options::default().checks(false);

@@ -2,9 +2,7 @@
 
 use std::time::Instant;
 
-use isograd::{
-    CloudCotangent, Cotangent, Field, Options, PullbackScratch, Reconstruction, Reconstructor,
-};
+use isograd::{CloudCotangent, Cotangent, Field, Options, Reconstruction, Reconstructor};
 use isograd_element::vector;
 use isograd_shapes::Shape;
 use serde::Serialize;
@@ -209,7 +207,6 @@ impl<'a> Bench<'a> {
     /// Gradient by the pullback. The first call, which allocates, is not timed.
     fn pull(&self, names: &[&'static str]) -> Outcome<Pulled> {
         let coordinates = &self.sampled.coordinates;
-        let cloud = points_only(&self.start.points_at::<f64>(coordinates)?)?;
         let pairs = self.base.sdf().values().iter().zip(self.target.values());
         let bar: Vec<f64> = pairs.map(|(phi, target)| 2.0 * (phi - target)).collect();
         let cotangent = Cotangent {
@@ -221,13 +218,11 @@ impl<'a> Bench<'a> {
             all.position(|(parameter, _)| parameter.name == name)
         });
         let places: Vec<usize> = places.collect();
-        let mut scratch = PullbackScratch::default();
         let mut out = CloudCotangent::default();
         let (mut pullback, mut chain, mut gradient) = (Vec::new(), Vec::new(), Vec::new());
         for _ in 0..=REPEATS {
             let start = Instant::now();
-            self.base
-                .pullback_into(&cloud, &cotangent, &mut scratch, &mut out)?;
+            self.base.pullback_into(&cotangent, &mut out)?;
             pullback.push(start.elapsed().as_secs_f64());
             let start = Instant::now();
             gradient = self.start.pullback_of(&places, coordinates, &out.points)?;

@@ -122,7 +122,7 @@ pub fn measure(body: &Body, sampled: &Sampled, draw: Draw) -> Outcome<Vec<Ratio>
         eprintln!("{}: {draw} samples, {choice:?}", body.name);
         let mut plan = Reconstructor::new(sampled.grid, choice.options(sampled.grid.spacing()))?;
         let cloud = choice.given(sampled.cloud.clone())?;
-        let local = local(plan.reconstruct(&cloud)?, &cloud, &sampled.cloud, &frame)?;
+        let local = local(plan.reconstruct(&cloud)?, &sampled.cloud, &frame)?;
         for (place, motion) in Motion::ALL.into_iter().enumerate() {
             let pulled = local[place];
             let path = match choice == Choice::ALL[0] {
@@ -155,7 +155,6 @@ type Slopes = [f64; Functional::ALL.len()];
 /// Derivatives for all motions, by one pullback for each functional.
 fn local(
     base: &Reconstruction<f64>,
-    cloud: &PointCloud<f64>,
     exact: &PointCloud<f64>,
     frame: &Frame,
 ) -> Outcome<[Slopes; Motion::ALL.len()]> {
@@ -168,7 +167,7 @@ fn local(
             sdf: Some(&bar),
             ..Cotangent::default()
         };
-        let out = base.pullback(cloud, &cotangent)?;
+        let out = base.pullback(&cotangent)?;
         for (slopes, motion) in slopes.iter_mut().zip(Motion::ALL) {
             let of_points = pairs().zip(&out.points);
             slopes[k] = of_points
@@ -198,7 +197,7 @@ fn path(
     for (cells, weight) in SIMPSON {
         let step = cells * sampled.grid.spacing();
         let moved = choice.given(Motion::ALL[place].moved(frame, &sampled.cloud, step)?)?;
-        let there = local(plan.reconstruct(&moved)?, &moved, &sampled.cloud, frame)?[place];
+        let there = local(plan.reconstruct(&moved)?, &sampled.cloud, frame)?[place];
         sum = std::array::from_fn(|k| sum[k] + weight * there[k]);
     }
     Ok(sum.map(|slope| slope / 12.0))
@@ -269,7 +268,7 @@ mod tests {
                         .expect("options");
                 let cloud = choice.given(sampled.cloud.clone()).expect("points");
                 let base = plan.reconstruct(&cloud).expect("a body");
-                let local = local(base, &cloud, &sampled.cloud, &frame).expect("a pullback");
+                let local = local(base, &sampled.cloud, &frame).expect("a pullback");
                 let ratio = |&motion: &Motion| {
                     let place = Motion::ALL.iter().position(|m| *m == motion);
                     let across = across(&mut plan, choice, &sampled, &frame, motion);

@@ -41,7 +41,7 @@ pub fn measure(cells: usize, samples: usize, draw: Draw) -> Outcome<Sphere> {
     let mut plan = Reconstructor::new(sampled.grid, options)?;
     let result = plan.reconstruct(&cloud)?;
     let grown = |cotangent: &Cotangent<'_, f64>| -> Outcome<f64> {
-        let out = result.pullback(&cloud, cotangent)?;
+        let out = result.pullback(cotangent)?;
         along_normals(&out.points, &sampled)
     };
     let of_mesh = |area: f64, volume: f64| -> Outcome<f64> {

@@ -4,7 +4,7 @@
 use std::any::Any;
 use std::sync::{Mutex, PoisonError};
 
-use isograd::{CloudCotangent, PullbackScratch};
+use isograd::CloudCotangent;
 use pyo3::prelude::*;
 
 use crate::arrays::Number;
@@ -19,8 +19,6 @@ const CAPACITY: usize = 4;
 pub struct Plan<T: Number> {
     /// The plan.
     pub plan: isograd_backend::Plan<T>,
-    /// Scratch buffers of the pullback.
-    pub scratch: PullbackScratch<T>,
     /// Output of the pullback.
     pub bar: CloudCotangent<T>,
 }
@@ -56,7 +54,6 @@ pub fn with_plan<T: Number, R>(
 fn create<T: Number>(settings: &str) -> Result<Plan<T>, Failure> {
     Ok(Plan {
         plan: backend::plan(&Settings::parse(settings)?)?,
-        scratch: PullbackScratch::default(),
         bar: CloudCotangent::default(),
     })
 }

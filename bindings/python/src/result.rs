@@ -69,7 +69,7 @@ impl ReconstructionArrays {
         each!(&self.0, this => {
             let this = this.clone();
             let text = background::run(py, move |_| {
-                let report = JsonReport::new(this.result.view().report(&this.cloud)?);
+                let report = JsonReport::new(this.result.view().report()?);
                 serde_json::to_string(&report).map_err(|e| Failure::Value(e.to_string()))
             })?;
             Ok(text?)
@@ -259,7 +259,7 @@ impl<T: Number> Bars<T> {
             areas: self.areas.as_deref(),
             extensions: &extensions,
         };
-        Ok(this.result.view().pullback(&this.cloud, &cotangent)?)
+        Ok(this.result.view().pullback(&cotangent)?)
     }
 }
 

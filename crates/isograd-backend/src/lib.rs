@@ -15,7 +15,7 @@
 //! let mut plan = Plan::new(Backend::Auto, grid, Options::default())?;
 //! let result = plan.reconstruct(&cloud)?;
 //! let cotangent = Cotangent { sdf: Some(result.sdf()?.values()), ..Cotangent::default() };
-//! let gradient = result.pullback(&cloud, &cotangent)?.points;
+//! let gradient = result.pullback(&cotangent)?.points;
 //! # assert_eq!(gradient.len(), cloud.len());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -39,4 +39,4 @@ pub use isograd_gpu::host::Number;
 
 /// `f32` or `f64`, wherever there are plans for it.
 #[cfg(not(feature = "gpu"))]
-pub use isograd::Real as Number;
+pub use isograd::Pipeline as Number;

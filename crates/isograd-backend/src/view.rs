@@ -1,10 +1,7 @@
 //! Results, wherever they were made.
 
 use isograd::distance::extend;
-use isograd::{
-    Attribute, CloudCotangent, Cotangent, Field, Grid, Mesh, PointCloud, PullbackScratch,
-    Reconstruction, Report,
-};
+use isograd::{Attribute, CloudCotangent, Cotangent, Field, Grid, Mesh, Reconstruction, Report};
 #[cfg(feature = "gpu")]
 use isograd_gpu::host;
 
@@ -100,18 +97,15 @@ impl<'a, T: Number> View<'a, T> {
         }
     }
 
-    /// Numbers, times and warnings about the reconstruction of `cloud`, the one that it was made of.
+    /// Numbers, times and warnings.
     ///
     /// # Errors
-    /// Those of the device; a cloud of another size, there.
-    pub fn report(
-        self,
-        #[cfg_attr(not(feature = "gpu"), allow(unused_variables))] cloud: &PointCloud<T>,
-    ) -> Result<&'a Report, Error> {
+    /// Those of the device.
+    pub fn report(self) -> Result<&'a Report, Error> {
         match self.0 {
             Of::Cpu(of) => Ok(of.report()),
             #[cfg(feature = "gpu")]
-            Of::Device(of, _) => Ok(of.report(cloud)?),
+            Of::Device(of, _) => Ok(of.report()?),
         }
     }
 
@@ -135,31 +129,25 @@ impl<'a, T: Number> View<'a, T> {
     ///
     /// # Errors
     /// Cotangents that are not those of this result; what the device says.
-    pub fn pullback(
-        self,
-        cloud: &PointCloud<T>,
-        cotangent: &Cotangent<'_, T>,
-    ) -> Result<CloudCotangent<T>, Error> {
-        let (mut scratch, mut bar) = Default::default();
-        self.pullback_into(cloud, cotangent, &mut scratch, &mut bar)?;
-        Ok(bar)
+    pub fn pullback(self, cotangent: &Cotangent<'_, T>) -> Result<CloudCotangent<T>, Error> {
+        let mut out = CloudCotangent::default();
+        self.pullback_into(cotangent, &mut out)?;
+        Ok(out)
     }
 
-    /// The same, with memory that is used again on the CPU.
+    /// Like [`Self::pullback`], writing into `out`; on the CPU the scratch buffers are those of the plan.
     ///
     /// # Errors
     /// As [`Self::pullback`].
     pub fn pullback_into(
         self,
-        cloud: &PointCloud<T>,
         cotangent: &Cotangent<'_, T>,
-        scratch: &mut PullbackScratch<T>,
-        bar: &mut CloudCotangent<T>,
+        out: &mut CloudCotangent<T>,
     ) -> Result<(), Error> {
         match self.0 {
-            Of::Cpu(of) => of.pullback_into(cloud, cotangent, scratch, bar)?,
+            Of::Cpu(of) => of.pullback_into(cotangent, out)?,
             #[cfg(feature = "gpu")]
-            Of::Device(of, _) => *bar = of.pullback(cotangent)?,
+            Of::Device(of, _) => *out = of.pullback(cotangent)?,
         }
         Ok(())
     }

@@ -84,7 +84,7 @@ fn check(view: View<'_, f32>, cloud: &PointCloud<f32>, tolerance: f32) {
     );
     assert_eq!(view.closest().unwrap().len(), sdf.len());
     assert_eq!(view.neighbor_counts().unwrap().len(), cloud.len());
-    let report = view.report(cloud).unwrap();
+    let report = view.report().unwrap();
     assert_eq!(report.warnings, expected.report().warnings);
 
     let attribute = attribute(cloud);
@@ -108,8 +108,8 @@ fn check(view: View<'_, f32>, cloud: &PointCloud<f32>, tolerance: f32) {
         [bars(&extension, &residual)],
         [bars(&of_cpu, &residual_of_cpu)],
     );
-    let found = view.pullback(cloud, &pulled(&of_view));
-    let wanted = expected.pullback(cloud, &pulled(&of_plan));
+    let found = view.pullback(&pulled(&of_view));
+    let wanted = expected.pullback(&pulled(&of_plan));
     let (found, wanted) = (found.unwrap(), wanted.unwrap());
     let of_values = off(&found.attributes[0], &wanted.attributes[0]);
     let of_points = off(found.points.as_flattened(), wanted.points.as_flattened());

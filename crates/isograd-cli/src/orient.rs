@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use isograd::orient::doubt::Doubt;
-use isograd::{Attribute, JsonReport, Orienter, PointCloud, PointCloudError, Real};
+use isograd::{Attribute, JsonReport, Orienter, Pipeline, PointCloud, PointCloudError, Real};
 use isograd_io::{CLOUD_EXTENSIONS, Dtype, Geometry};
 
 use crate::args;
@@ -86,7 +86,7 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    fn run<T: Real>(&self, geometry: &Geometry, progress: &mut Progress) -> Result<(), Error> {
+    fn run<T: Pipeline>(&self, geometry: &Geometry, progress: &mut Progress) -> Result<(), Error> {
         let cloud = geometry.cloud::<T>();
         let cloud = cloud.and_then(|cloud| self.args.normals.with_sensors(cloud));
         let cloud = cloud.map_err(Error::input(&self.args.cloud))?;

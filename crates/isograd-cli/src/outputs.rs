@@ -77,7 +77,7 @@ impl Outputs {
             let name = canonical(path);
             if seen.contains(&name) {
                 return Err(Error::Usage(format!(
-                    "{} is the name of two outputs; give each its own name",
+                    "{} is the name of two outputs; give each its own",
                     path.display()
                 )));
             }

@@ -80,13 +80,13 @@ struct Results<'a, T> {
 
 impl<'a, T: Number> Results<'a, T> {
     /// Copies the results of a device.
-    fn new(view: View<'a, T>, cloud: &PointCloud<T>) -> Result<Self, isograd_backend::Error> {
+    fn new(view: View<'a, T>) -> Result<Self, isograd_backend::Error> {
         Ok(Self {
             sdf: view.sdf()?,
             mesh: view.mesh()?,
             normals: view.normals()?,
             confidence: view.confidence()?,
-            report: view.report(cloud)?,
+            report: view.report()?,
             backend: view.backend(),
         })
     }
@@ -163,7 +163,7 @@ impl Job<'_> {
                     // On a device the checks run with the report.
                     progress.step(Stage::Checks.name());
                 }
-                Results::new(view, &cloud)
+                Results::new(view)
             })
             .map_err(Error::input(&self.args.cloud))?;
         let mut report = JsonReport::new(result.report);

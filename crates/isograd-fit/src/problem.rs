@@ -1,6 +1,6 @@
 //! The chain: variables → points → φ → loss, and its gradient back.
 
-use isograd::{CloudCotangent, Cotangent, PullbackScratch};
+use isograd::{CloudCotangent, Cotangent};
 use isograd_backend::{Plan, View};
 use serde::{Deserialize, Serialize};
 
@@ -31,7 +31,6 @@ pub(crate) struct Problem {
     pub plan: Plan<f64>,
     matching: Matching,
     phi_bar: Vec<f64>,
-    scratch: PullbackScratch<f64>,
     bar: CloudCotangent<f64>,
 }
 
@@ -49,7 +48,6 @@ impl Problem {
             plan: Plan::new(options.backend, *target.grid(), of_plan)?,
             matching: Matching::new(target.sdf(), options.band)?,
             phi_bar: vec![0.0; target.grid().cells()],
-            scratch: PullbackScratch::default(),
             bar: CloudCotangent::default(),
         })
     }
@@ -65,7 +63,7 @@ impl Problem {
             sdf: Some(&self.phi_bar),
             ..Cotangent::default()
         };
-        result.pullback_into(&cloud, &cotangent, &mut self.scratch, &mut self.bar)?;
+        result.pullback_into(&cotangent, &mut self.bar)?;
         let mut gradient = self.degrees.pullback(x, &self.bar.points)?;
         let extra = self.degrees.extra(x, &mut gradient);
         Ok(Evaluation {

@@ -105,7 +105,7 @@ fn all_that_is_asked_for_is_what_the_cpu_gives() {
             sdf.len()
         );
 
-        let (report, wanted) = (found.report(&cloud).unwrap(), expected.report());
+        let (report, wanted) = (found.report().unwrap(), expected.report());
         assert_eq!(report.points, 2000);
         assert!((report.radius / wanted.radius - 1.0).abs() < tolerance);
         assert_eq!(report.neighbors, wanted.neighbors);
@@ -193,7 +193,7 @@ fn any_cotangent_comes_back_as_on_the_cpu() {
                 },
             ),
         ] {
-            let wanted = expected.pullback(&cloud, &bar).unwrap();
+            let wanted = expected.pullback(&bar).unwrap();
             let back = found.pullback(&bar).unwrap();
             assert_eq!(back.guarded, wanted.guarded, "{what}");
             let (a, b) = (back.points.as_flattened(), wanted.points.as_flattened());
@@ -269,7 +269,7 @@ fn attributes_are_extended_and_pulled_back_as_on_the_cpu() {
             ..Cotangent::default()
         };
         let back = found.pullback(&bar(&of_device)).unwrap();
-        let wanted = expected.pullback(&cloud, &bar(&of_cpu)).unwrap();
+        let wanted = expected.pullback(&bar(&of_cpu)).unwrap();
         assert_eq!(back.guarded, wanted.guarded);
         assert_eq!(back.attributes.len(), 1);
         for (what, a, b) in [
@@ -332,20 +332,19 @@ fn previous_takes_the_sides_of_the_call_before() {
     let mut plan = Plan::new(Backend::Vulkan, grid, options).unwrap();
     let first = plan.reconstruct(&cloud).unwrap();
     let second = plan.reconstruct(&cloud).unwrap();
-    let method =
-        |of: &isograd_gpu::host::Reconstruction<f32>| of.report(&cloud).unwrap().orientation;
+    let method = |of: &isograd_gpu::host::Reconstruction<f32>| of.report().unwrap().orientation;
     assert_eq!([method(&first), method(&second)], ["auto", "previous"]);
     assert_eq!(first.sdf().unwrap(), second.sdf().unwrap());
     // A body that has turned by more than 60 degrees is looked at anew.
     let turned = |&[x, y, z]: &[f32; 3]| [x, -z, y];
     let turned = PointCloud::new(cloud.points().iter().map(turned).collect()).unwrap();
     let far = plan.reconstruct(&turned).unwrap();
-    assert_eq!(far.report(&turned).unwrap().orientation, "auto");
-    assert!(far.report(&turned).unwrap().surface.closed);
+    assert_eq!(far.report().unwrap().orientation, "auto");
+    assert!(far.report().unwrap().surface.closed);
     // Another number of points is another cloud.
     let fewer = PointCloud::new(cloud.points()[..1400].to_vec()).unwrap();
     let third = plan.reconstruct(&fewer).unwrap();
-    assert_eq!(third.report(&fewer).unwrap().orientation, "auto");
+    assert_eq!(third.report().unwrap().orientation, "auto");
     assert_eq!(third.normals().unwrap().len(), 1400);
 }
 
@@ -360,7 +359,7 @@ fn a_call_with_other_points_finds_their_sides_anew() {
     let mut plan = Plan::new(Backend::Vulkan, grid(&cloud), options()).unwrap();
     plan.reconstruct(&cloud).unwrap();
     let again = plan.reconstruct(&reversed).unwrap();
-    assert!(again.report(&reversed).unwrap().surface.closed);
+    assert!(again.report().unwrap().surface.closed);
 }
 
 #[test]
@@ -374,7 +373,7 @@ fn sensors_tell_the_sides_as_on_the_cpu() {
     let grid = grid(&cloud);
     let mut plan = Plan::new(Backend::Vulkan, grid, options.clone()).unwrap();
     let found = plan.reconstruct(&cloud).unwrap();
-    assert_eq!(found.report(&cloud).unwrap().orientation, "sensors");
+    assert_eq!(found.report().unwrap().orientation, "sensors");
     let mut plan = Reconstructor::new(grid, options).unwrap();
     let expected = plan.reconstruct(&cloud).unwrap();
     let phi = found.sdf().unwrap().values();
@@ -410,7 +409,7 @@ fn given_normals_are_taken_and_have_cotangents() {
         ..Cotangent::default()
     };
     let found = found.pullback(&cotangent).unwrap();
-    let expected = expected.pullback(&cloud, &cotangent).unwrap();
+    let expected = expected.pullback(&cotangent).unwrap();
     for (found, expected) in [
         (&found.points, &expected.points),
         (&found.normals, &expected.normals),

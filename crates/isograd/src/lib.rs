@@ -1,13 +1,63 @@
 //! Point cloud in, signed distance field out, gradients back.
 //!
-//! One stage is one folder: a forward map and, beside it, its pullback. A [`Reconstructor`] runs the stages
-//! in order, and [`Reconstruction::pullback`] their pullbacks in reverse. [`gradcheck`] compares it with
-//! finite differences.
+//! ```
+//! use isograd::{Cotangent, Grid, Options, PointCloud, Reconstructor, Resolution};
+//!
+//! // 2,000 samples of the unit sphere.
+//! let sphere = (0..2000).map(|i| {
+//!     let (z, turn) = ((2 * i + 1) as f64 / 2000.0 - 1.0, i as f64 * 2.399963);
+//!     let r = (1.0 - z * z).sqrt();
+//!     [r * turn.cos(), r * turn.sin(), z]
+//! });
+//! let cloud = PointCloud::new(sphere.collect())?;
+//!
+//! // φ at every cell center, in the unit of the points, negative inside.
+//! let grid = Grid::fit(&cloud, Resolution::Cells(32), 0.1)?;
+//! let mut plan = Reconstructor::new(grid, Options::default().screening(0.0))?;
+//! let result = plan.reconstruct(&cloud)?;
+//! assert!((result.sdf().interpolate([0.9, 0.0, 0.0]) + 0.1).abs() < 0.01);
+//!
+//! // The gradient of the loss Σ φ with respect to the points, `(N, 3)`.
+//! let ones = vec![1.0; grid.cells()];
+//! let gradient = result.pullback(&Cotangent { sdf: Some(&ones), ..Cotangent::default() })?.points;
+//! # assert_eq!(gradient.len(), cloud.len());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # What is guaranteed
+//! - Distance: φ is the exact distance to the triangles of the mesh, to rounding, at every cell center within the
+//!   [band](distance::Band). Its sign is that of the indicator, from which the mesh is made.
+//! - Mesh: every edge belongs to exactly two triangles with opposite directions, unless the surface reaches a wall of the
+//!   grid, which is a [`Warning`].
+//! - Gradient: [`Reconstruction::pullback`] is the transpose of the derivative of the whole pipeline, and finite for every
+//!   input. [`gradcheck`] compares it with finite differences.
+//! - Determinism: the same input gives the same bits on any number of threads.
+//! - Memory: a second call of a plan with as many points allocates nothing of the size of a field.
+//!
+//! # What is not
+//! - Signs are estimated. Where samples are sparse, noisy or the surface is open they may be wrong: see
+//!   [`Report::warnings`], [`Reconstruction::confidence`] and [`orient::doubt`].
+//! - Neighborhoods, signs, the topology of the mesh and the closest triangle are discrete: a pullback holds them constant.
+//!   Forward mode and second derivatives are not supported.
+//!
+//! # Modules
+//! A stage is a folder with a forward map and, beside it, its pullback. A [`Reconstructor`] runs them in this order:
+//!
+//! | module | map |
+//! |---|---|
+//! | [`data`] | clouds, grids, fields and meshes |
+//! | [`neighbors`] | points → neighborhoods |
+//! | [`normals`] | neighborhoods → unoriented normals |
+//! | [`orient`] | unoriented normals → outward normals |
+//! | [`splat`] | normals and areas → right-hand side of the Poisson equation |
+//! | [`poisson`] | right-hand side → indicator χ |
+//! | [`isosurface`] | χ → iso-value and mesh |
+//! | [`distance`] | mesh → φ; queries at points; attributes on the surface |
+//! | [`differential`] | φ → gradient, normal and curvature |
+//! | [`gradcheck`] | comparison of the pullback with finite differences |
 #![warn(missing_docs)]
 
 mod backend;
-mod checks;
-mod concrete;
 pub mod data;
 pub mod differential;
 pub mod distance;
@@ -37,13 +87,13 @@ pub use data::{
 };
 pub use pipeline::{
     CloudCotangent, Cotangent, Error, ExtensionCotangent, Options, Orienter, ParseOptionError,
-    PullbackError, PullbackScratch, Reconstruction, Reconstructor, RestoreError, Saved,
-    available_memory, check_memory,
+    Pipeline, PullbackError, Reconstruction, Reconstructor, RestoreError, Saved, available_memory,
+    check_memory,
 };
 pub use real::Real;
 pub use report::{JsonReport, Report, Seconds, Stage, Warning};
 
-/// The README's code, compiled and run with the doc tests.
+/// The code of the README, compiled and run with the doc tests.
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
 struct Readme;

@@ -1,5 +1,7 @@
 //! The stages in order: a plan ([`Reconstructor`]) and what it makes ([`Reconstruction`]).
 
+mod checks;
+mod concrete;
 mod cotangent;
 mod extend;
 mod memory;
@@ -16,18 +18,19 @@ use std::time::Instant;
 
 use crate::data::{Field, Grid, Mesh, PointCloud};
 use crate::isosurface::measure;
-use crate::report::{Report, Stage};
+use crate::report::Report;
+pub(crate) use crate::report::Stage;
 use crate::{Real, distance, isosurface, neighbors, normals, orient, poisson, splat};
 
+pub use concrete::Pipeline;
 pub use cotangent::{CloudCotangent, Cotangent, ExtensionCotangent, PullbackError};
 pub use memory::{available_memory, check_memory};
 pub use options::{Error, Options};
 pub use orienter::Orienter;
-pub use pullback::PullbackScratch;
 pub use restore::{RestoreError, Saved};
 pub use text::ParseOptionError;
 
-/// A plan for one grid and one set of options: Fourier tables and all memory, used again by every call.
+/// A plan for one grid and one set of options: Fourier tables and scratch buffers, reused by every call.
 ///
 /// A second [`reconstruct`](Self::reconstruct) with as many points allocates nothing of the size of a
 /// field.
@@ -36,7 +39,7 @@ pub struct Reconstructor<T: Real> {
     result: Reconstruction<T>,
 }
 
-/// Memory that the stages use again and nobody looks at.
+/// Scratch buffers of the stages, reused between calls.
 #[derive(Default)]
 struct Scratch<T: Real> {
     orient: orient::Scratch,
@@ -49,7 +52,7 @@ struct Scratch<T: Real> {
     distance: distance::Scratch<T>,
 }
 
-impl<T: Real> Reconstructor<T> {
+impl<T: Pipeline> Reconstructor<T> {
     /// A plan for clouds that lie on `grid`, at least 2 cells off its walls.
     ///
     /// # Errors
@@ -80,19 +83,19 @@ impl<T: Real> Reconstructor<T> {
         &self.result.options
     }
 
-    /// Runs all stages on a cloud. The result stays in the plan, whose memory the next call uses again:
+    /// Runs all stages on a cloud. The result stays in the plan, and the next call overwrites it:
     /// clone it, or [take it](Self::into_reconstruction), to keep it.
     ///
     /// # Errors
-    /// The error of the stage that failed; the result of an earlier call is then gone.
+    /// The error of the stage that failed; the result of the previous call is then lost.
     pub fn reconstruct(&mut self, cloud: &PointCloud<T>) -> Result<&Reconstruction<T>, Error> {
         self.reconstruct_observed(cloud, &mut |_| ControlFlow::Continue(()))
     }
 
-    /// The same, calling `observer` before each stage; where it breaks, so does the work.
+    /// Like [`reconstruct`](Self::reconstruct), calling `observer` before each stage; `Break` stops the work.
     ///
     /// # Errors
-    /// As [`reconstruct`](Self::reconstruct), and [`Error::Interrupted`] where the observer breaks.
+    /// As [`reconstruct`](Self::reconstruct), and [`Error::Interrupted`] if the observer returns `Break`.
     pub fn reconstruct_observed(
         &mut self,
         cloud: &PointCloud<T>,
@@ -101,10 +104,10 @@ impl<T: Real> Reconstructor<T> {
         self.run_all(cloud, None, observer)
     }
 
-    /// Runs all stages but the checks on a cloud of as many points, with the radii and the signs of the normals that
-    /// `held` has, and with its automatic smoothing where that does not go with the areas: the map that
-    /// [`Reconstruction::pullback`] differentiates, for those who compare it with differences. Neighborhoods are
-    /// those of the moved points; a sample that enters one or leaves it still makes the normal jump.
+    /// Runs all stages but the checks with the radii and the signs of the normals of `held`, a reconstruction of as many
+    /// points, and with its automatic smoothing unless that is a function of the areas. This is the map that
+    /// [`Reconstruction::pullback`] differentiates, for comparisons with finite differences. Neighborhoods are
+    /// those of the moved points: a sample that enters or leaves one still makes the normal jump.
     ///
     /// # Errors
     /// As [`reconstruct`](Self::reconstruct).
@@ -122,10 +125,7 @@ impl<T: Real> Reconstructor<T> {
         held: Option<&Reconstruction<T>>,
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
     ) -> Result<&Reconstruction<T>, Error> {
-        self.result.report = Report {
-            points: cloud.len(),
-            ..Report::default()
-        };
+        self.result.start(cloud);
         for stage in Stage::ALL {
             if observer(stage).is_break() {
                 return Err(Error::Interrupted(stage));
@@ -144,12 +144,15 @@ impl<T: Real> Reconstructor<T> {
     }
 }
 
-/// What a plan made of a cloud: the field, the surface, the normals, the report, and what the pullbacks
-/// need of each stage.
+/// Result of a plan: the field, the surface, the normals and the report, with the samples and the residuals of the
+/// stages for the pullback.
 #[derive(Clone)]
 pub struct Reconstruction<T: Real> {
     options: Options,
     poisson: Arc<poisson::Plan<T>>,
+    points: Vec<[T; 3]>,
+    /// Normals of the cloud, with [`orient::Method::Given`].
+    given: Vec<[T; 3]>,
     sdf: Field<T>,
     indicator: Field<T>,
     iso_value: T,
@@ -159,9 +162,10 @@ pub struct Reconstruction<T: Real> {
     orientation: orient::Orientation<T>,
     residuals: Residuals<T>,
     report: Report,
+    pullback: pullback::Workspace<T>,
 }
 
-/// What the stages keep for their pullbacks, beside the results themselves.
+/// Residuals of the stages, beside the results themselves.
 #[derive(Clone, Default)]
 struct Residuals<T> {
     neighborhoods: neighbors::Neighborhoods<T>,
@@ -173,11 +177,13 @@ struct Residuals<T> {
     local_level: isosurface::local_level::Residual<T>,
 }
 
-impl<T: Real> Reconstruction<T> {
+impl<T: Pipeline> Reconstruction<T> {
     fn empty(grid: Grid<T>, options: Options) -> Self {
         Self {
             options,
             poisson: Arc::new(T::poisson_plan(grid.shape())),
+            points: Vec::new(),
+            given: Vec::new(),
             sdf: Field::zeros(grid),
             indicator: Field::zeros(grid),
             iso_value: T::zero(),
@@ -187,10 +193,35 @@ impl<T: Real> Reconstruction<T> {
             orientation: orient::Orientation::default(),
             residuals: Residuals::default(),
             report: Report::default(),
+            pullback: pullback::Workspace::default(),
+        }
+    }
+}
+
+impl<T: Real> Reconstruction<T> {
+    /// Takes the samples of a cloud, for the stages to come.
+    fn start(&mut self, cloud: &PointCloud<T>) {
+        self.points.clear();
+        self.points.extend_from_slice(cloud.points());
+        self.given.clear();
+        if let (orient::Method::Given, Some(normals)) = (self.options.orient, cloud.normals()) {
+            self.given.extend_from_slice(normals);
+        }
+        self.report = Report {
+            points: cloud.len(),
+            ..Report::default()
+        };
+    }
+
+    fn splat_samples(&self) -> splat::Samples<'_, T> {
+        splat::Samples {
+            points: &self.points,
+            normals: &self.orientation.normals,
+            areas: &self.areas,
         }
     }
 
-    /// The options that it was made with.
+    /// The options of the plan.
     pub fn options(&self) -> &Options {
         &self.options
     }
@@ -221,6 +252,11 @@ impl<T: Real> Reconstruction<T> {
     /// [`NO_TRIANGLE`](distance::NO_TRIANGLE) outside the band.
     pub fn closest(&self) -> &[u32] {
         &self.closest
+    }
+
+    /// `(N, 3)` the samples, in the order of the cloud.
+    pub fn points(&self) -> &[[T; 3]] {
+        &self.points
     }
 
     /// `(N, 3)` outward unit normals of the samples, in their order.

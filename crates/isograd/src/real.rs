@@ -6,14 +6,13 @@ use std::iter::Sum;
 use num_traits::{Float, FloatConst, NumAssign};
 use rustfft::FftNum;
 
-use crate::concrete::Concrete;
 use crate::element::Element;
 
 /// `f32` or `f64`: the type of every coordinate and every field value. What comes in goes out.
 ///
 /// Sealed: the error bounds of the stages are stated for these two alone.
 pub trait Real:
-    Concrete
+    sealed::Sealed
     + Element
     + Float
     + FloatConst
@@ -39,6 +38,12 @@ pub trait Real:
     fn of_usize(n: usize) -> Self {
         Self::of(n as f64)
     }
+}
+
+mod sealed {
+    pub trait Sealed {}
+    impl Sealed for f32 {}
+    impl Sealed for f64 {}
 }
 
 impl Real for f32 {

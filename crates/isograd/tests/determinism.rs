@@ -5,7 +5,7 @@ mod common;
 use common::TORUS;
 use isograd::orient::{Method, ParityOptions};
 use isograd::poisson::Smoothing;
-use isograd::{Grid, Options, PointCloud, Real, Reconstruction, Reconstructor, Resolution};
+use isograd::{Grid, Options, Pipeline, PointCloud, Reconstruction, Reconstructor, Resolution};
 
 fn with_threads<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
     rayon::ThreadPoolBuilder::new()
@@ -15,11 +15,11 @@ fn with_threads<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
         .install(work)
 }
 
-fn bits<T: Real>(values: impl IntoIterator<Item = T>) -> Vec<u64> {
+fn bits<T: Pipeline>(values: impl IntoIterator<Item = T>) -> Vec<u64> {
     values.into_iter().map(|v| v.f64().to_bits()).collect()
 }
 
-fn all_bits<T: Real>(r: &Reconstruction<T>) -> Vec<Vec<u64>> {
+fn all_bits<T: Pipeline>(r: &Reconstruction<T>) -> Vec<Vec<u64>> {
     vec![
         bits(r.sdf().values().iter().copied()),
         bits(r.indicator().values().iter().copied()),
@@ -38,7 +38,7 @@ fn all_bits<T: Real>(r: &Reconstruction<T>) -> Vec<Vec<u64>> {
     ]
 }
 
-fn assert_same_bits<T: Real>(options: &Options) {
+fn assert_same_bits<T: Pipeline>(options: &Options) {
     let cloud = TORUS.ten_to_one::<T>(12_000, 5);
     let bare = PointCloud::new(cloud.points().to_vec()).expect("finite points");
     let run = |threads| {

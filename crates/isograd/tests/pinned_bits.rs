@@ -13,7 +13,7 @@ use isograd::orient::{Method, ParityOptions};
 use isograd::poisson::Smoothing;
 use isograd::splat::Weights;
 use isograd::{
-    Attribute, Cotangent, ExtensionCotangent, Grid, Options, PointCloud, Real, Reconstruction,
+    Attribute, Cotangent, ExtensionCotangent, Grid, Options, Pipeline, PointCloud, Reconstruction,
     Reconstructor, Resolution,
 };
 
@@ -31,12 +31,12 @@ impl Hash {
         }
     }
 
-    fn real<T: Real>(&mut self, value: T) {
+    fn real<T: Pipeline>(&mut self, value: T) {
         self.word(value.f64().to_bits());
     }
 }
 
-fn of_reals<'a, T: Real>(values: impl IntoIterator<Item = &'a T>) -> u64 {
+fn of_reals<'a, T: Pipeline>(values: impl IntoIterator<Item = &'a T>) -> u64 {
     let mut hash = Hash::new();
     values.into_iter().for_each(|&value| hash.real(value));
     hash.0
@@ -170,7 +170,7 @@ fn cases() -> Vec<Case> {
 }
 
 /// Hashes of φ, χ, mesh, normals, and all gradients.
-fn hashes<T: Real>(samples: &[([f64; 3], [f64; 3])], options: &Options) -> [u64; 5] {
+fn hashes<T: Pipeline>(samples: &[([f64; 3], [f64; 3])], options: &Options) -> [u64; 5] {
     let points = samples.iter().map(|(p, _)| p.map(T::of)).collect();
     let normals = samples.iter().map(|(_, n)| n.map(T::of)).collect();
     let values = samples
@@ -205,7 +205,7 @@ fn hashes<T: Real>(samples: &[([f64; 3], [f64; 3])], options: &Options) -> [u64;
     ]
 }
 
-fn gradients<T: Real>(
+fn gradients<T: Pipeline>(
     cloud: &PointCloud<T>,
     attribute: &Attribute<T>,
     result: &Reconstruction<T>,
@@ -248,7 +248,7 @@ fn gradients<T: Real>(
         areas: Some(&areas),
         extensions: &extensions,
     };
-    let bar = result.pullback(cloud, &cotangent).expect("pulls back");
+    let bar = result.pullback(&cotangent).expect("pulls back");
     let grid = bar.grid.lower.iter().chain([&bar.grid.spacing]);
     let points = bar.points.iter().chain(&bar.normals).flatten();
     of_reals(points.chain(bar.attributes.iter().flatten()).chain(grid))

@@ -10,7 +10,7 @@ mod stages;
 use std::io::{BufRead, Write};
 use std::time::Instant;
 
-use isograd::Real;
+use isograd::Pipeline;
 use isograd_benches::output::Outcome;
 use isograd_benches::pool;
 
@@ -32,7 +32,7 @@ fn main() -> Outcome {
 }
 
 /// Replies to requests until the input ends.
-fn serve<T: Real + Number>(name: &str, folder: &Folder, threads: usize) -> Outcome {
+fn serve<T: Pipeline + Number>(name: &str, folder: &Folder, threads: usize) -> Outcome {
     let pool = pool(threads);
     let mut stage =
         pool.install(|| stages::by_name::<T>(name, folder).map_err(|e| e.to_string()))?;

@@ -2,7 +2,7 @@
 
 use isograd::distance::Band;
 use isograd::{
-    Field, Mesh, Options, PointCloud, Real, Reconstructor, distance, isosurface, poisson,
+    Field, Mesh, Options, Pipeline, PointCloud, Reconstructor, distance, isosurface, poisson,
 };
 
 use isograd_benches::output::Outcome;
@@ -21,7 +21,7 @@ pub trait Stage: Send {
 }
 
 /// Reads the input of a stage.
-pub fn by_name<T: Real + Number>(name: &str, folder: &Folder) -> Outcome<Box<dyn Stage>> {
+pub fn by_name<T: Pipeline + Number>(name: &str, folder: &Folder) -> Outcome<Box<dyn Stage>> {
     Ok(match name {
         "distance" => Box::new(Distance::<T>::open(folder, None)?),
         "band" => Box::new(Distance::<T>::open(folder, Some(3.0))?),
@@ -36,14 +36,14 @@ pub fn by_name<T: Real + Number>(name: &str, folder: &Folder) -> Outcome<Box<dyn
 }
 
 /// `b` → `χ`.
-struct Poisson<T: Real> {
+struct Poisson<T: Pipeline> {
     b: Vec<T>,
     field: Vec<T>,
     plan: poisson::Plan<T>,
     scratch: poisson::Scratch<T>,
 }
 
-impl<T: Real + Number> Poisson<T> {
+impl<T: Pipeline + Number> Poisson<T> {
     fn open(folder: &Folder) -> Outcome<Self> {
         let b = folder.read("b")?;
         Ok(Self {
@@ -55,7 +55,7 @@ impl<T: Real + Number> Poisson<T> {
     }
 }
 
-impl<T: Real + Number> Stage for Poisson<T> {
+impl<T: Pipeline + Number> Stage for Poisson<T> {
     fn prepare(&mut self) {
         self.field.copy_from_slice(&self.b);
     }
@@ -71,13 +71,13 @@ impl<T: Real + Number> Stage for Poisson<T> {
 }
 
 /// A field → its zero level set.
-struct Isosurface<T: Real> {
+struct Isosurface<T: Pipeline> {
     chi: Field<T>,
     mesh: Mesh<T>,
     scratch: isosurface::Scratch,
 }
 
-impl<T: Real + Number> Isosurface<T> {
+impl<T: Pipeline + Number> Isosurface<T> {
     fn open(folder: &Folder) -> Outcome<Self> {
         Ok(Self {
             chi: Field::new(folder.grid()?, folder.read("chi")?)?,
@@ -87,7 +87,7 @@ impl<T: Real + Number> Isosurface<T> {
     }
 }
 
-impl<T: Real + Number> Stage for Isosurface<T> {
+impl<T: Pipeline + Number> Stage for Isosurface<T> {
     fn run(&mut self) -> Result<(), String> {
         let extracted =
             isosurface::forward(&self.chi, T::zero(), &mut self.scratch, &mut self.mesh);
@@ -101,7 +101,7 @@ impl<T: Real + Number> Stage for Isosurface<T> {
 }
 
 /// A field and its zero level set, extracted beforehand → `φ`.
-struct Distance<T: Real> {
+struct Distance<T: Pipeline> {
     band: Band,
     mesh: Mesh<T>,
     chi: Field<T>,
@@ -110,7 +110,7 @@ struct Distance<T: Real> {
     scratch: distance::Scratch<T>,
 }
 
-impl<T: Real + Number> Distance<T> {
+impl<T: Pipeline + Number> Distance<T> {
     fn open(folder: &Folder, cells: Option<f64>) -> Outcome<Self> {
         let chi = Field::new(folder.grid()?, folder.read("chi")?)?;
         let mut mesh = Mesh::default();
@@ -127,7 +127,7 @@ impl<T: Real + Number> Distance<T> {
     }
 }
 
-impl<T: Real + Number> Stage for Distance<T> {
+impl<T: Pipeline + Number> Stage for Distance<T> {
     fn run(&mut self) -> Result<(), String> {
         let done = distance::lattice::forward(
             &self.mesh,
@@ -149,13 +149,13 @@ impl<T: Real + Number> Stage for Distance<T> {
 }
 
 /// Points → `φ` and the report, by a plan with the default options.
-struct Whole<T: Real> {
+struct Whole<T: Pipeline> {
     cloud: PointCloud<T>,
     plan: Reconstructor<T>,
     phi: Vec<T>,
 }
 
-impl<T: Real + Number> Whole<T> {
+impl<T: Pipeline + Number> Whole<T> {
     fn open(folder: &Folder) -> Outcome<Self> {
         Ok(Self {
             cloud: PointCloud::new(folder.read_rows("points")?)?,
@@ -165,7 +165,7 @@ impl<T: Real + Number> Whole<T> {
     }
 }
 
-impl<T: Real + Number> Stage for Whole<T> {
+impl<T: Pipeline + Number> Stage for Whole<T> {
     fn run(&mut self) -> Result<(), String> {
         let result = self.plan.reconstruct(&self.cloud);
         let result = result.map_err(|error| error.to_string())?;

@@ -1,7 +1,7 @@
 //! Steps shared by the targets: run a plan on a cloud, save what a pullback needs, and restore the reconstruction
 //! from it.
 
-use isograd::{CloudCotangent, Cotangent, PointCloud, PullbackScratch, Real, Saved};
+use isograd::{CloudCotangent, Cotangent, PointCloud, Real, Saved};
 use isograd_backend::View;
 
 use super::buffers::{Call, Element};
@@ -90,8 +90,6 @@ impl<T: Float> CloudOutputs<'_, T> {
 pub struct Restored<'a, T: Number> {
     /// The reconstruction.
     pub result: View<'a, T>,
-    cloud: &'a PointCloud<T>,
-    scratch: &'a mut PullbackScratch<T>,
     bar: &'a mut CloudCotangent<T>,
 }
 
@@ -101,8 +99,7 @@ impl<'a, T: Number> Restored<'a, T> {
     /// # Errors
     /// See [`isograd::PullbackError`].
     pub fn pullback(self, cotangent: &Cotangent<'_, T>) -> Result<&'a CloudCotangent<T>, Failure> {
-        self.result
-            .pullback_into(self.cloud, cotangent, self.scratch, self.bar)?;
+        self.result.pullback_into(cotangent, self.bar)?;
         Ok(self.bar)
     }
 }
@@ -173,11 +170,9 @@ impl<'a> Call<'a> {
     ) -> Result<(), Failure> {
         self.check_all_taken()?;
         pool::with_plan::<T, _>(self.settings, |plan| {
-            let Plan { plan, scratch, bar } = plan;
+            let Plan { plan, bar } = plan;
             work(Restored {
                 result: plan.restore(cloud, saved)?,
-                cloud,
-                scratch,
                 bar,
             })
         })?

@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use isograd::{Cotangent, Grid, Options, PointCloud, Real, Reconstructor, Resolution};
+use isograd::{Cotangent, Grid, Options, Pipeline, PointCloud, Reconstructor, Resolution};
 use isograd_io::read_geometry;
 
 const CELLS: usize = 96;
@@ -25,7 +25,7 @@ fn clouds() -> Vec<PathBuf> {
 }
 
 /// Largest component of the cotangent of any point for `Σ φ²/2h²`, and how many places were guarded.
-fn largest<T: Real>(points: &[[f64; 3]]) -> (f64, usize) {
+fn largest<T: Pipeline>(points: &[[f64; 3]]) -> (f64, usize) {
     let points = points.iter().map(|p| p.map(T::of)).collect();
     let cloud = PointCloud::new(points).expect("finite points");
     let grid = Grid::fit(&cloud, Resolution::Cells(CELLS), T::of(0.1)).expect("a grid");
@@ -42,7 +42,7 @@ fn largest<T: Real>(points: &[[f64; 3]]) -> (f64, usize) {
         sdf: Some(&bar),
         ..Cotangent::default()
     };
-    let pulled = result.pullback(&cloud, &cotangent).expect("a pullback");
+    let pulled = result.pullback(&cotangent).expect("a pullback");
     let components = pulled.points.iter().flatten();
     let largest = components.fold(0.0, |m: f64, x| {
         assert!(x.is_finite());

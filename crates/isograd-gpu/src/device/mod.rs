@@ -18,7 +18,7 @@ pub use open::Cuda;
 pub use open::Vulkan;
 
 /// `f32` or `f64`, on the host and on a device.
-pub trait Scalar: isograd::Real + Float + CubeElement {}
+pub trait Scalar: isograd::Pipeline + Float + CubeElement {}
 
 impl Scalar for f32 {}
 impl Scalar for f64 {}

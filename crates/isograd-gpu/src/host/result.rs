@@ -8,8 +8,8 @@ use isograd::isosurface::measure;
 use isograd::neighbors::{Neighborhoods, Radii};
 use isograd::orient::Orientation;
 use isograd::{
-    Attribute, CloudCotangent, Cotangent, Field, Grid, Mesh, Options, PointCloud, PullbackError,
-    Report, Stage, Warning,
+    Attribute, CloudCotangent, Cotangent, Field, Grid, Mesh, Options, PointCloud, Report, Stage,
+    Warning,
 };
 
 use super::work::{Work, vectors_of};
@@ -215,20 +215,15 @@ impl<T: Number> Reconstruction<T> {
         })
     }
 
-    /// Numbers, times and warnings about the reconstruction of `cloud`, the one that it was made of. With
-    /// [`Options::checks`] φ, the surface and the normals are copied for it.
+    /// Numbers, times and warnings. With [`Options::checks`] points, φ, the surface and the normals are copied for them.
     ///
     /// # Errors
-    /// Those of the device; [`PullbackError::Cloud`] for a cloud of another size.
-    pub fn report(&self, cloud: &PointCloud<T>) -> Result<&Report, Error> {
-        once(&self.copies.report, || self.make_report(cloud))
+    /// Those of the device.
+    pub fn report(&self) -> Result<&Report, Error> {
+        once(&self.copies.report, || self.make_report())
     }
 
-    fn make_report(&self, cloud: &PointCloud<T>) -> Result<Report, Error> {
-        let (found, expected) = (cloud.len(), self.points());
-        if found != expected {
-            return Err(PullbackError::Cloud { found, expected }.into());
-        }
+    fn make_report(&self) -> Result<Report, Error> {
         let start = Instant::now();
         let mut report = self.begun.clone();
         report.smoothing = self.result.smoothing();
@@ -238,14 +233,15 @@ impl<T: Number> Reconstruction<T> {
         }
         if self.checks {
             let scratch = &mut measure::Scratch::default();
+            let points = self.vectors(&self.result.points)?;
             let (normals, mesh) = (self.normals()?, self.mesh()?);
-            report.check_field(cloud.points(), normals, self.sdf()?, mesh, scratch);
+            report.check_field(&points, normals, self.sdf()?, mesh, scratch);
             let orientation = Orientation {
                 normals: normals.to_vec(),
                 confidence: self.confidence()?.to_vec(),
                 ..Orientation::default()
             };
-            report.check_samples(cloud.points(), self.neighborhoods()?, &orientation);
+            report.check_samples(&points, self.neighborhoods()?, &orientation);
         }
         let before = report.seconds.of(Stage::Checks);
         let seconds = before + start.elapsed().as_secs_f64();

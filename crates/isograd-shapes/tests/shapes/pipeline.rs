@@ -67,7 +67,7 @@ fn sphere_errors(cells: usize, shift: [f64; 3]) -> [f64; 3] {
     let mut plan = Reconstructor::new(grid, isograd::Options::default()).expect("options");
     let result = plan.reconstruct(&cloud).expect("a sphere");
     let derivative = |cotangent: &Cotangent<'_, f64>| -> f64 {
-        let pulled = result.pullback(&cloud, cotangent).expect("a pullback");
+        let pulled = result.pullback(cotangent).expect("a pullback");
         let pairs = pulled.points.iter().zip(&outward);
         pairs
             .map(|(a, b)| isograd_element::vector::dot(*a, *b))

@@ -43,7 +43,7 @@ impl<'a> Check<'a> {
             base,
             functional,
             scale: bar.iter().map(|x| x.abs()).sum(),
-            pulled: pull(base, cloud, &bar)?,
+            pulled: pull(base, &bar)?,
             plan,
         })
     }
@@ -90,7 +90,7 @@ impl<'a> Check<'a> {
         }
         let mut bar = self.functional.cotangent(self.base.sdf());
         ridges.iter().for_each(|&cell| bar[cell] = 0.0);
-        Ok(along(&pull(self.base, self.cloud, &bar)?.points))
+        Ok(along(&pull(self.base, &bar)?.points))
     }
 
     /// The central difference over a step in cells, and each cell's part in it, without the cells `ridges`. A
@@ -177,16 +177,12 @@ impl<'a> Check<'a> {
     }
 }
 
-fn pull(
-    base: &Reconstruction<f64>,
-    cloud: &PointCloud<f64>,
-    bar: &[f64],
-) -> Result<CloudCotangent<f64>, CheckError> {
+fn pull(base: &Reconstruction<f64>, bar: &[f64]) -> Result<CloudCotangent<f64>, CheckError> {
     let cotangent = Cotangent {
         sdf: Some(bar),
         ..Cotangent::default()
     };
-    Ok(base.pullback(cloud, &cotangent)?)
+    Ok(base.pullback(&cotangent)?)
 }
 
 /// What is kept of one end of a step.

@@ -1,15 +1,14 @@
-//! What goes into a pullback of the pipeline, and what comes out.
+//! Input and output of the pullback of the pipeline.
 
 use rayon::prelude::*;
 
-use super::Reconstruction;
-use crate::data::{Attribute, GridCotangent, PointCloud};
+use crate::data::{Attribute, GridCotangent};
 use crate::distance::extend;
 use crate::parallel::CHUNK;
 use crate::{Real, poisson, vector};
 
-/// Cotangents of the results of a reconstruction: by how much a scalar (a loss) changes, a unit of each
-/// result. What is left out counts as zero.
+/// Cotangents of the results of a reconstruction: derivatives of a scalar (a loss) with respect to each result.
+/// `None` is zero.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cotangent<'a, T> {
     /// `(nx, ny, nz)` of φ, in memory order.
@@ -31,11 +30,11 @@ pub struct Cotangent<'a, T> {
 /// Cotangents of one attribute that was [extended](Reconstruction::extend_into).
 #[derive(Clone, Copy, Debug)]
 pub struct ExtensionCotangent<'a, T> {
-    /// The attribute, as it was given.
+    /// The attribute at the samples.
     pub attribute: &'a Attribute<T>,
-    /// What came out.
+    /// Its extension.
     pub extension: &'a extend::Extension<T>,
-    /// What was kept for this.
+    /// The residual of the extension.
     pub residual: &'a extend::Residual<T>,
     /// `(V, components)` of the values at the vertices.
     pub vertices: Option<&'a [T]>,
@@ -43,23 +42,23 @@ pub struct ExtensionCotangent<'a, T> {
     pub values: Option<&'a [T]>,
 }
 
-/// Cotangents of what a reconstruction was made from.
+/// Cotangents of the input of a reconstruction.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CloudCotangent<T> {
     /// `(N, 3)` of the points.
     pub points: Vec<[T; 3]>,
-    /// `(N, 3)` of the given normals; empty where the normals were found.
+    /// `(N, 3)` of the given normals; empty if the normals were estimated.
     pub normals: Vec<[T; 3]>,
     /// Of each extended attribute, `(N, components)` row by row, in the order of
     /// [`Cotangent::extensions`].
     pub attributes: Vec<Vec<T>>,
     /// Of the grid, at fixed points.
     pub grid: GridCotangent<T>,
-    /// Places where a derivative does not exist or has no bound, and a bounded one was taken.
+    /// Number of derivatives that do not exist or have no bound, and were replaced by a bounded one.
     pub guarded: usize,
 }
 
-/// Why nothing was pulled back.
+/// Errors of [`Reconstruction::pullback`](crate::Reconstruction::pullback).
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PullbackError {
@@ -75,19 +74,9 @@ pub enum PullbackError {
         /// Entries of the result.
         expected: usize,
     },
-    /// The cloud is another one.
-    #[error(
-        "the cloud is not the one that was reconstructed ({found} points, not {expected}, or other coordinates); give the same one"
-    )]
-    Cloud {
-        /// Points given.
-        found: usize,
-        /// Points reconstructed.
-        expected: usize,
-    },
     /// A cotangent is NaN or infinite.
     #[error(
-        "the cotangent of {what} is not finite at entry {index}; mend the function that it comes from"
+        "the cotangent of {what} is not finite at entry {index}; correct the function that computes it"
     )]
     NotFinite {
         /// The result.
@@ -107,8 +96,8 @@ pub enum PullbackError {
 }
 
 impl<T: Real> Cotangent<'_, T> {
-    /// Whether every cotangent has the length of its result, on a grid of so many cells, a surface of so many
-    /// vertices and a cloud of so many samples, and is finite.
+    /// Checks that every cotangent is finite and has the length of its result, given the numbers of cells of the grid,
+    /// vertices of the surface and samples of the cloud.
     ///
     /// # Errors
     /// [`PullbackError::Length`], [`PullbackError::NotFinite`].
@@ -145,23 +134,6 @@ impl<T: Real> Cotangent<'_, T> {
             || self.vertices.is_some()
             || !self.extensions.is_empty()
             || self.iso_value != T::zero()
-    }
-}
-
-impl<T: Real> Reconstruction<T> {
-    /// Whether the cloud is the one that was reconstructed, to the bit.
-    pub(super) fn check_cloud(&self, cloud: &PointCloud<T>) -> Result<(), PullbackError> {
-        let index = &self.residuals.neighborhoods.index;
-        let (found, expected) = (cloud.len(), index.len());
-        let order = index.order().par_iter().enumerate();
-        let same = found == expected
-            && order
-                .map(|(position, &i)| cloud.points()[i as usize] == index.point(position))
-                .reduce(|| true, |a, b| a && b);
-        match same {
-            true => Ok(()),
-            false => Err(PullbackError::Cloud { found, expected }),
-        }
     }
 }
 

@@ -1,15 +1,15 @@
-//! How much memory a reconstruction takes, and whether there is so much; and what it keeps for its pullback.
+//! Memory that a reconstruction needs, and memory that it keeps for its pullback.
 
 use super::{Error, Reconstruction};
 use crate::{Grid, Real};
 
-/// Values for each cell that are held at once, at most: φ, χ, the closest triangles, and the work space of the
-/// Fourier transform and of the distance. The scaling page has what was measured.
+/// Largest number of values held at once for each cell: φ, χ, the closest triangles, and the scratch buffers of the
+/// Fourier transform and of the distance. Measurements are on the scaling page.
 const VALUES: f64 = 4.5;
 
 const GIB: f64 = (1u64 << 30) as f64;
 
-/// Refuses a grid whose reconstruction needs more memory than is free, where the system says how much that is.
+/// Checks that the reconstruction on `grid` fits into the free memory, where the system reports it (Linux).
 ///
 /// # Errors
 /// [`Error::Memory`].
@@ -26,7 +26,7 @@ pub fn check_memory<T: Real>(grid: &Grid<T>) -> Result<(), Error> {
     }
 }
 
-/// Free memory in bytes, as Linux tells it; `None` elsewhere.
+/// Free memory in bytes on Linux; `None` elsewhere.
 pub fn available_memory() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
     let mut lines = text.lines();
@@ -36,15 +36,16 @@ pub fn available_memory() -> Option<f64> {
 }
 
 impl<T: Real> Reconstruction<T> {
-    /// Bytes that are kept for the pullback beside φ, the mesh and the oriented normals: the indicator and the
-    /// closest face of every cell, the edges of the vertices, the areas, and what the stages keep of the samples
-    /// (search tree, radii, fitted planes, order, the indicator there, and
-    /// what the local iso-value made of it).
+    /// Bytes kept for the pullback beside φ, the mesh and the oriented normals: the indicator and the closest face of
+    /// every cell, the edges of the vertices, the samples and their areas, and the residuals of the stages at the
+    /// samples (search tree, radii, fitted planes, order, values of the indicator, local iso-value).
     pub fn residual_bytes(&self) -> usize {
-        let [[neighbors, _], [normals, _]] = self.of_samples();
+        let [[neighbors, _], [normals, _]] = self.sample_bytes();
         size_of_val(self.indicator.values())
             + size_of_val(self.closest.as_slice())
             + size_of_val(self.mesh.edges())
+            + size_of_val(self.points.as_slice())
+            + size_of_val(self.given.as_slice())
             + size_of_val(self.areas.as_slice())
             + size_of_val(self.residuals.splat.order.as_slice())
             + size_of_val(self.residuals.iso_value.at_samples.as_slice())
@@ -53,13 +54,13 @@ impl<T: Real> Reconstruction<T> {
             + normals
     }
 
-    /// Bytes of work space that stays with the result, so that the next call of its plan need not take it again.
+    /// Bytes of scratch buffers of the samples that stay with the result for the next call of its plan.
     pub fn work_bytes(&self) -> usize {
-        let [[_, neighbors], [_, normals]] = self.of_samples();
+        let [[_, neighbors], [_, normals]] = self.sample_bytes();
         neighbors + normals
     }
 
-    fn of_samples(&self) -> [[usize; 2]; 2] {
+    fn sample_bytes(&self) -> [[usize; 2]; 2] {
         let residuals = &self.residuals;
         [residuals.neighborhoods.bytes(), residuals.normals.bytes()]
     }

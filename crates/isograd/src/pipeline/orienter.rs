@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::stages::find_axes;
-use super::{Error, Residuals};
+use super::{Error, Pipeline, Residuals};
 use crate::Real;
 use crate::data::PointCloud;
 use crate::neighbors::{Neighborhoods, Radius};
@@ -25,13 +25,13 @@ pub struct Orienter<T: Real> {
     report: Report,
 }
 
-impl<T: Real> Default for Orienter<T> {
+impl<T: Pipeline> Default for Orienter<T> {
     fn default() -> Self {
         Self::new(Radius::default(), Method::default())
     }
 }
 
-impl<T: Real> Orienter<T> {
+impl<T: Pipeline> Orienter<T> {
     /// A plan with this neighborhood radius and this way to choose signs, which are checked by its calls.
     pub fn new(radius: Radius, method: Method) -> Self {
         Self {
@@ -60,7 +60,7 @@ impl<T: Real> Orienter<T> {
         Ok(&self.orientation)
     }
 
-    /// [`Self::orient`], compiled where it is called: see [`concrete`](crate::concrete).
+    /// [`Self::orient`], compiled where it is called: see [`concrete`](super::concrete).
     pub(crate) fn run(&mut self, cloud: &PointCloud<T>) -> Result<(), Error> {
         let Self {
             residuals,

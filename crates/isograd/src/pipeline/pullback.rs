@@ -1,9 +1,11 @@
-//! The reverse of the pipeline: cotangents of its results → cotangents of its inputs.
+//! Pullback of the pipeline: cotangents of its results → cotangents of its inputs.
+
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-use super::{CloudCotangent, Cotangent, PullbackError, Reconstruction, Residuals};
-use crate::data::{Field, GridCotangent, PointCloud};
+use super::{CloudCotangent, Cotangent, Pipeline, PullbackError, Reconstruction, Residuals};
+use crate::data::{Field, GridCotangent};
 use crate::distance::{extend, lattice};
 use crate::isosurface::{Level, local_level};
 use crate::orient::Method;
@@ -11,7 +13,7 @@ use crate::poisson::screened;
 use crate::splat::{SampleCotangent, Samples};
 use crate::{Real, isosurface, normals, orient, poisson, splat, vector};
 
-/// Memory that pullbacks use again: a field, an index for each cell whose φ has a cotangent, and some numbers
+/// Scratch buffers of the pullback: a field, an index for each cell whose φ has a cotangent, and some numbers
 /// for each sample and each face.
 #[derive(Default)]
 pub struct PullbackScratch<T: Real> {
@@ -32,60 +34,77 @@ pub struct PullbackScratch<T: Real> {
     normals: normals::Scratch<T>,
 }
 
-impl<T: Real> Reconstruction<T> {
-    /// Pulls cotangents of any of the results back to the cloud that it was made from, and its grid: the
-    /// transpose of the derivative of the whole pipeline, stage by stage in reverse. `cloud` is the one that
-    /// was reconstructed.
+/// The scratch buffers that stay with a reconstruction between calls of [`Reconstruction::pullback_into`]. A call while
+/// another one runs takes new ones.
+#[derive(Default)]
+pub(super) struct Workspace<T: Real>(Mutex<Option<Box<PullbackScratch<T>>>>);
+
+impl<T: Real> Clone for Workspace<T> {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl<T: Pipeline> Reconstruction<T> {
+    /// Cotangents of the samples and of the grid, from cotangents of any of the results: the transpose of the derivative
+    /// of the whole pipeline, stage by stage in reverse.
     ///
     /// Held constant, as the stages say: neighborhoods and their radii, signs of the normals, which cells are
-    /// inside, which face is closest. Where a derivative has no bound it is bounded, and counted in
-    /// [`CloudCotangent::guarded`]. The same bits for any number of threads.
+    /// inside, which face is closest. A derivative without a bound is replaced by a bounded one, and counted in
+    /// [`CloudCotangent::guarded`]. The result has the same bits for any number of threads.
     ///
     /// # Errors
     /// As [`PullbackError`] lists.
     pub fn pullback(
         &self,
-        cloud: &PointCloud<T>,
         cotangent: &Cotangent<'_, T>,
     ) -> Result<CloudCotangent<T>, PullbackError> {
         let mut out = CloudCotangent::default();
-        self.pullback_into(cloud, cotangent, &mut PullbackScratch::default(), &mut out)?;
+        T::pull(self, cotangent, &mut PullbackScratch::default(), &mut out)?;
         Ok(out)
     }
 
-    /// The same, in memory that is used again.
+    /// Like [`pullback`](Self::pullback), writing into `out`. The scratch buffers stay with the reconstruction, or with
+    /// the plan that holds it: a second call allocates nothing of the size of a field.
     ///
     /// # Errors
     /// As [`pullback`](Self::pullback); `out` is then not to be used.
     pub fn pullback_into(
         &self,
-        cloud: &PointCloud<T>,
         cotangent: &Cotangent<'_, T>,
-        scratch: &mut PullbackScratch<T>,
         out: &mut CloudCotangent<T>,
     ) -> Result<(), PullbackError> {
-        T::pull(self, cloud, cotangent, scratch, out)
+        let buffers = || {
+            self.pullback
+                .0
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+        };
+        let mut scratch = buffers().take().unwrap_or_default();
+        let done = T::pull(self, cotangent, &mut scratch, out);
+        *buffers() = Some(scratch);
+        done
     }
+}
 
-    /// [`Self::pullback_into`], compiled where it is called: see [`concrete`](crate::concrete).
-    pub(crate) fn pull(
+impl<T: Real> Reconstruction<T> {
+    /// [`Self::pullback_into`], compiled where it is called: see [`concrete`](super::concrete).
+    pub(super) fn pull(
         &self,
-        cloud: &PointCloud<T>,
         cotangent: &Cotangent<'_, T>,
         scratch: &mut PullbackScratch<T>,
         out: &mut CloudCotangent<T>,
     ) -> Result<(), PullbackError> {
-        self.check_cloud(cloud)?;
         let cells = self.sdf.values().len();
         cotangent.check(cells, self.mesh.vertices().len(), self.areas.len())?;
-        scratch.start(cotangent, cloud.len(), self.mesh.vertices().len());
+        scratch.start(cotangent, self.points.len(), self.mesh.vertices().len());
         out.guarded = 0;
         self.pull_extensions(cotangent, scratch, out)?;
         if cotangent.reaches_indicator() {
             self.pull_distance(cotangent, scratch);
-            self.pull_indicator(cloud, cotangent, scratch, out)?;
+            self.pull_indicator(cotangent, scratch, out)?;
         }
-        self.pull_samples(cloud, scratch, out);
+        self.pull_samples(scratch, out);
         out.grid = GridCotangent {
             lower: vector::of_f64(scratch.samples.grid.lower),
             spacing: T::of(scratch.samples.grid.spacing),
@@ -156,7 +175,6 @@ impl<T: Real> Reconstruction<T> {
     /// From the vertices, the indicator and the iso-value to points, normals and areas.
     fn pull_indicator(
         &self,
-        cloud: &PointCloud<T>,
         cotangent: &Cotangent<'_, T>,
         scratch: &mut PullbackScratch<T>,
         out: &mut CloudCotangent<T>,
@@ -175,11 +193,7 @@ impl<T: Real> Reconstruction<T> {
         );
         samples.grid.add(&found.grid);
         out.guarded += found.guarded;
-        let given = Samples {
-            points: cloud.points(),
-            normals: &self.orientation.normals,
-            areas: &self.areas,
-        };
+        let given = self.splat_samples();
         let mut level_bar = cotangent.iso_value.f64() + found.level;
         let mut smoothing_bar = 0.0;
         scratch.values.clear();
@@ -263,12 +277,7 @@ impl<T: Real> Reconstruction<T> {
     }
 
     /// From points, normals and areas to the points alone, or the given normals.
-    fn pull_samples(
-        &self,
-        cloud: &PointCloud<T>,
-        scratch: &mut PullbackScratch<T>,
-        out: &mut CloudCotangent<T>,
-    ) {
+    fn pull_samples(&self, scratch: &mut PullbackScratch<T>, out: &mut CloudCotangent<T>) {
         let Residuals {
             neighborhoods,
             normals: axes,
@@ -281,9 +290,9 @@ impl<T: Real> Reconstruction<T> {
             ..
         } = &mut scratch.samples;
         out.normals.clear();
-        match (self.options.orient, cloud.normals()) {
-            (Method::Given, Some(given)) => {
-                orient::given_pullback(given, normals_bar);
+        match self.options.orient {
+            Method::Given => {
+                orient::given_pullback(&self.given, normals_bar);
                 out.normals.extend_from_slice(normals_bar);
             }
             _ => {
@@ -307,7 +316,7 @@ impl<T: Real> Reconstruction<T> {
 }
 
 impl<T: Real> PullbackScratch<T> {
-    /// Fills the sums with what is given for them.
+    /// Starts the sums at the cotangents of the caller.
     fn start(&mut self, cotangent: &Cotangent<'_, T>, points: usize, vertices: usize) {
         let samples = &mut self.samples;
         samples.points.clear();
@@ -328,7 +337,7 @@ impl<T: Real> PullbackScratch<T> {
         );
     }
 
-    /// A field on the grid of `chi` that holds what is given, or zeros, in the memory of the last one.
+    /// A field on the grid of `chi` with the given values, or zeros, in the memory of the last one.
     fn take_field(&mut self, chi: &Field<T>, given: Option<&[T]>) -> Field<T> {
         let last = self.field.take().filter(|field| field.grid() == chi.grid());
         let mut field = last.unwrap_or_else(|| Field::zeros(*chi.grid()));
@@ -347,7 +356,7 @@ fn add<E: Copy>(sums: &mut [E], more: &[E], plus: impl Fn(E, E) -> E) {
     }
 }
 
-/// Overwrites `out` with what is given, or with `n` zeros.
+/// Overwrites `out` with the given values, or with `n` zeros.
 fn fill<E: Copy>(out: &mut Vec<E>, given: Option<&[E]>, n: usize, zero: E) {
     out.clear();
     match given {

@@ -1,11 +1,10 @@
 //! A reconstruction from arrays of known size, for callers that can keep nothing else between a forward and
 //! its pullback.
 
-use super::{Error, Reconstruction, Reconstructor};
+use super::{Error, Pipeline, Reconstruction, Reconstructor};
 use crate::data::PointCloud;
 use crate::distance::NO_TRIANGLE;
-use crate::report::Report;
-use crate::{Real, isosurface};
+use crate::isosurface;
 
 /// The results that take longest to find, from which the others are found again: arrays whose length is that of the cloud
 /// or of the grid, which is known before anything is computed.
@@ -47,7 +46,7 @@ pub enum RestoreError {
     Stage(#[from] Error),
 }
 
-impl<T: Real> Reconstructor<T> {
+impl<T: Pipeline> Reconstructor<T> {
     /// The reconstruction of `cloud` that `saved` is from, to the bit. What is not saved is computed again: all but
     /// orientation and distance. The report is empty, and so is the confidence.
     ///
@@ -58,31 +57,26 @@ impl<T: Real> Reconstructor<T> {
         cloud: &PointCloud<T>,
         saved: &Saved<'_, T>,
     ) -> Result<&Reconstruction<T>, RestoreError> {
-        T::bring_back(self, cloud, saved)?;
+        T::rebuild(self, cloud, saved)?;
         Ok(&self.result)
     }
 
-    /// [`Self::restore`], compiled where it is called: see [`concrete`](crate::concrete).
-    pub(crate) fn bring_back(
+    /// [`Self::restore`], compiled where it is called: see [`concrete`](super::concrete).
+    pub(crate) fn rebuild(
         &mut self,
         cloud: &PointCloud<T>,
         saved: &Saved<'_, T>,
     ) -> Result<(), RestoreError> {
         saved.check(self.grid().cells(), cloud.len())?;
-        self.result.report = Report {
-            points: cloud.len(),
-            ..Report::default()
-        };
-        self.result.orientation.normals.clear();
-        self.result.orientation.confidence.clear();
-        self.result
-            .orientation
-            .normals
-            .extend_from_slice(saved.normals);
+        self.result.start(cloud);
+        let orientation = &mut self.result.orientation;
+        orientation.normals.clear();
+        orientation.confidence.clear();
+        orientation.normals.extend_from_slice(saved.normals);
         self.normals(cloud, None)?;
-        self.splat(cloud)?;
-        // What the pullback wants of the indicator is what it was before the local iso-value was taken off.
-        self.solve(cloud, None)?;
+        self.splat()?;
+        // The pullback needs residuals of the indicator before the local iso-value was subtracted.
+        self.solve(None)?;
         let Reconstruction {
             sdf,
             indicator,

@@ -1,16 +1,15 @@
-//! The stages of a plan, each from the results of those before it.
+//! The stages of a plan, each from the results of the previous ones.
 
 use super::{Error, Reconstruction, Reconstructor, Residuals};
-use crate::data::{Field, Mesh, PointCloud};
-use crate::isosurface::{Level, local_level, measure};
+use crate::data::PointCloud;
+use crate::isosurface::{Level, local_level};
 use crate::neighbors::{Neighborhoods, Radius};
-use crate::orient::Orientation;
 use crate::poisson::screened;
 use crate::report::{Report, Stage, Warning};
-use crate::{Real, checks, distance, isosurface, neighbors, normals, orient, splat};
+use crate::{Real, distance, isosurface, neighbors, normals, orient, splat};
 
 impl<T: Real> Reconstructor<T> {
-    /// One stage, compiled where it is called: see [`concrete`](crate::concrete).
+    /// One stage, compiled where it is called: see [`concrete`](super::concrete).
     pub(crate) fn run(
         &mut self,
         stage: Stage,
@@ -20,12 +19,12 @@ impl<T: Real> Reconstructor<T> {
         match stage {
             Stage::Normals => self.normals(cloud, held)?,
             Stage::Orient => self.orient(cloud, held)?,
-            Stage::Splat => self.splat(cloud)?,
-            Stage::Poisson => self.solve(cloud, held)?,
+            Stage::Splat => self.splat()?,
+            Stage::Poisson => self.solve(held)?,
             Stage::Isosurface => self.isosurface()?,
             Stage::Distance => self.distance()?,
             Stage::Checks if held.is_some() => (),
-            Stage::Checks => self.check(cloud),
+            Stage::Checks => self.check(),
         }
         Ok(())
     }
@@ -98,9 +97,10 @@ impl<T: Real> Reconstructor<T> {
         Ok(())
     }
 
-    pub(super) fn splat(&mut self, cloud: &PointCloud<T>) -> Result<(), Error> {
+    pub(super) fn splat(&mut self) -> Result<(), Error> {
         let Reconstruction {
             options,
+            points,
             orientation,
             areas,
             indicator,
@@ -108,29 +108,87 @@ impl<T: Real> Reconstructor<T> {
             ..
         } = &mut self.result;
         let samples = splat::Samples {
-            points: cloud.points(),
+            points,
             normals: &orientation.normals,
             areas,
         };
-        splat::forward(
-            samples,
-            options.splat,
-            &mut self.scratch.splat,
-            &mut residuals.splat,
+        let (scratch, residual) = (&mut self.scratch.splat, &mut residuals.splat);
+        splat::forward(samples, options.splat, scratch, residual, indicator)?;
+        Ok(())
+    }
+
+    /// The indicator and the level of its surface.
+    pub(super) fn solve(&mut self, held: Option<&Reconstruction<T>>) -> Result<(), Error> {
+        let smoothing = self.smoothing(held);
+        let Reconstruction {
+            poisson,
             indicator,
+            residuals,
+            report,
+            ..
+        } = &mut self.result;
+        (residuals.smoothing, report.smoothing) = (smoothing, smoothing);
+        poisson.solve(indicator.values_mut(), smoothing, &mut self.scratch.poisson)?;
+        if self.result.options.screening > 0.0 {
+            self.screen()?;
+        }
+        self.level()
+    }
+
+    /// Width `σ` of the smoothing, in cells.
+    fn smoothing(&self, held: Option<&Reconstruction<T>>) -> f64 {
+        let result = &self.result;
+        match held.filter(|_| !result.options.smoothing_follows()) {
+            Some(held) => held.residuals.smoothing,
+            None => {
+                let sample_spacing = match result.options.area {
+                    true => splat::area::mean(&result.areas).0.sqrt(),
+                    false => result.residuals.neighborhoods.spacing().f64(),
+                };
+                let spacing = result.indicator.grid().spacing().f64();
+                result.options.smoothing.cells(sample_spacing / spacing)
+            }
+        }
+    }
+
+    /// The solution of the screened equation, from that of the plain one.
+    fn screen(&mut self) -> Result<(), Error> {
+        let Reconstruction {
+            options,
+            poisson,
+            points,
+            orientation,
+            areas,
+            indicator,
+            residuals,
+            ..
+        } = &mut self.result;
+        let grid = *indicator.grid();
+        let equation = screened::Equation {
+            plan: poisson,
+            grid: &grid,
+            samples: splat::Samples {
+                points,
+                normals: &orientation.normals,
+                areas,
+            },
+            area_weights: options.area,
+            order: &residuals.splat,
+            screening: options.screening,
+        };
+        screened::forward(
+            &equation,
+            indicator.values_mut(),
+            &mut self.scratch.screened,
         )?;
         Ok(())
     }
 
-    /// The indicator, plain or screened, and the level of its surface.
-    pub(super) fn solve(
-        &mut self,
-        cloud: &PointCloud<T>,
-        held: Option<&Reconstruction<T>>,
-    ) -> Result<(), Error> {
+    /// The iso-value, and the indicator relative to the local one.
+    fn level(&mut self) -> Result<(), Error> {
         let Reconstruction {
             options,
-            poisson,
+            points,
             orientation,
             areas,
             indicator,
@@ -139,44 +197,17 @@ impl<T: Real> Reconstructor<T> {
             report,
             ..
         } = &mut self.result;
-        let grid = *indicator.grid();
-        let held = held.filter(|_| !options.smoothing_follows());
-        residuals.smoothing = match held {
-            Some(held) => held.residuals.smoothing,
-            None => {
-                let apart = match options.area {
-                    true => splat::area::mean(areas).0.sqrt(),
-                    false => residuals.neighborhoods.spacing().f64(),
-                };
-                options.smoothing.cells(apart / grid.spacing().f64())
-            }
-        };
-        report.smoothing = residuals.smoothing;
-        let values = indicator.values_mut();
-        poisson.solve(values, residuals.smoothing, &mut self.scratch.poisson)?;
-        let samples = splat::Samples {
-            points: cloud.points(),
-            normals: &orientation.normals,
-            areas,
-        };
-        if options.screening > 0.0 {
-            let equation = screened::Equation {
-                plan: poisson,
-                grid: &grid,
-                samples,
-                area_weights: options.area,
-                order: &residuals.splat,
-                screening: options.screening,
-            };
-            screened::forward(&equation, values, &mut self.scratch.screened)?;
-        }
         let level = &mut residuals.iso_value;
-        *iso_value = isosurface::iso_value::forward(indicator, samples.points, areas, level)?;
+        *iso_value = isosurface::iso_value::forward(indicator, points, areas, level)?;
         report.iso_value = iso_value.f64();
         if options.level != Level::Mean {
             local_level::forward(
                 indicator,
-                samples,
+                splat::Samples {
+                    points,
+                    normals: &orientation.normals,
+                    areas,
+                },
                 local_level::Choice {
                     area_weights: options.area,
                     smoothing: residuals.smoothing,
@@ -228,12 +259,13 @@ impl<T: Real> Reconstructor<T> {
         Ok(())
     }
 
-    /// Measures the result and looks for reasons not to trust it.
-    fn check(&mut self, cloud: &PointCloud<T>) {
+    /// Measures the result and checks whether it can be trusted.
+    fn check(&mut self) {
         if !self.result.options.checks {
             return;
         }
         let Reconstruction {
+            points,
             sdf,
             mesh,
             orientation,
@@ -241,54 +273,14 @@ impl<T: Real> Reconstructor<T> {
             report,
             ..
         } = &mut self.result;
-        let (points, neighborhoods) = (cloud.points(), &residuals.neighborhoods);
+        let neighborhoods = &residuals.neighborhoods;
         let scratch = &mut self.scratch.measure;
         report.check_field(points, &orientation.normals, sdf, mesh, scratch);
         report.check_samples(points, neighborhoods, orientation);
     }
 }
 
-impl Report {
-    /// Measures φ and the surface, and looks for reasons not to trust them: for results that were not made by a
-    /// [`Reconstructor`]. `normals` are those of the points, outward; [`Report::sample_spacing`] is there already.
-    pub fn check_field<T: Real>(
-        &mut self,
-        points: &[[T; 3]],
-        normals: &[[T; 3]],
-        sdf: &Field<T>,
-        mesh: &Mesh<T>,
-        scratch: &mut measure::Scratch,
-    ) {
-        self.measure_field(sdf);
-        self.surface = measure::measure(mesh, scratch);
-        let (warnings, spacing) = (&mut self.warnings, sdf.grid().spacing());
-        warnings.extend(checks::thin_and_missed(points, normals, sdf));
-        warnings.extend(checks::sparse(self.sample_spacing, spacing.f64()));
-        warnings.extend(checks::components(self.surface.components));
-        warnings.extend(checks::rounded(points, spacing));
-    }
-
-    /// Measures the samples and their normals, and looks for reasons not to trust them. `neighborhoods` are those of
-    /// the points; [`Report::guarded`] is there already.
-    pub fn check_samples<T: Real>(
-        &mut self,
-        points: &[[T; 3]],
-        neighborhoods: &Neighborhoods<T>,
-        orientation: &Orientation<T>,
-    ) {
-        self.measure_samples(&neighborhoods.count, &orientation.confidence);
-        let rims = orient::rim::rims(points, &orientation.normals, neighborhoods);
-        let reasons = orient::doubt::reasons_beside(&rims, points, orientation, neighborhoods);
-        self.doubt = orient::doubt::Doubt::count(points.len(), &reasons);
-        let warnings = &mut self.warnings;
-        warnings.extend(checks::open(&rims));
-        warnings.extend(checks::doubtful_signs(self.doubt));
-        warnings.extend(checks::guarded(self.guarded, points.len()));
-    }
-}
-
-/// Neighborhoods, with the radii of `held` where there is such a thing, and the axis of every point, unless
-/// all normals are given.
+/// Neighborhoods, with the radii of `held` if given, and the axis of every point, unless all normals are given.
 pub(super) fn find_axes<T: Real>(
     cloud: &PointCloud<T>,
     radius: Radius,

@@ -1,12 +1,14 @@
-//! Reasons not to trust a reconstruction, looked for in its own results.
-//!
-//! Each check names what it measures, so that a warning can be understood and argued with. None of them
-//! changes a result.
+//! Measurements of a reconstruction, and warnings that follow from them. None of them changes a result.
 
 use rayon::prelude::*;
 
-use crate::orient::doubt::Doubt;
-use crate::report::Warning;
+use crate::data::Mesh;
+use crate::isosurface::measure;
+use crate::neighbors::Neighborhoods;
+use crate::orient::Orientation;
+use crate::orient::doubt::{self, Doubt};
+use crate::orient::rim;
+use crate::report::{Report, Warning};
 use crate::{Field, Real, vector};
 
 /// Share of the samples below which thin parts, missed samples and doubtful signs go without a warning.
@@ -16,18 +18,54 @@ const SPARSE_CELLS: f64 = 1.25;
 /// Depth below a sample at which its own side must still be the nearest, in cells.
 const THIN_DEPTH: f64 = 2.0;
 
+impl Report {
+    /// Measures φ and the surface and adds warnings about them, for results that were not made by a
+    /// [`Reconstructor`](crate::Reconstructor). `normals` are the outward ones of the points;
+    /// [`Report::sample_spacing`] must be set.
+    pub fn check_field<T: Real>(
+        &mut self,
+        points: &[[T; 3]],
+        normals: &[[T; 3]],
+        sdf: &Field<T>,
+        mesh: &Mesh<T>,
+        scratch: &mut measure::Scratch,
+    ) {
+        self.measure_field(sdf);
+        self.surface = measure::measure(mesh, scratch);
+        let (warnings, spacing) = (&mut self.warnings, sdf.grid().spacing());
+        warnings.extend(thin_and_missed(points, normals, sdf));
+        warnings.extend(sparse(self.sample_spacing, spacing.f64()));
+        warnings.extend(components(self.surface.components));
+        warnings.extend(rounded(points, spacing));
+    }
+
+    /// Measures the samples and their normals and adds warnings about them. `neighborhoods` are those of the points;
+    /// [`Report::guarded`] must be set.
+    pub fn check_samples<T: Real>(
+        &mut self,
+        points: &[[T; 3]],
+        neighborhoods: &Neighborhoods<T>,
+        orientation: &Orientation<T>,
+    ) {
+        self.measure_samples(&neighborhoods.count, &orientation.confidence);
+        let rims = rim::rims(points, &orientation.normals, neighborhoods);
+        let reasons = doubt::reasons_beside(&rims, points, orientation, neighborhoods);
+        self.doubt = Doubt::count(points.len(), &reasons);
+        let warnings = &mut self.warnings;
+        warnings.extend(open(&rims));
+        warnings.extend(doubtful_signs(self.doubt));
+        warnings.extend(guarded(self.guarded, points.len()));
+    }
+}
+
 /// Samples on parts thinner than about three cells, and samples off the surface.
 ///
 /// At [`THIN_DEPTH`] cells below a sample on a thick part, φ still grows toward that sample. On a part
 /// thinner than about three cells the opposite side is nearer there, and the gradient has turned round.
-pub(crate) fn thin_and_missed<T: Real>(
-    points: &[[T; 3]],
-    normals: &[[T; 3]],
-    sdf: &Field<T>,
-) -> Vec<Warning> {
+fn thin_and_missed<T: Real>(points: &[[T; 3]], normals: &[[T; 3]], sdf: &Field<T>) -> Vec<Warning> {
     let h = sdf.grid().spacing();
     let depth = T::of(THIN_DEPTH) * h;
-    let looks: Vec<[bool; 2]> = points
+    let flags: Vec<[bool; 2]> = points
         .par_iter()
         .zip(normals)
         .map(|(&x, &n)| {
@@ -37,8 +75,8 @@ pub(crate) fn thin_and_missed<T: Real>(
             [thin, !(sdf.interpolate(x).abs() <= h)]
         })
         .collect();
-    let share = |what: usize| {
-        looks.iter().filter(|look| look[what]).count() as f64 / points.len().max(1) as f64
+    let share = |which: usize| {
+        flags.iter().filter(|flags| flags[which]).count() as f64 / points.len().max(1) as f64
     };
     let mut warnings = Vec::new();
     if share(0) > TOLERATED_SHARE {
@@ -51,7 +89,7 @@ pub(crate) fn thin_and_missed<T: Real>(
 }
 
 /// Samples further apart than the grid resolves.
-pub(crate) fn sparse(sample_spacing: f64, spacing: f64) -> Option<Warning> {
+fn sparse(sample_spacing: f64, spacing: f64) -> Option<Warning> {
     (sample_spacing > SPARSE_CELLS * spacing).then_some(Warning::Sparse {
         sample_spacing,
         spacing,
@@ -59,22 +97,22 @@ pub(crate) fn sparse(sample_spacing: f64, spacing: f64) -> Option<Warning> {
 }
 
 /// Signs that are little more than a guess.
-pub(crate) fn doubtful_signs(doubt: Doubt) -> Option<Warning> {
+fn doubtful_signs(doubt: Doubt) -> Option<Warning> {
     (doubt.share() > TOLERATED_SHARE).then_some(Warning::DoubtfulSigns { doubt })
 }
 
 /// More than one piece of surface.
-pub(crate) fn components(count: usize) -> Option<Warning> {
+fn components(count: usize) -> Option<Warning> {
     (count > 1).then_some(Warning::Components { count })
 }
 
 /// Samples whose neighbors define no normal.
-pub(crate) fn guarded(samples: usize, points: usize) -> Option<Warning> {
+fn guarded(samples: usize, points: usize) -> Option<Warning> {
     (samples as f64 > TOLERATED_SHARE * points as f64).then_some(Warning::Guarded { samples })
 }
 
 /// Coordinates whose rounding is visible in cells.
-pub(crate) fn rounded<T: Real>(points: &[[T; 3]], spacing: T) -> Option<Warning> {
+fn rounded<T: Real>(points: &[[T; 3]], spacing: T) -> Option<Warning> {
     let largest = points
         .iter()
         .flatten()
@@ -84,7 +122,7 @@ pub(crate) fn rounded<T: Real>(points: &[[T; 3]], spacing: T) -> Option<Warning>
 }
 
 /// A surface that ends at rims.
-pub(crate) fn open(rims: &[bool]) -> Option<Warning> {
+fn open(rims: &[bool]) -> Option<Warning> {
     let samples = rims.iter().filter(|&&at_rim| at_rim).count();
     // A hole across a fifteenth of the square root of the area has a rim of this many samples; what is
     // shorter is a gap in the sampling, or the tip of a fin whose two sides were taken for one.
