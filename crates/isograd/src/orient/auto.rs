@@ -1,15 +1,12 @@
 //! The default method: evidence from fills at two scales, spread along the neighbor graph.
 
-use std::convert::Infallible;
-
 use rayon::prelude::*;
 
 use super::Axes;
-use super::decide::{Beliefs, Domains, Place, Reading, Signs, Verdict};
+use super::clusters::Clusters;
 use super::fill::Fill;
 use super::graph::Graph;
-use super::groups::Groups;
-use super::winding;
+use super::signs::{Interpretation, Place, Signs, Verdict};
 use crate::Real;
 use crate::element::evidence::{self, of_view};
 use crate::neighbors::Neighborhoods;
@@ -19,37 +16,30 @@ use crate::vector;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Auto {
     graph: Graph,
-    groups: Groups,
+    clusters: Clusters,
     fill: Fill,
-    seen: Seen,
+    evidence: Evidence,
     /// Beliefs of the next round.
     next: Vec<f32>,
     signs: Signs,
     reaches: Vec<f32>,
 }
 
-/// What there is to see at each sample.
+/// Evidence at each sample.
 #[derive(Clone, Debug, Default)]
-struct Seen {
-    /// What the fills say, the light on both sides of each axis, and what sheets say.
+struct Evidence {
+    /// Evidence of the exterior fill, and the light on both sides of each axis.
     filled: Vec<f32>,
-    ends: Vec<[f32; 2]>,
+    light: Vec<[f32; 2]>,
+    /// Evidence of a second sheet close by.
     sheets: Vec<f32>,
-    /// How much light there is on both sides of samples that scatter: 0..1.
+    /// Light on the darker side of each sample: 0..1.
     slabs: Vec<f32>,
-    /// What sensors know; empty without them.
+    /// Evidence of sensors; empty without them.
     views: Vec<f32>,
 }
 
-/// The samples' own voices, and how they are spread.
-struct Voices<'a, P> {
-    graph: &'a Graph,
-    seen: &'a Seen,
-    next: &'a mut Vec<f32>,
-    place: &'a P,
-}
-
-/// Where the points are.
+/// Positions of the points, in sorted order.
 struct Sorted<'a, T>(&'a Neighborhoods<T>);
 
 impl<T: Real> Place for Sorted<'_, T> {
@@ -63,8 +53,8 @@ impl<T: Real> Place for Sorted<'_, T> {
 }
 
 impl Auto {
-    /// Finds the sign of each axis. `views`, in input order, say from which side each point was seen, where
-    /// that is known; see [`sensors`](super::sensors).
+    /// Finds the sign of each axis. `views`, in input order, are cosines between axes and lines of sight, if known; see
+    /// [`sensors`](super::sensors).
     pub(super) fn run<T: Real>(
         &mut self,
         axes: &Axes<'_, T>,
@@ -73,60 +63,68 @@ impl Auto {
     ) {
         let place = Sorted(neighborhoods);
         self.graph.build(axes, neighborhoods);
-        self.groups.find(&self.graph, |p| place.user(p));
-        self.look(&place);
-        let known = &mut self.seen.views;
-        known.clear();
+        self.clusters.find(&self.graph, |p| place.user(p));
+        self.collect(&place);
+        let of_sensors = &mut self.evidence.views;
+        of_sensors.clear();
         if let Some(views) = views {
             let order = neighborhoods.index.order().iter();
-            known.extend(order.map(|&i| of_view(views[i as usize])));
+            of_sensors.extend(order.map(|&i| of_view(views[i as usize])));
         }
-        let mut voices = Voices {
-            graph: &self.graph,
-            seen: &self.seen,
-            next: &mut self.next,
-            place: &place,
-        };
-        let Ok(()) = self
-            .signs
-            .find(&self.graph, &mut voices, views.is_some(), &place);
+        let (graph, observed, next) = (&self.graph, &self.evidence, &mut self.next);
+        let sensors = views.is_some();
+        let ambiguous = !sensors && observed.is_ambiguous();
+        self.signs.find(
+            graph,
+            &place,
+            sensors,
+            ambiguous,
+            |interpretation, evidence, belief| {
+                evidence.clear();
+                let all = 0..graph.near.len();
+                evidence.extend(all.map(|p| observed.total(p, graph.side[p], interpretation)));
+                graph.relax(evidence, belief, next);
+            },
+        );
     }
 
-    /// What was found for the point at a sorted position.
+    /// The sign of the point at a sorted position.
     pub(super) fn verdict(&self, p: usize) -> Verdict {
         self.signs.verdict(p)
     }
 
-    /// Gathers what there is to see.
-    fn look(&mut self, place: &impl Place) {
+    /// Collects the evidence of the fills and of the sheets.
+    fn collect(&mut self, place: &impl Place) {
         let n = self.graph.near.len();
-        let Seen {
+        let Evidence {
             filled,
-            ends,
+            light,
             sheets,
             slabs,
             ..
-        } = &mut self.seen;
+        } = &mut self.evidence;
         for values in [&mut *filled, &mut *slabs] {
             values.clear();
             values.resize(n, 0.0);
         }
-        ends.clear();
-        ends.resize(n, [1.0; 2]);
-        for group in 0..self.groups.bounds.len() {
-            let (graph, members) = (&self.graph, self.groups.members(group));
-            let scales = self.groups.scales(group, graph, place, &mut self.reaches);
+        light.clear();
+        light.resize(n, [1.0; 2]);
+        for cluster in 0..self.clusters.bounds.len() {
+            let (graph, members) = (&self.graph, self.clusters.members(cluster));
+            let scales = self
+                .clusters
+                .scales(cluster, graph, place, &mut self.reaches);
             for scale in scales {
                 self.fill.run(&scale.lattice, members.len(), |m| {
                     let p = members[m] as usize;
                     let reach = scale.growth * f64::from(graph.reach[p]);
                     (place.user(p), graph.axis[p], reach)
                 });
-                for (&p, sights) in members.iter().zip(self.fill.sights()) {
+                for (&p, sides) in members.iter().zip(self.fill.evidence()) {
                     let p = p as usize;
-                    filled[p] += scale.weight * sights.evidence;
-                    slabs[p] = slabs[p].max(sights.ends[0].min(sights.ends[1]));
-                    ends[p] = [0, 1].map(|side| ends[p][side].min(sights.ends[side]));
+                    filled[p] += scale.weight * sides.evidence;
+                    slabs[p] = slabs[p].max(sides.light[0].min(sides.light[1]));
+                    light[p] = [0, 1].map(|side| light[p][side].min(sides.light[side]));
                 }
             }
         }
@@ -137,60 +135,27 @@ impl Auto {
     }
 }
 
-impl<P> Voices<'_, P> {
-    fn weighed(&self, p: usize, reading: Reading) -> f32 {
-        let Seen {
-            filled,
-            sheets,
-            slabs,
-            views,
-            ..
-        } = self.seen;
-        let open = match reading {
-            Reading::Careful => self.open(p),
-            Reading::Bold => 1.0,
+impl Evidence {
+    /// Evidence of all kinds, from −1 to 1. `side` is the side of the sample in a layer of noise.
+    fn total(&self, p: usize, side: f32, interpretation: Interpretation) -> f32 {
+        let openness = match interpretation {
+            Interpretation::Careful => self.openness(p),
+            Interpretation::Bold => 1.0,
         };
-        let seen = views.get(p).copied().unwrap_or(0.0);
-        evidence::weighed(
-            filled[p],
-            sheets[p],
-            open,
-            slabs[p],
-            self.graph.side[p],
-            seen,
-        )
+        let view = self.views.get(p).copied().unwrap_or(0.0);
+        let (filled, sheet, slab) = (self.filled[p], self.sheets[p], self.slabs[p]);
+        evidence::weighed(filled, sheet, openness, slab, side, view)
     }
 
-    /// In 0..1, how open the side is that a second sheet behind the point makes the outer one.
-    fn open(&self, p: usize) -> f32 {
-        let side = usize::from(self.seen.sheets[p] < 0.0);
-        evidence::openness(self.seen.ends[p][side])
-    }
-}
-
-impl<P: Place> Beliefs for Voices<'_, P> {
-    type Error = Infallible;
-
-    fn hear(
-        &mut self,
-        reading: Reading,
-        evidence: &mut Vec<f32>,
-        belief: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        let all = 0..self.seen.sheets.len();
-        evidence.clear();
-        evidence.extend(all.map(|p| self.weighed(p, reading)));
-        self.graph.relax(evidence, belief, self.next);
-        Ok(())
+    /// In 0..1, the openness of the side that a second sheet behind the point makes the outer one.
+    fn openness(&self, p: usize) -> f32 {
+        let side = usize::from(self.sheets[p] < 0.0);
+        evidence::openness(self.light[p][side])
     }
 
-    fn differ(&mut self) -> Result<bool, Infallible> {
-        let sheets = self.seen.sheets.iter().enumerate();
-        let mut differing = sheets.filter(|&(p, &sheet)| evidence::differs(sheet, self.open(p)));
-        Ok(differing.next().is_some())
-    }
-
-    fn winding(&mut self, domains: &Domains<'_>, probes: &[u32]) -> Result<Vec<f64>, Infallible> {
-        Ok(winding::numbers(self.graph, self.place, domains, probes))
+    /// Whether the two interpretations differ anywhere.
+    fn is_ambiguous(&self) -> bool {
+        let mut sheets = self.sheets.iter().enumerate();
+        sheets.any(|(p, &sheet)| evidence::differs(sheet, self.openness(p)))
     }
 }

@@ -1,20 +1,15 @@
 //! Evidence for the sign of an axis: which of its two sides is closer to the open air.
 //!
 //! Every sample is drawn on a grid as a disc in its tangent plane, as wide as the samples round it are
-//! apart: so thin bodies keep their inside, and sparse sampling leaves no holes. Regions of free cells
-//! that the discs close off are matter; cells of the open region count as air by the share of the sky
-//! that they see. So a body with a hole in its sampling, which a flood alone would call all air, still
-//! has a darker and a brighter side.
-//!
-//! A part of [`Method::Auto`](super::Method::Auto), named for those who do the same elsewhere: `isograd-gpu` makes
-//! the same grid, and is compared with what is found here.
+//! apart, so that thin bodies keep their inside and sparse sampling leaves no holes. Regions of free cells
+//! that the discs enclose are matter; cells of the open region count as air in proportion to the directions
+//! in which they see out of the grid. A body with a hole in its sampling, which a flood fill alone would classify as
+//! air, still has a darker and a brighter side.
 
 use rayon::prelude::*;
 
-pub use super::flood::{Wall, sides_of_walls};
-
-use super::flood::{self, Regions};
-use super::sky::Sky;
+use super::regions::{self, Regions};
+use super::visibility::Visibility;
 use crate::element::disc as element;
 use crate::element::sight::{self, RAYS, STEPS};
 use crate::parallel::CHUNK;
@@ -56,21 +51,6 @@ impl Lattice {
         }
     }
 
-    /// The low corner of cell (0, 0, 0), in user coordinates.
-    pub fn lower(&self) -> [f64; 3] {
-        self.lower
-    }
-
-    /// The length of the edges of its cells, in user coordinates.
-    pub fn cell(&self) -> f64 {
-        self.cell
-    }
-
-    /// Numbers of cells along x, y and z; the last axis varies fastest in memory.
-    pub fn shape(&self) -> [usize; 3] {
-        self.shape
-    }
-
     /// Position in cells, kept inside the grid.
     fn place(&self, point: [f64; 3]) -> [f32; 3] {
         [0, 1, 2].map(|a| {
@@ -94,35 +74,35 @@ struct Disc {
     half: f32,
 }
 
-/// What is seen along one ray.
+/// First free cell along a ray.
 #[derive(Clone, Copy, Debug)]
-struct Sight {
-    /// The free cell that the ray meets first, and after how many steps.
+struct FirstFree {
+    /// The cell, and the number of steps to it.
     cell: usize,
     region: u32,
     steps: usize,
 }
 
-/// What a sample sees.
+/// Evidence of one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Sights {
+pub struct SideEvidence {
     /// The evidence, in −1..1: positive where the axis points into the air.
     pub evidence: f32,
     /// The light in front, along the axis, and behind: −1 in matter, up to 1 in the open air.
-    pub ends: [f32; 2],
+    pub light: [f32; 2],
 }
 
-/// The grid of occupied cells, its regions and its sky: scratch that is used again.
+/// The grid of occupied cells, its regions and their visibility: scratch buffers reused between calls.
 #[derive(Clone, Debug, Default)]
 pub struct Fill {
     discs: Vec<Disc>,
     by_slab: Vec<Vec<u32>>,
     occupied: Vec<u8>,
     regions: Regions,
-    sky: Sky,
+    visibility: Visibility,
     walls: Vec<(u32, u32)>,
     sides: Vec<i8>,
-    sights: Vec<Sights>,
+    evidence: Vec<SideEvidence>,
 }
 
 impl Fill {
@@ -141,29 +121,18 @@ impl Fill {
         });
         self.draw(lattice);
         let (occupied, shape) = (&self.occupied, lattice.shape);
-        let (regions, sky) = (&mut self.regions, &mut self.sky);
+        let (regions, visibility) = (&mut self.regions, &mut self.visibility);
         rayon::join(
             || regions.find(occupied, shape),
-            || sky.look(occupied, shape),
+            || visibility.compute(occupied, shape),
         );
-        self.tell_sides(lattice);
-        self.look_both_ways(lattice);
+        self.classify_regions(lattice);
+        self.compare_sides(lattice);
     }
 
-    /// `(members,)`: what each member of the last run sees.
-    pub fn sights(&self) -> &[Sights] {
-        &self.sights
-    }
-
-    /// Which cells of the last run samples cover: 1, else 0.
-    pub fn occupied(&self) -> &[u8] {
-        &self.occupied
-    }
-
-    /// Of each region of free cells that are joined through faces, in the order of their first cells: +1 for air, −1
-    /// for matter, 0 where no wall tells. Region 0 is the open air.
-    pub fn sides(&self) -> &[i8] {
-        &self.sides
+    /// `(members,)`: evidence of each member of the last run.
+    pub fn evidence(&self) -> &[SideEvidence] {
+        &self.evidence
     }
 
     /// Marks the cells that the discs cover.
@@ -188,7 +157,7 @@ impl Fill {
     }
 
     /// Air or matter, for each region.
-    fn tell_sides(&mut self, lattice: &Lattice) {
+    fn classify_regions(&mut self, lattice: &Lattice) {
         let mut walls = std::mem::take(&mut self.walls);
         walls.clear();
         let this = &*self;
@@ -197,27 +166,25 @@ impl Fill {
             let back = this.first_free(lattice, disc.center, disc.axis.map(|a| -a))?;
             (front.region != back.region).then_some((front.region, back.region))
         }));
-        flood::sides(self.regions.len, &mut walls, &mut self.sides);
+        regions::sides(self.regions.len, &mut walls, &mut self.sides);
         self.walls = walls;
     }
 
     /// The evidence of each disc: light on one side less light on the other, over a cone of directions.
-    fn look_both_ways(&mut self, lattice: &Lattice) {
-        let mut sights = std::mem::take(&mut self.sights);
-        sights.resize(self.discs.len(), Sights::default());
+    fn compare_sides(&mut self, lattice: &Lattice) {
+        let mut all = std::mem::take(&mut self.evidence);
+        all.resize(self.discs.len(), SideEvidence::default());
         let this = &*self;
-        let chunks = sights
-            .par_chunks_mut(CHUNK)
-            .zip(this.discs.par_chunks(CHUNK));
-        chunks.for_each(|(sights, discs)| {
-            for (sights, disc) in sights.iter_mut().zip(discs) {
-                *sights = this.look(lattice, disc);
+        let chunks = all.par_chunks_mut(CHUNK).zip(this.discs.par_chunks(CHUNK));
+        chunks.for_each(|(all, discs)| {
+            for (evidence, disc) in all.iter_mut().zip(discs) {
+                *evidence = this.compare(lattice, disc);
             }
         });
-        self.sights = sights;
+        self.evidence = all;
     }
 
-    fn look(&self, lattice: &Lattice, disc: &Disc) -> Sights {
+    fn compare(&self, lattice: &Lattice, disc: &Disc) -> SideEvidence {
         let light = |direction: [f32; 3]| {
             self.first_free(lattice, disc.center, direction)
                 .map_or(0.0, |sight| self.light(&sight))
@@ -230,25 +197,30 @@ impl Fill {
             sum += pair(vector::add(disc.axis, tangent));
             sum += pair(vector::sub(disc.axis, tangent));
         }
-        Sights {
+        SideEvidence {
             evidence: sight::evidence(sum),
-            ends,
+            light: ends,
         }
     }
 
     /// Light in the cell that a ray meets: −1 in matter, up to 1 in the open air, less for a longer way.
-    fn light(&self, sight: &Sight) -> f32 {
+    fn light(&self, sight: &FirstFree) -> f32 {
         let light = match self.sides[sight.region as usize] {
-            // Region 0 is the open air; other air is a cavity, which sees no sky.
+            // Region 0 is the open air; other air is a cavity, from which nothing leads out.
             1 if sight.region == 0 => {
-                sight::open_air(f32::from(self.sky.free(sight.cell)), RAYS as f32)
+                sight::open_air(f32::from(self.visibility.free(sight.cell)), RAYS as f32)
             }
             side => f32::from(side),
         };
         sight::dimmed(light, sight.steps as f32, STEPS as f32)
     }
 
-    fn first_free(&self, lattice: &Lattice, from: [f32; 3], direction: [f32; 3]) -> Option<Sight> {
+    fn first_free(
+        &self,
+        lattice: &Lattice,
+        from: [f32; 3],
+        direction: [f32; 3],
+    ) -> Option<FirstFree> {
         let [nx, ny, nz] = lattice.shape;
         for steps in 0..STEPS {
             let at = vector::add(
@@ -260,7 +232,7 @@ impl Fill {
             let cell = (x * ny + y) * nz + z;
             if self.occupied[cell] == 0 {
                 let region = self.regions.at(x * ny + y, z)?;
-                return Some(Sight {
+                return Some(FirstFree {
                     cell,
                     region,
                     steps,

@@ -1,4 +1,4 @@
-//! The neighbor graph: who is next to whom, and how the signs of two neighbors hang together.
+//! The neighbor graph and the coupling of the signs of neighbors.
 //!
 //! # Map
 //! [`Axes`] and [`Neighborhoods`] → [`Graph`], on which the [automatic method](super::Method::Auto) spreads its
@@ -49,7 +49,7 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// Finds all of it, in the memory of the graph before. The axes are those of the same points.
+    /// Builds the graph, reusing its memory. The axes are those of the same points.
     ///
     /// # Panics
     /// There are fewer axes than points.
@@ -200,7 +200,7 @@ impl Graph {
     }
 
     /// In layers with air on both sides, as far as they are that (`slab`, `(N,)` in 0..1), two samples hang together
-    /// as they lie: on one side of the middle, or on both.
+    /// by their positions: on one side of the middle, or on both.
     ///
     /// # Panics
     /// There are fewer slabs than points.
@@ -256,8 +256,8 @@ impl Graph {
         coupling::sheet_evidence(signed, total)
     }
 
-    /// Spreads the evidence `(N,)`, in −1..1: repeated weighted means of what a point's neighbors believe and its
-    /// own evidence, held with its strength. `next` is scratch.
+    /// Propagates the evidence `(N,)`, in −1..1: repeated means of the beliefs of the neighbors of a point, weighted by
+    /// coupling, and its own evidence, weighted by its magnitude. `next` is scratch.
     ///
     /// # Panics
     /// There is evidence of fewer or of more than the points of the graph.

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::flood::{Regions, sides};
-use super::settle::contract;
+use super::domains::contract;
+use super::regions::{Regions, sides};
 use super::shapes::Random;
-use super::sky::Sky;
+use super::visibility::Visibility;
 
 fn random_cells(shape: [usize; 3], share: f64, seed: u64) -> Vec<u8> {
     let mut random = Random(seed);
@@ -26,8 +26,8 @@ fn neighbor(cell: [usize; 3], step: [i64; 3], shape: [usize; 3]) -> Option<[usiz
 }
 
 #[test]
-fn the_sky_is_what_rays_see() {
-    let mut sky = Sky::default();
+fn visibility_agrees_with_rays() {
+    let mut visibility = Visibility::default();
     for (shape, share) in [
         ([5, 7, 9], 0.1),
         ([9, 4, 6], 0.4),
@@ -36,7 +36,7 @@ fn the_sky_is_what_rays_see() {
     ] {
         let occupied = random_cells(shape, share, 21);
         let at = |[x, y, z]: [usize; 3]| (x * shape[1] + y) * shape[2] + z;
-        sky.look(&occupied, shape);
+        visibility.compute(&occupied, shape);
         for cell in cells(shape) {
             let escapes = |step: [i64; 3]| {
                 let mut place = Some(cell);
@@ -51,7 +51,7 @@ fn the_sky_is_what_rays_see() {
             let steps = (0..27).map(|k| [k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1]);
             let seen = steps.filter(|&s| s != [0; 3] && escapes(s)).count();
             assert_eq!(
-                usize::from(sky.free(at(cell))),
+                usize::from(visibility.free(at(cell))),
                 seen,
                 "{cell:?} of {shape:?}"
             );

@@ -4,20 +4,19 @@
 //! Axes `(N, 3)` of unit length and arbitrary sign (from [`normals`]), or the cloud's
 //! own normals → unit normals `(N, 3)` that point outward, with a confidence for each. Six methods:
 //!
-//! - [`Method::Auto`], the default, weighs evidence of five kinds. *Enclosure*: the samples are drawn on a
-//!   grid as discs in their tangent planes, and what they close off from the outside is matter (a cavity
-//!   inside matter is air again, and so on). *Sky*: where the samples leave holes, the side of the
-//!   surface that sees less of the sky, along 26 directions, is the inner one. *Sheets*: where neighbors
-//!   lie on several sheets, the one through the sample is told from the others by a robust fit; a parallel
-//!   sheet close by is the other side of a thin body, or of a narrow gap. Where noise has made one layer of
-//!   the two sides of a thin body, a sample above the middle of the layer belongs to the upper side.
-//!   *Neighbors*: two axes next to
-//!   each other hang together, reflected at the plane half-way between their samples, so that the tie
-//!   holds along a sheet, round an edge, and across a thin body or a narrow gap. What these say is spread
-//!   over the neighbor graph; points that agree make domains, and between domains that contradict each
-//!   other the *winding number* decides: the right signs are those with which it is ½ on the surface.
-//!   Thin bodies and narrow gaps look alike from near; where that matters, both readings are tried, and
-//!   the winding number chooses. Time and memory are `O(N log N)`, wherever outliers are.
+//! - [`Method::Auto`], the default, combines five kinds of evidence. *Exterior fill*: the samples are drawn on a
+//!   grid as discs in their tangent planes, and the regions that they enclose are matter (a cavity
+//!   inside matter is air again, and so on). *Visibility*: where the samples leave holes, the inner side of the
+//!   surface is the one from which fewer of 26 directions lead out of the grid. *Sheets*: where neighbors
+//!   lie on several sheets, a robust fit separates the one through the sample from the others; a parallel
+//!   sheet close by is the other side of a thin body, or of a narrow gap. Where noise has merged the
+//!   two sides of a thin body into one layer, a sample above the middle of the layer belongs to the upper side.
+//!   *Neighbors*: the signs of adjacent axes are coupled by a reflection at the plane half-way between their
+//!   samples, which holds along a sheet, around an edge, and across a thin body or a narrow gap. Belief propagation
+//!   on the neighbor graph spreads this evidence. Points that agree form domains; between domains that contradict
+//!   each other the *winding number* decides: with the correct signs it is ½ on the surface.
+//!   Thin bodies and narrow gaps are locally the same; where that matters, both interpretations are solved, and
+//!   the winding number selects one. Time and memory are `O(N log N)`, regardless of outliers.
 //! - [`Method::Parity`]: the paper's method as printed (its §2.2), with its hyperparameters.
 //! - [`Method::Given`]: the cloud's own normals, trusted as they are.
 //! - [`Method::Signs`]: each axis, turned to the side of the cloud's own normal: for normals whose side is
@@ -40,7 +39,7 @@
 //! sheets can't be told apart beyond doubt, and a few per cent of the signs there are wrong. Noise throws
 //! samples of a thin body to its other side, where nothing tells them from those that belong there: of
 //! bodies as thick as four, two, one deviation of the noise about 2, 16 and 31 % of the signs. Faces
-//! of two bodies that lie in the same place have samples of both signs mixed, which nothing can part.
+//! of two bodies that lie in the same place have samples of both signs mixed, which nothing can separate.
 //!
 //! # Residual
 //! [`Orientation::normals`] holds the sign that was chosen: the stage multiplies by it.
@@ -53,36 +52,36 @@
 //! The signs are discrete; nothing of how they are chosen has a derivative. The confidence has none.
 
 mod auto;
-pub mod decide;
+mod clusters;
+mod domains;
 pub mod doubt;
 mod error;
-pub mod fill;
-mod flood;
-mod found;
-pub mod graph;
+mod fill;
+mod graph;
 #[cfg(test)]
 mod grid_tests;
-pub mod groups;
 #[cfg(test)]
 mod known_tests;
+mod orientation;
 mod parity;
 #[cfg(test)]
 mod parity_tests;
 mod previous;
 mod pullback;
+mod regions;
 pub(crate) mod rim;
 mod sensors;
-mod settle;
 #[cfg(test)]
 mod shapes;
 mod sheet;
-mod sky;
+mod signs;
 #[cfg(test)]
 mod tests;
+mod visibility;
 mod winding;
 
 pub use error::Error;
-pub use found::{Decided, MethodUsed, Orientation};
+pub use orientation::{Decided, MethodUsed, Orientation};
 pub use parity::ParityOptions;
 pub(crate) use pullback::hold;
 pub use pullback::{axes_pullback, given_pullback};
@@ -92,15 +91,15 @@ use crate::element::evidence;
 use crate::neighbors::Neighborhoods;
 use crate::normals::{self, Plane};
 use crate::{PointCloud, Real, vector};
-use decide::{Decision, Verdict};
+use signs::{Decision, Verdict};
 
 /// Confidence below which a sign is [doubtful](Orientation::doubtful).
 const DOUBTFUL: f64 = 0.1;
 
-/// How the signs are chosen.
+/// Method that chooses the signs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Method {
-    /// From enclosure, sky, sheets and neighbors; nothing to set.
+    /// From exterior fill, visibility, sheets and neighbors; no parameters.
     #[default]
     Auto,
     /// By parity along the normal, as the paper prints it.
@@ -115,7 +114,7 @@ pub enum Method {
     Previous,
 }
 
-/// Memory that is used again from call to call.
+/// Scratch buffers reused between calls.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     auto: auto::Auto,
@@ -155,7 +154,7 @@ impl<'a, T> From<&'a Vec<[T; 3]>> for Axes<'a, T> {
     }
 }
 
-/// What is known of a cloud's orientation beside its points.
+/// Information about the orientation of a cloud beside its points.
 #[derive(Clone, Copy, Debug)]
 pub struct Known<'a, T> {
     /// `(N, 3)` normals of any length, for [`Method::Given`] and [`Method::Signs`].
@@ -218,7 +217,7 @@ pub fn forward<'a, T: Real>(
     Ok(())
 }
 
-/// The axes as they are, for a sign to be chosen.
+/// Copies the axes to the output.
 fn take_axes<T: Real>(
     points: &[[T; 3]],
     axes: &[[T; 3]],

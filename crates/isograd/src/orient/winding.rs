@@ -1,4 +1,4 @@
-//! The generalized winding number as an arbiter.
+//! Generalized winding number, which decides between domains.
 //!
 //! With outward normals, the winding number of a closed surface is 0 outside, 1 inside and ½ on the
 //! surface itself, however deep bodies and cavities are nested. It is a sum over samples: that of domains
@@ -13,12 +13,12 @@ use std::f32::consts::PI;
 
 use rayon::prelude::*;
 
-use super::decide::{Beliefs, Domains, Place};
 use super::graph::Graph;
+use super::signs::{Domains, Place};
 use crate::element::winding::{share, softened};
 use crate::vector;
 
-/// Samples at which the winding number is asked, and the fewest in one domain.
+/// Number of samples at which the winding number is computed, and the fewest in one domain.
 const PROBES: usize = 2048;
 const FEWEST_PROBES: usize = 4;
 
@@ -40,12 +40,7 @@ impl Dipole {
 }
 
 /// `(probes, domains)` the winding number that each domain gives at each of the `probes`.
-pub(super) fn numbers(
-    graph: &Graph,
-    place: &impl Place,
-    domains: &Domains<'_>,
-    probes: &[u32],
-) -> Vec<f64> {
+fn numbers(graph: &Graph, place: &impl Place, domains: &Domains<'_>, probes: &[u32]) -> Vec<f64> {
     let dipole = |&p: &u32| {
         let p = p as usize;
         let normal = vector::scale(graph.axis[p], domains.sign[p]);
@@ -57,7 +52,7 @@ pub(super) fn numbers(
     };
     let blocks: Vec<Vec<Block>> = domains.members().into_iter().map(of_domain).collect();
     let arch = pulp::Arch::new();
-    let ask = |&probe: &u32| -> Vec<f64> {
+    let at_probe = |&probe: &u32| -> Vec<f64> {
         let at = place.in_spacings(probe as usize);
         let winding = |blocks: &Vec<Block>| {
             crate::simd::dispatch(
@@ -68,11 +63,11 @@ pub(super) fn numbers(
         };
         blocks.iter().map(winding).collect()
     };
-    let asked: Vec<Vec<f64>> = probes.par_iter().map(ask).collect();
-    asked.concat()
+    let rows: Vec<Vec<f64>> = probes.par_iter().map(at_probe).collect();
+    rows.concat()
 }
 
-/// What signs cost: the sum over all samples of the squared distance of the winding number from ½, which is
+/// Cost of signs: the sum over all samples of the squared distance of the winding number from ½, which is
 /// `Σ_ab gram[a][b] s_a s_b − Σ_a pull[a] s_a + samples/4`.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Misfit {
@@ -84,12 +79,12 @@ pub(super) struct Misfit {
 }
 
 impl Misfit {
-    /// Of domains with the signs that their samples have relative to each other.
-    pub(super) fn of<B: Beliefs>(samples: &mut B, domains: &Domains<'_>) -> Result<Self, B::Error> {
+    /// The cost of domains, with the signs that their samples have relative to each other.
+    pub(super) fn new(graph: &Graph, place: &impl Place, domains: &Domains<'_>) -> Self {
         let members = domains.members();
         let in_one = members.iter().map(Vec::len).sum();
         let (probes, weights) = probes(&members, in_one);
-        let windings = samples.winding(domains, &probes)?;
+        let windings = numbers(graph, place, domains, &probes);
         let count = domains.count;
         let (mut gram, mut pull) = (vec![0.0; count * count], vec![0.0; count]);
         for (weight, winding) in weights.iter().zip(windings.chunks_exact(count.max(1))) {
@@ -100,11 +95,11 @@ impl Misfit {
                 }
             }
         }
-        Ok(Self {
+        Self {
             gram,
             pull,
             samples: in_one,
-        })
+        }
     }
 
     /// The cost with the signs as they are.
@@ -113,7 +108,8 @@ impl Misfit {
     }
 }
 
-/// Samples to ask at, and how many each stands for: spread evenly over those of each domain.
+/// Samples at which the winding number is computed, spread evenly over each domain, and the number of samples that each
+/// represents.
 fn probes(members: &[Vec<u32>], samples: usize) -> (Vec<u32>, Vec<f64>) {
     let (mut probes, mut weights) = (Vec::new(), Vec::new());
     for members in members {
@@ -165,9 +161,6 @@ fn winding_number(blocks: &[Block], at: [f32; 3]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use std::convert::Infallible;
-
-    use super::super::decide::Reading;
     use super::super::shapes::{Sampled, inside_out, join, sphere};
     use super::*;
 
@@ -187,31 +180,6 @@ mod tests {
         }
     }
 
-    impl Beliefs for Body {
-        type Error = Infallible;
-
-        fn hear(
-            &mut self,
-            _: Reading,
-            _: &mut Vec<f32>,
-            _: &mut Vec<f32>,
-        ) -> Result<(), Infallible> {
-            Ok(())
-        }
-
-        fn differ(&mut self) -> Result<bool, Infallible> {
-            Ok(false)
-        }
-
-        fn winding(
-            &mut self,
-            domains: &Domains<'_>,
-            probes: &[u32],
-        ) -> Result<Vec<f64>, Infallible> {
-            Ok(numbers(&self.graph, self, domains, probes))
-        }
-    }
-
     impl Body {
         fn of((points, normals): Sampled) -> Self {
             let graph = Graph {
@@ -222,8 +190,8 @@ mod tests {
             Self { graph, points }
         }
 
-        /// What it costs that the first samples are one domain, and the others another.
-        fn misfit(&mut self, first: usize) -> Misfit {
+        /// Cost with the first samples in one domain, and the others in another.
+        fn misfit(&self, first: usize) -> Misfit {
             let n = self.points.len();
             let domain: Vec<u32> = (0..n).map(|p| u32::from(p >= first)).collect();
             let domains = Domains {
@@ -231,8 +199,7 @@ mod tests {
                 sign: &vec![1.0; n],
                 count: if first < n { 2 } else { 1 },
             };
-            let Ok(misfit) = Misfit::of(self, &domains);
-            misfit
+            Misfit::new(&self.graph, self, &domains)
         }
 
         fn dipoles(&self) -> Vec<Dipole> {
@@ -249,7 +216,7 @@ mod tests {
     #[test]
     fn it_is_one_inside_nothing_outside_and_a_half_on_the_surface() {
         let r = radius(4000);
-        let mut ball = Body::of(sphere(4000, [0.0; 3], r, 3));
+        let ball = Body::of(sphere(4000, [0.0; 3], r, 3));
         let blocks = blocks(&ball.dipoles());
         let first = ball.points[0];
         let at =

@@ -1,11 +1,11 @@
-//! What an orientation is, and what decided it.
+//! Result of the orientation.
 
 #[cfg(doc)]
 use super::Method;
 use super::doubt;
 use crate::Real;
 
-/// How the signs were chosen.
+/// Method that chose the signs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum MethodUsed {
     /// See [`Method::Auto`].
@@ -43,18 +43,18 @@ impl MethodUsed {
     }
 }
 
-/// How many signs were decided by what. The counts add up to the number of points.
+/// Number of signs by the kind of evidence that decided them. The counts add up to the number of points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Decided {
-    /// By what was given: normals, sensors or the call before.
+    /// By normals or sensors of the cloud, or by the previous call.
     pub given: usize,
     /// By parity.
     pub parity: usize,
     /// By clear evidence at the point itself.
     pub evidence: usize,
-    /// By what its neighbors know.
+    /// By the evidence of the neighbors.
     pub neighbors: usize,
-    /// By a rule, for want of evidence or against what there was: confidence 0.
+    /// By a rule, without evidence or against it: confidence 0.
     pub rule: usize,
 }
 
@@ -72,9 +72,9 @@ pub struct Orientation<T> {
     pub confidence: Vec<T>,
     /// Number of axes whose sign was changed.
     pub flipped: usize,
-    /// The method, and what it found on the way.
+    /// The method, with the parameters that it determined.
     pub method: MethodUsed,
-    /// What decided how many signs.
+    /// Number of signs by kind of evidence.
     pub decided: Decided,
 }
 

@@ -104,32 +104,26 @@ fn push_runs(row: &[u8], runs: &mut Vec<(u32, u32)>) {
     }
 }
 
-/// Which regions are outside the body, from `walls`: for each sample that has a region on either side, that pair;
-/// see [`sides_of_walls`].
+/// A wall: its number of samples, and the regions on its two sides.
+type Wall = (usize, (u32, u32));
+
+/// Classifies the `regions`: `sides[r]` is +1 for air, −1 for matter, 0 where no wall separates it.
+///
+/// `walls` has a pair of regions for each sample between two regions. Region 0 is air. From region to region across the
+/// wall with the most samples, air and matter alternate: the cavity of a hollow body is air again, and a body inside
+/// the cavity is matter.
+///
+/// # Panics
+/// A wall names a region that does not exist.
 pub(super) fn sides(regions: usize, walls: &mut [(u32, u32)], sides: &mut Vec<i8>) {
     walls
         .iter_mut()
         .for_each(|wall| *wall = (wall.0.min(wall.1), wall.0.max(wall.1)));
     walls.sort_unstable();
-    let mut counted: Vec<Wall> = walls
+    let mut walls: Vec<Wall> = walls
         .chunk_by(|a, b| a == b)
         .map(|same| (same.len(), same[0]))
         .collect();
-    sides_of_walls(regions, &mut counted, sides);
-}
-
-/// A wall: how many samples it has, and the regions on its two sides.
-pub type Wall = (usize, (u32, u32));
-
-/// Which of the `regions` are outside the body: `sides[r]` is +1 for air, −1 for matter, 0 where no wall tells.
-///
-/// `walls` are the pairs of regions, the lower first and no pair twice, with the number of samples that have one on
-/// either side, in any order. Region 0 is air. From region to region across the wall with the most samples, air and
-/// matter alternate: so the cavity of a hollow body is air again, and a body inside the cavity is matter.
-///
-/// # Panics
-/// A wall names a region that there is not.
-pub fn sides_of_walls(regions: usize, walls: &mut [Wall], sides: &mut Vec<i8>) {
     sides.clear();
     sides.resize(regions, 0);
     let Some(open_air) = sides.first_mut() else {

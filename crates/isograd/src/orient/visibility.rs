@@ -1,4 +1,4 @@
-//! How much of the sky every free cell sees.
+//! Number of directions in which each free cell sees out of the grid.
 
 use crate::element::sight;
 
@@ -9,24 +9,24 @@ const _: () = assert!(2 * DIRECTIONS as usize == sight::RAYS);
 
 /// Scratch of the two sweeps, and their counts for each cell.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Sky {
+pub(super) struct Visibility {
     sweeps: [Sweep; 2],
 }
 
 #[derive(Clone, Debug, Default)]
 struct Sweep {
     count: Vec<u8>,
-    /// The plane before, the plane at work (both with a border that sees the whole sky), and a row that
+    /// The plane before, the plane at work (both with a border that is open in all directions), and a row that
     /// is all ones where free.
     before: Vec<u16>,
     current: Vec<u16>,
     free: Vec<u16>,
 }
 
-impl Sky {
+impl Visibility {
     /// From each cell a ray starts in each of the 26 directions to its neighbors; it is free if it
     /// leaves the grid without meeting an occupied cell.
-    pub(super) fn look(&mut self, occupied: &[u8], shape: [usize; 3]) {
+    pub(super) fn compute(&mut self, occupied: &[u8], shape: [usize; 3]) {
         let [forward, backward] = &mut self.sweeps;
         rayon::join(
             || forward.run(occupied, shape, false),

@@ -1,9 +1,9 @@
-//! Parts of the cloud that get a grid of their own.
+//! Clusters of samples, each with its own grid.
 
-use super::decide::Place;
 use super::fill::Lattice;
-use super::flood::root;
 use super::graph::Graph;
+use super::regions::root;
+use super::signs::Place;
 use crate::vector;
 
 /// Cells of the two grids over the median reach of the samples, and what their evidence weighs.
@@ -20,10 +20,10 @@ const FINE: f64 = 1.1;
 /// Two neighbors belong together where they are at most this many reaches apart.
 const LINK: f32 = 8.0;
 
-/// Neighbors that are asked.
-const ASKED: usize = 8;
+/// Number of neighbors that are linked.
+const LINKED: usize = 8;
 
-/// Fewer samples than this are no body; they get no grid, and mark none.
+/// A cluster of fewer samples has no grid.
 const SMALLEST: u32 = 8;
 
 /// With more separate parts than this, all share one grid.
@@ -32,20 +32,20 @@ const MOST: usize = 256;
 /// By how much of its longest side a box grows before it is compared with others.
 const NEAR: f64 = 0.1;
 
-/// The mark of a point without a group.
+/// Marks a point without a cluster.
 const NONE: u32 = u32::MAX;
 
-/// Parts of the cloud whose boxes are apart: so one that is far away doesn't make the grid of another
-/// coarse. Parts whose boxes meet, as a body inside the cavity of another, share one.
+/// Clusters of samples with disjoint bounding boxes, so that a distant one does not coarsen the grid of another.
+/// Parts whose boxes overlap, such as a body inside the cavity of another, form one cluster.
 #[derive(Clone, Debug, Default)]
-pub struct Groups {
+pub struct Clusters {
     parent: Vec<u32>,
     size: Vec<u32>,
     /// The part of each point, or [`NONE`].
     part: Vec<u32>,
-    /// Points in order of their group.
+    /// Points in order of their cluster.
     members: Vec<u32>,
-    /// One box for each group, and where its members end.
+    /// One box for each cluster, and where its members end.
     pub bounds: Vec<Bounds>,
     ends: Vec<usize>,
 }
@@ -59,12 +59,12 @@ pub struct Bounds {
     pub high: [f64; 3],
 }
 
-/// One of the grids that the samples of a group are drawn on.
+/// One of the grids that the samples of a cluster are drawn on.
 #[derive(Clone, Copy, Debug)]
 pub struct Scale {
     /// The grid.
     pub lattice: Lattice,
-    /// What its evidence weighs.
+    /// Weight of its evidence.
     pub weight: f32,
     /// How wide a disc is there whose sample reaches one spacing, in user units.
     pub growth: f64,
@@ -97,28 +97,32 @@ impl Bounds {
     }
 }
 
-impl Groups {
-    /// The points of a group, in order.
+impl Clusters {
+    /// The points of a cluster, in order.
     ///
     /// # Panics
-    /// There is no such group.
-    pub fn members(&self, group: usize) -> &[u32] {
-        let start = if group == 0 { 0 } else { self.ends[group - 1] };
-        &self.members[start..self.ends[group]]
+    /// There is no such cluster.
+    pub fn members(&self, cluster: usize) -> &[u32] {
+        let start = if cluster == 0 {
+            0
+        } else {
+            self.ends[cluster - 1]
+        };
+        &self.members[start..self.ends[cluster]]
     }
 
-    /// The grids of a group, finest first. `reaches` is scratch.
+    /// The grids of a cluster, finest first. `reaches` is scratch.
     ///
     /// # Panics
-    /// There is no such group.
+    /// There is no such cluster.
     pub fn scales(
         &self,
-        group: usize,
+        cluster: usize,
         graph: &Graph,
         place: &impl Place,
         reaches: &mut Vec<f32>,
     ) -> [Scale; 2] {
-        let (bounds, members) = (self.bounds[group], self.members(group));
+        let (bounds, members) = (self.bounds[cluster], self.members(cluster));
         let reach = place.spacing() * median_reach(graph, members, reaches);
         let budget = (CELLS_PER_SAMPLE * members.len()).clamp(FEWEST_CELLS, MOST_CELLS);
         SCALES.map(|(scale, weight)| Scale {
@@ -148,9 +152,9 @@ impl Groups {
                 bounds.extend(Bounds::of(point(p)));
             }
         }
-        let group = merge(&mut parts);
+        let cluster = merge(&mut parts);
         self.bounds = parts;
-        self.sort_members(&group);
+        self.sort_members(&cluster);
     }
 
     fn link(&mut self, graph: &Graph) {
@@ -158,7 +162,7 @@ impl Groups {
         self.parent.clear();
         self.parent.extend(0..n as u32);
         for p in 0..n {
-            for (&q, &d) in graph.near[p].iter().zip(&graph.offset[p]).take(ASKED) {
+            for (&q, &d) in graph.near[p].iter().zip(&graph.offset[p]).take(LINKED) {
                 let limit = LINK * graph.reach[p].max(graph.reach[q as usize]);
                 if vector::norm(d) <= limit {
                     let (a, b) = (root(&mut self.parent, p as u32), root(&mut self.parent, q));
@@ -175,12 +179,13 @@ impl Groups {
         }
     }
 
-    /// Sorts the points by the group of their part, in order within each.
-    fn sort_members(&mut self, group: &[u32]) {
+    /// Sorts the points by the cluster of their part, in order within each.
+    fn sort_members(&mut self, cluster: &[u32]) {
         self.ends.clear();
         self.ends.resize(self.bounds.len() + 1, 0);
-        let grouped = |(p, &part): (u32, &u32)| group.get(part as usize).map(|&g| (g as usize, p));
-        for (g, _) in (0..).zip(&self.part).filter_map(grouped) {
+        let clustered =
+            |(p, &part): (u32, &u32)| cluster.get(part as usize).map(|&g| (g as usize, p));
+        for (g, _) in (0..).zip(&self.part).filter_map(clustered) {
             self.ends[g + 1] += 1;
         }
         for g in 0..self.bounds.len() {
@@ -188,8 +193,8 @@ impl Groups {
         }
         self.members.clear();
         self.members.resize(self.ends[self.bounds.len()], 0);
-        // Each start moves on to the end of its group.
-        for (g, p) in (0..).zip(&self.part).filter_map(grouped) {
+        // Each start moves on to the end of its cluster.
+        for (g, p) in (0..).zip(&self.part).filter_map(clustered) {
             self.members[self.ends[g]] = p;
             self.ends[g] += 1;
         }
@@ -257,10 +262,10 @@ mod tests {
     }
 
     #[test]
-    fn a_crowd_of_parts_shares_one_box() {
+    fn many_parts_share_one_box() {
         let far = |k: i32| Bounds::of([f64::from(k) * 100.0; 3]);
         let mut boxes: Vec<Bounds> = (0..300).map(far).collect();
-        assert!(merge(&mut boxes).iter().all(|&group| group == 0));
+        assert!(merge(&mut boxes).iter().all(|&cluster| cluster == 0));
         assert_eq!(boxes.len(), 1);
         assert_eq!(boxes[0].high, [29_900.0; 3]);
     }

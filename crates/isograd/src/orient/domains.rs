@@ -3,61 +3,61 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 
-use super::decide::{self, Beliefs, Place};
 use super::graph::Graph;
+use super::signs::{Domains, Place};
 use super::winding::Misfit;
 use crate::vector;
 
 /// Neighbors whose coupling is at least this strong belong to one domain if their beliefs agree.
 const STRONG: f32 = 0.5;
 
-/// Fewest points of a domain about which the winding number is asked, and the most such domains: the
-/// others have too little surface to matter to it.
+/// Fewest points of a domain whose winding number is computed, and the largest number of such domains: the
+/// others have too little surface to matter.
 const SMALLEST: usize = 12;
 const MOST_DOMAINS: usize = 256;
 
-/// A domain is overruled where this much more speaks against its signs than for them.
+/// A domain is overruled if the beliefs against its signs outweigh those for them by this factor.
 const MOSTLY: f64 = 3.0;
 
-/// Rounds in which single domains may turn.
+/// Rounds of flips of single domains.
 const SWEEPS: usize = 20;
 
-/// A belief below this says nothing.
-const SILENT: f32 = 1e-2;
+/// A belief below this is none.
+const NEGLIGIBLE: f32 = 1e-2;
 
 /// Turns beliefs into one sign for each point; all in sorted order.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Settle {
+pub(super) struct DomainSigns {
     /// `+1` where the axis points outward, `−1` where it points inward.
     pub sign: Vec<f32>,
     /// Whether the domain of a point was turned against what its points believed.
     pub overruled: Vec<bool>,
-    domains: Domains,
+    domains: SignedUnionFind,
     /// The domain of each point.
     domain: Vec<u32>,
-    /// Strong couplings of silent points.
-    silent: Vec<(f32, u32, u32)>,
+    /// Strong couplings of points without belief.
+    undecided: Vec<(f32, u32, u32)>,
 }
 
 /// Union-find in which every point knows its sign relative to its root.
 #[derive(Clone, Debug, Default)]
-struct Domains {
+struct SignedUnionFind {
     parent: Vec<u32>,
     /// Sign relative to the parent.
     relative: Vec<f32>,
     /// Whether the domain of this root holds a belief.
-    believes: Vec<bool>,
+    has_belief: Vec<bool>,
 }
 
-impl Domains {
+impl SignedUnionFind {
     fn reset(&mut self, belief: &[f32]) {
         self.parent.clear();
         self.parent.extend(0..belief.len() as u32);
         self.relative.clear();
         self.relative.resize(belief.len(), 1.0);
-        self.believes.clear();
-        self.believes
-            .extend(belief.iter().map(|b| b.abs() >= SILENT));
+        self.has_belief.clear();
+        self.has_belief
+            .extend(belief.iter().map(|b| b.abs() >= NEGLIGIBLE));
     }
 
     /// Root of `p`, and the sign of `p` relative to it.
@@ -79,50 +79,48 @@ impl Domains {
             let (low, high) = (a.min(b) as usize, a.max(b) as usize);
             self.parent[high] = low as u32;
             self.relative[high] = sign_a * sign_b * product;
-            self.believes[low] |= self.believes[high];
+            self.has_belief[low] |= self.has_belief[high];
         }
     }
 }
 
-impl Settle {
-    /// `evidence` and `belief` are what the samples said; `winding` is what one at which the winding number is wrong by
-    /// 1 weighs, beside evidence of 1.
+impl DomainSigns {
+    /// Finds the signs, from the `evidence` and the `belief` of each sample. `winding` is the weight of a sample at which
+    /// the winding number is wrong by 1, relative to evidence of 1.
     ///
-    /// Domains of neighbors that agree are first oriented as a whole, the strongest tie first: to the
+    /// SignedUnionFind of neighbors that agree are first oriented as a whole, the strongest tie first: to the
     /// evidence, or to the domain next to them. So a part whose evidence is weak follows the neighbors
     /// on which it borders, however large it is. What is tied to no evidence at all turns its axes away
     /// from its centroid.
-    pub(super) fn run<B: Beliefs>(
+    pub(super) fn run(
         &mut self,
         graph: &Graph,
         (evidence, belief): (&[f32], &[f32]),
-        samples: &mut B,
         winding: f64,
         place: &impl Place,
-    ) -> Result<(), B::Error> {
+    ) {
         self.domains.reset(belief);
         self.join_agreeing(graph, belief);
-        self.join_silent(graph, belief);
+        self.join_undecided(graph, belief);
         let domains = self.number_domains();
         let mut ties = self.ties(graph, evidence, domains);
         if winding > 0.0 {
-            self.arbitrate(samples, winding, &mut ties)?;
+            self.add_winding(graph, place, winding, &mut ties);
         }
         let mut outcome = contract(ties.clone());
         improve(&ties, &mut outcome);
         self.apply(&outcome);
         self.find_overruled(domains, belief);
         self.turn_from_centroids(graph, &outcome, |p| place.user(p));
-        Ok(())
     }
 
     fn join_agreeing(&mut self, graph: &Graph, belief: &[f32]) {
         for p in 0..belief.len() {
             for (&q, &coupling) in graph.near[p].iter().zip(&graph.coupling[p]) {
                 let (mine, other) = (belief[p], belief[q as usize]);
-                let heard = mine.abs() >= SILENT && other.abs() >= SILENT;
+                let both_decided = mine.abs() >= NEGLIGIBLE && other.abs() >= NEGLIGIBLE;
                 let product = mine.signum() * other.signum();
-                if heard && coupling * product >= STRONG {
+                if both_decided && coupling * product >= STRONG {
                     let (a, b) = (self.domains.root(p as u32), self.domains.root(q));
                     self.domains.join(a, b, product);
                 }
@@ -131,24 +129,25 @@ impl Settle {
     }
 
     /// Points that the evidence has not reached follow their strongest couplings, strongest first.
-    fn join_silent(&mut self, graph: &Graph, belief: &[f32]) {
-        self.silent.clear();
+    fn join_undecided(&mut self, graph: &Graph, belief: &[f32]) {
+        self.undecided.clear();
         for p in 0..belief.len() {
             for (&q, &coupling) in graph.near[p].iter().zip(&graph.coupling[p]) {
-                let heard = belief[p].abs() >= SILENT && belief[q as usize].abs() >= SILENT;
-                if !heard && coupling.abs() >= STRONG {
-                    self.silent.push((coupling, p as u32, q));
+                let both_decided =
+                    belief[p].abs() >= NEGLIGIBLE && belief[q as usize].abs() >= NEGLIGIBLE;
+                if !both_decided && coupling.abs() >= STRONG {
+                    self.undecided.push((coupling, p as u32, q));
                 }
             }
         }
-        self.silent.sort_unstable_by(|a, b| {
+        self.undecided.sort_unstable_by(|a, b| {
             let stronger = b.0.abs().total_cmp(&a.0.abs());
             stronger.then((a.1, a.2).cmp(&(b.1, b.2)))
         });
-        for &(coupling, p, q) in &self.silent {
+        for &(coupling, p, q) in &self.undecided {
             let (a, b) = (self.domains.root(p), self.domains.root(q));
-            // Silent points must not become a bridge between domains that have a mind of their own.
-            if !(self.domains.believes[a.0 as usize] && self.domains.believes[b.0 as usize]) {
+            // Points without belief must not join domains with strong evidence of their own.
+            if !(self.domains.has_belief[a.0 as usize] && self.domains.has_belief[b.0 as usize]) {
                 self.domains.join(a, b, coupling.signum());
             }
         }
@@ -202,21 +201,22 @@ impl Settle {
         ties
     }
 
-    /// Adds what the winding number says for and between the larger domains.
-    fn arbitrate<B: Beliefs>(
+    /// Adds the ties of the winding number, of the larger domains and between them.
+    fn add_winding(
         &self,
-        samples: &mut B,
+        graph: &Graph,
+        place: &impl Place,
         winding: f64,
         ties: &mut [BTreeMap<u32, f64>],
-    ) -> Result<(), B::Error> {
+    ) {
         let ground = ties.len() - 1;
         let large = self.large_domains(ground);
-        let mut row = vec![decide::Domains::NONE; ground];
+        let mut row = vec![Domains::NONE; ground];
         for (k, &domain) in (0..).zip(&large) {
             row[domain] = k;
         }
-        let asked: Vec<u32> = self.domain.iter().map(|&d| row[d as usize]).collect();
-        let misfit = Misfit::of(samples, &self.asked(&asked, large.len()))?;
+        let domain: Vec<u32> = self.domain.iter().map(|&d| row[d as usize]).collect();
+        let misfit = Misfit::new(graph, place, &self.signed(&domain, large.len()));
         let mut tie = |a: usize, b: usize, weight: f64| {
             *ties[a].entry(b as u32).or_insert(0.0) += weight;
             *ties[b].entry(a as u32).or_insert(0.0) += weight;
@@ -227,18 +227,17 @@ impl Settle {
                 tie(a, b, -2.0 * winding * misfit.gram[k * large.len() + l]);
             }
         }
-        Ok(())
     }
 
-    fn asked<'a>(&'a self, domain: &'a [u32], count: usize) -> decide::Domains<'a> {
-        decide::Domains {
+    fn signed<'a>(&'a self, domain: &'a [u32], count: usize) -> Domains<'a> {
+        Domains {
             domain,
             sign: &self.sign,
             count,
         }
     }
 
-    /// The domains that the winding number is asked about, largest first.
+    /// The domains whose winding numbers are computed, largest first.
     fn large_domains(&self, domains: usize) -> Vec<usize> {
         let mut size = vec![0; domains];
         self.domain.iter().for_each(|&d| size[d as usize] += 1);
@@ -248,21 +247,21 @@ impl Settle {
         large
     }
 
-    /// How far the winding number of the whole is from that of a body.
-    pub(super) fn misfit<B: Beliefs>(&self, samples: &mut B) -> Result<f64, B::Error> {
+    /// Deviation of the winding number of the whole from that of a body.
+    pub(super) fn misfit(&self, graph: &Graph, place: &impl Place) -> f64 {
         let whole = vec![0; self.sign.len()];
-        Ok(Misfit::of(samples, &self.asked(&whole, 1))?.total())
+        Misfit::new(graph, place, &self.signed(&whole, 1)).total()
     }
 
-    /// Marks the domains whose signs are against most of what their points believed: the winding number of all
-    /// domains together, or their neighbors, said otherwise.
+    /// Marks the domains whose signs contradict most beliefs of their points, because of the winding number of all
+    /// domains together or of their neighbors.
     fn find_overruled(&mut self, domains: usize, belief: &[f32]) {
-        let mut heard = vec![[0.0; 2]; domains];
+        let mut totals = vec![[0.0; 2]; domains];
         for (p, &domain) in self.domain.iter().enumerate() {
-            let said = f64::from(self.sign[p] * belief[p]);
-            heard[domain as usize][usize::from(said < 0.0)] += said.abs();
+            let signed = f64::from(self.sign[p] * belief[p]);
+            totals[domain as usize][usize::from(signed < 0.0)] += signed.abs();
         }
-        let against = |&d: &u32| heard[d as usize][1] > MOSTLY * heard[d as usize][0];
+        let against = |&d: &u32| totals[d as usize][1] > MOSTLY * totals[d as usize][0];
         self.overruled.clear();
         self.overruled.extend(self.domain.iter().map(against));
     }
@@ -282,14 +281,14 @@ impl Settle {
         point: impl Fn(usize) -> [f64; 3],
     ) {
         let ground = outcome[outcome.len() - 1].0;
-        let mut lost: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        let mut isolated: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         for (p, &domain) in self.domain.iter().enumerate() {
             let cluster = outcome[domain as usize].0;
             if cluster != ground {
-                lost.entry(cluster).or_default().push(p);
+                isolated.entry(cluster).or_default().push(p);
             }
         }
-        for members in lost.values() {
+        for members in isolated.values() {
             let total = members
                 .iter()
                 .fold([0.0; 3], |sum, &p| vector::add(sum, point(p)));
