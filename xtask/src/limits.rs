@@ -8,11 +8,13 @@ use std::path::{Path, PathBuf};
 use crate::process::{self, Outcome};
 
 const PARAMETERS: usize = 8;
+/// Functions still above that limit; to be lowered, never raised.
+const EXCEPTIONS: usize = 44;
 const LINES: usize = 400;
 /// Folders with Rust sources.
 const FOLDERS: [&str; 4] = ["benches", "bindings", "crates", "xtask"];
 
-/// Fails on functions with too many parameters; prints files that are too long.
+/// Fails if more functions than [`EXCEPTIONS`] have too many parameters; prints files that are too long.
 pub fn run() -> Outcome<Vec<String>> {
     let mut files = Vec::new();
     for folder in FOLDERS {
@@ -39,13 +41,17 @@ pub fn run() -> Outcome<Vec<String>> {
             }
         }
     }
-    if offenders.is_empty() {
-        return Ok(Vec::new());
-    }
-    println!(
-        "functions with more than {PARAMETERS} parameters\n  {}",
+    let list = format!(
+        "{} functions have more than {PARAMETERS} parameters\n  {}",
+        offenders.len(),
         offenders.join("\n  ")
     );
+    if offenders.len() > EXCEPTIONS {
+        return Err(format!("{list}\n{EXCEPTIONS} are left to change"));
+    }
+    if !offenders.is_empty() {
+        println!("{list}");
+    }
     Ok(Vec::new())
 }
 
