@@ -1,7 +1,7 @@
 //! The paper's inverse problem, small: a fish of random widths and heights finds those of the target by
 //! matching its signed distance field.
 //!
-//! The target is sampled at the same places of the surface as the fit: what is left is the optimizer alone.
+//! The target has the surface coordinates of the fit's samples, so that the error is that of the optimizer alone.
 //! `cargo xtask fit` makes docs/fit.md with a target that has samples of its own.
 
 use std::error::Error;

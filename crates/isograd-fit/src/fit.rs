@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::Error;
 use crate::loss::Band;
 use crate::optimize::{self, Optimizer, Step};
-use crate::problem::{Fingerprints, Parts, Problem};
+use crate::problem::{Fingerprints, LossTerms, Problem};
 use crate::target::Target;
 use crate::variables::{Degrees, Variables};
 
@@ -96,7 +96,7 @@ pub struct Epoch {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Checkpoint {
     fingerprints: Fingerprints,
-    state: optimize::State<Parts>,
+    state: optimize::State<LossTerms>,
     /// The samples in use: their number, and the variables when they were drawn.
     sampled: Option<(u64, Vec<f64>)>,
     history: Vec<Epoch>,
@@ -114,7 +114,7 @@ pub struct Fit {
     options: Options,
     problem: Problem,
     fingerprints: Fingerprints,
-    state: optimize::State<Parts>,
+    state: optimize::State<LossTerms>,
     sampled: Option<(u64, Vec<f64>)>,
     history: Vec<Epoch>,
 }
@@ -332,7 +332,7 @@ impl Fit {
     /// The current field and surface.
     ///
     /// # Errors
-    /// Those of a device; on the CPU none, once a step was taken there.
+    /// Errors of a device; on the CPU none, once a step was taken there.
     pub fn reconstruction(&mut self) -> Result<View<'_, f64>, Error> {
         self.problem.reconstruction(&self.state.x)
     }

@@ -56,6 +56,6 @@ pub use error::Error;
 pub use fit::{Checkpoint, Epoch, Fit, Options, Outcome};
 pub use loss::{Band, Matching, Mismatch};
 pub use optimize::{Adam, Decay, Lbfgs, Optimizer};
-pub use problem::Parts;
+pub use problem::LossTerms;
 pub use target::{Target, TargetError};
 pub use variables::{Points, ShapeParameters, Start, Variables};

@@ -14,7 +14,7 @@ use crate::variables::{Degrees, Variables};
 
 /// Terms of the loss at one point.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Parts {
+pub struct LossTerms {
     /// Mean squared difference of φ, in cells².
     pub data: f64,
     /// The smoothness term of raw points.
@@ -53,7 +53,7 @@ impl Problem {
     }
 
     /// Loss and gradient at `x`.
-    pub fn evaluate(&mut self, x: &[f64]) -> Result<Evaluation<Parts>, Error> {
+    pub fn evaluate(&mut self, x: &[f64]) -> Result<Evaluation<LossTerms>, Error> {
         let cloud = self.degrees.cloud(x)?;
         let result = self.plan.reconstruct(&cloud)?;
         let mismatch = self
@@ -65,14 +65,14 @@ impl Problem {
         };
         result.pullback_into(&cotangent, &mut self.bar)?;
         let mut gradient = self.degrees.pullback(x, &self.bar.points)?;
-        let extra = self.degrees.extra(x, &mut gradient);
+        let regularization = self.degrees.regularization(x, &mut gradient);
         Ok(Evaluation {
-            value: mismatch.loss + extra.smoothness + extra.bounds,
+            value: mismatch.loss + regularization.smoothness + regularization.bounds,
             gradient,
-            detail: Parts {
+            detail: LossTerms {
                 data: mismatch.loss,
-                smoothness: extra.smoothness,
-                bounds: extra.bounds,
+                smoothness: regularization.smoothness,
+                bounds: regularization.bounds,
                 mean_error: mismatch.mean_error,
             },
         })
@@ -117,19 +117,19 @@ impl Fingerprints {
         others: &str,
     ) -> Self {
         let grid = target.grid();
-        let mut of_target = Fingerprint::default();
-        of_target.numbers(&grid.lower());
-        of_target.numbers(&[grid.spacing()]);
+        let mut target_hash = Fingerprint::default();
+        target_hash.numbers(&grid.lower());
+        target_hash.numbers(&[grid.spacing()]);
         for n in grid.shape() {
-            of_target.number(n as u64);
+            target_hash.number(n as u64);
         }
-        of_target.numbers(target.sdf().values());
-        let mut of_options = Fingerprint::default();
-        of_options.text(&format!("{options:?} {others}"));
+        target_hash.numbers(target.sdf().values());
+        let mut options_hash = Fingerprint::default();
+        options_hash.text(&format!("{options:?} {others}"));
         Self {
-            target: of_target.finish(),
+            target: target_hash.finish(),
             variables: degrees.fingerprint(),
-            options: of_options.finish(),
+            options: options_hash.finish(),
         }
     }
 

@@ -3,7 +3,7 @@
 use crate::jet::Jet;
 use crate::surface::Surface;
 
-/// Unit of lengths: any, as long as it is the same for all.
+/// Unit of lengths, chosen by the user.
 pub(crate) const UNIT_OF_LENGTH: &str = "unit length";
 
 /// One parameter of a shape.

@@ -216,10 +216,10 @@ mod tests {
     }
 
     #[test]
-    fn the_volume_round_a_joint_is_that_of_the_points_inside() {
+    fn the_volume_near_a_joint_is_that_of_the_points_inside() {
         let shape = with("vessels", &[("generations", 2.0), ("radius", 0.2)]);
         let (seen, mut inside, n) = (measure(&*shape.surface), 0u32, 200_000u32);
-        // Halton points in a box round the tree.
+        // Halton points in a box around the tree.
         let halton = |mut i: u32, base: u32| {
             let (mut f, mut x) = (1.0, 0.0);
             while i > 0 {

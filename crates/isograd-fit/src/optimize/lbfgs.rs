@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use super::line_search::{Found, search};
+use super::line_search::{SearchResult, search};
 use super::{Evaluation, Function, Step, dot, largest, norm};
 
 /// Options of L-BFGS. The length of a step is its largest change of a variable.
@@ -30,7 +30,7 @@ impl Default for Lbfgs {
 
 /// A pair `(s, y)` is stored only if `s·y` exceeds this fraction of `|s| |y|` (positive curvature along the step);
 /// otherwise the next direction might not be one of descent.
-const CURVED: f64 = 1e-8;
+const MIN_CURVATURE: f64 = 1e-8;
 
 /// A step and the change of the gradient along it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -65,15 +65,15 @@ impl Memory {
             let d = self.direction(options, &here.gradient);
             let reach = options.longest_step / largest(&d);
             match search(x, here, &d, reach, function) {
-                Found::Lower(there, evaluation) => {
+                SearchResult::Lower(there, evaluation) => {
                     self.remember(options, x, &there, &here.gradient, &evaluation.gradient);
                     (*x, *here) = (there, evaluation);
                     return Ok(Step::Moved);
                 }
-                // What is remembered may mislead: once more, down the gradient.
+                // The stored pairs may be inconsistent: retry along the negative gradient.
                 _ if !self.pairs.is_empty() => self.pairs.clear(),
-                Found::Nothing => return Ok(Step::Stalled),
-                Found::Failing(error) => return Err(error),
+                SearchResult::NoDecrease => return Ok(Step::Stalled),
+                SearchResult::Failed(error) => return Err(error),
             }
         }
     }
@@ -112,7 +112,7 @@ impl Memory {
     fn remember(&mut self, options: &Lbfgs, from: &[f64], to: &[f64], g0: &[f64], g1: &[f64]) {
         let difference = |a: &[f64], b: &[f64]| b.iter().zip(a).map(|(b, a)| b - a).collect();
         let (step, change): (Vec<f64>, Vec<f64>) = (difference(from, to), difference(g0, g1));
-        if dot(&step, &change) > CURVED * norm(&step) * norm(&change) {
+        if dot(&step, &change) > MIN_CURVATURE * norm(&step) * norm(&change) {
             self.pairs.push_back(Pair { step, change });
         }
         while self.pairs.len() > options.memory {

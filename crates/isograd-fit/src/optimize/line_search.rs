@@ -13,13 +13,13 @@ const GROWTH: f64 = 2.5;
 const TRIALS: usize = 12;
 
 /// Result of a line search.
-pub(super) enum Found<D, E> {
+pub(super) enum SearchResult<D, E> {
     /// A lower point and its evaluation.
     Lower(Vec<f64>, Evaluation<D>),
     /// No point with sufficient decrease.
-    Nothing,
+    NoDecrease,
     /// The function failed even at the shortest step.
-    Failing(E),
+    Failed(E),
 }
 
 /// A point of the line.
@@ -81,10 +81,10 @@ pub(super) fn search<D, E>(
     d: &[f64],
     reach: f64,
     function: &mut impl Function<D, E>,
-) -> Found<D, E> {
+) -> SearchResult<D, E> {
     let slope = dot(&here.gradient, d);
     if !(slope < 0.0) {
-        return Found::Nothing;
+        return SearchResult::NoDecrease;
     }
     let start = Place {
         at: 0.0,
@@ -127,8 +127,8 @@ pub(super) fn search<D, E>(
         at = next;
     }
     match (lowest, failure) {
-        (Some((point, evaluation)), _) => Found::Lower(point, evaluation),
-        (None, Some(error)) if trials == 0 => Found::Failing(error),
-        _ => Found::Nothing,
+        (Some((point, evaluation)), _) => SearchResult::Lower(point, evaluation),
+        (None, Some(error)) if trials == 0 => SearchResult::Failed(error),
+        _ => SearchResult::NoDecrease,
     }
 }

@@ -5,19 +5,19 @@
 //!
 //! # Why these are here
 //!
-//! [`argmin`](https://docs.rs/argmin) is the well-kept crate for this, and was tried first (0.11.0). It has no
-//! Adam. Its L-BFGS does not fit a function that is not defined everywhere and that is dear to evaluate:
+//! [`argmin`](https://docs.rs/argmin) 0.11.0 was evaluated first. It has no Adam, and its L-BFGS does not suit a
+//! function that is expensive and not defined everywhere:
 //!
-//! - A point without a value (parameters that make no body, a sample outside the grid) can't be answered: its
+//! - A point without a value (parameters that make no body, a sample outside the grid) cannot be handled: its
 //!   strong-Wolfe searches end with an error on a value that is not finite, and on any error the solver drops
 //!   the problem and the parameters with it, so that the run ends where it should take a shorter step.
 //! - It keeps every pair `(s, y)`, also those with `s·y ≤ 0`. After a search that ended early the direction may
 //!   then point uphill, which it reports as an error
 //!   ([#400](https://github.com/argmin-rs/argmin/issues/400)). Reconstruction is smooth only piecewise, so
 //!   that this does happen.
-//! - Value and gradient are asked for apart, and again at the end of each search. Here they come together, and
-//!   each costs a reconstruction.
-//! - Its state holds infinities, which JSON has no words for.
+//! - It evaluates value and gradient separately, and again at the end of each search. Here one evaluation gives
+//!   both, at the cost of a reconstruction.
+//! - Its state contains infinities, which JSON cannot represent.
 //!
 //! The recursion itself is thirty lines, and so is Adam.
 
@@ -42,7 +42,7 @@ pub enum Optimizer {
     /// Limited-memory BFGS with a search for the strong Wolfe conditions: the default. Few steps, each one
     /// lower than the one before.
     Lbfgs(Lbfgs),
-    /// Adam: steps of a given length, whatever the size of the gradient; may go uphill.
+    /// Adam: steps of a given length, independent of the size of the gradient; the loss may increase.
     Adam(Adam),
 }
 

@@ -26,7 +26,7 @@ pub enum Variables {
 
 /// Regularization terms of the loss.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Extra {
+pub(crate) struct Regularization {
     /// Roughness of the displacement of the points.
     pub smoothness: f64,
     /// Penalty of parameters beyond their bounds.
@@ -67,10 +67,10 @@ impl Degrees {
 
     /// Orientation method, given the one of the options. Instead of automatic orientation, which may change
     /// discontinuously at sharp edges, a shape gives the signs of its own normals.
-    pub fn orientation(&self, asked: orient::Method) -> orient::Method {
-        match (self, asked) {
+    pub fn orientation(&self, requested: orient::Method) -> orient::Method {
+        match (self, requested) {
             (Self::Shape(_), orient::Method::Auto) => orient::Method::Signs,
-            _ => asked,
+            _ => requested,
         }
     }
 
@@ -83,15 +83,15 @@ impl Degrees {
     }
 
     /// Regularization terms at `x`; their gradient is added to `gradient`.
-    pub fn extra(&self, x: &[f64], gradient: &mut [f64]) -> Extra {
+    pub fn regularization(&self, x: &[f64], gradient: &mut [f64]) -> Regularization {
         match self {
-            Self::Shape(shape) => Extra {
+            Self::Shape(shape) => Regularization {
                 bounds: shape.overshoot(x, gradient),
-                ..Extra::default()
+                ..Regularization::default()
             },
-            Self::Points(points) => Extra {
+            Self::Points(points) => Regularization {
                 smoothness: points.roughness(x, gradient),
-                ..Extra::default()
+                ..Regularization::default()
             },
         }
     }

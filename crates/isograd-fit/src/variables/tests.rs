@@ -26,7 +26,7 @@ fn weights(n: usize) -> Vec<f64> {
     (0..n).map(|k| (12.9898 * k as f64 + 0.3).sin()).collect()
 }
 
-/// A functional of the points and what is added, and its gradient.
+/// A functional of the points with the regularization terms, and its gradient.
 fn functional(degrees: &Degrees, x: &[f64]) -> (f64, Vec<f64>) {
     let cloud = degrees.cloud(x).expect("a cloud");
     let w = weights(3 * cloud.len());
@@ -39,8 +39,8 @@ fn functional(degrees: &Degrees, x: &[f64]) -> (f64, Vec<f64>) {
         .map(|(x, w)| x * w)
         .sum();
     let mut gradient = degrees.pullback(x, &bars).expect("a gradient");
-    let extra = degrees.extra(x, &mut gradient);
-    (value + extra.smoothness + extra.bounds, gradient)
+    let terms = degrees.regularization(x, &mut gradient);
+    (value + terms.smoothness + terms.bounds, gradient)
 }
 
 fn assert_gradient(degrees: &Degrees, x: &[f64], components: &[usize]) {

@@ -84,7 +84,7 @@ fn a_device_goes_the_way_of_the_cpu_and_can_be_resumed() {
     let mesh = fit.reconstruction().unwrap().mesh().unwrap().clone();
     assert_eq!(mesh.faces(), of_cpu.mesh().unwrap().faces());
 
-    // The same bits as without a stop; and a state of the device is not one of the CPU.
+    // The bits of an uninterrupted run; and the CPU refuses a checkpoint of the device.
     let kept: Checkpoint = kept.expect("two epochs");
     let resume = |backend| Fit::resume(&target, variables(), options(backend), kept.clone());
     let mut resumed = resume(Backend::Vulkan).unwrap();

@@ -1,4 +1,4 @@
-//! Whole fits, small: what is known comes out again.
+//! Small complete fits that recover known parameters.
 
 use std::ops::ControlFlow;
 

@@ -53,7 +53,7 @@ fn the_control_values_of_the_fish_fit_the_eel() {
     for k in 0..=400 {
         let (s, w, h) = section(&fish, 0, f64::from(k) / 400.0);
         let (width, height) = eel(s);
-        // What the documentation of EEL_HEIGHTS says.
+        // The bound in the documentation of EEL_HEIGHTS.
         assert!(
             (w - width).abs() < 0.0025 && (h - height).abs() < 0.0025,
             "{s}: {w} {h}"
