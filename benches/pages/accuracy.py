@@ -41,7 +41,7 @@ class Results:
             "samples": self.samples,
             "normals": "estimated",
             "splat": "bspline",
-            "area_weights": True,
+            "area": True,
             "smoothing": None,
             "screening": 0.0,
             "level": "local",
@@ -59,7 +59,7 @@ class Results:
     def weighted(self, cells: int, draw: str, splat: str, area: bool) -> dict:
         """Results for one choice of the splat, without local level and smoothing."""
         return self.row(
-            cells, draw=draw, splat=splat, area_weights=area, normals="exact", level="mean", smoothing=0.0
+            cells, draw=draw, splat=splat, area=area, normals="exact", level="mean", smoothing=0.0
         )
 
     def leveled(self, cells: int, level: str, smoothing: float | None, screening: float) -> dict:

@@ -25,7 +25,7 @@ FUNCTIONALS = ("volume", "shell")
 
 
 def choice(row: dict) -> tuple:
-    return row["paper_weights"], row["area_weights"], row["exact_normals"]
+    return row["paper_weights"], row["area"], row["exact_normals"]
 
 
 def ratio(row: dict) -> float:

@@ -68,7 +68,7 @@ pub struct Case {
     /// Splat weights.
     pub splat: Splat,
     /// Whether samples are weighted by their area.
-    pub area_weights: bool,
+    pub area: bool,
     /// Width of the smoothing, in cells; automatic if absent.
     pub smoothing: Option<f64>,
     /// `α` of the screened equation.
@@ -89,7 +89,7 @@ impl Case {
             cells,
             normals: Normals::Estimated,
             splat: Splat::Bspline,
-            area_weights: true,
+            area: true,
             smoothing: None,
             screening: 0.0,
             level: Level::Local,
@@ -127,7 +127,7 @@ impl Case {
                 Splat::Bspline => splat::Weights::BSpline,
                 Splat::Paper => splat::Weights::Paper,
             })
-            .area(self.area_weights)
+            .area(self.area)
             .smoothing(self.smoothing.map_or(Smoothing::Auto, Smoothing::Cells))
             .screening(self.screening)
             .level(match self.level {

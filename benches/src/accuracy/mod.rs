@@ -145,10 +145,10 @@ impl Study {
     }
 
     /// The first body with exact normals and one choice of the splat.
-    fn splat_case(&self, draw: Draw, splat: Splat, area_weights: bool, cells: usize) -> Case {
+    fn splat_case(&self, draw: Draw, splat: Splat, area: bool, cells: usize) -> Case {
         Case {
             splat,
-            area_weights,
+            area,
             // Without the local level, which would hide their effect.
             level: Level::Mean,
             smoothing: Some(0.0),

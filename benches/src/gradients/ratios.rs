@@ -20,7 +20,7 @@ pub struct Choice {
     /// Whether the paper's weights are used instead of the B-spline.
     pub paper_weights: bool,
     /// Whether samples are weighted by their area.
-    pub area_weights: bool,
+    pub area: bool,
     /// Whether exact normals are given, which turn with the motion.
     pub exact_normals: bool,
 }
@@ -35,10 +35,10 @@ impl Choice {
         Self::new(true, false, false),
     ];
 
-    const fn new(paper_weights: bool, area_weights: bool, exact_normals: bool) -> Self {
+    const fn new(paper_weights: bool, area: bool, exact_normals: bool) -> Self {
         Self {
             paper_weights,
-            area_weights,
+            area,
             exact_normals,
         }
     }
@@ -55,7 +55,7 @@ impl Choice {
             } else {
                 splat::Weights::BSpline
             })
-            .area(self.area_weights)
+            .area(self.area)
             // The other settings of the paper as well.
             .level(if self.paper_weights {
                 isosurface::Level::Mean
