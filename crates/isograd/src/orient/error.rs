@@ -1,9 +1,9 @@
-//! Why there is no orientation.
+//! Errors of the orientation.
 
-/// Why there is no orientation.
+/// Errors of the orientation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
-    /// Given normals were asked for, and there are none.
+    /// The method needs normals, and the cloud has none.
     #[error("the cloud has no normals to take; orient it automatically or by parity")]
     NoNormals,
     /// Points, axes or normals differ in number.
@@ -26,7 +26,7 @@ pub enum Error {
         /// `"the axis"` or `"the normal"`.
         kind: &'static str,
     },
-    /// Sensor positions were asked for, and there are none.
+    /// The method needs sensor positions, and the cloud has none.
     #[error("the cloud has no sensor positions; give them, or orient automatically")]
     NoSensors,
     /// A point that is where its sensor is.

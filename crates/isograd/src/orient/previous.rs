@@ -1,4 +1,4 @@
-//! The signs of the step before: for bodies that move.
+//! Signs from the previous step, for bodies that move.
 //!
 //! Between two steps of a simulation an axis turns by a few degrees, and keeps its side. So its sign is that
 //! of the normal which the same point had in the step before: a product for each point, instead of a search.
@@ -10,7 +10,7 @@ use crate::element::turned;
 use crate::neighbors::Neighborhoods;
 use crate::{Real, vector};
 
-/// What is kept of the step before, in input order.
+/// State of the previous step, in input order.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Previous {
     /// Outward normals: their sides are all that counts.
@@ -23,7 +23,7 @@ pub(super) struct Previous {
 }
 
 impl Previous {
-    /// Remembers a result of another method.
+    /// Stores a result of another method.
     pub(super) fn keep<T: Real>(&mut self, out: &Orientation<T>) {
         self.keep_normals(out);
         let confidence = out.confidence.iter().map(|c| c.f64() as f32);
@@ -89,8 +89,8 @@ impl Previous {
         turned::are_few(self.turned.len(), axes.len())
     }
 
-    /// What the neighbors that have not turned say of the axis of point `i`, from −1 to 1; `None` where there
-    /// is none.
+    /// Evidence for the axis of point `i` from its neighbors that have not turned, from −1 to 1; `None` without such
+    /// neighbors.
     fn side_among_neighbors<T: Real>(
         &self,
         i: usize,

@@ -1,4 +1,4 @@
-//! Samples along the rims of an open surface.
+//! Samples along the boundary of an open surface.
 
 use pulp::Arch;
 use rayon::prelude::*;

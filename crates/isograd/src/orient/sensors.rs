@@ -1,4 +1,4 @@
-//! Sides from where the samples were seen.
+//! Signs from sensor positions.
 //!
 //! A sample was seen from outside: its outward normal is on the side of its sensor. How well that tells the two
 //! sides apart is the cosine between axis and line of sight. A grazing view, of which a small error of the axis

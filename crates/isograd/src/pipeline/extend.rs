@@ -32,7 +32,7 @@ impl<T: Real> Reconstruction<T> {
         Ok(self.extend_with_residual(attribute, band)?.0)
     }
 
-    /// The same for one value per sample that was reconstructed, with what the pullback needs.
+    /// Like [`extend`](Self::extend), for an attribute of the reconstructed samples, with the residual for the pullback.
     ///
     /// # Errors
     /// As [`extend`](Self::extend).
@@ -47,7 +47,7 @@ impl<T: Real> Reconstruction<T> {
         Ok((extension, residual))
     }
 
-    /// The same, in memory that is used again.
+    /// Like [`extend_with_residual`](Self::extend_with_residual), writing into `residual` and `extension`.
     ///
     /// # Errors
     /// As [`extend`](Self::extend); the outputs are then not to be used.

@@ -59,14 +59,14 @@ impl Options {
     }
 }
 
-/// Why a reconstruction failed: which stage, and its own reason.
+/// Errors of a reconstruction, by stage.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The smoothing makes no sense.
+    /// The smoothing is negative or not finite.
     #[error("the smoothing is {0:?}; it must be 0 or more cells, and finite")]
     Smoothing(poisson::Smoothing),
-    /// The screening makes no sense.
+    /// The screening is negative or not finite.
     #[error("the screening is {0}; it must be 0 or more, and finite")]
     Screening(f64),
     /// Neighbors.

@@ -45,7 +45,7 @@ impl<T: Pipeline> Orienter<T> {
         }
     }
 
-    /// The same; `checks` says whether its calls measure the samples and look for reasons not to trust them.
+    /// Sets whether calls measure the samples and add warnings.
     pub fn with_checks(self, checks: bool) -> Self {
         Self { checks, ..self }
     }
@@ -53,8 +53,8 @@ impl<T: Pipeline> Orienter<T> {
     /// Outward unit normals of a cloud, and the confidence in each.
     ///
     /// # Errors
-    /// That of the neighbors or of the orientation, or [`Error::NoPlane`]; the result of an earlier call is
-    /// then gone.
+    /// Those of the neighbors and of the orientation, or [`Error::NoPlane`]; the result of the previous call is
+    /// then lost.
     pub fn orient(&mut self, cloud: &PointCloud<T>) -> Result<&Orientation<T>, Error> {
         T::orient(self, cloud)?;
         Ok(&self.orientation)

@@ -6,8 +6,8 @@ use crate::data::PointCloud;
 use crate::distance::NO_TRIANGLE;
 use crate::isosurface;
 
-/// The results that take longest to find, from which the others are found again: arrays whose length is that of the cloud
-/// or of the grid, which is known before anything is computed.
+/// The most expensive results, from which the others are recomputed: arrays with the length of the cloud or of the grid,
+/// which are known before the computation.
 #[derive(Clone, Copy, Debug)]
 pub struct Saved<'a, T> {
     /// `(nx, ny, nz)` φ.
@@ -18,7 +18,7 @@ pub struct Saved<'a, T> {
     pub normals: &'a [[T; 3]],
 }
 
-/// Why nothing was restored.
+/// Errors of [`Reconstructor::restore`].
 #[derive(Debug, thiserror::Error)]
 pub enum RestoreError {
     /// An array is not that of a result of this plan and cloud.
@@ -38,17 +38,17 @@ pub enum RestoreError {
         "the saved closest faces are those of another reconstruction: the surface has {faces} faces"
     )]
     Face {
-        /// Number of faces of the surface that was found again.
+        /// Number of faces of the recomputed surface.
         faces: usize,
     },
-    /// A stage that is done again failed.
+    /// A recomputed stage failed.
     #[error(transparent)]
     Stage(#[from] Error),
 }
 
 impl<T: Pipeline> Reconstructor<T> {
-    /// The reconstruction of `cloud` that `saved` is from, to the bit. What is not saved is computed again: all but
-    /// orientation and distance. The report is empty, and so is the confidence.
+    /// The reconstruction of `cloud` from saved results, with the same bits. All stages but orientation and distance are
+    /// recomputed. The report and the confidence are empty.
     ///
     /// # Errors
     /// As [`RestoreError`] lists.
@@ -102,7 +102,7 @@ impl<T: Pipeline> Reconstructor<T> {
 }
 
 impl<T> Saved<'_, T> {
-    /// Whether these may be of a result with so many cells and points.
+    /// Checks the lengths, given the numbers of cells and points.
     ///
     /// # Errors
     /// [`RestoreError::Length`].

@@ -1,4 +1,4 @@
-//! Why signs are doubtful.
+//! Reasons of doubtful signs.
 //!
 //! # Map
 //! Points `(N, 3)`, their [`Orientation`] and neighborhoods → a [`Reason`] for each point whose
@@ -141,7 +141,7 @@ pub fn reasons<T: Real>(
     reasons_beside(&rims, points, orientation, neighborhoods)
 }
 
-/// The same, where the rims are known.
+/// Like [`reasons`], with known rims.
 pub(crate) fn reasons_beside<T: Real>(
     rims: &[bool],
     points: &[[T; 3]],
@@ -173,7 +173,7 @@ pub(super) fn is_doubtful<T: Real>(confidence: T) -> bool {
     !(confidence.f64() >= DOUBTFUL)
 }
 
-/// What there is to look at.
+/// The cloud and its rims.
 struct Look<'a, T: Real> {
     rims: &'a [bool],
     cloud: Cloud<'a, T>,
