@@ -14,8 +14,7 @@ pub(crate) struct Buckets {
 }
 
 impl Buckets {
-    /// Sorts the items `0..items` by their keys, any number each and all below `buckets`, in the memory of the
-    /// last call.
+    /// Sorts the items `0..items` by their keys, any number each and all below `buckets`, reusing the memory.
     pub(crate) fn fill<K: IntoIterator<Item = u32>>(
         &mut self,
         buckets: usize,
@@ -82,7 +81,7 @@ impl Buckets {
     }
 }
 
-/// The nearest number of type `T`; 0 where there is none that is finite, and then `guarded` counts one more.
+/// The nearest number of type `T`; 0 where it is not finite, which increments `guarded`.
 #[inline(always)]
 pub(crate) fn bounded<T: Real>(x: f64, guarded: &mut usize) -> T {
     let x = T::of(x);
@@ -93,7 +92,7 @@ pub(crate) fn bounded<T: Real>(x: f64, guarded: &mut usize) -> T {
     T::zero()
 }
 
-/// Adds `term(i)` to each entry. Returns how many numbers were out of range; they are left out.
+/// Adds `term(i)` to each entry. Returns the number of values out of range, which are left out.
 pub(crate) fn add_to<T: Real>(
     out: &mut [[T; 3]],
     term: impl Fn(usize) -> [f64; 3] + Sync,

@@ -76,6 +76,8 @@ mod real;
 mod report;
 pub(crate) mod simd;
 pub mod splat;
+#[cfg(test)]
+mod testing;
 pub(crate) mod trilinear;
 
 use isograd_element::{self as element, vector};

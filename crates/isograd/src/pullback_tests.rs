@@ -6,46 +6,11 @@ use crate::isosurface::{self, iso_value};
 use crate::neighbors::tests::{Random, torus, ugly_clouds};
 use crate::neighbors::{self, Neighborhoods, Radius};
 use crate::splat::{self, SampleCotangent, Samples, Weights};
+use crate::testing::{Direction, assert_adjoint, inner, moved, numbers, product, vectors};
 use crate::{Real, distance, normals, poisson, vector};
 
 /// Truncation is of the square of the step, rounding of its inverse.
 const STEP: f64 = 1e-5;
-const TOLERANCE: f64 = 1e-6;
-
-fn numbers(n: usize, random: &mut Random) -> Vec<f64> {
-    (0..n).map(|_| 2.0 * random.uniform() - 1.0).collect()
-}
-
-fn vectors(n: usize, random: &mut Random) -> Vec<[f64; 3]> {
-    (0..n)
-        .map(|_| [0; 3].map(|_| 2.0 * random.uniform() - 1.0))
-        .collect()
-}
-
-fn moved(points: &[[f64; 3]], v: &[[f64; 3]], step: f64) -> Vec<[f64; 3]> {
-    let pairs = points.iter().zip(v);
-    pairs
-        .map(|(p, v)| vector::add(*p, vector::scale(*v, step)))
-        .collect()
-}
-
-fn inner(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| vector::dot(*a, *b)).sum()
-}
-
-fn product(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// Compares `⟨v, Jᵀ w⟩`, given, with the central difference of `⟨f(step), w⟩`.
-fn agrees(what: &str, pulled: f64, step: f64, along: impl Fn(f64) -> f64) {
-    let difference = (along(step) - along(-step)) / (2.0 * step);
-    let error = (pulled - difference).abs() / pulled.abs().max(difference.abs());
-    assert!(
-        error < TOLERANCE,
-        "{what}: {pulled}, not {difference} ({error:e})"
-    );
-}
 
 /// A torus' neighborhoods, and those of moved points with the same radii.
 struct Near {
@@ -105,7 +70,7 @@ fn axes_and_areas_with_grown_radii() {
     let residual = axes(&near.held);
     let guarded = normals::pullback(&near.held, &residual, &w, &mut Default::default(), &mut bar);
     assert_eq!(guarded, 0);
-    agrees("axes", inner(&bar, &v), step, |s| {
+    assert_adjoint("axes", inner(&bar, &v), step, |s| {
         let at = axes(&near.moved(&v, s)).normals;
         inner(&at, &w)
     });
@@ -113,7 +78,7 @@ fn axes_and_areas_with_grown_radii() {
     let mut bar = vec![[0.0; 3]; n];
     let found = areas(&near.held);
     splat::area::pullback(&near.held, &found, &u, &mut Default::default(), &mut bar);
-    agrees("areas", inner(&bar, &v), step, |s| {
+    assert_adjoint("areas", inner(&bar, &v), step, |s| {
         product(&areas(&near.moved(&v, s)), &u)
     });
 }
@@ -134,7 +99,7 @@ fn axes_from_wider_neighborhoods() {
     let step = STEP * near.held.common_radius * 1e-2;
     let mut bar = vec![[0.0; 3]; n];
     normals::pullback(&near.held, &residual, &w, &mut Default::default(), &mut bar);
-    agrees("axes", inner(&bar, &v), step, |s| {
+    assert_adjoint("axes", inner(&bar, &v), step, |s| {
         let mut at = normals::Residual::default();
         normals::hold(&near.moved(&v, s), &residual, &mut at);
         assert_eq!(at.count, residual.count, "a neighborhood changed");
@@ -216,42 +181,7 @@ impl Setting {
     }
 
     fn zeros(&self) -> SampleCotangent<f64> {
-        let n = self.points.len();
-        SampleCotangent {
-            points: vec![[0.0; 3]; n],
-            normals: vec![[0.0; 3]; n],
-            areas: vec![0.0; n],
-            ..SampleCotangent::default()
-        }
-    }
-}
-
-/// A direction in the inputs of a [`Setting`].
-struct Direction {
-    points: Vec<[f64; 3]>,
-    normals: Vec<[f64; 3]>,
-    areas: Vec<f64>,
-    lower: [f64; 3],
-    spacing: f64,
-}
-
-impl Direction {
-    fn new(n: usize, random: &mut Random) -> Self {
-        Self {
-            points: vectors(n, random),
-            normals: vectors(n, random),
-            areas: numbers(n, random),
-            lower: vectors(1, random)[0],
-            spacing: 0.1 * numbers(1, random)[0],
-        }
-    }
-
-    fn inner(&self, bar: &SampleCotangent<f64>) -> f64 {
-        inner(&bar.points, &self.points)
-            + inner(&bar.normals, &self.normals)
-            + product(&bar.areas, &self.areas)
-            + vector::dot(bar.grid.lower, self.lower)
-            + bar.grid.spacing * self.spacing
+        SampleCotangent::zeros(self.points.len())
     }
 }
 
@@ -268,7 +198,7 @@ fn splat_to_points_normals_areas_and_grid() {
         let scratch = &mut Default::default();
         splat::pullback(setting.samples(), &residual, &bar, scratch, &mut out);
         // No sample may cross a face of a cell, where the paper's weights jump.
-        agrees("splat", v.inner(&out), 1e-2 * STEP, |s| {
+        assert_adjoint("splat", v.inner(&out), 1e-2 * STEP, |s| {
             product(setting.moved(&v, s).splat(weights).0.values(), &w)
         });
     }
@@ -315,12 +245,14 @@ fn iso_value_to_indicator_samples_and_grid() {
     let values_bar = numbers(700, &mut random);
     let order = setting.splat(Weights::BSpline).1;
     let (mut out, mut chi_bar) = (setting.zeros(), vec![0.0; along.len()]);
-    let samples = setting.samples();
+    let samples = splat::SortedSamples {
+        samples: setting.samples(),
+        order: &order,
+    };
     iso_value::pullback(
         chi.grid(),
         samples,
         &residual,
-        &order,
         2.5,
         &values_bar,
         &mut chi_bar,
@@ -328,7 +260,7 @@ fn iso_value_to_indicator_samples_and_grid() {
     );
     let pulled = v.inner(&out) + product(&chi_bar, &along);
     // No sample may cross a plane through cell centers, where the slope jumps.
-    agrees("iso-value", pulled, 1e-2 * STEP, |s| {
+    assert_adjoint("iso-value", pulled, 1e-2 * STEP, |s| {
         let at = setting.moved(&v, s);
         let values = chi.values().iter().zip(&along).map(|(c, v)| c + s * v);
         let chi = Field::new(at.grid, values.collect()).expect("sizes match");
@@ -361,7 +293,7 @@ fn vertices_to_indicator_level_and_grid() {
         + 0.3 * found.level
         + vector::dot(found.grid.lower, v.lower)
         + found.grid.spacing * v.spacing;
-    agrees("vertices", pulled, STEP, |s| {
+    assert_adjoint("vertices", pulled, STEP, |s| {
         let grid = setting.moved(&v, s).grid;
         let values = chi.values().iter().zip(&along).map(|(c, v)| c + s * v);
         let chi = Field::new(grid, values.collect()).expect("sizes match");
@@ -411,7 +343,7 @@ fn distance_to_vertices_and_grid() {
     let pulled =
         inner(&vertices_bar, &along) + vector::dot(grid.lower, v.lower) + grid.spacing * v.spacing;
     // On the medial axis φ has a crease: few cells are near it, and ever fewer for a smaller step.
-    agrees("distance", pulled, 1e-3 * STEP, |s| {
+    assert_adjoint("distance", pulled, 1e-3 * STEP, |s| {
         let grid = setting.moved(&v, s).grid;
         let chi = Field::new(grid, chi.values().to_vec()).expect("sizes match");
         let vertices = moved(mesh.vertices(), &along, s);
@@ -453,7 +385,7 @@ fn given_normals_are_pulled_back_through_their_length() {
     );
     let mut bars = w.clone();
     crate::orient::given_pullback(&g, &mut bars);
-    agrees("given normals", inner(&bars, &v), STEP, |s| {
+    assert_adjoint("given normals", inner(&bars, &v), STEP, |s| {
         let units = moved(&g, &v, s).into_iter();
         let units: Vec<[f64; 3]> = units.filter_map(vector::normalized).collect();
         inner(&units, &w)

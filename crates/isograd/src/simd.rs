@@ -1,4 +1,4 @@
-//! Loops compiled for the instruction set that the processor has.
+//! Loops compiled for the instruction set of the processor.
 
 use pulp::{Arch, Simd, WithSimd};
 
@@ -6,7 +6,7 @@ use pulp::{Arch, Simd, WithSimd};
 /// loops are to be `#[inline(always)]`: a function that stands alone is compiled for the oldest set.
 ///
 /// `pulp` takes closures too, but as `FnOnce`, and the compiler calls most closures through a shim of that
-/// trait which it need not inline: such a loop may end up in baseline code without a word.
+/// trait which it need not inline: such a loop may silently end up in baseline code.
 #[inline(always)]
 pub(crate) fn dispatch<R>(arch: Arch, f: impl FnMut() -> R) -> R {
     arch.dispatch(Inline(f))

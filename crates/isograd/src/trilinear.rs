@@ -1,18 +1,19 @@
 //! Trilinear interpolation of a field between its cell centers: value and gradient at a point.
 //!
-//! Within half a cell of a wall, and outside the grid, the field goes on as a constant across the wall
+//! Within half a cell of a wall, and outside the grid, the field continues as a constant across the wall
 //! (its even reflection): the value is that of the nearest point between the cell centers, and the
 //! gradient has no component across the wall. The gradient jumps at the planes through cell centers.
 
 use rayon::prelude::*;
 
 use crate::element::linear::lerp;
-use crate::{Field, Grid, Real, splat};
+use crate::splat::SortedSamples;
+use crate::{Field, Grid, Real};
 
 /// Planes across x that one task of [`spread`] owns.
 const SLAB: usize = 8;
 
-/// The eight cells round a point and where the point is between them.
+/// The eight cells round a point, and the position of the point between them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cube<T> {
     /// Place in memory of the lowest of the eight cells.
@@ -95,22 +96,21 @@ impl<T: Real> Cube<T> {
 }
 
 /// Adds `value(i)` at every sample to the eight cells round it, in memory order: the transpose of
-/// [`Cube::value`]. Each task owns some planes; `order` lists the samples by plane.
+/// [`Cube::value`]. Each task owns some planes.
 pub(crate) fn spread<T: Real>(
     grid: &Grid<T>,
-    points: &[[T; 3]],
-    order: &splat::Residual,
+    sorted: SortedSamples<'_, T>,
     value: impl Fn(usize) -> T + Sync,
     out: &mut [T],
 ) {
-    let plane = grid.strides()[0];
+    let (plane, points) = (grid.strides()[0], sorted.samples.points);
     let slabs = out.par_chunks_mut(SLAB * plane).enumerate();
     slabs.for_each(|(task, slab)| {
         let first = task * SLAB * plane;
         let planes = task * SLAB..task * SLAB + slab.len() / plane;
         // The eight cells reach one plane beyond that of the sample's own cell.
         let near = planes.start.saturating_sub(1)..planes.end + 1;
-        for &i in order.in_planes(points, grid, near) {
+        for &i in sorted.order.in_planes(points, grid, near) {
             let i = i as usize;
             let cube = Cube::new(grid, grid.to_index(points[i]));
             let part = value(i);
@@ -125,7 +125,7 @@ pub(crate) fn spread<T: Real>(
 
 impl<T: Real> Field<T> {
     /// The value at a point of the user's coordinates, trilinear between cell centers and constant across
-    /// the walls. NaN for a point that is not a number.
+    /// the walls. NaN for a NaN point.
     pub fn interpolate(&self, point: [T; 3]) -> T {
         let grid = self.grid();
         Cube::new(grid, grid.to_index(point)).value(self.values())

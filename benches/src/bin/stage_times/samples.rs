@@ -163,9 +163,8 @@ impl<T: Real + Number> Indicator<T> {
         let residual = &self.residual;
         iso_value::pullback(
             &grid,
-            samples,
+            splat::SortedSamples { samples, order },
             residual,
-            order,
             level_bar,
             &[],
             chi_bar,

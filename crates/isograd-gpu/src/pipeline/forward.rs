@@ -291,8 +291,8 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         if self.options.level == Level::Mean {
             return Ok((chi, None));
         }
-        let choice = local::Choice {
-            area_weights: self.options.area_weights,
+        let choice = local::Options {
+            area: self.options.area_weights,
             smoothing: width.cells,
             thin: self.options.level == Level::Thin,
         };

@@ -126,10 +126,12 @@ fn pull_on_cpu<T: Scalar>(
     let mut residual = cpu::Residual::default();
     let chi = noise(cloud, 5);
     cpu::forward(&chi, &cloud.points, &cloud.areas, &mut residual).expect("a value");
-    let (grid, samples, chi_bar) = (&cloud.grid, cloud.samples(), chi_bar.values_mut());
-    cpu::pullback(
-        grid, samples, &residual, &order, bar, values_bar, chi_bar, out,
-    );
+    let samples = isograd::splat::SortedSamples {
+        samples: cloud.samples(),
+        order: &order,
+    };
+    let (grid, chi_bar) = (&cloud.grid, chi_bar.values_mut());
+    cpu::pullback(grid, samples, &residual, bar, values_bar, chi_bar, out);
 }
 
 fn pull_on_device<R: Runtime, T: Scalar>(

@@ -3,9 +3,9 @@
 use cubecl::prelude::Runtime;
 use isograd::isosurface::iso_value as mean;
 use isograd::isosurface::local_level as cpu;
-use isograd::splat::Weights;
+use isograd::splat::{SortedSamples, Weights};
 use isograd::{Field, Grid};
-use isograd_gpu::iso_value::local::{Choice, Residual, forward, pullback};
+use isograd_gpu::iso_value::local::{Options, Residual, forward, pullback};
 use isograd_gpu::splat::{self, SampleCotangent};
 use isograd_gpu::{Buffer, Device, Scalar, iso_value};
 
@@ -16,7 +16,7 @@ use crate::samples::{Cloud, OnDevice, assert_near, distance, report, upload_cota
 struct Setting<T> {
     cloud: Cloud<T>,
     chi: Field<T>,
-    choice: Choice,
+    options: Options,
 }
 
 /// What a run on the CPU leaves.
@@ -37,7 +37,7 @@ struct OfDevice<T> {
 impl<T: Scalar> Setting<T> {
     /// `crowd` more samples of less area are in one cell. Every fourth normal is turned anywhere: the indicator is as
     /// flat along it as it is on thin parts.
-    fn new(count: usize, crowd: usize, choice: Choice) -> Self {
+    fn new(count: usize, crowd: usize, options: Options) -> Self {
         let lower = [-1.41, -1.36, -0.81].map(T::of);
         let grid = Grid::new(lower, T::of(0.1), [29, 27, 17]).expect("a grid");
         let mut numbers = Numbers((count + crowd) as u64);
@@ -70,7 +70,7 @@ impl<T: Scalar> Setting<T> {
         Self {
             chi: indicator(grid),
             cloud,
-            choice,
+            options,
         }
     }
 
@@ -89,7 +89,7 @@ impl<T: Scalar> Setting<T> {
                 areas: numbers(&self.cloud.areas),
             },
             chi: Field::new(grid, numbers(self.chi.values())).expect("sizes match"),
-            choice: self.choice,
+            options: self.options,
         }
     }
 
@@ -103,15 +103,16 @@ impl<T: Scalar> Setting<T> {
     fn run_on_cpu(&self) -> OfCpu<T> {
         let (mut chi, mut residual) = (self.chi.clone(), cpu::Residual::default());
         let order = self.cloud.splat_on_cpu(Weights::BSpline).residual;
-        let scratch = &mut cpu::Scratch::default();
-        let (samples, choice) = (self.cloud.samples(), self.choice);
-        let mean = self.mean();
+        let sorted = SortedSamples {
+            samples: self.cloud.samples(),
+            order: &order,
+        };
+        let (mean, scratch) = (self.mean(), &mut cpu::Scratch::default());
         cpu::forward(
             &mut chi,
-            samples,
-            choice,
+            sorted,
+            self.options,
             &mean,
-            &order,
             scratch,
             &mut residual,
         );
@@ -130,7 +131,7 @@ impl<T: Scalar> Setting<T> {
         let chi = device.upload(self.chi.values()).unwrap();
         let (points, areas) = (samples.points, samples.areas);
         let (_, mean) = iso_value::forward(device, &chi, grid, points, areas).unwrap();
-        let (chi, residual) = forward(device, &chi, samples, self.choice, &mean, &splat).unwrap();
+        let (chi, residual) = forward(device, &chi, samples, self.options, &mean, &splat).unwrap();
         OfDevice {
             samples: on_device,
             splat,
@@ -175,14 +176,14 @@ const CHOICES: [(bool, bool); 3] = [(true, false), (true, true), (false, false)]
 /// Runs `check` on all settings that samples are followed in.
 fn for_each_setting<T: Scalar>(mut check: impl FnMut(Setting<T>)) {
     for (count, crowd) in COUNTS {
-        for (area_weights, thin) in CHOICES {
-            let choice = Choice {
-                area_weights,
+        for (area, thin) in CHOICES {
+            let options = Options {
+                area,
                 smoothing: 0.5,
                 thin,
             };
-            println!("{} {count} {crowd} {choice:?}", T::NAME);
-            check(Setting::new(count, crowd, choice));
+            println!("{} {count} {crowd} {options:?}", T::NAME);
+            check(Setting::new(count, crowd, options));
         }
     }
 }
@@ -257,8 +258,7 @@ struct Pulled<T> {
 /// Cotangents on the CPU.
 struct PulledOnCpu<T> {
     chi_bar: Vec<T>,
-    values: Vec<T>,
-    found: cpu::Found,
+    found: cpu::Cotangent<T>,
     out: isograd::splat::SampleCotangent<T>,
 }
 
@@ -282,22 +282,23 @@ impl<T: Scalar> Setting<T> {
 
     fn pull_on_cpu(&self) -> PulledOnCpu<T> {
         let run = self.run_on_cpu();
-        let (mut chi_bar, mut values) = (self.weights(), Vec::new());
+        let (mut chi_bar, mut found) = (self.weights(), cpu::Cotangent::default());
         let mut out = self.started();
-        let found = cpu::pullback(
+        let sorted = SortedSamples {
+            samples: self.cloud.samples(),
+            order: &run.order,
+        };
+        cpu::pullback(
             &run.chi,
-            self.cloud.samples(),
-            self.choice.area_weights,
-            &run.order,
+            sorted,
             &run.residual,
             &mut chi_bar,
             &mut cpu::PullbackScratch::default(),
-            &mut values,
+            &mut found,
             &mut out,
         );
         PulledOnCpu {
             chi_bar,
-            values,
             found,
             out,
         }
@@ -334,8 +335,11 @@ impl PulledOnCpu<f64> {
         let numbers = |of: &[f64]| of.iter().map(|&x| T::of(x)).collect();
         PulledOnCpu {
             chi_bar: numbers(&self.chi_bar),
-            values: numbers(&self.values),
-            found: self.found,
+            found: cpu::Cotangent {
+                values: numbers(&self.found.values),
+                level: self.found.level,
+                smoothing: self.found.smoothing,
+            },
             out: isograd::splat::SampleCotangent {
                 points: vectors(&self.out.points),
                 normals: vectors(&self.out.normals),
@@ -359,12 +363,17 @@ impl<T: Scalar> Pulled<T> {
         };
         same("chi", &self.chi, setting.chi.values());
         same("chi_bar", &self.chi_bar, &expected.chi_bar);
-        same("values", &self.values, &expected.values);
+        same("values", &self.values, &expected.found.values);
         setting
             .cloud
             .compare(device, &self.out, &expected.out, tolerance);
         // Relative to the sum of the magnitudes of its terms.
-        let size = expected.values.iter().map(|v| v.f64().abs()).sum::<f64>();
+        let size = expected
+            .found
+            .values
+            .iter()
+            .map(|v| v.f64().abs())
+            .sum::<f64>();
         let level = device.download(&self.level).unwrap()[0];
         let error = distance(level, expected.found.level) / size;
         report("level", error);
@@ -384,12 +393,12 @@ fn where_nothing_is_followed_nothing_changes() {
 
 /// Samples whose normals point to where `χ` falls, one sample, which nothing foretells, and no samples.
 fn check_nothing_followed<R: Runtime, T: Scalar>(device: &Device<R>) {
-    let choice = Choice {
-        area_weights: true,
+    let options = Options {
+        area: true,
         smoothing: 0.5,
         thin: false,
     };
-    let mut inside_out = Setting::<T>::new(300, 0, choice);
+    let mut inside_out = Setting::<T>::new(300, 0, options);
     let Cloud {
         points, normals, ..
     } = &mut inside_out.cloud;
@@ -398,11 +407,11 @@ fn check_nothing_followed<R: Runtime, T: Scalar>(device: &Device<R>) {
         let far = 0.7 / x.hypot(y) - 1.0;
         *normal = [far * x, far * y, -z].map(|x| T::of(4.0 * x));
     }
-    let mut none = Setting::<T>::new(1, 0, choice);
+    let mut none = Setting::<T>::new(1, 0, options);
     none.cloud.points.clear();
     none.cloud.normals.clear();
     none.cloud.areas.clear();
-    for setting in [inside_out, Setting::new(1, 0, choice), none] {
+    for setting in [inside_out, Setting::new(1, 0, options), none] {
         let run = setting.run(device);
         assert_eq!(run.residual.gains().count(), 0);
         assert_eq!(device.download(&run.chi).unwrap(), setting.chi.values());

@@ -161,8 +161,8 @@ fn local_levels<T: Scalar>(device: &Device<Recorder>, samples: Samples<'_, T>) {
     let (chi, of_splat) = splat::forward(device, samples, &grid(), Weights::BSpline).unwrap();
     let (_, mean) = iso_value::forward(device, &chi, &grid(), points, areas).unwrap();
     for thin in [false, true] {
-        let choice = local::Choice {
-            area_weights: thin,
+        let choice = local::Options {
+            area: thin,
             smoothing: 1.0,
             thin,
         };

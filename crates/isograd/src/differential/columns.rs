@@ -1,5 +1,4 @@
-//! Transposed finite differences, a row of cells at a time: what each cell gets back from the differences that
-//! it has a part in.
+//! Transposed finite differences, a row of cells at a time: each cell gathers from the differences that use it.
 
 use super::rows::{Order, Stencil};
 use crate::Real;
@@ -107,7 +106,7 @@ pub(super) fn add_along<T: Real, U>(
     }
 }
 
-/// A number as it is.
+/// Identity.
 #[inline(always)]
 pub(super) fn same<T: Real>(x: &T) -> T {
     *x

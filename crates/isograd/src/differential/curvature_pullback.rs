@@ -95,7 +95,7 @@ fn pull<T: Real>(g: [T; 3], h: [T; 6], bar: T) -> Option<([T; 3], [T; 6])> {
 
 /// Cotangents of one plane of derivatives.
 struct Plane<T> {
-    /// Of what is differenced along y: once, twice, and once after x.
+    /// Cotangents of values differenced along y: once, twice, and once after x.
     once: Vec<T>,
     twice: Vec<T>,
     mixed: Vec<T>,
@@ -176,7 +176,7 @@ impl<T: Real> Plane<T> {
     }
 }
 
-/// All but the differences along x, plane by plane. `out` is what is differenced along x once, twice and not at
+/// All but the differences along x, plane by plane. `out` is the cotangent of values differenced along x once, twice and not at
 /// all, in units of cells; overwritten. Returns the number of guarded cells.
 fn within_planes<T: Real>(
     rows: &Rows<T>,

@@ -38,7 +38,7 @@ impl Bins {
     }
 }
 
-/// What is counted, and how.
+/// Options of [`eikonal`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EikonalOptions {
     /// Cells with `|φ|` below this many cell sizes are near the surface. Default 3.
@@ -56,7 +56,7 @@ impl Default for EikonalOptions {
     }
 }
 
-/// How the values of `|∇φ|` are spread over some cells.
+/// Distribution of `|∇φ|` over a set of cells.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Spread {
     /// Number of cells.
@@ -80,9 +80,9 @@ pub struct Eikonal {
     pub near: Option<Spread>,
 }
 
-/// Statistics of `|∇φ|`. Gradients that are not finite are left out. A `φ` that is cut off beyond a band is
-/// flat there: `all` then says little, `near` what it should. Allocates nothing that grows with the grid:
-/// percentiles are found by three passes over the field, exactly (in single precision).
+/// Statistics of `|∇φ|`. Gradients that are not finite are left out. A `φ` that is limited to a band is
+/// flat beyond it: only `near` is then meaningful. Allocates nothing that grows with the grid:
+/// percentiles are computed by three passes over the field, exactly (in single precision).
 pub fn eikonal<T: Real>(phi: &Field<T>, options: &EikonalOptions) -> Eikonal {
     let near = options.near * phi.grid().spacing().f64();
     let moments = moments(phi, near, &options.bins);
@@ -189,8 +189,7 @@ fn moments<T: Real>(phi: &Field<T>, near: f64, bins: &Bins) -> [Moments; 2] {
 /// Bits of a key that one pass looks at.
 const DIGIT: u32 = 11;
 
-/// An order statistic that is being closed in on: how its key begins, and its rank among the keys that
-/// begin so.
+/// An order statistic in a radix search: the prefix of its key, and its rank among the keys with that prefix.
 #[derive(Clone, Copy, Debug)]
 struct Target {
     prefix: u32,

@@ -73,7 +73,7 @@ use crate::data::{Field, Grid};
 use crate::{Real, vector};
 use rows::Rows;
 
-/// `∇φ` at every cell, per unit length, in memory order. Overwrites `out`, whose memory is used again.
+/// `∇φ` at every cell, per unit length, in memory order. Overwrites `out`, reusing its memory.
 pub fn gradient<T: Real>(phi: &Field<T>, out: &mut Vec<[T; 3]>) {
     for_each_gradient(phi, out, |g| g);
 }
@@ -116,8 +116,8 @@ fn for_each_gradient<T: Real>(
         });
 }
 
-/// Gradient and mean curvature at every cell, kept to be asked at any point: what a flow solver reads each
-/// time step. [`update`](Self::update) uses the same memory again.
+/// Gradient and mean curvature at every cell, to be interpolated at any point, such as in each time step of a flow
+/// solver. [`update`](Self::update) reuses the memory.
 #[derive(Debug)]
 pub struct Differential<T> {
     grid: Grid<T>,
@@ -128,7 +128,7 @@ pub struct Differential<T> {
 }
 
 impl<T: Real> Differential<T> {
-    /// Of a signed distance.
+    /// Computes gradient and curvature of a signed distance.
     pub fn new(phi: &Field<T>, options: &Options) -> Self {
         let mut new = Self {
             grid: *phi.grid(),
@@ -141,7 +141,7 @@ impl<T: Real> Differential<T> {
         new
     }
 
-    /// Of another signed distance; allocates nothing field-sized where the grid has no more cells.
+    /// Replaces them by those of another signed distance; allocates nothing field-sized where the grid has no more cells.
     pub fn update(&mut self, phi: &Field<T>, options: &Options) {
         self.grid = *phi.grid();
         self.options = *options;

@@ -5,18 +5,18 @@ use rayon::prelude::*;
 
 use super::columns::{Column, Strided, add_across, add_along, component};
 use super::rows::{self, Order, Rows};
-use super::sample_pullback::AtPoint;
+use super::sample_pullback::PointBars;
 use super::{Error, Scratch};
 use crate::data::{Field, Grid};
 use crate::gather::Buckets;
 use crate::{Real, vector};
 
-/// Memory of the pullbacks, kept between calls: up to nine values a cell.
+/// Scratch buffers of the pullbacks reused between calls: up to nine values per cell.
 #[derive(Debug, Default)]
 pub struct PullbackScratch<T> {
     /// The smoothed field, and one more.
     pub(super) smoothing: Scratch<T>,
-    /// Cotangents of what is differenced along x: once, twice, and not at all.
+    /// Cotangents of values differenced along x: once, twice, and not at all.
     pub(super) once: Vec<T>,
     pub(super) twice: Vec<T>,
     pub(super) rest: Vec<T>,
@@ -24,13 +24,13 @@ pub struct PullbackScratch<T> {
     pub(super) gradient: Vec<[T; 3]>,
     pub(super) curvature: Vec<T>,
     /// Of points: cotangents of gradient and curvature, and which points are between which planes.
-    pub(super) at_points: Vec<AtPoint>,
+    pub(super) at_points: Vec<PointBars>,
     pub(super) between: Buckets,
 }
 
 /// Adds the cotangent of `φ` for that of its [`gradient`](super::gradient): `bar` is `(cells, 3)`, in length
 /// over the unit of `φ` for a loss without a unit; `phi_bar` is `(cells,)`, in memory order. The map is linear,
-/// so the values of `φ` don't matter: this is its exact transpose, walls included. The cell size is held
+/// so the result does not depend on `φ`: this is its exact transpose, walls included. The cell size is held
 /// constant.
 ///
 /// # Errors
@@ -163,7 +163,7 @@ pub(super) fn add_finite<T: Real>(numbers: &[T], factor: T, out: &mut [T]) -> us
     guarded
 }
 
-/// Whether an array has one entry a cell.
+/// Checks that an array has one entry per cell.
 pub(super) fn check_cells<T: Real>(
     phi: &Field<T>,
     what: &'static str,

@@ -5,6 +5,7 @@ use super::rows::{self, Order, Stencil};
 use super::tests::{cube, field, sphere, torus};
 use super::*;
 use crate::data::Field;
+use crate::testing::{inner, product};
 
 /// A reproducible stream of numbers in [−1, 1).
 fn noise<T: Real>(n: usize, seed: u64) -> Vec<T> {
@@ -23,15 +24,6 @@ fn vectors<T: Real>(n: usize, seed: u64) -> Vec<[T; 3]> {
         .chunks_exact(3)
         .map(|v| [v[0], v[1], v[2]])
         .collect()
-}
-
-fn product(a: &[f64], b: &[f64]) -> f64 {
-    assert_eq!(a.len(), b.len());
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn product_of_vectors(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
-    product(a.as_flattened(), b.as_flattened())
 }
 
 fn gradient_of(phi: &Field<f64>) -> Vec<[f64; 3]> {
@@ -168,7 +160,7 @@ fn products_with_the_jacobians_agree_on_a_torus() {
     let bar = vectors(cells, 2);
     let mut found = vec![0.0; cells];
     gradient_pullback(&phi, &bar, &mut found).expect("matching");
-    let loss = |phi: &Field<f64>| product_of_vectors(&gradient_of(phi), &bar);
+    let loss = |phi: &Field<f64>| inner(&gradient_of(phi), &bar);
     check(&found, loss(&ends[0]), loss(&ends[1]));
 
     let mut found = vec![0.0; cells];
@@ -176,7 +168,7 @@ fn products_with_the_jacobians_agree_on_a_torus() {
         unit_normals_pullback(&phi, &bar, scratch, &mut found),
         Ok(0)
     );
-    let loss = |phi: &Field<f64>| product_of_vectors(&normals_of(phi), &bar);
+    let loss = |phi: &Field<f64>| inner(&normals_of(phi), &bar);
     check(&found, loss(&ends[0]), loss(&ends[1]));
 
     for smoothing in [0, 1, 3] {
@@ -255,14 +247,14 @@ fn products_with_the_jacobian_at_points_agree() {
         &mut points_bar,
     );
     assert_eq!(guarded, Ok(0));
-    let found = product(&phi_bar, &phi_way) + product_of_vectors(&points_bar, &point_way);
+    let found = product(&phi_bar, &phi_way) + inner(&points_bar, &point_way);
     let expected = (loss(step) - loss(-step)) / (2.0 * step);
     // Rounding of 500 terms divided by h² and by the step.
     assert!(
         (found - expected).abs() < 1e-6 * (1.0 + expected.abs()),
         "{found} {expected}"
     );
-    assert!(product_of_vectors(&points_bar, &point_way).abs() > 1e-3);
+    assert!(inner(&points_bar, &point_way).abs() > 1e-3);
 }
 
 /// Everything that comes back: from normals and curvature at cells, and from points.
@@ -331,12 +323,7 @@ fn guards_are_counted_only_where_a_cotangent_meets_them() {
 
 fn same_bits<T: Real>() {
     let phi = field(cube::<T>(20), torus);
-    let run = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        pool.expect("threads").install(|| all_of(&phi))
-    };
-    let one = run(1);
-    assert!(one == run(2) && one == run(5));
+    crate::testing::assert_same_bits(|| all_of(&phi));
 }
 
 #[test]

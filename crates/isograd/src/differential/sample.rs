@@ -6,7 +6,7 @@ use super::{Differential, unit};
 use crate::data::Grid;
 use crate::{Real, vector};
 
-/// What is known of `φ` at a point.
+/// Differential quantities of `φ` at a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Local<T> {
     /// `∇φ`, per unit length.
@@ -17,7 +17,7 @@ pub struct Local<T> {
     pub curvature: T,
 }
 
-/// Why nothing can be said at a point, or pulled back.
+/// Errors at points and of the pullbacks.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
     /// The point is not in the grid.
@@ -35,7 +35,7 @@ pub enum Error {
         upper: [f64; 3],
     },
     /// An array of the pullback has the wrong length.
-    #[error("{what} has {length} entries and must have {expected}: one a cell, or one a point")]
+    #[error("{what} has {length} entries and must have {expected}: one per cell, or one per point")]
     Mismatch {
         /// The array.
         what: &'static str,
@@ -50,7 +50,7 @@ pub enum Error {
 }
 
 impl<T: Real> Differential<T> {
-    /// At a point, in the user's unit; `None` outside the grid (NaN included).
+    /// Quantities at a point in the user's unit; `None` outside the grid and for NaN.
     pub fn at(&self, point: [T; 3]) -> Option<Local<T>> {
         let corners = corners(&self.grid, point)?;
         let zero = Local::default();
@@ -65,7 +65,7 @@ impl<T: Real> Differential<T> {
         })
     }
 
-    /// At `(N, 3)` points, in their order. Overwrites `out`, whose memory is used again.
+    /// Quantities at `(N, 3)` points, in their order. Overwrites `out`, reusing its memory.
     ///
     /// # Errors
     /// The first point outside the grid; `out` is then empty.

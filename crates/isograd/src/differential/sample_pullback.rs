@@ -12,17 +12,17 @@ use crate::vector::{add, dot, scale, to_f64};
 
 /// Cotangents of the interpolated gradient and curvature at a point.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct AtPoint {
+pub(super) struct PointBars {
     /// Three of the gradient and one of the curvature.
     bar: [f64; 4],
     guarded: bool,
 }
 
 impl<T: Real> Differential<T> {
-    /// Pulls cotangents of what [`at_points`](Self::at_points) gives back to `φ` and to the points. `phi` is the
+    /// Pulls cotangents of the result of [`at_points`](Self::at_points) back to `φ` and to the points. `phi` is the
     /// field that this was made of; `bar` has, for each of the `(N, 3)` points, the cotangents of gradient,
-    /// normal and curvature. Adds into `phi_bar` `(cells,)` and `points_bar` `(N, 3)`; the latter is first brought
-    /// to its length, new entries being zero, so that an empty one will do. The same bits for any number of
+    /// normal and curvature. Adds into `phi_bar` `(cells,)` and `points_bar` `(N, 3)`; the latter is first extended
+    /// to its length with zeros and may be empty. The same bits for any number of
     /// threads.
     ///
     /// The grid is held constant. At a point that passes from one cell-center cube to the next the derivative is
@@ -75,11 +75,11 @@ impl<T: Real> Differential<T> {
     }
 
     /// The cotangent of the normal goes to the gradient at the point.
-    fn pull(&self, point: [T; 3], bar: &Local<T>) -> AtPoint {
+    fn pull(&self, point: [T; 3], bar: &Local<T>) -> PointBars {
         let gradient = self.at(point).unwrap_or_default().gradient;
         let through_normal = unit_pullback(to_f64(gradient), to_f64(bar.normal));
         let [x, y, z] = add(to_f64(bar.gradient), through_normal.unwrap_or_default());
-        AtPoint {
+        PointBars {
             bar: [x, y, z, bar.curvature.f64()],
             guarded: through_normal.is_none(),
         }

@@ -4,7 +4,7 @@
 //! Mesh and signs → `φ(q) = σ(q) · min_y |q − y|` over all points `y` of the mesh, in the user's unit, negative
 //! inside. [`lattice::forward`] fills a grid: the distance is exact, faces, edges and corners alike, and the
 //! sign is that of `χ − c` at the same cell, so it cannot disagree with the field that made the mesh.
-//! [`Query`] answers at any point, with the gradient and the closest point; where no lattice gives the sign, it
+//! [`Query`] computes distance, gradient and closest point at any point; where no lattice gives the sign, it
 //! is that of the angle-weighted pseudonormal of the closest feature (J. A. Bærentzen and H. Aanæs, *Signed
 //! distance computation using the angle weighted pseudonormal*, IEEE TVCG 11, 2005).
 //!
@@ -41,15 +41,15 @@ mod tests;
 pub use lattice::{Band, NO_TRIANGLE, Scratch};
 pub use query::{Hit, Query};
 
-/// Why the distance stage refused its input.
+/// Errors of the distance stage.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
-    /// There is no triangle to be near to.
+    /// The mesh has no triangle.
     #[error(
         "the mesh has no triangle, so there is no distance to it; check that the surface crosses the grid"
     )]
     Empty,
-    /// Squares of such lengths leave the range of double precision.
+    /// Squares of the lengths are out of the range of double precision.
     #[error(
         "coordinates up to {magnitude:e} and an extent of {extent:e} cannot be squared in f64; use another unit of length"
     )]
@@ -59,7 +59,7 @@ pub enum Error {
         /// The longest side of the bounding box.
         extent: f64,
     },
-    /// What the pullback was given does not fit together.
+    /// Arguments of the pullback have different lengths.
     #[error(
         "{what} has {length} entries for {expected} points; give the points and hits of one query, and one cotangent a hit"
     )]
@@ -71,7 +71,7 @@ pub enum Error {
         /// Number of points.
         expected: usize,
     },
-    /// A hit on a face that is not there.
+    /// A hit names a face that does not exist.
     #[error("a hit names face {face}, which the mesh does not have; give the hits of this query")]
     Face {
         /// The face.

@@ -1,4 +1,4 @@
-//! Directions that tell inside from outside at the edges and corners of a mesh.
+//! Angle-weighted pseudonormals: they distinguish inside from outside at the edges and corners of a mesh.
 //!
 //! The pseudonormal of an edge is the sum of the normals of its faces, that of a vertex the sum weighted by the
 //! angles of the faces there. For the point `y` of a closed mesh that is closest to `q`, the sign of
@@ -34,7 +34,7 @@ impl Pseudonormals {
         }
     }
 
-    /// Of a feature of a face. A face without area has that of nothing: zero.
+    /// Pseudonormal of a feature of a face; zero for a face without area.
     pub(super) fn of<T: Real>(&self, mesh: &Mesh<T>, face: u32, feature: Feature) -> [f64; 3] {
         match feature {
             Feature::Face => self.faces[face as usize],

@@ -4,18 +4,18 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::Error;
-use super::bvh::{Bvh, Found, LANES, NOWHERE, Points, Stack, corners, morton_code};
+use super::bvh::{Bvh, LANES, NOWHERE, NearestTriangles, Points, Stack, corners, morton_code};
 use super::lattice::NO_TRIANGLE;
 use super::pseudonormals::Pseudonormals;
 use super::triangle::{Closest, closest_point};
 use crate::vector::{dot, normalized, of_f64, scale, to_f64};
 use crate::{Field, Mesh, Real};
 
-/// Points that one task takes: a fixed number, so that the result does not depend on the threads.
+/// Packets of points per task: a fixed number, so that the result does not depend on the threads.
 const PACKETS_PER_TASK: usize = 16;
 
-/// A mesh that answers how far from it a point is. Any mesh will do; the sign needs a closed one whose faces
-/// share their vertices, or a field that knows the sides.
+/// Signed distance to a mesh at any point. The distance is defined for any mesh; the sign needs a closed mesh whose
+/// faces share their vertices, or a field with the same inside.
 #[derive(Clone, Debug)]
 pub struct Query<T> {
     mesh: Mesh<T>,
@@ -23,24 +23,24 @@ pub struct Query<T> {
     pseudonormals: Pseudonormals,
 }
 
-/// What a mesh says about one point.
+/// Result of a query at one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit<T> {
     /// Signed distance, in the user's unit, negative inside.
     pub distance: T,
-    /// Its gradient with respect to the point, of unit length: away from the closest point on the outside, and
-    /// toward it inside. At distance 0 the normal of the closest face. Zero only where that has no area.
+    /// Gradient of the distance with respect to the point, of unit length: away from the closest point outside, toward
+    /// it inside. At distance 0 it is the normal of the closest face; zero only where that face has no area.
     pub gradient: [T; 3],
     /// The closest point of the mesh.
     pub point: [T; 3],
-    /// The face that it lies on; [`NO_TRIANGLE`] for a point that is not a number.
+    /// The face of the closest point; [`NO_TRIANGLE`] where the query point is NaN or out of range.
     pub triangle: u32,
     /// Weights of the corners of that face at the closest point.
     pub barycentric: [T; 3],
 }
 
 impl<T: Real> Query<T> {
-    /// Makes the mesh ready for queries.
+    /// Builds the tree and the pseudonormals of a mesh.
     ///
     /// # Errors
     /// [`Error::Empty`] and [`Error::Range`].
@@ -60,14 +60,14 @@ impl<T: Real> Query<T> {
         &self.mesh
     }
 
-    /// What the mesh says about each of the `(N, 3)` points, in their order.
+    /// Distance, gradient and closest point at `(N, 3)` points, in their order.
     ///
     /// `signs` is a field that is negative inside, such as the distance on the lattice: where its eight values
     /// round a point agree, they give the sign. Elsewhere, and without it, the pseudonormal of the closest
-    /// feature does, which is right for a closed mesh. Of an open mesh it tells the two sides near the surface
-    /// and means nothing near its border.
+    /// feature does, which is right for a closed mesh. For an open mesh it distinguishes the two sides near the surface;
+    /// near the border it is meaningless.
     ///
-    /// A point that is not finite, or too far for its squared distance to be, gets NaN and no triangle.
+    /// A point that is not finite, or whose squared distance overflows, gets NaN and no triangle.
     pub fn query(&self, points: &[[T; 3]], signs: Option<&Field<T>>) -> Vec<Hit<T>> {
         let nearest = self.nearest_triangles(points);
         points
@@ -171,8 +171,7 @@ fn side_on_lattice<T: Real>(field: &Field<T>, point: [T; 3]) -> Option<bool> {
         .then_some(first)
 }
 
-/// What is not a number is infinitely far from everything: comparisons with it would all fail, and let it into
-/// boxes that are not there.
+/// Infinity for NaN, since comparisons with NaN all fail and would admit it to absent boxes.
 #[inline(always)]
 fn far_if_nan(x: f64) -> f64 {
     if x.is_nan() { f64::INFINITY } else { x }
@@ -202,7 +201,7 @@ impl<T: Real> WithSimd for Packets<'_, T> {
                     packet[a][l] = far_if_nan(self.points[index as usize][a].f64());
                 }
             }
-            let mut nearest = Found::NOTHING;
+            let mut nearest = NearestTriangles::NOTHING;
             self.bvh.nearest(&packet, &mut nearest, &mut stack);
             found.copy_from_slice(&nearest.triangle[..found.len()]);
         }

@@ -11,17 +11,16 @@ use crate::gather::{Buckets, add_to};
 use crate::vector::{add, dot, norm, scale, sub, to_f64};
 
 impl<T: Real> Query<T> {
-    /// Pulls cotangents of what [`Self::query`] said about `(N, 3)` points back to the points and to the vertices
-    /// of the mesh: `distance_bar` is `(N,)`, of the signed distances, and `point_bar` `(N, 3)`, of the closest
-    /// points; `hits` are those that the query gave. Returns the number of guarded hits.
+    /// Pulls cotangents of the result `hits` of [`Self::query`] at `(N, 3)` points back to the points and to the
+    /// vertices of the mesh. `distance_bar` `(N,)` is that of the signed distances, `point_bar` `(N, 3)` that of the
+    /// closest points. Returns the number of guarded hits.
     ///
     /// Adds into `points_bar` `(N, 3)` and `vertices_bar` `(V, 3)`, in the order of the points and the vertices;
-    /// each is first brought to its length, new entries being zero, so that an empty one will do. The unit is
-    /// that of `distance_bar` for a distance (a number per unit length), of `point_bar` for a point. Sums run in
+    /// both are first extended to that length with zeros and may be empty. Sums run in
     /// double precision in a fixed order: the same bits for any number of threads.
     ///
-    /// A hit without a triangle gives nothing, whatever its cotangents are. The sign and the closest face are held
-    /// constant: on the medial axis, and on the mesh at its edges and corners, what comes out is the derivative on
+    /// A hit without a triangle contributes nothing, whatever its cotangents are. The sign and the closest face are held
+    /// constant: on the medial axis, and on the mesh at its edges and corners, the result is the derivative on
     /// one side. Where a face is much thinner than the distance, its closest point turns without bound as a corner
     /// moves: a direction in which it is thinner than `√ε` distances (`ε` of the number type) is left out of the
     /// cotangent of the closest point, and the hit counts as guarded.
@@ -105,7 +104,7 @@ impl<T: Real> Query<T> {
         share
     }
 
-    /// The closest point is `Σ β_k y_k`: `β_k` times the cotangent for each corner, and what moves `β`.
+    /// Pullback of the closest point `Σ β_k y_k`: `β_k` times the cotangent for each corner, plus the terms of `β`.
     fn add_closest_point(&self, point: [T; 3], hit: &Hit<T>, bar: [f64; 3], share: &mut Share) {
         let corners = self.mesh().corners(hit.triangle as usize).map(to_f64);
         let closest = closest_point(to_f64(point), corners);
@@ -126,7 +125,7 @@ impl<T: Real> Query<T> {
     }
 }
 
-/// What one hit gives.
+/// Cotangents from one hit.
 #[derive(Clone, Copy, Debug, Default)]
 struct Share {
     point: [f64; 3],

@@ -1,4 +1,4 @@
-//! How the closest point of a triangle moves: the derivative of what is interpolated there.
+//! Derivative of a value interpolated at the closest point of a triangle.
 //!
 //! Let `y_0` be a corner of the feature (face, edge or vertex) that holds the closest point `p` of `q`, `E` the
 //! columns `y_k − y_0` for its other corners, `o = q − p`, and `δ_k = u_k − u_0` the differences of a linear
@@ -15,14 +15,14 @@ pub(super) struct Tangent {
     pub query: [f64; 3],
     /// With respect to the corners.
     pub corners: [[f64; 3]; 3],
-    /// Whether a bounded gradient was taken where the true one has no useful bound.
+    /// Whether a direction without a useful bound was left out.
     pub guarded: bool,
 }
 
 /// Gradient of `Σ β_k u_k` for the corner values `values`.
 ///
-/// A direction in which the feature is thinner than `thinnest` is left out: `G` has the thickness in its
-/// denominator, `γ` has its square.
+/// A direction in which the feature is thinner than `thinnest` is left out: `G` is divided by the thickness, `γ` by
+/// its square.
 pub(super) fn tangent(
     closest: &Closest,
     corners: [[f64; 3]; 3],
@@ -69,7 +69,7 @@ fn of_edge(
     gamma
 }
 
-/// The same of the face, in the orthonormal frame of its longest edge, which slivers do not harm.
+/// Like [`of_edge`] for the face, in the orthonormal frame of its longest edge, which is accurate for slivers too.
 fn of_face(
     corners: [[f64; 3]; 3],
     values: [f64; 3],

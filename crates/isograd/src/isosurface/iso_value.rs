@@ -4,25 +4,25 @@
 //! `c = Σ a_i χ(x_i) / Σ a_i`, with `χ` trilinear between cell centers and `a_i` the area that sample `i`
 //! stands for. The paper takes the value "near the input point samples", after Kazhdan, Bolitho and
 //! Hoppe, *Poisson surface reconstruction* (SGP 2006), §4.4; the weights make it the mean over the
-//! surface, whatever the density of the samples. Sums are in double precision, in one fixed order.
+//! surface for any density of the samples. Sums are in double precision, in one fixed order.
 //!
 //! # Residual
-//! `Σ a_i`, `c`, and `χ` and `∇χ` at every sample: the field itself need not be kept.
+//! `Σ a_i`, `c`, and `χ` and `∇χ` at every sample, without the field itself.
 //!
 //! # Pullback
 //! With `w_i` the trilinear weights at `x_i` and `s_i = c̄ a_i / Σ a`: `χ̄ += s_i w_i`, `x̄_i += s_i ∇χ(x_i)`,
-//! `ā_i += c̄ (χ(x_i) − c) / Σ a`: [`pullback`]. Whoever used `χ(x_i)` besides adds its cotangents to `s_i`.
+//! `ā_i += c̄ (χ(x_i) − c) / Σ a`: [`pullback`]. Further cotangents of `χ(x_i)` are added to `s_i`.
 //!
 //! # Not differentiable
 //! `∇χ` jumps where a sample crosses a plane through cell centers; the gradient on its side is used.
 
 use rayon::prelude::*;
 
-use crate::splat::{self, SampleCotangent, Samples};
+use crate::splat::{SampleCotangent, Samples, SortedSamples};
 use crate::trilinear::{self, Cube};
 use crate::{Field, Grid, Real, parallel, vector};
 
-/// What the pullback needs besides the inputs.
+/// Values that the pullback needs besides the inputs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Residual<T> {
     /// `Σ a_i`.
@@ -42,11 +42,11 @@ pub struct AtSample<T> {
     pub gradient: [T; 3],
 }
 
-/// Why there is no iso-value.
+/// Errors of the iso-value.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
     /// The areas do not match the points.
-    #[error("{areas} areas for {points} points; give one area a point")]
+    #[error("{areas} areas for {points} points; give one area per point")]
     Count {
         /// Number of points.
         points: usize,
@@ -65,7 +65,7 @@ pub enum Error {
     },
     /// The indicator at the samples is not finite.
     #[error(
-        "the indicator is not finite at the samples; use f64, or a unit in which the cell size is nearer to 1"
+        "the indicator is not finite at the samples; use f64, or a unit in which the cell size is closer to 1"
     )]
     NotFinite,
 }
@@ -111,22 +111,20 @@ pub fn forward<T: Real>(
     Ok(c)
 }
 
-/// Adds to `chi_bar` (in memory order, on `grid`) and to `out` what the cotangent `bar` of the iso-value, and
-/// the cotangents `values_bar` `(N,)` of `χ(x_i)` (empty for none), mean for the indicator, the samples and the
-/// grid. All else is as it was in [`forward`]; `order` lists the samples by plane of the grid, as the splat's
-/// [`Residual`](splat::Residual) does.
-#[allow(clippy::too_many_arguments)]
+/// Adds to `chi_bar` `(nx, ny, nz)` on `grid`, and to `out`, the cotangents of the indicator, the samples and the
+/// grid from the cotangent `bar` of the iso-value and the cotangents `values_bar` `(N,)` of `χ(x_i)` (empty for
+/// none). All other arguments are those of [`forward`].
 pub fn pullback<T: Real>(
     grid: &Grid<T>,
-    samples: Samples<'_, T>,
+    sorted: SortedSamples<'_, T>,
     residual: &Residual<T>,
-    order: &splat::Residual,
     bar: T,
     values_bar: &[T],
     chi_bar: &mut [T],
     out: &mut SampleCotangent<T>,
 ) {
-    let Samples { points, areas, .. } = samples;
+    let samples = sorted.samples;
+    let Samples { areas, .. } = samples;
     let share = bar.f64() / residual.area;
     // Cotangent of the value at a sample, and that of its point.
     let value_bar = |i: usize| {
@@ -137,12 +135,12 @@ pub fn pullback<T: Real>(
         let slope = value_bar(i) / grid.spacing();
         vector::scale(residual.at_samples[i].gradient, slope)
     };
-    // The mean is the same whatever the unit of the areas.
+    // The mean does not depend on the unit of the areas.
     out.areas.par_iter_mut().enumerate().for_each(|(i, area)| {
         *area += T::of(share * (residual.at_samples[i].value.f64() - residual.value));
     });
     out.add(grid, samples, false, |i| (point_bar(i), T::zero()));
-    trilinear::spread(grid, points, order, value_bar, chi_bar);
+    trilinear::spread(grid, sorted, value_bar, chi_bar);
 }
 
 #[cfg(test)]
@@ -196,16 +194,11 @@ mod tests {
             })
             .collect();
         let areas: Vec<f64> = points.iter().map(|p| p[1]).collect();
-        let run = |threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            pool.expect("threads").install(|| {
-                let mut residual = Residual::default();
-                let c = forward(&linear(), &points, &areas, &mut residual).expect("valid");
-                (c, residual)
-            })
-        };
-        let one = run(1);
-        assert!(one == run(2) && one == run(5));
+        crate::testing::assert_same_bits(|| {
+            let mut residual = Residual::default();
+            let c = forward(&linear(), &points, &areas, &mut residual).expect("valid");
+            (c, residual)
+        });
     }
 
     #[test]

@@ -10,7 +10,7 @@ use crate::data::{Field, Grid, LatticeEdge, Mesh};
 use crate::element::crossing::crossing;
 use crate::{Real, vector};
 
-/// Memory of the stage, kept between calls: about a fifth of a byte per cell.
+/// Scratch buffers reused between calls: about a fifth of a byte per cell.
 #[derive(Debug, Default)]
 pub struct Scratch {
     signs: Signs,

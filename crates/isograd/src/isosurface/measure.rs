@@ -1,4 +1,4 @@
-//! What can be said of any triangle mesh: area, volume, pieces, topology.
+//! Area, volume, components and topology of a triangle mesh.
 
 use rayon::prelude::*;
 
@@ -9,7 +9,7 @@ use crate::{Real, vector};
 /// Area, volume and topology of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measures {
-    /// Number of vertices that a face names.
+    /// Number of vertices used by faces.
     pub vertices: usize,
     /// Number of different edges.
     pub edges: usize,
@@ -18,10 +18,10 @@ pub struct Measures {
     /// Sum of the areas of the faces, in unit length².
     pub area: f64,
     /// Enclosed volume by the divergence theorem, in unit length³; positive where faces are
-    /// counter-clockwise seen from outside. Of a mesh that is not closed it is the volume of the cone
-    /// from the center of its bounding box, and means little.
+    /// counter-clockwise seen from outside. For an open mesh it is the volume of the cone
+    /// from the center of its bounding box, and not meaningful.
     pub volume: f64,
-    /// Number of pieces; faces that share a vertex are of one piece.
+    /// Number of connected components; faces that share a vertex belong to one.
     pub components: usize,
     /// `V − E + F`: for a closed manifold 2 for each sphere, 0 for each torus, `2 − 2g` for genus `g`.
     pub euler: i64,
@@ -35,7 +35,7 @@ pub struct Measures {
     pub crowded_edges: usize,
 }
 
-/// Memory of [`measure`], kept between calls: about 40 bytes per face.
+/// Scratch buffers of [`measure`] reused between calls: about 40 bytes per face.
 #[derive(Debug, Default)]
 pub struct Scratch {
     parent: Vec<u32>,
@@ -44,14 +44,14 @@ pub struct Scratch {
     uses: Vec<u64>,
 }
 
-/// Measures a mesh. Sums run in double precision relative to the mesh's own center and in a fixed order,
-/// so neither the place of the mesh nor the number of threads changes a digit that counts.
+/// Measures a mesh. Sums run in double precision relative to the center of the mesh and in a fixed order: the position
+/// of the mesh does not reduce the accuracy, and the number of threads does not change a bit.
 ///
 /// A face that names a vertex twice has two edges that close on each other and one from the vertex to
 /// itself, which counts as a boundary edge: such a mesh is not closed.
 ///
 /// # Pullback
-/// [`measure_pullback`](super::measure_pullback), of area and volume; the rest are counts.
+/// [`measure_pullback`](super::measure_pullback), of area and volume; all other quantities are counts.
 pub fn measure<T: Real>(mesh: &Mesh<T>, scratch: &mut Scratch) -> Measures {
     let [area, volume] = integrals(mesh);
     let (vertices, components) = scratch.components(mesh);
@@ -74,7 +74,7 @@ pub fn measure<T: Real>(mesh: &Mesh<T>, scratch: &mut Scratch) -> Measures {
 }
 
 impl Measures {
-    /// [`measure`] with memory of its own.
+    /// [`measure`] with new scratch buffers.
     pub fn of<T: Real>(mesh: &Mesh<T>) -> Self {
         measure(mesh, &mut Scratch::default())
     }
@@ -137,7 +137,7 @@ fn directed(face: &[u32; 3]) -> [[u32; 2]; 3] {
 }
 
 impl Scratch {
-    /// Number of vertices that a face names, and of the pieces they make.
+    /// Number of vertices used by faces, and of connected components.
     fn components<T: Real>(&mut self, mesh: &Mesh<T>) -> (usize, usize) {
         // A vertex is its own root from the moment that a face names it.
         const UNUSED: u32 = u32::MAX;

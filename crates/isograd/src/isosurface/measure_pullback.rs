@@ -8,19 +8,18 @@ use crate::{Real, parallel};
 
 /// Adds `area_bar ∂A/∂y + volume_bar ∂V/∂y` to the cotangent `(V, 3)` of the vertices, with the
 /// [area](super::Measures::area) `A` and the signed [volume](super::Measures::volume) `V` of the mesh. Returns
-/// how many faces have no area, if that of any is asked for.
+/// the number of faces without area, if `area_bar` is not 0.
 ///
 /// With `n` the unit normal of a face `(a, b, c)`, `ā += A̅ (b − c) × n / 2` and `ā += V̅ b × c / 6`, and so on round
-/// the face. For a closed mesh moved outward by `δ(s)` the first is the change of area and the second, exactly,
-/// the flux of the motion. Positive where faces are counter-clockwise seen from outside. The unit of the
+/// the face. Positive where faces are counter-clockwise seen from outside. The unit of the
 /// cotangent of a vertex is length for the area, length² for the volume, times those of the arguments.
 ///
-/// `vertices_bar` is first brought to its length, new entries being zero, so that an empty one will do. Sums run
+/// `vertices_bar` is first extended to its length with zeros and may be empty. Sums run
 /// in double precision and in a fixed order: the same bits for any number of threads.
 ///
 /// # Not differentiable
-/// A face without area: its area grows whichever way a corner moves off its line. It is left out of the area
-/// and counted. For a mesh that is not closed, the point that its volume is seen from is held constant.
+/// A face without area: its area grows in whichever direction a corner leaves the line. It is left out of the area
+/// and counted. For an open mesh, the apex of its volume is held constant.
 pub fn pullback<T: Real>(
     mesh: &Mesh<T>,
     area_bar: f64,
@@ -49,7 +48,7 @@ pub fn pullback<T: Real>(
     out_of_range + flat as usize
 }
 
-/// What corner `k` of a face gets.
+/// Cotangent of corner `k` of a face.
 fn at_corner(corners: [[f64; 3]; 3], k: usize, area_bar: f64, volume_bar: f64) -> [f64; 3] {
     let (b, c) = (corners[(k + 1) % 3], corners[(k + 2) % 3]);
     let of_volume = scale(cross(b, c), volume_bar / 6.0);

@@ -14,8 +14,8 @@
 //! it coincide.
 //!
 //! The lattice ends at the outermost cell centers. Where inside cells reach them the surface is left
-//! **open**: a cap would need vertices that lie on no lattice edge, and moving the wall is the real
-//! remedy. [`Report::walls`] says where.
+//! **open**: a cap would need vertices that lie on no lattice edge, and a larger grid is the
+//! remedy. [`Report::walls`] lists the walls.
 //!
 //! # Residual
 //! Nothing beyond `χ`, `c` and [`Mesh::edges`](crate::Mesh::edges): `η` is two loads and a division.
@@ -57,24 +57,24 @@ pub use measure_pullback::pullback as measure_pullback;
 pub use pullback::{LevelCotangent, SMALLEST_DIFFERENCE, pullback};
 pub use tables::triangles;
 
-/// Which value of the indicator the surface is at.
+/// Iso-value of the indicator at which the surface is extracted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Level {
     /// The mean at all samples: [`iso_value`], as in the paper.
     Mean,
-    /// What it is at the samples near by: [`local_level`].
+    /// Local value at the samples near by: [`local_level`].
     #[default]
     Local,
-    /// The same, also on parts that are thinner than a cell, which are made about a cell thick. Hardly any of them is
-    /// missed; but how they lie on the grid shows, so that derivatives go up and down within a cell there.
+    /// Like `Local`, also on parts thinner than a cell, which are made about a cell thick. Hardly any of them is
+    /// missed; but their position on the grid shows, so that derivatives oscillate within a cell there.
     Thin,
 }
 
-/// What the stage has to say about a surface.
+/// Report of the stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Report {
-    /// Whether inside cells lie at a wall of the grid. The surface is open there (or, where all of the
-    /// outermost cells are inside, it is turned inside out).
+    /// Whether inside cells lie at a wall of the grid. The surface is open there; if all of the
+    /// outermost cells are inside, it is inside out.
     pub touches_wall: bool,
     /// At which walls: `walls[axis][0]` at the low end of the axis, `walls[axis][1]` at the high one.
     pub walls: [[bool; 2]; 3],
@@ -82,15 +82,15 @@ pub struct Report {
     pub inside: usize,
 }
 
-/// Why there is no surface.
+/// Errors of the isosurface stage.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
     /// The level is NaN or infinite.
     #[error(
-        "the level is {level}; it must be finite: look for bad numbers in the stage that made it"
+        "the level is {level}; it must be finite: look for NaN or overflow in the stage that computed it"
     )]
     Level {
-        /// What was given.
+        /// The level.
         level: f64,
     },
     /// A value is NaN or infinite.
@@ -127,9 +127,9 @@ pub enum Error {
         /// Greatest value of the field.
         max: f64,
     },
-    /// More vertices than 32-bit indices can name.
+    /// More vertices than 32-bit indices can address.
     #[error(
-        "the surface has {vertices} vertices, more than 32-bit indices can name; use a coarser grid, or smooth the field if it is noise"
+        "the surface has {vertices} vertices, more than 32-bit indices can address; use a coarser grid, or smooth the field if it is noise"
     )]
     TooManyVertices {
         /// Number of vertices.

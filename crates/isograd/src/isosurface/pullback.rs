@@ -13,7 +13,7 @@ const SLAB: usize = 8;
 /// by no more than a million cells while the whole of `χ` passes.
 pub const SMALLEST_DIFFERENCE: f64 = 1e-6;
 
-/// What the vertices mean for the level and the grid.
+/// Cotangents of the level and the grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LevelCotangent {
     /// Cotangent of the level `c`.
@@ -24,8 +24,8 @@ pub struct LevelCotangent {
     pub guarded: usize,
 }
 
-/// Adds to `chi_bar` (in memory order) what the cotangents `vertices_bar` `(V, 3)` of the vertices mean for
-/// the indicator, and returns what they mean for the level and the grid. `chi`, `level` and `mesh` are those
+/// Pulls the cotangents `vertices_bar` `(V, 3)` of the vertices back: adds that of the indicator to `chi_bar`
+/// `(nx, ny, nz)`, and returns those of the level and the grid. `chi`, `level` and `mesh` are those
 /// of [`forward`](super::forward).
 pub fn pullback<T: Real>(
     chi: &Field<T>,
@@ -63,12 +63,12 @@ struct Vertices<'a, T> {
     level: T,
     edges: &'a [LatticeEdge],
     bars: &'a [[T; 3]],
-    /// The least difference along an edge that is taken as it is.
+    /// Lower bound of differences along an edge.
     smallest: T,
 }
 
-/// A vertex seen from its edge.
-struct OnEdge<T> {
+/// A vertex on its lattice edge.
+struct EdgeVertex<T> {
     /// The two cells.
     cells: [usize; 2],
     eta: T,
@@ -79,14 +79,14 @@ struct OnEdge<T> {
 
 impl<T: Real> Vertices<'_, T> {
     #[inline(always)]
-    fn on_edge(&self, vertex: usize) -> OnEdge<T> {
+    fn edge_vertex(&self, vertex: usize) -> EdgeVertex<T> {
         let (grid, values) = (self.chi.grid(), self.chi.values());
         let (p, axis) = (self.edges[vertex].cell(), self.edges[vertex].axis());
         let q = p + grid.strides()[axis];
         let difference = values[q] - values[p];
         let guarded = difference.abs() < self.smallest;
         let s = self.bars[vertex][axis] * grid.spacing();
-        OnEdge {
+        EdgeVertex {
             cells: [p, q],
             eta: crossing(values[p], values[q], self.level),
             pull: s / bounded(difference, self.smallest),
@@ -99,9 +99,9 @@ impl<T: Real> Vertices<'_, T> {
     fn add(&self, first: usize, plane: usize, slab: &mut [T]) {
         let near = |cell: usize| self.edges.partition_point(|edge| edge.cell() < cell);
         for vertex in near(first.saturating_sub(plane))..near(first + slab.len()) {
-            let OnEdge {
+            let EdgeVertex {
                 cells, eta, pull, ..
-            } = self.on_edge(vertex);
+            } = self.edge_vertex(vertex);
             let parts = [pull * (eta - T::one()), -pull * eta];
             for (cell, part) in cells.into_iter().zip(parts) {
                 if let Some(value) = cell.checked_sub(first).and_then(|at| slab.get_mut(at)) {
@@ -114,13 +114,13 @@ impl<T: Real> Vertices<'_, T> {
     fn level(&self, mesh: &Mesh<T>) -> LevelCotangent {
         let grid = self.chi.grid();
         let [level, x, y, z, spacing, guarded] = parallel::sum_array(self.edges.len(), |vertex| {
-            let on_edge = self.on_edge(vertex);
+            let edge_vertex = self.edge_vertex(vertex);
             let place = vector::to_f64(grid.to_index(mesh.vertices()[vertex]));
             let mut part = GridCotangent::default();
             part.add_place(place, vector::to_f64(self.bars[vertex]));
             let [x, y, z] = part.lower;
-            let guarded = f64::from(u8::from(on_edge.guarded));
-            [on_edge.pull.f64(), x, y, z, part.spacing, guarded]
+            let guarded = f64::from(u8::from(edge_vertex.guarded));
+            [edge_vertex.pull.f64(), x, y, z, part.spacing, guarded]
         });
         LevelCotangent {
             level,

@@ -1,4 +1,4 @@
-//! Which cells are inside, one bit a cell, and what follows from these bits alone: the crossed edges, the
+//! Signs of the cells, one bit per cell, and what they determine: the crossed edges, the
 //! case of each cube, the number of each vertex.
 
 use pulp::Arch;

@@ -41,7 +41,7 @@ fn open_noise(shape: [usize; 3], seed: u64) -> Field<f64> {
     Field::new(grid, values.collect()).expect("one value a cell")
 }
 
-/// The same, outside at the walls.
+/// Noise that is outside at the walls.
 fn noise(shape: [usize; 3], seed: u64) -> Field<f64> {
     let mut field = open_noise(shape, seed);
     for at in 0..field.grid().cells() {
@@ -311,20 +311,11 @@ fn the_smallest_grid_works() {
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
     let chi = noise([30, 20, 70], 3);
-    let run = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("a pool");
-        pool.install(|| {
-            let mesh = surface(&chi, 0.0).0;
-            let measures = Measures::of(&mesh);
-            (mesh, measures)
-        })
-    };
-    let one = run(1);
-    assert_eq!(one, run(2));
-    assert_eq!(one, run(5));
+    crate::testing::assert_same_bits(|| {
+        let mesh = surface(&chi, 0.0).0;
+        let measures = Measures::of(&mesh);
+        (mesh, measures)
+    });
 }
 
 #[test]

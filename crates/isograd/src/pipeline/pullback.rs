@@ -10,7 +10,7 @@ use crate::distance::{extend, lattice};
 use crate::isosurface::{Level, local_level};
 use crate::orient::Method;
 use crate::poisson::screened;
-use crate::splat::{SampleCotangent, Samples};
+use crate::splat::{SampleCotangent, Samples, SortedSamples};
 use crate::{Real, isosurface, normals, orient, poisson, splat, vector};
 
 /// Scratch buffers of the pullback: a field, an index for each cell whose φ has a cotangent, and some numbers
@@ -27,8 +27,7 @@ pub struct PullbackScratch<T: Real> {
     poisson: poisson::Scratch<T>,
     screened: screened::Scratch<T>,
     level: local_level::PullbackScratch<T>,
-    /// Cotangents of the indicator at the samples.
-    values: Vec<T>,
+    level_bars: local_level::Cotangent<T>,
     splat: splat::PullbackScratch<T>,
     areas: splat::area::PullbackScratch<T>,
     normals: normals::Scratch<T>,
@@ -129,16 +128,16 @@ impl<T: Real> Reconstruction<T> {
             ..
         } = scratch;
         for (of, attribute) in cotangent.extensions.iter().zip(&mut out.attributes) {
-            extend::pullback(
-                self.samples(),
-                of.attribute,
-                self.surface(),
-                of.residual,
-                of.extension,
-                of.vertices,
-                of.values,
-                found,
-            )?;
+            let inputs = extend::Inputs {
+                samples: self.samples(),
+                attribute: of.attribute,
+                surface: self.surface(),
+                residual: of.residual,
+                extension: of.extension,
+                vertices_bar: of.vertices,
+                values_bar: of.values,
+            };
+            extend::pullback(&inputs, found)?;
             attribute.clone_from(&found.attribute);
             add(vertices, &found.vertices, vector::add);
             add(&mut samples.points, &found.points, vector::add);
@@ -196,34 +195,35 @@ impl<T: Real> Reconstruction<T> {
         let given = self.splat_samples();
         let mut level_bar = cotangent.iso_value.f64() + found.level;
         let mut smoothing_bar = 0.0;
-        scratch.values.clear();
+        scratch.level_bars.values.clear();
+        let sorted = SortedSamples {
+            samples: given,
+            order: &residuals.splat,
+        };
         if self.options.level != Level::Mean {
-            let found = local_level::pullback(
+            local_level::pullback(
                 chi,
-                given,
-                self.options.area,
-                &residuals.splat,
+                sorted,
                 &residuals.local_level,
                 field.values_mut(),
                 &mut scratch.level,
-                &mut scratch.values,
+                &mut scratch.level_bars,
                 samples,
             );
-            level_bar += found.level;
-            smoothing_bar = found.smoothing;
+            level_bar += scratch.level_bars.level;
+            smoothing_bar = scratch.level_bars.smoothing;
         }
         isosurface::iso_value::pullback(
             chi.grid(),
-            given,
+            sorted,
             &residuals.iso_value,
-            &residuals.splat,
             T::of(level_bar),
-            &scratch.values,
+            &scratch.level_bars.values,
             field.values_mut(),
             samples,
         );
         if self.options.screening > 0.0 {
-            let equation = self.screened_equation(given);
+            let equation = self.screened_equation(sorted);
             let (level, scratch) = (&residuals.iso_value, &mut scratch.screened);
             screened::pullback(&equation, level, field.values_mut(), scratch, samples)?;
         }
@@ -247,8 +247,8 @@ impl<T: Real> Reconstruction<T> {
         if self.options.level == Level::Mean {
             return whole;
         }
-        let taken = level.sum_of_taken(chi.grid(), |start, taken| {
-            poisson::smoothing::laplacian_dot(bars, shape, start, taken)
+        let taken = level.sum_of_corrections(chi.grid(), |start, part| {
+            poisson::smoothing::laplacian_dot(bars, shape, start, part)
         });
         whole + smoothing * taken
     }
@@ -265,13 +265,12 @@ impl<T: Real> Reconstruction<T> {
         samples.grid.spacing -= by_logarithm / self.indicator.grid().spacing().f64();
     }
 
-    fn screened_equation<'a>(&'a self, samples: Samples<'a, T>) -> screened::Equation<'a, T> {
+    fn screened_equation<'a>(&'a self, samples: SortedSamples<'a, T>) -> screened::Equation<'a, T> {
         screened::Equation {
             plan: &self.poisson,
             grid: self.indicator.grid(),
             samples,
-            area_weights: self.options.area,
-            order: &self.residuals.splat,
+            area: self.options.area,
             screening: self.options.screening,
         }
     }

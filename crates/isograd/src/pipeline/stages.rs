@@ -167,13 +167,15 @@ impl<T: Real> Reconstructor<T> {
         let equation = screened::Equation {
             plan: poisson,
             grid: &grid,
-            samples: splat::Samples {
-                points,
-                normals: &orientation.normals,
-                areas,
+            samples: splat::SortedSamples {
+                samples: splat::Samples {
+                    points,
+                    normals: &orientation.normals,
+                    areas,
+                },
+                order: &residuals.splat,
             },
-            area_weights: options.area,
-            order: &residuals.splat,
+            area: options.area,
             screening: options.screening,
         };
         screened::forward(
@@ -203,18 +205,20 @@ impl<T: Real> Reconstructor<T> {
         if options.level != Level::Mean {
             local_level::forward(
                 indicator,
-                splat::Samples {
-                    points,
-                    normals: &orientation.normals,
-                    areas,
+                splat::SortedSamples {
+                    samples: splat::Samples {
+                        points,
+                        normals: &orientation.normals,
+                        areas,
+                    },
+                    order: &residuals.splat,
                 },
-                local_level::Choice {
-                    area_weights: options.area,
+                local_level::Options {
+                    area: options.area,
                     smoothing: residuals.smoothing,
                     thin: options.level == Level::Thin,
                 },
                 level,
-                &residuals.splat,
                 &mut self.scratch.level,
                 &mut residuals.local_level,
             );

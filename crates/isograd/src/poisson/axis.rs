@@ -3,7 +3,7 @@
 //! Two real lines travel as one complex line `x` of length `n`. With `v` its Makhoul order (even places
 //! first, then odd places backwards), `Z = FFT(v)` and `w_k = exp(−iπk/2n)`, the cosine transforms of both
 //! lines are `Y_k = w_k Z_k + w̄_k Z_{n−k} = 2 Σ_j x_j cos(πk(2j+1)/2n)`. Backwards,
-//! `Z_k = w̄_k (Y_k − i Y_{n−k})` with `Y_n = 0`, and `x` comes out times `2n`.
+//! `Z_k = w̄_k (Y_k − i Y_{n−k})` with `Y_n = 0`, and the result is `2n x`.
 
 use std::f64::consts::{PI, SQRT_2};
 use std::sync::Arc;
@@ -31,11 +31,11 @@ pub(super) struct Axis<T> {
     inverse: Arc<dyn Fft<T>>,
 }
 
-/// What a line is multiplied by at frequency `k` of its axis:
+/// Gain of a line at frequency `k` of its axis:
 /// `amplitude · G_k / (K_k · mass + M_k · stiffness)`.
 #[derive(Clone, Copy)]
 pub(super) struct Gain<T> {
-    /// `G` of the other two axes, over the factor that the transforms leave.
+    /// `G` of the other two axes, over the factor of the unnormalized transforms.
     pub(super) amplitude: T,
     /// `M M` of the other two axes.
     pub(super) mass: T,
@@ -139,7 +139,7 @@ impl<T: Real> Axis<T> {
         }
     }
 
-    /// Writes what two lines are multiplied by, at every frequency.
+    /// Writes the gains of two lines at every frequency.
     #[inline(always)]
     pub(super) fn write_gains(&self, gaussian: &[T], lines: [Gain<T>; 2], out: &mut [Complex<T>]) {
         let [re, im] = lines;

@@ -53,10 +53,10 @@ use crate::Real;
 pub use scratch::Scratch;
 pub use smoothing::Smoothing;
 
-/// Why an equation was not solved.
+/// Errors of the Poisson stage.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
-    /// The field is not the one that the plan was made for.
+    /// The field has another size than the plan.
     #[error(
         "a field of {values} values for a plan of {shape:?} cells; make a plan for the field's own grid"
     )]
@@ -69,13 +69,13 @@ pub enum Error {
     /// The smoothing is negative or not finite.
     #[error("the smoothing is {smoothing} cells; it must be finite and 0 or more")]
     Smoothing {
-        /// What was given.
+        /// The smoothing, in cells.
         smoothing: f64,
     },
 }
 
-/// Everything about a grid's Poisson equation that does not depend on its right-hand side: the Fourier
-/// plans and the eigenvalues per axis. Made once, used for every solve; shared freely between threads.
+/// Solver for one grid: the Fourier plans and the eigenvalues per axis. Reused for every right-hand side and shared
+/// between threads.
 pub struct Plan<T: Real> {
     shape: [usize; 3],
     axes: [Axis<T>; 3],

@@ -1,4 +1,4 @@
-//! Buffers that a solve uses and the next one uses again.
+//! Scratch buffers of a solve.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -6,7 +6,7 @@ use rustfft::num_complex::Complex;
 
 use crate::Real;
 
-/// Buffers of a solve, a few lines of the grid for each thread. Reused by the next call.
+/// Scratch buffers reused between calls: a few lines of the grid for each thread.
 #[derive(Default)]
 pub struct Scratch<T> {
     /// `G` at every frequency, per axis.
@@ -19,9 +19,9 @@ pub struct Scratch<T> {
 pub(super) struct Lines<T> {
     /// Complex lines, one after the other; each holds two real lines of the grid.
     pub(super) lines: Vec<Complex<T>>,
-    /// What two real lines are multiplied by.
+    /// Gains of two real lines.
     pub(super) gains: Vec<Complex<T>>,
-    /// What the Fourier transform asks for.
+    /// Scratch of the Fourier transform.
     pub(super) fft: Vec<Complex<T>>,
 }
 

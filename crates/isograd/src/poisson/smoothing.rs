@@ -1,4 +1,4 @@
-//! How much the indicator is smoothed, and what more of it would do.
+//! Width of the smoothing of the indicator, and its pullback.
 
 use pulp::Arch;
 use rayon::prelude::*;
@@ -23,8 +23,8 @@ const CELLS: usize = 64;
 /// Width `σ` of the Gaussian that the indicator is smoothed with.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Smoothing {
-    /// 0.8 of the typical distance between samples: what is between them is not known, and ripples otherwise.
-    /// Where samples count by their areas, that distance is the root of their mean, and has a derivative.
+    /// 0.8 of the typical distance between samples, which removes ripples between them.
+    /// Where samples count by their areas, that distance is the root of the mean area, and is differentiated.
     #[default]
     Auto,
     /// This many cells; 0 for none.
@@ -41,7 +41,7 @@ impl Smoothing {
         }
     }
 
-    /// Whether it is a width: finite, and 0 or more.
+    /// Whether the width is finite and not negative.
     pub fn is_valid(self) -> bool {
         match self {
             Self::Auto => true,

@@ -218,30 +218,10 @@ fn constant_part_of_the_right_hand_side_is_ignored() {
     assert!(chi.iter().sum::<f64>().abs() < 1e-13 * norm(&chi));
 }
 
-#[test]
-fn solve_is_its_own_transpose() {
-    let shape = [9, 12, 7];
-    let (b, g) = (right_hand_side(756, 1), right_hand_side(756, 2));
-    let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(a, b)| a * b).sum::<f64>();
-    let (left, right) = (
-        dot(&solve::<f64>(shape, &b, 0.8), &g),
-        dot(&b, &solve::<f64>(shape, &g, 0.8)),
-    );
-    assert!((left - right).abs() < 1e-12 * norm(&b) * norm(&g));
-}
-
 fn same_bits_for_any_threads<T: Real>() {
     let shape = [40, 33, 51];
     let b = right_hand_side(shape.iter().product(), 5);
-    let run = |threads| {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("threads")
-            .install(|| solve::<T>(shape, &b, 0.5))
-    };
-    let one = run(1);
-    assert!(one == run(2) && one == run(5));
+    crate::testing::assert_same_bits(|| solve::<T>(shape, &b, 0.5));
 }
 
 #[test]

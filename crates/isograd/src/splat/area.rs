@@ -1,15 +1,15 @@
-//! The area of surface that each sample stands for.
+//! Area of surface that each sample represents.
 //!
 //! # Map
 //! Neighborhoods → `a_i = 1 / Σ_{j∈N_i} K(r_j)` with `r_j = |x_j − x_i|` and
 //! `K(r) = 3/(π R_i²) · (1 − r²/R_i²)²`, whose integral over the disk of radius `R_i` is 1: the sum is the
 //! density of samples at `x_i`, in samples a unit of area. The paper has no such weight; without it the
-//! reconstructed surface moves away from where samples are few. An isolated sample (an outlier, see
-//! [`Neighborhoods::isolated`]) stands for no surface: `a_i = 0`. By the sum alone it would stand for
+//! reconstructed surface moves away from sparsely sampled parts. An isolated sample (an outlier, see
+//! [`Neighborhoods::isolated`]) represents no surface: `a_i = 0`. By the sum alone its area would be
 //! about the square of its distance to the surface, and one in a hundred would outweigh the surface.
 //!
-//! The sum is made where the neighbors are counted ([`crate::neighbors`]): every other pass over all
-//! neighbors would cost ten times as much as the sum.
+//! The sum is accumulated while the neighbors are counted ([`crate::neighbors`]): a pass of its own over all
+//! neighbors would cost ten times as much.
 //!
 //! # Residual
 //! The areas and the neighborhoods themselves.
@@ -23,7 +23,7 @@
 //! `K` and its derivative are 0 at the radius, so samples enter and leave smoothly. [`pullback`] gathers.
 //!
 //! # Not differentiable
-//! The radii and what is isolated, which are held constant.
+//! The radii and the isolated samples are held constant.
 
 use rayon::prelude::*;
 
@@ -54,7 +54,7 @@ pub fn forward<T: Real>(neighborhoods: &Neighborhoods<T>, areas: &mut Vec<T>) {
     samples.map(area).collect_into_vec(areas);
 }
 
-/// The mean of areas that are not 0, and how many those are.
+/// Mean of the positive areas, and their number.
 pub fn mean<T: Real>(areas: &[T]) -> (f64, usize) {
     let [sum, count] = parallel::sum_array(areas.len(), |i| {
         let area = areas[i].f64();
@@ -72,7 +72,7 @@ pub struct PullbackScratch<T> {
     sorted: Vec<[T; 3]>,
 }
 
-/// Adds to the `(N, 3)` `points_bar` what the cotangents `areas_bar` `(N,)` of the areas mean for the points.
+/// Adds to `points_bar` `(N, 3)` the cotangents of the points from those of the areas, `areas_bar` `(N,)`.
 /// `neighborhoods` and `areas` are those of [`forward`]; all in input order.
 pub fn pullback<T: Real>(
     neighborhoods: &Neighborhoods<T>,
@@ -116,7 +116,7 @@ pub fn pullback<T: Real>(
     });
 }
 
-/// `−Σ_c (f_k + f_c)(1 − r_c²/R²) d_c`: what point `k` gets as a center, and as a neighbor of the others.
+/// `−Σ_c (f_k + f_c)(1 − r_c²/R²) d_c`: cotangent of point `k` as a center, and as a neighbor of others.
 #[inline(always)]
 fn gather<T: Real>(center: [T; 3], own: T, radius: T, candidates: &Candidates<T, 1>) -> [T; 3] {
     let scale = T::one() / (radius * radius);

@@ -1,7 +1,5 @@
 //! Oracles: plain sums, known areas, finite differences.
 
-use rayon::ThreadPoolBuilder;
-
 use super::forward;
 use crate::neighbors::tests::{Random, even_sphere, torus, ugly_clouds};
 use crate::neighbors::{self, Neighborhoods, Radius};
@@ -89,30 +87,21 @@ fn a_few_outliers_add_no_area() {
         neighborhoods.isolated[range].iter().filter(|&&x| x).count()
     };
     assert_eq!(isolated(0..20_000), 0);
-    // Those that happen to be near another outlier are not told from a sparse surface.
+    // Outliers next to other outliers cannot be distinguished from a sparse surface.
     assert!(
         isolated(20_000..20_040) >= 30,
         "{}",
         isolated(20_000..20_040)
     );
     let surface: f64 = found[..20_000].iter().sum();
-    // The automatic radius moves a little, for it is asked of other samples.
+    // The automatic radius changes a little, since it is measured at other samples.
     assert!((surface / clean - 1.0).abs() < 0.01, "{}", surface / clean);
 }
 
 #[test]
 fn same_bits_for_any_number_of_threads() {
     let points: Vec<[f32; 3]> = torus(9000, 8).iter().map(|s| vector::of_f64(s.0)).collect();
-    let run = |threads: usize| {
-        let pool = ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("a pool");
-        pool.install(|| areas(&points).1)
-    };
-    let one = run(1);
-    assert_eq!(one, run(2));
-    assert_eq!(one, run(5));
+    crate::testing::assert_same_bits(|| areas(&points).1);
 }
 
 #[test]

@@ -57,7 +57,7 @@ pub enum Weights {
     Paper,
 }
 
-/// What the pullback needs besides the inputs.
+/// Values that the pullback needs besides the inputs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Residual {
     /// Indices of the samples, sorted by row of the grid.
@@ -66,11 +66,11 @@ pub struct Residual {
     pub weights: Weights,
 }
 
-/// Why samples were not splatted.
+/// Errors of the splat.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
-    /// The inputs do not match.
-    #[error("{normals} normals and {areas} areas for {points} points; give one of each a point")]
+    /// Points, normals and areas differ in number.
+    #[error("{normals} normals and {areas} areas for {points} points; give one of each per point")]
     Count {
         /// Number of points.
         points: usize,
@@ -79,7 +79,7 @@ pub enum Error {
         /// Number of areas.
         areas: usize,
     },
-    /// A sample is outside the grid or too near to a wall.
+    /// A sample is outside the grid or too close to a wall.
     #[error(
         "point {index} is at {position:?} cells from the low corner of a grid of {shape:?} cells; every sample must be at least 2 cells inside: use more padding or larger bounds, or remove the point"
     )]
@@ -92,7 +92,9 @@ pub enum Error {
         shape: [usize; 3],
     },
     /// A normal or an area is NaN or infinite.
-    #[error("the normal or the area of point {index} is not finite; mend it, or remove the point")]
+    #[error(
+        "the normal or the area of point {index} is not finite; correct it, or remove the point"
+    )]
     NotFinite {
         /// Index of the point, from 0.
         index: usize,
@@ -108,6 +110,15 @@ pub struct Samples<'a, T> {
     pub normals: &'a [[T; 3]],
     /// `(N,)` areas, in that unit squared.
     pub areas: &'a [T],
+}
+
+/// Splatted samples with the order in which they were visited, as the stages after the splat take them.
+#[derive(Clone, Copy, Debug)]
+pub struct SortedSamples<'a, T> {
+    /// The samples, in input order.
+    pub samples: Samples<'a, T>,
+    /// The residual of [`forward`].
+    pub order: &'a Residual,
 }
 
 /// Writes `b` on the grid of `b`, whose old values are lost. Areas are all 1 for no area weights: `χ` is then
@@ -168,7 +179,7 @@ impl<T: Real> Samples<'_, T> {
         }
     }
 
-    /// Adds what sample `i` contributes to the planes of `slab`, the first of which is plane `from`.
+    /// Adds the contribution of sample `i` to the planes of `slab`, the first of which is plane `from`.
     #[inline(always)]
     fn add(&self, i: usize, grid: &Grid<T>, weights: Weights, from: usize, slab: &mut [T]) {
         let x = grid.to_index(self.points[i]);

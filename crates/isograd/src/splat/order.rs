@@ -8,7 +8,7 @@ use super::{Error, Residual, stencil::REACH};
 use crate::parallel::CHUNK;
 use crate::{Grid, Real};
 
-/// Buffers of a splat. Reused by the next call.
+/// Scratch buffers reused between calls.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     /// Row `i n_y + j` of the central cell of each sample.
@@ -107,7 +107,7 @@ impl Residual {
     }
 }
 
-/// The cell that holds the point of index coordinates `x`; `None` nearer than 2 cells to a wall, or
+/// The cell that contains the point of index coordinates `x`; `None` closer than 2 cells to a wall, and
 /// for NaN. A point exactly 2 cells from the far wall counts to the cell before it.
 #[inline(always)]
 pub(crate) fn central_cell<T: Real>(shape: [usize; 3], x: [T; 3]) -> Option<[usize; 3]> {

@@ -11,7 +11,7 @@ use crate::{Field, Grid, Real, parallel, simd, vector};
 /// Samples in one task.
 const TASK: usize = 512;
 
-/// Cotangents of what a splat reads, the samples in input order: the stages that read them add to these.
+/// Cotangents of the inputs of the splat, samples in input order. Every stage that reads the samples adds to these.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SampleCotangent<T> {
     /// `(N, 3)` of the points.
@@ -25,17 +25,17 @@ pub struct SampleCotangent<T> {
 }
 
 impl<T: Real> SampleCotangent<T> {
-    /// Adds what each sample has in `bar(i)`: the cotangents of its point, and of its [area in
-    /// cells](Samples::area_in_cells). The grid takes its share; sums are in one fixed order.
+    /// Adds `bar(i)` of each sample: the cotangents of its point, and of its [area in
+    /// cells](Samples::area_in_cells). Adds those of the grid that follow; sums are in one fixed order.
     pub(crate) fn add(
         &mut self,
         grid: &Grid<T>,
         samples: Samples<'_, T>,
-        area_weights: bool,
+        in_cells: bool,
         bar: impl Fn(usize) -> ([T; 3], T) + Sync,
     ) {
         let (h, points) = (grid.spacing(), samples.points);
-        let unit = if area_weights { h } else { T::one() };
+        let unit = if in_cells { h } else { T::one() };
         let bars = self.points.par_iter_mut().zip(&mut self.areas).enumerate();
         bars.for_each(|(i, (point_bar, area_bar))| {
             let (point, area) = bar(i);
@@ -46,8 +46,8 @@ impl<T: Real> SampleCotangent<T> {
             let (point, area) = bar(i);
             let mut part = GridCotangent::default();
             part.subtract_point(grid, points[i], point);
-            if area_weights {
-                let share = samples.area_in_cells(grid, area_weights, i) * area / h;
+            if in_cells {
+                let share = samples.area_in_cells(grid, in_cells, i) * area / h;
                 part.spacing -= 2.0 * share.f64();
             }
             let [x, y, z] = part.lower;
@@ -65,8 +65,8 @@ pub struct PullbackScratch<T> {
     sorted: Vec<Gathered<T>>,
 }
 
-/// Adds to `out` what the cotangents `b_bar` of the right-hand side mean for the samples and the grid. The
-/// samples, and `residual`, are those of [`forward`](super::forward); `b_bar` is on its grid.
+/// Pulls the cotangent `b_bar` of the right-hand side back, and adds to `out` the cotangents of the samples and the
+/// grid. `samples` and `residual` are those of [`forward`](super::forward); `b_bar` is on its grid.
 pub fn pullback<T: Real>(
     samples: Samples<'_, T>,
     residual: &Residual,
@@ -112,17 +112,17 @@ pub fn pullback<T: Real>(
 }
 
 impl<T: Real> Samples<'_, T> {
-    /// `â_i`: the area of a sample in cells², or the weight itself where it is a count.
+    /// `â_i`: the area of a sample in cells² with `in_cells`, else the weight itself.
     #[inline(always)]
-    pub(crate) fn area_in_cells(&self, grid: &Grid<T>, area_weights: bool, i: usize) -> T {
+    pub(crate) fn area_in_cells(&self, grid: &Grid<T>, in_cells: bool, i: usize) -> T {
         let h = grid.spacing();
-        match area_weights {
+        match in_cells {
             true => self.areas[i] / h / h,
             false => self.areas[i],
         }
     }
 
-    /// What `b_bar` holds for sample `i`.
+    /// Cotangents of sample `i` from the 5³ cells of `b_bar` round it.
     #[inline(always)]
     fn gather(&self, i: usize, residual: &Residual, b_bar: &Field<T>) -> Gathered<T> {
         let (grid, values) = (b_bar.grid(), b_bar.values());

@@ -51,7 +51,7 @@ fn splat<T: Real>(grid: &Grid<f64>, cloud: &Cloud, weights: Weights) -> Vec<f64>
     let lower = vector::of_f64(grid.lower());
     let grid = Grid::new(lower, T::of(grid.spacing()), grid.shape()).expect("valid");
     let areas: Vec<T> = cloud.areas.iter().map(|&a| T::of(a)).collect();
-    // What was there before must not matter.
+    // The previous contents must not matter.
     let mut b = Field::new(grid, vec![T::of(f64::NAN); grid.cells()]).expect("sizes match");
     let (points, normals) = (cast(&cloud.points), cast(&cloud.normals));
     let samples = Samples {
@@ -242,13 +242,7 @@ fn threads_do_not_change_a_bit() {
     let grid = Grid::new([0.0; 3], 1.0, [45, 20, 16]).expect("valid");
     let cloud = random_cloud(&grid, 5000, 4);
     for weights in BOTH {
-        let run = |threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            pool.expect("threads")
-                .install(|| splat::<f32>(&grid, &cloud, weights))
-        };
-        let one = run(1);
-        assert!(one == run(2) && one == run(5));
+        crate::testing::assert_same_bits(|| splat::<f32>(&grid, &cloud, weights));
     }
 }
 

@@ -1,7 +1,7 @@
 //! From the indicator to the one whose level is the mean at every sample that is followed.
 
 use cubecl::prelude::*;
-use isograd::isosurface::local_level::{Choice, PASSES, Sums};
+use isograd::isosurface::local_level::{Options, PASSES, Sums};
 
 use super::cells::take_means;
 use super::near::Near;
@@ -28,7 +28,7 @@ pub fn forward<R: Runtime, T: Scalar>(
     device: &Device<R>,
     chi: &Buffer<T>,
     samples: Samples<'_, T>,
-    choice: Choice,
+    options: Options,
     mean: &iso_value::Residual<T>,
     splat: &splat::Residual<T>,
 ) -> Result<(Buffer<T>, Residual<T>), Error> {
@@ -44,8 +44,8 @@ pub fn forward<R: Runtime, T: Scalar>(
         order,
         samples: &packed,
     };
-    near.pack(samples, choice.area_weights);
-    let (mut state, step, area) = near.slopes(chi, choice)?;
+    near.pack(samples, options.area);
+    let (mut state, step, area) = near.slopes(chi, options)?;
     let now = near.trust(&state, &step, mean)?;
     let (areas, sums) = (near.areas()?, near.field()?);
     let (mut out, mut seen) = (chi.clone(), packed.clone());
@@ -71,7 +71,7 @@ pub fn forward<R: Runtime, T: Scalar>(
         flattened = after;
     }
     let residual = Residual {
-        area_weights: choice.area_weights,
+        area_weights: options.area,
         step,
         area,
         samples: packed,

@@ -33,7 +33,7 @@ mod sample;
 mod trust;
 
 pub use forward::forward;
-pub use isograd::isosurface::local_level::{Choice, PASSES};
+pub use isograd::isosurface::local_level::{Options, PASSES};
 pub use pullback::{Found, pullback};
 
 use isograd::isosurface::local_level::{Step, Sums};

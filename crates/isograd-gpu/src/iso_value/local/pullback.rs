@@ -233,7 +233,7 @@ impl<T: Scalar> Pulled<T> {
                 T::of(bars.slope),
                 T::of(bars.agreement),
                 T::of(bars.offset),
-                T::of(bars.forecast),
+                T::of(bars.prediction),
             ),
             grid::arg(near.grid),
         );

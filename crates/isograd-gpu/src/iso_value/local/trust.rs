@@ -1,7 +1,7 @@
 //! The samples as the passes take them: how steep `χ` is there, and how far they are followed.
 
 use cubecl::prelude::*;
-use isograd::isosurface::local_level::{Choice, STEEPEST, Step};
+use isograd::isosurface::local_level::{Options, STEEPEST, Step};
 
 use super::near::Near;
 use super::plate::{self, Usual, plate_of, shift};
@@ -37,7 +37,7 @@ impl<R: Runtime, T: Scalar> Near<'_, R, T> {
     pub(super) fn slopes(
         &self,
         chi: &Buffer<T>,
-        choice: Choice,
+        options: Options,
     ) -> Result<(Buffer<T>, Step, f64), Error> {
         let state: Buffer<T> = self.device.empty(STATE * self.count())?;
         let partial: Buffer<T> = self.device.empty(2 * self.shares())?;
@@ -56,7 +56,7 @@ impl<R: Runtime, T: Scalar> Near<'_, R, T> {
         let found = sum_columns(self.device, &partial, 2)?;
         let found = self.device.download(&found)?;
         let (squares, area) = (isograd::Real::f64(found[0]), isograd::Real::f64(found[1]));
-        Ok((state, Step::new(squares, area, choice), area))
+        Ok((state, Step::new(squares, area, options), area))
     }
 
     /// `(N,)` `χ(x_i) + δ_i − c`; and `ω`, among the samples.

@@ -1,4 +1,4 @@
-//! Making the tree.
+//! Construction of the tree.
 
 use rayon::prelude::*;
 
@@ -14,7 +14,7 @@ use crate::{Mesh, Real};
 const LENGTHS: std::ops::Range<f64> = 1e-140..1e140;
 
 impl Bvh {
-    /// Puts the tree of `mesh` in place of what was here.
+    /// Builds the tree of `mesh`, reusing the memory.
     pub(in crate::distance) fn rebuild<T: Real>(&mut self, mesh: &Mesh<T>) -> Result<(), Error> {
         if mesh.faces().is_empty() {
             return Err(Error::Empty);
@@ -95,7 +95,7 @@ fn depth(triangles: usize) -> usize {
     depth
 }
 
-/// Makes the nodes above `children` boxes.
+/// Fills a level with the nodes above `children` boxes.
 fn fill_level(
     level: &mut Vec<Node>,
     children: usize,

@@ -1,4 +1,4 @@
-//! A tree of boxes over the triangles of a mesh.
+//! Bounding volume hierarchy over the triangles of a mesh.
 //!
 //! The triangles are sorted along a Morton curve and cut into leaves of [`LEAF`]; every [`WIDTH`] leaves, or
 //! nodes, have one node above them. So the tree is a few flat arrays: no pointers, built in parallel, the
@@ -17,39 +17,39 @@ pub(super) use node::Region;
 pub(super) const LEAF: usize = 4;
 /// Children of a node.
 const WIDTH: usize = 8;
-/// Points walked down the tree together.
+/// Points that traverse the tree together.
 pub(super) const LANES: usize = 8;
 
 /// Coordinates of [`LANES`] points, `[axis][point]`.
 pub(super) type Points = [[f64; LANES]; 3];
 
-/// The closest triangles found so far for [`LANES`] points.
+/// Nearest triangles of [`LANES`] points so far: squared distances and triangles.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Found {
+pub(super) struct NearestTriangles {
     /// Squared distances.
     pub squared: [f64; LANES],
     /// Places of the triangles in the sorted order.
     pub triangle: [u32; LANES],
 }
 
-impl Found {
+impl NearestTriangles {
     pub(super) const NOTHING: Self = Self {
         squared: [f64::INFINITY; LANES],
         triangle: [NOWHERE; LANES],
     };
 }
 
-/// The place of a triangle that was not found.
+/// Place of no triangle.
 pub(super) const NOWHERE: u32 = u32::MAX;
 
 /// A node still to be visited: its level, its place in the level, and the least squared distance from it to
 /// any of the points.
 type Waiting = (u32, u32, f64);
 
-/// Memory of a walk down the tree.
+/// Scratch buffer of a traversal.
 pub(super) type Stack = Vec<Waiting>;
 
-/// See the head of this file.
+/// Bounding volume hierarchy; see the head of this file.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Bvh {
     /// Morton code and face, sorted.
@@ -100,9 +100,9 @@ impl Bvh {
         self.magnitude
     }
 
-    /// Replaces in `found` whatever has a closer triangle. Nodes are visited nearest first.
+    /// Updates `found` with the nearest triangles of the whole tree. Nodes are visited nearest first.
     #[inline(always)]
-    pub(super) fn nearest(&self, points: &Points, found: &mut Found, stack: &mut Stack) {
+    pub(super) fn nearest(&self, points: &Points, found: &mut NearestTriangles, stack: &mut Stack) {
         stack.clear();
         stack.push((self.levels.len() as u32, 0, 0.0));
         while let Some((level, index, least)) = stack.pop() {
@@ -126,7 +126,7 @@ impl Bvh {
         }
     }
 
-    /// The triangle closest to one point, by its place, if one is within a distance (squared).
+    /// Place of the triangle closest to one point, if its squared distance is below `within`.
     #[inline(always)]
     pub(super) fn nearest_to(&self, q: [f64; 3], within: f64, stack: &mut Stack) -> Option<u32> {
         let mut best = (within, None);
@@ -159,13 +159,13 @@ impl Bvh {
     }
 
     #[inline(always)]
-    fn nearest_in_leaf(&self, points: &Points, leaf: u32, found: &mut Found) {
+    fn nearest_in_leaf(&self, points: &Points, leaf: u32, found: &mut NearestTriangles) {
         for place in self.leaf(leaf) {
             found.try_triangle(self.frame(place), place, points);
         }
     }
 
-    /// Appends the leaves that may hold what is closest to some point of the box `region`.
+    /// Appends the leaves that may contain the closest triangle of some point of the box `region`.
     ///
     /// The rule: let `y` be any point of the mesh. `|q|² − d²(q, S)` is convex in `q` for every set `S`, and
     /// `|q|² − |q − y|²` is linear; so where a set is farther than `y` from all eight corners of the box, it
@@ -190,9 +190,9 @@ impl Bvh {
     }
 }
 
-impl Found {
-    /// Takes the triangle for every point to which it is closer than what was found. Of equally close ones it
-    /// is the last in the sorted order, whichever comes first.
+impl NearestTriangles {
+    /// Updates the points that are closer to this triangle. Of equally close triangles the last in the sorted order is
+    /// taken, in whichever order they are tried.
     #[inline(always)]
     pub(super) fn try_triangle(&mut self, frame: &Frame, place: u32, points: &Points) {
         let squared = frame.distances(points);

@@ -1,9 +1,9 @@
-//! Boxes of the tree.
+//! Nodes of the tree: the boxes of their children.
 
 use super::{LANES, Points, WIDTH};
 use crate::vector::{add, norm, scale, sub};
 
-/// Boxes of the children of a node, `[axis][child]`. A child that is not there has an inverted infinite box,
+/// Boxes of the children of a node, `[axis][child]`. An absent child has an inverted infinite box,
 /// infinitely far from everything.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
@@ -11,21 +11,21 @@ pub(super) struct Node {
     high: [[f64; WIDTH]; 3],
 }
 
-/// A box of queries, `low..=high`, and a point of the mesh near it.
+/// Box of query points, `low..=high`, and a point of the mesh near it.
 pub(in crate::distance) struct Region {
-    /// Squares of the way from `y` to the low and high faces of the box, per axis.
+    /// Squared distances from `y` to the low and high faces of the box, per axis.
     to_faces: [[f64; 2]; 3],
     low: [f64; 3],
     high: [f64; 3],
-    /// Slack, and what rounding may have taken from a difference of squares.
+    /// Slack, plus a bound of rounding in a difference of squares.
     margin: f64,
-    /// Sets farther than this (squared) from the center are of no interest.
+    /// Squared distance from the center beyond which sets are ignored.
     reach: f64,
 }
 
 impl Region {
-    /// `reach` is a distance from the center of the box, infinite for no limit; `slack` is how much closer
-    /// (squared) than a set something may be that counts with it; `rounding` is the error of the coordinates.
+    /// `reach` is a distance from the center of the box, infinite for no limit. Triangles may be closer than the set
+    /// that represents them by `slack`, squared. `rounding` is the error of the coordinates.
     pub(in crate::distance) fn new(
         [low, high]: [[f64; 3]; 2],
         y: [f64; 3],
@@ -136,16 +136,16 @@ fn interval_distance(low: f64, high: f64, x: f64) -> f64 {
     if d > 0.0 { d } else { 0.0 }
 }
 
-/// The box of nothing.
+/// Empty box.
 pub(super) const EMPTY_BOX: [[f64; 3]; 2] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
 
-/// The box of a box and a point. A coordinate that is no number changes nothing.
+/// Bounding box of a box and a point. NaN coordinates are ignored.
 #[inline(always)]
 pub(super) fn including(bounds: [[f64; 3]; 2], p: [f64; 3]) -> [[f64; 3]; 2] {
     joined(bounds, [p, p])
 }
 
-/// The box of two.
+/// Bounding box of two boxes.
 #[inline(always)]
 pub(super) fn joined([mut low, mut high]: [[f64; 3]; 2], other: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
     for a in 0..3 {
@@ -155,7 +155,7 @@ pub(super) fn joined([mut low, mut high]: [[f64; 3]; 2], other: [[f64; 3]; 2]) -
     [low, high]
 }
 
-/// As the machine does it: the second one where one is no number.
+/// The lesser; the second where one is NaN.
 #[inline(always)]
 fn lesser(x: f64, y: f64) -> f64 {
     if x < y { x } else { y }

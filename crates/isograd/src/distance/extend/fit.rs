@@ -3,7 +3,7 @@
 use crate::element::fit;
 use crate::vector::{add, dot, norm_squared, scale, sub};
 
-/// The fit at one vertex; see the head of [`extend`](super).
+/// Linear fit at one vertex; see [`extend`](super).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Fit {
     /// `R_v`, in the unit of the points.

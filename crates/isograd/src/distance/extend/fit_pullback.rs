@@ -7,10 +7,10 @@ use super::fit::{self, Neighbor};
 use crate::element::fit as element;
 use crate::vector::{add, dot, norm_squared, scale};
 
-/// What one sample gets from the fit at one vertex.
+/// Cotangents of one sample from the fit at one vertex.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Share {
-    /// `p_j t_j`: how much of `ū_v` is that of the sample's value.
+    /// `p_j t_j`: factor of `ū_v` in the cotangent of the sample's value.
     pub value: f64,
     /// `d̄_j`, times `R_v`.
     pub offset: [f64; 3],
@@ -18,7 +18,7 @@ pub(super) struct Share {
     pub area: f64,
 }
 
-/// The fit at a vertex and what its pullback needs; made by [`Adjoint::new`] from neighbors with weights `w_j`.
+/// Adjoint of the fit at a vertex, from neighbors with weights `w_j`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Adjoint {
     /// `W`, `m` and `s`.
@@ -91,7 +91,7 @@ impl Adjoint {
         )
     }
 
-    /// What a neighbor gets: `q` is its `q_j`, `area` is `a_j + a₀`.
+    /// Cotangents of a neighbor: `q` is its `q_j`, `area` is `a_j + a₀`.
     #[inline(always)]
     pub(super) fn share(&self, n: &Neighbor, q: f64, area: f64) -> Share {
         let e = n.offset;

@@ -16,7 +16,7 @@ use crate::{Grid, Mesh, Real};
 /// Cells in one chunk of a loop over the grid.
 const CELLS: usize = 1 << 16;
 
-/// Memory that a second call of the same size uses again.
+/// Scratch buffers reused between calls.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     /// Cells of the band in each chunk of the grid.
@@ -133,7 +133,7 @@ fn find_band<T: Real>(
     });
 }
 
-/// What one thread needs for one vertex after the other.
+/// Scratch buffers of one thread.
 #[derive(Default)]
 struct Workspace<T> {
     neighbors: Vec<Neighbor>,

@@ -1,11 +1,11 @@
-//! Closest-point extension: what is known at the samples (a surface velocity, a temperature), at the
+//! Closest-point extension: an attribute of the samples (a surface velocity, a temperature), evaluated at the
 //! surface point closest to every cell of a band.
 //!
 //! # Map
 //! Attribute `v_i` per sample → value `u_v` at every vertex `y_v` of the surface → value at every cell with
 //! `|φ| ≤ band`, `Σ_k β_k u_k` over the corners of the cell's closest triangle, `β` the barycentric
-//! coordinates of the closest point. The value is constant along the normal of the surface, which is what a
-//! boundary condition at a cell near the wall wants.
+//! coordinates of the closest point. The value is constant along the normal of the surface, as a
+//! boundary condition at a cell near the wall needs it.
 //!
 //! At a vertex a linear function is fitted to the samples round it and taken at the vertex (moving least
 //! squares: D. Levin, *The approximation power of moving least-squares*, Math. Comp. 67, 1998). With
@@ -24,7 +24,7 @@
 //!
 //! `R_v` is the common radius of the neighborhoods where a vertex has enough samples round it. Else it is
 //! `max(R, min(1.5 r₆, 1.05 r₆₄))` with `r_k` the distance to the `k`-th nearest sample: a vertex in a hole
-//! sees the samples round the hole. `a₀` is a millionth of the mean area: outliers, whose area is 0, count
+//! takes the samples round the hole. `a₀` is a millionth of the mean area: outliers, whose area is 0, count
 //! only where there is nothing else.
 //!
 //! # Residual
@@ -69,7 +69,7 @@ mod tests;
 
 pub use fit::Fit;
 pub use forward::{Scratch, forward};
-pub use pullback::{Cotangent, pullback};
+pub use pullback::{Cotangent, Inputs, pullback};
 
 use super::NO_TRIANGLE;
 use crate::neighbors::Neighborhoods;
@@ -113,7 +113,7 @@ pub struct Extension<T> {
     pub values: Vec<T>,
 }
 
-/// What the pullback needs besides the inputs and the list of cells.
+/// Values that the pullback needs besides the inputs and the list of cells.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Residual<T> {
     /// `(V,)` the fit at each vertex.
@@ -124,18 +124,18 @@ pub struct Residual<T> {
     pub barycentric: Vec<[T; 3]>,
 }
 
-/// Why an attribute was not extended.
+/// Errors of the extension.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
     /// The cloud has no attribute of that name.
     #[error("the cloud has no attribute '{name}'; {}", available(.known))]
     Missing {
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// The names it has.
         known: Vec<String>,
     },
-    /// The samples do not match.
+    /// Samples, areas and values differ in number.
     #[error(
         "{areas} areas and {values} values of {components} components for {samples} samples; give one area and one value for each sample, and at least one sample and one component"
     )]
@@ -150,7 +150,7 @@ pub enum Error {
         components: usize,
     },
     /// A value of the attribute is NaN or infinite.
-    #[error("the attribute of sample {sample} is not finite; mend it, or remove the sample")]
+    #[error("the attribute of sample {sample} is not finite; correct it, or remove the sample")]
     NotFinite {
         /// Index of the first such sample, from 0.
         sample: usize,
@@ -181,7 +181,7 @@ pub enum Error {
         /// Number of cells.
         cells: usize,
     },
-    /// A face, or a vertex of it, that is not there.
+    /// A face, or a vertex of it, does not exist.
     #[error(
         "face {face} is not part of the surface; take the closest faces and the mesh from the same reconstruction"
     )]
@@ -189,7 +189,7 @@ pub enum Error {
         /// The face.
         face: u32,
     },
-    /// What the pullback was given does not fit together.
+    /// Arguments of the pullback have the wrong length.
     #[error(
         "{what} has {length} entries and must have {expected}; give the inputs and outputs of one call of the forward map, and cotangents of its outputs"
     )]
@@ -201,7 +201,7 @@ pub enum Error {
         /// The right length.
         expected: usize,
     },
-    /// A cell of the band that the grid does not have.
+    /// A cell of the band is outside the grid.
     #[error(
         "the band lists cell {cell} of a grid of {cells} cells; take the extension and the grid from one call"
     )]
@@ -211,8 +211,8 @@ pub enum Error {
         /// Cells of the grid.
         cells: usize,
     },
-    /// An array that is to be written has the wrong length.
-    #[error("an array of {length} numbers was given for {expected}")]
+    /// An output array has the wrong length.
+    #[error("the output has {length} numbers and must have {expected}")]
     Length {
         /// Its length.
         length: usize,
@@ -254,11 +254,11 @@ impl<T: Real> Extension<T> {
         Ok(())
     }
 
-    /// Writes the value at a point of a face of `mesh`, the surface of this extension, into `value`: for
-    /// what a query of arbitrary points returns. Continuous over the surface.
+    /// Writes the value at a point of a face of `mesh`, the surface of this extension, into `value`, such as at the
+    /// closest point of a query. Continuous over the surface.
     ///
     /// # Errors
-    /// A face that is not there, or another number of components.
+    /// [`Error::Face`] for a face that does not exist, [`Error::Length`] for another number of components.
     pub fn at(
         &self,
         mesh: &Mesh<T>,

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::forward::{check_faces, check_samples};
-use super::shares::{Inputs, Shares, Workspace, add_to_samples};
+use super::shares::{Shares, Workspace, add_to_samples};
 use super::{Error, Extension, Residual, Samples, Surface};
 use crate::Real;
 use crate::data::{Attribute, GridCotangent};
@@ -13,7 +13,53 @@ use crate::gather::{Buckets, bounded};
 use crate::parallel::CHUNK;
 use crate::vector::{add, dot, to_f64};
 
-/// Cotangents of what an attribute was extended from, in memory that a second call uses again.
+/// Inputs and outputs of [`forward`](super::forward), and cotangents of its outputs.
+#[derive(Clone, Copy, Debug)]
+pub struct Inputs<'a, T> {
+    /// The samples.
+    pub samples: Samples<'a, T>,
+    /// Their attribute.
+    pub attribute: &'a Attribute<T>,
+    /// The surface.
+    pub surface: Surface<'a, T>,
+    /// Residual of the forward map.
+    pub residual: &'a Residual<T>,
+    /// Result of the forward map.
+    pub extension: &'a Extension<T>,
+    /// `(V, components)` cotangent of the values at the vertices, row by row, finite, in 1 over the unit of the
+    /// attribute for a loss without a unit; `None` counts as zero.
+    pub vertices_bar: Option<&'a [T]>,
+    /// `(B, components)` cotangent of the values at the cells, likewise.
+    pub values_bar: Option<&'a [T]>,
+}
+
+impl<T: Real> Inputs<'_, T> {
+    /// Sets `bar` to `ū_v` as passed by the caller.
+    pub(super) fn start_bar(&self, vertex: usize, bar: &mut Vec<f64>) {
+        let components = self.attribute.components;
+        bar.clear();
+        match self.vertices_bar {
+            Some(given) => {
+                let own = &given[vertex * components..][..components];
+                bar.extend(own.iter().map(|u| u.f64()));
+            }
+            None => bar.resize(components, 0.0),
+        }
+    }
+
+    /// Adds `β_k ū_cell` to `ū` of a corner of the face of a cell.
+    #[inline(always)]
+    pub(super) fn add_cell(&self, values_bar: &[T], b: usize, corner: usize, bar: &mut [f64]) {
+        let [_, y, z] = self.residual.barycentric[b].map(T::f64);
+        let weight = [1.0 - y - z, y, z][corner];
+        let of_cell = &values_bar[b * bar.len()..][..bar.len()];
+        for (bar, u) in bar.iter_mut().zip(of_cell) {
+            *bar += weight * u.f64();
+        }
+    }
+}
+
+/// Cotangents of the inputs of an extension; the memory is reused by the next call.
 #[derive(Clone, Debug, Default)]
 pub struct Cotangent<T> {
     /// `(N, components)` of the attribute, row by row, in the order of the samples.
@@ -31,7 +77,7 @@ pub struct Cotangent<T> {
     work: Work,
 }
 
-/// Memory between the steps.
+/// Buffers between the steps.
 #[derive(Clone, Debug, Default)]
 struct Work {
     /// Cells of the band, as places in its list, by closest face.
@@ -40,14 +86,12 @@ struct Work {
     faces_of: Buckets,
     /// `ȳ` of the corners of each face, through `β`.
     corners: Vec<[[f64; 3]; 3]>,
-    /// What the samples get from each chunk of vertices.
+    /// Cotangents of the samples from each chunk of vertices.
     shares: Vec<Shares>,
 }
 
-/// Pulls cotangents of an extension back to everything it was made from. `vertices_bar` is `(V, components)`
-/// and `values_bar` is `(B, components)`, row by row, finite, in 1 over the unit of the attribute for a loss
-/// without one; what is left out counts as zero. The other arguments are those of the forward map and what it
-/// gave. Overwrites `out`. The same bits for any number of threads.
+/// Pulls cotangents of an extension back to all its inputs. Overwrites `out`. The same bits for any number of
+/// threads.
 ///
 /// The radii `R_v`, `a₀`, φ (which chooses the band) and the list of closest faces are held constant; see the
 /// [module](super) for that and for what is guarded.
@@ -55,31 +99,13 @@ struct Work {
 /// # Errors
 /// As the forward map, and [`Error::Mismatch`] or [`Error::Cell`] where something has the wrong length or names
 /// a cell that is not there; `out` is then not to be used.
-#[expect(clippy::too_many_arguments, reason = "inputs, outputs and cotangents")]
-pub fn pullback<T: Real>(
-    samples: Samples<'_, T>,
-    attribute: &Attribute<T>,
-    surface: Surface<'_, T>,
-    residual: &Residual<T>,
-    extension: &Extension<T>,
-    vertices_bar: Option<&[T]>,
-    values_bar: Option<&[T]>,
-    out: &mut Cotangent<T>,
-) -> Result<(), Error> {
+pub fn pullback<T: Real>(inputs: &Inputs<'_, T>, out: &mut Cotangent<T>) -> Result<(), Error> {
+    let (samples, attribute) = (inputs.samples, inputs.attribute);
     check_samples(samples, attribute)?;
-    let inputs = Inputs {
-        samples,
-        attribute,
-        surface,
-        residual,
-        extension,
-        vertices_bar,
-        values_bar,
-    };
-    check(&inputs)?;
+    check(inputs)?;
     out.guarded = 0;
-    from_cells(&inputs, out);
-    from_vertices(&inputs, out);
+    from_cells(inputs, out);
+    from_vertices(inputs, out);
     let stride = attribute.components;
     out.attribute.resize(attribute.values.len(), T::zero());
     out.points.resize(samples.areas.len(), [T::zero(); 3]);
@@ -118,7 +144,7 @@ fn check<T: Real>(inputs: &Inputs<'_, T>) -> Result<(), Error> {
     check_faces(surface, band)
 }
 
-/// What is checked, its length, and what that must be.
+/// Name, length and required length of each array.
 #[rustfmt::skip]
 fn lengths<T: Real>(inputs: &Inputs<'_, T>) -> [(&'static str, usize, usize); 10] {
     let (residual, extension) = (inputs.residual, inputs.extension);
@@ -140,9 +166,9 @@ fn lengths<T: Real>(inputs: &Inputs<'_, T>) -> [(&'static str, usize, usize); 10
     ]
 }
 
-/// What one face gets through the barycentric weights of its cells.
+/// Cotangents of a face through the barycentric weights of its cells.
 #[derive(Clone, Copy, Default)]
-struct OfFace {
+struct FaceBars {
     corners: [[f64; 3]; 3],
     /// Of the low corner of the grid, and of its spacing.
     lower: [f64; 3],
@@ -164,14 +190,14 @@ fn from_cells<T: Real>(inputs: &Inputs<'_, T>, out: &mut Cotangent<T>) {
     cells_of.fill(faces, cells.len(), |b| [closest[cells[b] as usize]]);
     corners.resize(faces, [[0.0; 3]; 3]);
     let cells_of = &*cells_of;
-    let chunks: Vec<OfFace> = corners
+    let chunks: Vec<FaceBars> = corners
         .par_chunks_mut(CHUNK)
         .enumerate()
         .map(|(chunk, corners)| {
-            let mut sum = OfFace::default();
+            let mut sum = FaceBars::default();
             for (k, corners) in corners.iter_mut().enumerate() {
                 let face = chunk * CHUNK + k;
-                let got = of_face(inputs, values_bar, face, cells_of.of(face));
+                let got = face_bars(inputs, values_bar, face, cells_of.of(face));
                 *corners = got.corners;
                 sum.lower = add(sum.lower, got.lower);
                 sum.spacing += got.spacing;
@@ -190,17 +216,17 @@ fn from_cells<T: Real>(inputs: &Inputs<'_, T>, out: &mut Cotangent<T>) {
     out.grid.spacing = bounded(spacing, &mut out.guarded);
 }
 
-fn of_face<T: Real>(
+fn face_bars<T: Real>(
     inputs: &Inputs<'_, T>,
     values_bar: &[T],
     face: usize,
     cells: &[u32],
-) -> OfFace {
-    let mut sum = OfFace::default();
+) -> FaceBars {
+    let mut sum = FaceBars::default();
     let (mesh, grid) = (inputs.surface.mesh, inputs.surface.phi.grid());
     let components = inputs.attribute.components;
     // Differences of values are known to ε of the values, and γ divides them by the thickness squared: from √ε
-    // cells on, what is noise stays below a value per cell.
+    // cells on, noise stays below a value per cell.
     let thinnest = T::epsilon().f64().sqrt() * grid.spacing().f64();
     let corners = mesh.corners(face).map(to_f64);
     let value = |k: usize, c: usize| {
@@ -231,14 +257,14 @@ fn of_face<T: Real>(
     sum
 }
 
-/// What the cells of the band gave to the faces.
+/// Cotangents of the faces from the cells of the band.
 struct Cells<'a> {
     cells_of: &'a Buckets,
     faces_of: &'a Buckets,
     corners: &'a [[[f64; 3]; 3]],
 }
 
-/// What a vertex gets from the cells of its faces: returns `ȳ_v`, and adds to `ū_v`.
+/// Cotangent of a vertex from the cells of its faces: returns `ȳ_v`, and adds to `ū_v`.
 fn through_cells<T: Real>(
     inputs: &Inputs<'_, T>,
     cells: &Cells<'_>,

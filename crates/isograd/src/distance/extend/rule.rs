@@ -1,4 +1,4 @@
-//! Numbers that choose radii and areas, the same on the CPU and on devices.
+//! Constants of radii and areas, shared with the GPU.
 
 /// Samples that have to be well within the radius of a vertex, so that a plane of values fits them.
 pub const ENOUGH: usize = 6;
@@ -10,7 +10,8 @@ pub const REACH: f64 = 1.5;
 /// of a hole.
 pub const MOST: usize = 64;
 
-/// By how much it passes the last of these, so that the weights are not all 0 where all are equally far.
+/// Factor by which it exceeds the distance to the last of these, so that the weights are not all 0 where all are
+/// equally far.
 pub const MARGIN: f64 = 1.05;
 
 /// `a₀` over the mean area.

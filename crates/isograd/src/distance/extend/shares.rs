@@ -1,6 +1,6 @@
-//! What the samples get from the fits at the vertices.
+//! Cotangents of the samples from the fits at the vertices.
 //!
-//! Every chunk of vertices adds up what it has for each sample that it sees; the samples then add up the
+//! Every chunk of vertices sums the contributions to each sample in its reach; the samples then sum the
 //! chunks, in their order.
 
 use std::collections::HashMap;
@@ -10,52 +10,13 @@ use rayon::prelude::*;
 use super::fit::Neighbor;
 use super::fit_pullback::{Adjoint, Share};
 use super::forward::collect;
-use super::{Extension, Residual, Samples, Surface};
+use super::pullback::Inputs;
 use crate::Real;
-use crate::data::Attribute;
 use crate::gather::bounded;
 use crate::parallel::CHUNK;
 use crate::vector::{add, scale};
 
-/// All that is only read.
-#[derive(Clone, Copy)]
-pub(super) struct Inputs<'a, T> {
-    pub samples: Samples<'a, T>,
-    pub attribute: &'a Attribute<T>,
-    pub surface: Surface<'a, T>,
-    pub residual: &'a Residual<T>,
-    pub extension: &'a Extension<T>,
-    pub vertices_bar: Option<&'a [T]>,
-    pub values_bar: Option<&'a [T]>,
-}
-
-impl<T: Real> Inputs<'_, T> {
-    /// `ū_v` as it was given.
-    pub(super) fn start_bar(&self, vertex: usize, bar: &mut Vec<f64>) {
-        let components = self.attribute.components;
-        bar.clear();
-        match self.vertices_bar {
-            Some(given) => {
-                let own = &given[vertex * components..][..components];
-                bar.extend(own.iter().map(|u| u.f64()));
-            }
-            None => bar.resize(components, 0.0),
-        }
-    }
-
-    /// Adds what `ū` of a corner of the face of a cell gets: `β_k ū_cell`.
-    #[inline(always)]
-    pub(super) fn add_cell(&self, values_bar: &[T], b: usize, corner: usize, bar: &mut [f64]) {
-        let [_, y, z] = self.residual.barycentric[b].map(T::f64);
-        let weight = [1.0 - y - z, y, z][corner];
-        let of_cell = &values_bar[b * bar.len()..][..bar.len()];
-        for (bar, u) in bar.iter_mut().zip(of_cell) {
-            *bar += weight * u.f64();
-        }
-    }
-}
-
-/// What one thread needs for one chunk after the other.
+/// Scratch buffers of one thread.
 #[derive(Default)]
 pub(super) struct Workspace {
     /// `ū_v` of the vertex at hand.
@@ -67,7 +28,7 @@ pub(super) struct Workspace {
     slots: HashMap<u32, u32>,
 }
 
-/// What each sample gets from one chunk of vertices.
+/// Cotangents of the samples from one chunk of vertices.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Shares {
     /// Sample and slot, ascending.
@@ -90,8 +51,7 @@ impl Shares {
         self.order.sort_unstable();
     }
 
-    /// Adds what the samples round a vertex get from `ū_v`, which is in `work.bar`, and returns what the vertex
-    /// itself gets.
+    /// Adds the cotangents of the samples round a vertex from `ū_v`, which is in `work.bar`. Returns `ȳ_v`.
     pub(super) fn add_fit<T: Real>(
         &mut self,
         inputs: &Inputs<'_, T>,
@@ -158,7 +118,7 @@ impl Shares {
     }
 }
 
-/// Adds the chunks up for every sample. Overwrites the outputs, and returns how many numbers were out of range.
+/// Sums the chunks for every sample. Overwrites the outputs, and returns the number of values out of range.
 pub(super) fn add_to_samples<T: Real>(
     shares: &[Shares],
     components: usize,

@@ -1,10 +1,10 @@
-//! From the lists of a block to those of its children.
+//! Culling: from the candidates of a block to those of its children.
 
 use super::block::{CHILDREN, Children, Extent, bit, centers, closest_of};
 use super::kernels::{self, MARGIN};
 use super::site_list::{Boxes, closest};
 use super::task::{Local, Task};
-use super::workspace::{Kept, Lists};
+use super::workspace::{ChildCandidates, Lists};
 use crate::Real;
 use crate::distance::bvh::{LANES, Points};
 use crate::simd::dispatch;
@@ -12,7 +12,13 @@ use crate::vector::{norm, sub};
 
 impl<T: Real> Task<'_, T> {
     /// Fills the lists of the children from those of their parent.
-    pub(super) fn cull(&self, local: &Local, lists: Lists, children: &Children, kept: &mut Kept) {
+    pub(super) fn cull(
+        &self,
+        local: &Local,
+        lists: Lists,
+        children: &Children,
+        kept: &mut ChildCandidates,
+    ) {
         let feet = self.feet(local, lists, children);
         let mut boxes = Boxes::NOTHING;
         for l in 0..CHILDREN {

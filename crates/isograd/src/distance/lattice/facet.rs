@@ -1,4 +1,4 @@
-//! A triangle as the search for the closest one sees it: in single precision, and in cells.
+//! Triangles in single precision and in cells, for the search of the closest one.
 
 use pulp::Simd;
 

@@ -4,20 +4,20 @@
 use pulp::{Simd, WithSimd};
 
 use super::block::Cells;
-use super::packet::{Packet, Search};
-use super::workspace::Measured;
-use crate::distance::bvh::{Bvh, Found, LANES, Points, Region, Stack};
+use super::packet::{BlockCandidates, Packet};
+use super::workspace::Candidates;
+use crate::distance::bvh::{Bvh, LANES, NearestTriangles, Points, Region, Stack};
 
-/// Relative error of squares that culling allows its single precision for (a dozen times over).
+/// Margin of culling for the relative error of squares in single precision, a dozen times that error.
 pub(super) const MARGIN: f64 = 2e-5;
 
-/// Appends to the list of a child the large triangles that may be closest to one of its points: those that
-/// are closer than the foot to one of the corners of its box.
+/// Appends to the list of a child the large triangles that may be closest to one of its points: those closer than
+/// the foot to a corner of its box.
 pub(super) struct CullLarge<'a> {
     pub bvh: &'a Bvh,
     pub list: &'a [u32],
     pub corners: &'a Points,
-    /// Squares of the distances from the corners to the foot, and what rounding may have taken.
+    /// Squared distances from the corners to the foot, plus a bound of rounding.
     pub bound: &'a [f64; LANES],
     pub kept: &'a mut Vec<u32>,
 }
@@ -28,7 +28,7 @@ impl WithSimd for CullLarge<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         for &place in self.list {
-            let mut found = Found::NOTHING;
+            let mut found = NearestTriangles::NOTHING;
             found.try_triangle(self.bvh.frame(place), place, self.corners);
             if (0..LANES).any(|l| !(found.squared[l] > self.bound[l])) {
                 self.kept.push(place);
@@ -45,11 +45,11 @@ pub(super) struct ClosestListed<'a> {
 }
 
 impl WithSimd for ClosestListed<'_> {
-    type Output = Found;
+    type Output = NearestTriangles;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Found {
-        let mut found = Found::NOTHING;
+    fn with_simd<S: Simd>(self, _: S) -> NearestTriangles {
+        let mut found = NearestTriangles::NOTHING;
         for &place in self.list {
             found.try_triangle(self.bvh.frame(place), place, self.points);
         }
@@ -57,7 +57,7 @@ impl WithSimd for ClosestListed<'_> {
     }
 }
 
-/// Appends the leaves that may hold what is closest to a point of the region.
+/// Appends the leaves that may contain the closest triangle of a point of the region.
 pub(super) struct Gather<'a> {
     pub bvh: &'a Bvh,
     pub region: &'a Region,
@@ -74,17 +74,17 @@ impl WithSimd for Gather<'_> {
     }
 }
 
-/// What is closest to the cells of a packet, whose number in its block is `index`.
+/// Finds the closest triangles of the cells of packet `index` of a block.
 pub(super) struct Closest<'a> {
-    pub search: &'a Search<'a>,
+    pub search: &'a BlockCandidates<'a>,
     pub cells: &'a Cells,
     pub index: usize,
     /// Origin of the packet's frame.
     pub origin: [f64; 3],
     /// Places of sites near its halves.
     pub seeds: [u32; 2],
-    pub measured: &'a mut Measured,
-    pub found: &'a mut [Found; 2],
+    pub measured: &'a mut Candidates,
+    pub found: &'a mut [NearestTriangles; 2],
 }
 
 impl WithSimd for Closest<'_> {

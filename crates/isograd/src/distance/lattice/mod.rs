@@ -37,14 +37,14 @@ pub enum Band {
     Within(f64),
 }
 
-/// What `closest` holds where the band does not reach.
+/// Entry of `closest` beyond the band.
 pub const NO_TRIANGLE: u32 = u32::MAX;
 
-/// Blocks worked on between two writes of the results: enough for any number of threads, and few enough that
-/// their memory stays small beside the field.
+/// Blocks per wave, after which the results are written to the field: enough for any number of threads, few enough
+/// that their memory stays small compared with the field.
 const BLOCKS_PER_WAVE: usize = 512;
 
-/// Memory that a second call of the same size uses again.
+/// Scratch buffers reused between calls.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch<T> {
     bvh: Bvh,
@@ -55,7 +55,7 @@ pub struct Scratch<T> {
 }
 
 impl<T> Scratch<T> {
-    /// Entries that its memory has room for.
+    /// Capacity of all buffers, in entries.
     #[cfg(test)]
     pub(super) fn capacity(&self) -> usize {
         self.bvh.capacity()
@@ -173,7 +173,7 @@ fn magnitude<T: Real>(grid: &Grid<T>) -> f64 {
     corners.fold(0.0, |m, x| m.max(x.f64().abs()))
 }
 
-/// Brings the results of a wave into the order of the field, with their signs.
+/// Writes the results of a wave in the order of the field, with their signs.
 fn write_wave<T: Real>(
     grid: &Grid<T>,
     scratch: &Scratch<T>,

@@ -1,14 +1,14 @@
-//! Sixteen cells, measured together.
+//! Packets of sixteen cells, searched together.
 //!
-//! Single precision finds out which triangles come into question; they are measured in double precision.
+//! Single precision selects candidates; their distances are computed in double precision.
 
 use pulp::Simd;
 
 use super::block::Cells;
 use super::site_list::Site;
 use super::sites::Sites;
-use super::workspace::Measured;
-use crate::distance::bvh::{Bvh, Found, LANES, Points};
+use super::workspace::Candidates;
+use crate::distance::bvh::{Bvh, LANES, NearestTriangles, Points};
 use crate::simd::multiply_add;
 
 /// Cells of a packet, in halves of [`LANES`].
@@ -17,7 +17,7 @@ pub(super) const CELLS: usize = 2 * LANES;
 /// Bounds the error of single precision, when multiplied by the way from the center of the block to a cell and
 /// on to a triangle.
 ///
-/// In units of 2⁻²⁴: what is between a cell and a corner is off by 2 of them, its coordinates in the frame of
+/// In units of 2⁻²⁴: the offset of a cell from a corner has an error of 2, its coordinates in the frame of
 /// the triangle by 13, and the parts of the distance by 21; so the square of a distance `d` by `46 d`, and a
 /// difference of two by `92 d`. Where a product and a sum are rounded at once, it is less.
 const ERROR: f32 = 128.0 / (1u32 << 24) as f32;
@@ -51,7 +51,7 @@ impl Packet {
     }
 }
 
-/// Where in its packet a cell is.
+/// Offset of a cell in its packet.
 #[inline(always)]
 pub(super) fn offset(lane: usize) -> [usize; 3] {
     [
@@ -61,13 +61,13 @@ pub(super) fn offset(lane: usize) -> [usize; 3] {
     ]
 }
 
-/// What is the same for all packets of a block.
-pub(super) struct Search<'a> {
+/// Candidate lists and constants that the packets of a block share.
+pub(super) struct BlockCandidates<'a> {
     pub bvh: &'a Bvh,
     pub sites: &'a Sites,
     /// All sites of the block of side 16.
     pub all: &'a [Site],
-    /// Places of those that matter.
+    /// Places of the candidates.
     pub listed: &'a [u32],
     /// Large triangles, by their places in the tree.
     pub large: &'a [u32],
@@ -79,15 +79,15 @@ pub(super) struct Search<'a> {
     pub width: f32,
 }
 
-impl Search<'_> {
+impl BlockCandidates<'_> {
     /// The closest triangle to each cell.
     #[inline(always)]
     pub(super) fn closest<S: Simd>(
         &self,
         packet: &Packet,
         seeds: [u32; 2],
-        measured: &mut Measured,
-        found: &mut [Found; 2],
+        measured: &mut Candidates,
+        found: &mut [NearestTriangles; 2],
     ) {
         for half in 0..2 {
             self.try_all(self.large, &packet.points[half], &mut found[half]);
@@ -106,7 +106,7 @@ impl Search<'_> {
 
     /// Measures triangles in double precision.
     #[inline(always)]
-    fn try_all(&self, places: &[u32], points: &Points, found: &mut Found) {
+    fn try_all(&self, places: &[u32], points: &Points, found: &mut NearestTriangles) {
         // In registers: in memory, what one triangle stores for some points would hold up the load of the next.
         let mut nearest = *found;
         for &place in places {
@@ -117,7 +117,7 @@ impl Search<'_> {
 
     /// In squared cells and single precision.
     #[inline(always)]
-    fn bounds(&self, found: &[Found; 2]) -> [f32; CELLS] {
+    fn bounds(&self, found: &[NearestTriangles; 2]) -> [f32; CELLS] {
         let scale = self.per_cell * self.per_cell;
         let mut best = [self.width; CELLS];
         for l in 0..CELLS {
@@ -127,7 +127,7 @@ impl Search<'_> {
         best
     }
 
-    /// What is measured above this, squared, is not closest.
+    /// Squared distances above which a triangle is not closest.
     #[inline(always)]
     fn limits(&self, best: &[f32; CELLS]) -> [f32; CELLS] {
         let mut limit = *best;
@@ -146,7 +146,7 @@ impl Search<'_> {
         packet: &Packet,
         seeds: [u32; 2],
         best: &mut [f32; CELLS],
-        measured: &mut Measured,
+        measured: &mut Candidates,
     ) {
         for seed in seeds {
             self.collect_star(seed, measured);
@@ -159,14 +159,19 @@ impl Search<'_> {
 
     /// Lists the small triangles round a site.
     #[inline(always)]
-    fn collect_star(&self, place: u32, measured: &mut Measured) {
+    fn collect_star(&self, place: u32, measured: &mut Candidates) {
         let site = &self.all[place as usize];
         measured.extend(self.sites.star(site.number), site.position);
     }
 
     /// Lists the small triangles round the sites that matter.
     #[inline(always)]
-    fn collect_near<S: Simd>(&self, packet: &Packet, best: &[f32; CELLS], measured: &mut Measured) {
+    fn collect_near<S: Simd>(
+        &self,
+        packet: &Packet,
+        best: &[f32; CELLS],
+        measured: &mut Candidates,
+    ) {
         let limit = self.limits(best);
         let [x, y, z] = &packet.local;
         // |q − v|² − slack ≤ limit where (|v|² − slack) − 2 q·v ≤ limit − |q|²
@@ -193,7 +198,7 @@ impl Search<'_> {
                 let two = multiply_add::<S>(minus_twice[1][l], v[1], last);
                 near |= multiply_add::<S>(minus_twice[0][l], v[0], two) <= most[l];
             }
-            // Written in any case, and kept if near: no branch can foretell which are.
+            // Written in any case, kept if near: a branch would be mispredicted.
             kept[length] = place;
             length += usize::from(near);
         }
@@ -209,7 +214,7 @@ impl Search<'_> {
         packet: &Packet,
         first: usize,
         best: &mut [f32; CELLS],
-        measured: &mut Measured,
+        measured: &mut Candidates,
     ) {
         let range = first..measured.length;
         let candidates = &measured.candidates[range.clone()];

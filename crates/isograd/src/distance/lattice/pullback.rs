@@ -1,7 +1,7 @@
 //! Cotangents of φ at the cells to cotangents of the vertices and the grid.
 //!
-//! The cells are sorted by their closest face, and each face gathers from its cells; then each vertex gets
-//! what its faces have, in their order.
+//! The cells are sorted by their closest face, and each face gathers from its cells; then each vertex adds up
+//! its faces, in their order.
 
 use rayon::prelude::*;
 
@@ -15,7 +15,7 @@ use crate::{Field, Mesh, Real, vector};
 /// Faces in one task.
 const TASK: usize = 512;
 
-/// Buffers of the pullback: at most an index a cell, and what each face has for its corners.
+/// Scratch buffers: at most an index per cell, and the cotangents of the corners of each face.
 #[derive(Clone, Debug, Default)]
 pub struct PullbackScratch<T> {
     /// Cells whose cotangent is not zero, by closest face.
@@ -23,10 +23,9 @@ pub struct PullbackScratch<T> {
     corners: Vec<[[T; 3]; 3]>,
 }
 
-/// Adds to the `(V, 3)` `vertices_bar` what the cotangents `phi_bar` (in memory order) of the distances mean
-/// for the vertices, and returns what they mean for the grid through its cell centers. `mesh`, `phi` and
-/// `closest` are those of [`forward`](super::forward). Cells outside the band count for nothing: there `φ` is
-/// constant.
+/// Pulls the cotangent `phi_bar` `(nx, ny, nz)` of the distances back: adds that of the vertices to `vertices_bar`
+/// `(V, 3)`, and returns that of the grid through its cell centers. `mesh`, `phi` and `closest` are those of
+/// [`forward`](super::forward). Cells outside the band contribute nothing: `φ` is constant there.
 pub fn pullback<T: Real>(
     mesh: &Mesh<T>,
     phi: &Field<T>,

@@ -1,8 +1,8 @@
-//! Lists of vertices, and what of them matters for the children of a block.
+//! Lists of vertices, and their culling for the children of a block.
 
 use super::block::CHILDREN;
 
-/// A vertex as culling sees it, in cells from the center of the block.
+/// A vertex, in cells from the center of the block.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(32))]
 pub(super) struct Site {
@@ -15,7 +15,7 @@ pub(super) struct Site {
     pub number: u32,
 }
 
-/// The children of a block as culling sees them, `[axis][child]`, in cells from the center of the block.
+/// Boxes of the children of a block, `[axis][child]`, in cells from the center of the block.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Boxes {
     /// Centers of the boxes of cell centers.
@@ -24,14 +24,14 @@ pub(super) struct Boxes {
     pub side: [[f32; CHILDREN]; 3],
     /// A point of the mesh near each.
     pub foot: [[f32; CHILDREN]; 3],
-    /// `|center − foot|²` and what rounding may have taken.
+    /// `|center − foot|²` plus a bound of rounding.
     pub bound: [f32; CHILDREN],
-    /// Squares of the distances from the centers beyond which nothing matters.
+    /// Squared distances from the centers beyond which sites are ignored.
     pub reach: [f32; CHILDREN],
 }
 
 impl Boxes {
-    /// Boxes for which no site matters.
+    /// Boxes that reject all sites.
     pub(super) const NOTHING: Self = Self {
         center: [[0.0; CHILDREN]; 3],
         side: [[0.0; CHILDREN]; 3],
@@ -40,7 +40,7 @@ impl Boxes {
         reach: [f32::NEG_INFINITY; CHILDREN],
     };
 
-    /// Whether the site matters for each child.
+    /// For each child, 1 if a triangle of the site may be closest to one of its points, else 0.
     ///
     /// For a point `v`, `|q − foot|² − |q − v|²` is linear in `q`: over the box it is at most
     /// `|c − foot|² − |c − v|² + Σ side |v − foot|`. A triangle adds at most its slack.
@@ -90,7 +90,7 @@ impl ChildLists {
         for &place in listed {
             let matter = boxes.matter(&sites[place as usize]);
             for l in 0..CHILDREN {
-                // Written in any case, and kept if it matters: no branch can foretell which do.
+                // Written in any case, kept if not culled: a branch would be mispredicted.
                 self.places[l * self.room + length[l] as usize] = place;
             }
             for l in 0..CHILDREN {

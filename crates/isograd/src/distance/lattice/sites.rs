@@ -1,4 +1,4 @@
-//! What culling needs to know of a mesh: its vertices in the order of the tree, and the triangles round each.
+//! Vertices of a mesh in the order of the tree, with the triangles round each, for culling.
 
 use rayon::prelude::*;
 

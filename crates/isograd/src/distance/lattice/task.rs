@@ -1,19 +1,19 @@
 //! Distances in one block of cells.
 //!
-//! A block is halved along every axis down to 4×4×4 cells, and with it the list of vertices whose triangles may
-//! be closest: each child keeps what is not farther than one point of the mesh, its *foot*, from the whole of the
-//! child. The last list is short, and [`packet`] does the rest for sixteen cells at once.
+//! A block is halved along every axis down to 4×4×4 cells. Each child keeps the vertices of its parent whose
+//! triangles may be closest: it rejects those that are farther from the whole of the child than one point of the mesh,
+//! its *foot*. The last lists are short, and [`packet`] searches them for sixteen cells at once.
 
 use pulp::Arch;
 
 use super::NO_TRIANGLE;
 use super::block::{BLOCK, Block, CHILDREN, Cells, Extent, PACKETS, children};
 use super::kernels;
-use super::packet::{self, CELLS, Packet, Search};
+use super::packet::{self, BlockCandidates, CELLS, Packet};
 use super::site_list::Site;
 use super::sites::{LARGE, Sites};
-use super::workspace::{Kept, Lists, Measured, Workspace};
-use crate::distance::bvh::{Bvh, Found, LANES, NOWHERE, Region, Stack};
+use super::workspace::{Candidates, ChildCandidates, Lists, Workspace};
+use crate::distance::bvh::{Bvh, LANES, NOWHERE, NearestTriangles, Region, Stack};
 use crate::distance::triangle;
 use crate::simd::dispatch;
 use crate::vector::{scale, sub, to_f64};
@@ -22,7 +22,7 @@ use crate::{Grid, Mesh, Real};
 /// Where a distance is below this share of a triangle's longest edge, it is measured from the nearest corner.
 pub(super) const NEAR: f64 = 0.1;
 
-/// What is the same for all blocks.
+/// Inputs and constants of all blocks.
 pub(super) struct Task<'a, T> {
     pub grid: &'a Grid<T>,
     pub mesh: &'a Mesh<T>,
@@ -43,7 +43,7 @@ pub(super) struct Output<'a, T> {
     pub closest: &'a mut [u32],
 }
 
-/// What is the same for one block of side [`BLOCK`].
+/// Frame and sites of one block of side [`BLOCK`].
 pub(super) struct Local<'a> {
     /// Its first cell.
     origin: [usize; 3],
@@ -83,7 +83,7 @@ impl<T: Real> Task<'_, T> {
         self.refine(&local, block, lists, levels, measured, output);
     }
 
-    /// How far from the center of a box of this radius the corner of a triangle may be that lies within the
+    /// Greatest distance from the center of a box of this radius to the nearest corner of a triangle that is within the
     /// band of some point of the box.
     pub(super) fn reach(&self, radius: f64) -> f64 {
         (self.width * self.width + self.largest_slack()).sqrt() + radius
@@ -100,7 +100,7 @@ impl<T: Real> Task<'_, T> {
         1e-14 * self.magnitude
     }
 
-    /// The point of the mesh closest to the center of a block, if any matters.
+    /// The point of the mesh closest to the center of a block; `None` if the block is beyond the band.
     fn foot(&self, extent: &Extent, stack: &mut Stack) -> Option<[f64; 3]> {
         let reach = self.reach(extent.radius);
         let place = dispatch(
@@ -111,7 +111,7 @@ impl<T: Real> Task<'_, T> {
         Some(self.bvh.frame(place).nearest(extent.center))
     }
 
-    /// Lists what may be closest to some cell of a block.
+    /// Lists the sites and large triangles that may be closest to some cell of a block.
     fn gather(&self, extent: &Extent, foot: [f64; 3], workspace: &mut Workspace) {
         let Workspace {
             stack,
@@ -166,14 +166,14 @@ impl<T: Real> Task<'_, T> {
         }
     }
 
-    /// Hands the lists of a block down to its children, or measures where there are none.
+    /// Culls the lists of a block for its children, recursively; blocks of side 4 are searched.
     fn refine(
         &self,
         local: &Local,
         block: &Block,
         lists: Lists,
-        levels: &mut [Kept],
-        measured: &mut Measured,
+        levels: &mut [ChildCandidates],
+        measured: &mut Candidates,
         output: &mut Output<T>,
     ) {
         let Some((kept, deeper)) = levels.split_first_mut() else {
@@ -189,18 +189,18 @@ impl<T: Real> Task<'_, T> {
         }
     }
 
-    /// Measures what is left in the lists of a block of side 4.
+    /// Searches the lists of a block of side 4.
     fn finish(
         &self,
         local: &Local,
         block: &Block,
         lists: Lists,
-        measured: &mut Measured,
+        measured: &mut Candidates,
         output: &mut Output<T>,
     ) {
         let per_cell = 1.0 / self.grid.spacing().f64();
         let width = self.width * per_cell;
-        let search = Search {
+        let search = BlockCandidates {
             bvh: self.bvh,
             sites: self.sites,
             all: local.sites,
@@ -215,7 +215,7 @@ impl<T: Real> Task<'_, T> {
         let seeds = self.closest_sites(local, lists, &cells.centers_of_children());
         for index in (0..PACKETS).filter(|&index| cells.contain(Cells::packet(index))) {
             let seeds = [seeds[2 * index], seeds[2 * index + 1]];
-            let mut found = [Found::NOTHING; 2];
+            let mut found = [NearestTriangles::NOTHING; 2];
             let packet = self.arch.dispatch(kernels::Closest {
                 search: &search,
                 cells: &cells,
@@ -230,14 +230,14 @@ impl<T: Real> Task<'_, T> {
         }
     }
 
-    /// Writes what was found in a packet whose first cell is `first`, from that of the block.
+    /// Writes the result of a packet whose first cell is `first`, from that of the block.
     fn write(
         &self,
         local: &Local,
         block: &Block,
         cells: &Cells,
         (first, packet): ([usize; 3], &Packet),
-        found: &[Found; 2],
+        found: &[NearestTriangles; 2],
         output: &mut Output<T>,
     ) {
         let at: [usize; 3] = std::array::from_fn(|a| block.start[a] - local.origin[a] + first[a]);
@@ -256,7 +256,7 @@ impl<T: Real> Task<'_, T> {
             if distance <= self.width {
                 let index = ((at[0] + x) * BLOCK + at[1] + y) * BLOCK + at[2] + z;
                 output.distance[index] = T::of(distance);
-                // The facet was just in use: what the tree has of the face would come from afar.
+                // The facet is in the cache; the tree's entry of the face is not.
                 output.closest[index] = self.sites.facets()[place as usize].face;
             }
         }

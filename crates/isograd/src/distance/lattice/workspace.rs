@@ -1,4 +1,4 @@
-//! Memory of the recursion.
+//! Scratch buffers of the recursion.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -11,26 +11,26 @@ use crate::distance::bvh::{LANES, Stack};
 /// Halvings from a block to 4×4×4 cells.
 pub(super) const LEVELS: usize = 2;
 
-/// Memory of one thread.
+/// Scratch buffers of one thread.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Workspace {
     pub stack: Stack,
     pub leaves: Vec<u32>,
-    /// What matters for a block of side [`BLOCK`](super::block::BLOCK).
+    /// Candidates of a block of side [`BLOCK`](super::block::BLOCK).
     pub sites: Vec<Site>,
     /// All of them, by their places.
     pub listed: Vec<u32>,
     pub large: Vec<u32>,
-    pub levels: [Kept; LEVELS],
-    pub measured: Measured,
+    pub levels: [ChildCandidates; LEVELS],
+    pub measured: Candidates,
 }
 
-/// Workspaces that wait for a thread. What is in one has no influence on the next result.
+/// Idle workspaces. Their contents have no influence on results.
 #[derive(Debug, Default)]
 pub(super) struct Pool(Mutex<Vec<Workspace>>);
 
 impl Pool {
-    /// Does `work` with a workspace of the pool.
+    /// Runs `work` with a workspace of the pool.
     pub(super) fn with(&self, work: impl FnOnce(&mut Workspace)) {
         let waiting = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let mut workspace = waiting().pop().unwrap_or_default();
@@ -40,7 +40,7 @@ impl Pool {
 }
 
 impl Clone for Pool {
-    /// An empty pool: what is in it is only memory.
+    /// An empty pool.
     fn clone(&self) -> Self {
         Self::default()
     }
@@ -57,9 +57,9 @@ pub(super) struct Candidate {
     pub from: [f32; 3],
 }
 
-/// Triangles measured in single precision, each once.
+/// Candidates with distances in single precision, each triangle once.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Measured {
+pub(super) struct Candidates {
     pub candidates: Vec<Candidate>,
     /// Squared distances from the cells of a packet.
     pub squared: Vec<[f32; CELLS]>,
@@ -68,10 +68,10 @@ pub(super) struct Measured {
     pub near: Vec<u32>,
     chosen: Vec<u32>,
     choices: usize,
-    seen: Seen,
+    seen: Visited,
 }
 
-/// What may be closest to some cell of a block.
+/// Triangles that may be closest to some cell of a block.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lists<'a> {
     /// Places in [`Workspace::sites`].
@@ -86,14 +86,14 @@ impl Lists<'_> {
     }
 }
 
-/// Lists for the children of a block.
+/// Candidates of each child of a block.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Kept {
+pub(super) struct ChildCandidates {
     pub sites: ChildLists,
     pub large: [Vec<u32>; CHILDREN],
 }
 
-impl Kept {
+impl ChildCandidates {
     pub(super) fn of(&self, child: usize) -> Lists<'_> {
         Lists {
             sites: self.sites.of(child),
@@ -102,14 +102,14 @@ impl Kept {
     }
 }
 
-/// A set of small integers that is emptied at once.
+/// Set of small integers that is cleared in constant time.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Seen {
+pub(super) struct Visited {
     rounds: Vec<u32>,
     round: u32,
 }
 
-impl Seen {
+impl Visited {
     pub(super) fn empty(&mut self, size: usize) {
         if self.rounds.len() < size || self.round == u32::MAX {
             self.rounds.clear();
@@ -128,7 +128,7 @@ impl Seen {
     }
 }
 
-/// [`Seen`] in a loop: what writes to other memory leaves this in registers.
+/// [`Visited`] in a loop: stays in registers while other memory is written.
 struct Open<'a> {
     rounds: &'a mut [u32],
     round: u32,
@@ -145,14 +145,14 @@ impl Open<'_> {
     }
 }
 
-impl Measured {
-    /// Forgets all; what comes is below `size`.
+impl Candidates {
+    /// Clears the list; triangles are below `size`.
     pub(super) fn clear(&mut self, size: usize) {
         self.seen.empty(size);
         self.length = 0;
     }
 
-    /// Lists the triangles of a star that are not listed yet; `from` is its vertex.
+    /// Appends the triangles of a star that are not listed yet; `from` is its vertex.
     #[inline(always)]
     pub(super) fn extend(&mut self, star: &[Spoke], from: [f32; 3]) {
         let most = self.length + star.len();
@@ -164,7 +164,7 @@ impl Measured {
         let mut seen = self.seen.open();
         let mut length = 0;
         for &Spoke { place, corner } in star {
-            // Written in any case, and kept if new: half of them are, and no branch can foretell which.
+            // Written in any case, kept if new: about half are, and a branch would be mispredicted.
             candidates[length] = Candidate {
                 place,
                 corner,
@@ -175,7 +175,7 @@ impl Measured {
         self.length += length;
     }
 
-    /// Chooses the triangles that are within the limit of some cell of a half of the packet.
+    /// Selects the triangles within the limit of some cell of a half of the packet.
     #[inline(always)]
     pub(super) fn choose(&mut self, half: usize, limit: &[f32; CELLS]) {
         if self.chosen.len() < self.length {
@@ -192,7 +192,7 @@ impl Measured {
             for l in 0..LANES {
                 near |= !(squared[first + l] > own[l]);
             }
-            // Written in any case, and kept if near: no branch can foretell which are.
+            // Written in any case, kept if near: a branch would be mispredicted.
             chosen[length] = candidate.place;
             length += usize::from(near);
         }

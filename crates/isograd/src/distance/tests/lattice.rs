@@ -1,6 +1,6 @@
 use super::{Random, brute_force, soup, sphere, torus};
 use crate::distance::Error;
-use crate::distance::bvh::{Bvh, Found, LANES};
+use crate::distance::bvh::{Bvh, LANES, NearestTriangles};
 use crate::distance::lattice::{Band, NO_TRIANGLE, Scratch, forward};
 use crate::distance::triangle::closest_point;
 use crate::vector::to_f64;
@@ -169,21 +169,12 @@ fn bits_do_not_depend_on_the_number_of_threads() {
     let mesh = torus::<f32>(150, 50);
     let grid = Grid::new([-1.0, -1.0, -0.4], 0.03, [67, 66, 27]).expect("valid");
     let chi = signs(grid, 2);
-    let with = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("threads");
-        pool.install(|| {
-            (
-                solve(&mesh, &chi, Band::Full),
-                solve(&mesh, &chi, Band::Within(0.06)),
-            )
-        })
-    };
-    let one = with(1);
-    assert!(one == with(2));
-    assert!(one == with(5));
+    crate::testing::assert_same_bits(|| {
+        (
+            solve(&mesh, &chi, Band::Full),
+            solve(&mesh, &chi, Band::Within(0.06)),
+        )
+    });
 }
 
 #[test]
@@ -195,7 +186,7 @@ fn face_does_not_depend_on_what_single_precision_leaves_over() {
     bvh.rebuild(&mesh).expect("a mesh");
     for index in (0..grid.cells()).step_by(7) {
         let points = grid.center_f64(grid.cell(index)).map(|x| [x; LANES]);
-        let (mut found, mut backwards) = (Found::NOTHING, Found::NOTHING);
+        let (mut found, mut backwards) = (NearestTriangles::NOTHING, NearestTriangles::NOTHING);
         for place in 0..bvh.len() as u32 {
             found.try_triangle(bvh.frame(place), place, &points);
             let place = bvh.len() as u32 - 1 - place;

@@ -1,46 +1,46 @@
-//! How far a pass goes: the gain `λ` and its pullback, from sums over the samples.
+//! The gain `λ` of a pass, from sums over the samples, and its pullback.
 
 use super::FLATTENED;
 
-/// Sums over the samples, each weighed by its area in cells².
+/// Sums over the samples, each weighted by its area in cells².
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {
-    /// Of `w u`: slopes along the normals, of `e` and of `χ`.
+    /// `Σ â w u`: slopes along the normals, of `e` and of `χ`.
     pub rise: f64,
-    /// Of `u²`.
+    /// `Σ â u²`.
     pub slope: f64,
-    /// Of `s p`: what is left, and its forecast.
+    /// `Σ â s p`: offsets and their predictions.
     pub agreement: f64,
-    /// Of `s²`.
+    /// `Σ â s²`.
     pub offset: f64,
-    /// Of `p²`.
-    pub forecast: f64,
+    /// `Σ â p²`.
+    pub prediction: f64,
 }
 
 impl Sums {
-    /// In the order of the fields.
-    pub fn new([rise, slope, agreement, offset, forecast]: [f64; 5]) -> Self {
+    /// From the five sums in the order of the fields.
+    pub fn new([rise, slope, agreement, offset, prediction]: [f64; 5]) -> Self {
         Self {
             rise,
             slope,
             agreement,
             offset,
-            forecast,
+            prediction,
         }
     }
 
-    /// As [`Self::new`] takes them.
+    /// The five sums in the order of the fields.
     pub fn to_array(self) -> [f64; 5] {
         [
             self.rise,
             self.slope,
             self.agreement,
             self.offset,
-            self.forecast,
+            self.prediction,
         ]
     }
 
-    /// `ρ`: the share of the slope of `χ` that `e` would take.
+    /// `ρ`: the share of the slope of `χ` that subtracting `e` removes.
     fn share(&self) -> f64 {
         (self.rise / self.slope).max(0.0)
     }
@@ -50,17 +50,17 @@ impl Sums {
         let share = self.share();
         [
             self.agreement - share * self.offset,
-            self.forecast - 2.0 * share * self.agreement + share * share * self.offset,
+            self.prediction - 2.0 * share * self.agreement + share * share * self.offset,
         ]
     }
 
-    /// `λ`, and the share of the slope that is gone after the pass if `flattened` was before it. 0 where nothing is to
-    /// be done, and where there is no number.
+    /// `λ`, and the share of the slope removed after the pass, where `flattened` was removed before it. `λ` is 0 where
+    /// the samples must not be followed, and where the sums are NaN.
     pub fn gain(&self, flattened: f64) -> [f64; 2] {
         let share = self.share();
         let [up, down] = self.fit();
         let (fit, left) = (up / down, 1.0 - (flattened + share) / FLATTENED);
-        // Neither bound is met by what is not a number.
+        // NaN meets neither bound.
         if !(fit > 0.0 && left > 0.0) {
             return [0.0, flattened];
         }
@@ -68,8 +68,8 @@ impl Sums {
         [gain, flattened + gain * share]
     }
 
-    /// Cotangents of the sums and of `flattened`, for those of `λ` and of the share that is gone after the pass. `λ` is
-    /// not 0.
+    /// Cotangents of the sums and of `flattened`, from those of `λ` and of the share removed after the pass. `λ` must
+    /// not be 0.
     pub fn pullback(&self, flattened: f64, gain_bar: f64, flattened_bar: f64) -> (Self, f64) {
         let share = self.share();
         let [up, down] = self.fit();
@@ -91,7 +91,7 @@ impl Sums {
             slope: -rise_bar * share,
             agreement: up_bar - 2.0 * share * down_bar,
             offset: share * (share * down_bar - up_bar),
-            forecast: down_bar,
+            prediction: down_bar,
         };
         (bars, flattened_bar - left_bar / FLATTENED)
     }
@@ -103,7 +103,7 @@ mod tests {
 
     #[test]
     fn pullback_is_the_derivative_of_gain_and_share() {
-        // A forecast that is too small, one that is too large, and a surface that falls.
+        // A prediction that is too small, one that is too large, and a falling surface.
         for sums in [
             [0.3, 2.0, 0.9, 1.1, 1.4],
             [0.2, 3.0, 1.0, 1.1, 0.9],

@@ -1,4 +1,4 @@
-//! What a sample has to do with the cells round it: small pure functions.
+//! Weights and derivatives on the cells round a sample: small pure functions.
 
 use crate::vector::dot;
 use crate::{Grid, Real, splat};
@@ -34,7 +34,7 @@ pub(super) const CUBE: [[usize; 3]; 8] = [
 ];
 
 impl<T: Real> Stencil<T> {
-    /// That of a point; `None` too near to a wall, where the splat refuses it.
+    /// Stencil of a point; `None` closer than 2 cells to a wall, where the splat refuses it.
     #[inline(always)]
     pub(super) fn of(grid: &Grid<T>, point: [T; 3]) -> Option<Self> {
         let x = grid.to_index(point);
@@ -67,7 +67,7 @@ impl<T: Real> Stencil<T> {
         let ([x, y, z], [dx, dy, dz]) = (self.weights(), self.slopes());
         let bends = [T::one(), -T::of(2.0), T::one()];
         let zero = T::zero();
-        let (mut gradient, mut same, mut mixed) = ([zero; 3], [zero; 3], [zero; 3]);
+        let (mut gradient, mut pure, mut mixed) = ([zero; 3], [zero; 3], [zero; 3]);
         for i in 0..3 {
             for j in 0..3 {
                 let row = row(i, j);
@@ -75,9 +75,9 @@ impl<T: Real> Stencil<T> {
                 gradient[0] += dx[i] * y[j] * along;
                 gradient[1] += x[i] * dy[j] * along;
                 gradient[2] += x[i] * y[j] * slope;
-                same[0] += bends[i] * y[j] * along;
-                same[1] += x[i] * bends[j] * along;
-                same[2] += x[i] * y[j] * bend;
+                pure[0] += bends[i] * y[j] * along;
+                pure[1] += x[i] * bends[j] * along;
+                pure[2] += x[i] * y[j] * bend;
                 mixed[0] += x[i] * dy[j] * slope;
                 mixed[1] += dx[i] * y[j] * slope;
                 mixed[2] += dx[i] * dy[j] * along;
@@ -85,7 +85,7 @@ impl<T: Real> Stencil<T> {
         }
         Derivatives {
             gradient,
-            same,
+            pure,
             mixed,
         }
     }
@@ -105,22 +105,22 @@ impl<T: Real> Stencil<T> {
     }
 }
 
-/// What quadratic B-splines make of values at cells: derivatives per cell, at a sample.
+/// Derivatives per cell, at a sample, of the quadratic B-spline of values at cells.
 #[derive(Clone, Copy)]
 pub(super) struct Derivatives<T> {
     /// `∇`.
     pub(super) gradient: [T; 3],
-    /// `∂²/∂x²` and so on.
-    same: [T; 3],
+    /// `∂²/∂x²`, `∂²/∂y²`, `∂²/∂z²`.
+    pure: [T; 3],
     /// `∂²/∂y∂z`, `∂²/∂x∂z`, `∂²/∂x∂y`.
     mixed: [T; 3],
 }
 
 impl<T: Real> Derivatives<T> {
-    /// `∇(n·∇)`: how the slope along `n` changes with the place.
+    /// `∇(n·∇)`: gradient of the slope along `n`.
     #[inline(always)]
     pub(super) fn bend(&self, [x, y, z]: [T; 3]) -> [T; 3] {
-        let ([xx, yy, zz], [yz, xz, xy]) = (self.same, self.mixed);
+        let ([xx, yy, zz], [yz, xz, xy]) = (self.pure, self.mixed);
         [
             xx * x + xy * y + xz * z,
             xy * x + yy * y + yz * z,
@@ -137,7 +137,7 @@ impl<T: Real> Corners<T> {
         [[T::one() - x, x], [T::one() - y, y], [T::one() - z, z]]
     }
 
-    /// The weight of each cell and its derivatives, by place among the 2³.
+    /// Weight and its derivatives of a cell, by its place among the 2³.
     #[inline(always)]
     pub(super) fn weight_and_slope(&self, [i, j, k]: [usize; 3]) -> (T, [T; 3]) {
         let [x, y, z] = self.weights();

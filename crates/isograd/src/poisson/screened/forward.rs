@@ -6,7 +6,7 @@ use super::{Equation, Error, MOST_ITERATIONS};
 use crate::trilinear::{self, Cube};
 use crate::{Real, parallel, poisson};
 
-/// Memory that a second call uses again: a field, and five numbers a sample.
+/// Scratch buffers reused between calls: a field, and five numbers per sample.
 #[derive(Default)]
 pub struct Scratch<T> {
     /// A right-hand side, then its solution.
@@ -22,10 +22,10 @@ pub struct Scratch<T> {
     pub(super) poisson: poisson::Scratch<T>,
 }
 
-/// Turns the plain solution `chi` (in memory order) into the screened one, and returns the iterations it took.
+/// Replaces the plain solution `chi` `(nx, ny, nz)` by the screened one, and returns the number of iterations.
 ///
 /// # Errors
-/// [`Error::NotConverged`]; `chi` is then as it was.
+/// [`Error::NotConverged`]; `chi` is then unchanged.
 pub fn forward<T: Real>(
     equation: &Equation<'_, T>,
     chi: &mut [T],
@@ -50,14 +50,18 @@ pub fn forward<T: Real>(
 impl<T: Real> Equation<'_, T> {
     /// The value of a field at a sample.
     pub(super) fn at_sample(&self, field: &[T], i: usize) -> T {
-        Cube::new(self.grid, self.grid.to_index(self.samples.points[i])).value(field)
+        Cube::new(
+            self.grid,
+            self.grid.to_index(self.samples.samples.points[i]),
+        )
+        .value(field)
     }
 }
 
 impl<T: Real> Scratch<T> {
     pub(super) fn start(&mut self, equation: &Equation<'_, T>) {
-        let samples = (0..equation.samples.points.len()).into_par_iter();
-        let root = |i| equation.area(i).sqrt();
+        let samples = (0..equation.samples.samples.points.len()).into_par_iter();
+        let root = |i| equation.area_of(i).sqrt();
         samples.map(root).collect_into_vec(&mut self.roots);
         self.field.resize(equation.grid.cells(), T::zero());
     }
@@ -108,7 +112,7 @@ impl<T: Real> Scratch<T> {
         solution.resize(rest.len(), T::zero());
         direction.clone_from(rest);
         let start = dot(rest, rest);
-        // The square of what the residual may be.
+        // Square of the residual at which iterations end.
         let goal = start * T::epsilon().f64().powf(1.4);
         let mut now = start;
         for iteration in 0..MOST_ITERATIONS {
@@ -149,11 +153,10 @@ fn green<T: Real>(
         plan,
         grid,
         samples,
-        order,
         ..
     } = *equation;
     field.par_iter_mut().for_each(|value| *value = T::zero());
-    trilinear::spread(grid, samples.points, order, |i| roots[i] * u[i], field);
+    trilinear::spread(grid, samples, |i| roots[i] * u[i], field);
     Ok(plan.solve(field, 0.0, scratch)?)
 }
 
@@ -169,7 +172,7 @@ fn add<T: Real>(a: &mut [T], b: &[T], s: f64) {
     pairs.for_each(|(a, &b)| *a += s * b);
 }
 
-/// Takes off the part along `d = √â`.
+/// Subtracts the projection on `d = √â`.
 fn project<T: Real>(v: &mut [T], roots: &[T]) {
     add(v, roots, -dot(v, roots) / dot(roots, roots));
 }

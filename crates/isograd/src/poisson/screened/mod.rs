@@ -1,4 +1,4 @@
-//! The screened Poisson equation: the indicator is drawn to one value at the samples.
+//! The screened Poisson equation: the indicator is attracted to one value at the samples.
 //!
 //! # Map
 //! `x₀ → χ`, where `x₀` is the solution of the plain equation `A x₀ = b`. `χ` minimizes
@@ -16,7 +16,7 @@
 //! `1e-5` in `f32`.
 //!
 //! # Residual
-//! `χ` and `∇χ` at the samples, and `c`: what the [iso-value](crate::isosurface::iso_value) keeps of `χ`.
+//! `χ` and `∇χ` at the samples, and `c`: the residual of the [iso-value](crate::isosurface::iso_value).
 //!
 //! # Pullback
 //! The adjoint of a solve is a solve. With `v` from `P (I + α S A⁺ Sᵀ) P v = −α P S A⁺ χ̄`, `x̄₀ = χ̄ + Sᵀv` and the
@@ -37,43 +37,41 @@ pub use forward::{Scratch, forward};
 pub use pullback::pullback;
 
 use super::Plan;
-use crate::splat::{self, Samples};
+use crate::splat::SortedSamples;
 use crate::{Grid, Real};
 
-/// Iterations after which something is wrong. At `α = 4` some 30 are needed, and they grow with `√α`.
+/// Limit of iterations. At `α = 4` some 30 are needed, and their number grows with `√α`.
 pub const MOST_ITERATIONS: usize = 2000;
 
-/// The equation, but for its right-hand side.
+/// Operator of the screened equation.
 #[derive(Clone, Copy)]
 pub struct Equation<'a, T: Real> {
     /// The direct solve.
     pub plan: &'a Plan<T>,
-    /// The grid that it is of.
+    /// Its grid.
     pub grid: &'a Grid<T>,
     /// Samples; their normals are not used.
-    pub samples: Samples<'a, T>,
+    pub samples: SortedSamples<'a, T>,
     /// Whether areas count in cells², or each sample as 1.
-    pub area_weights: bool,
-    /// The samples by plane of the grid.
-    pub order: &'a splat::Residual,
+    pub area: bool,
     /// `α`: 0 or more.
     pub screening: f64,
 }
 
-/// Why there is no solution.
+/// Errors of the screened equation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
-    /// The direct solve.
+    /// The direct solve failed.
     #[error(transparent)]
     Poisson(#[from] super::Error),
-    /// Conjugate gradients did not end.
+    /// Conjugate gradients did not converge.
     #[error(
-        "the screened equation is solved to {residual:e} only, after {iterations} iterations; use less screening, or f64"
+        "the screened equation did not converge: relative residual {residual:e} after {iterations} iterations; use less screening, or f64"
     )]
     NotConverged {
-        /// Iterations made.
+        /// Number of iterations.
         iterations: usize,
-        /// Residual left, relative to the right-hand side.
+        /// Residual relative to the right-hand side.
         residual: f64,
     },
 }
@@ -81,7 +79,7 @@ pub enum Error {
 impl<T: Real> Equation<'_, T> {
     /// `â_i`.
     #[inline(always)]
-    fn area(&self, i: usize) -> T {
-        self.samples.area_in_cells(self.grid, self.area_weights, i)
+    fn area_of(&self, i: usize) -> T {
+        self.samples.samples.area_in_cells(self.grid, self.area, i)
     }
 }

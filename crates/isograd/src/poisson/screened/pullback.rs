@@ -6,12 +6,12 @@ use crate::splat::SampleCotangent;
 use crate::trilinear::{self, Cube};
 use crate::{Real, parallel, vector};
 
-/// Turns the cotangents `chi_bar` (in memory order) of the screened solution into those of the plain one, adds
-/// what they mean for points, areas and grid to `out`, and returns the iterations it took. `level` is what the
-/// iso-value kept of `χ`; all else is as it was in [`forward`](super::forward).
+/// Replaces the cotangent `chi_bar` `(nx, ny, nz)` of the screened solution by that of the plain one, adds those of
+/// points, areas and grid to `out`, and returns the number of iterations. `level` is the residual of the iso-value
+/// of `χ`; `equation` is that of [`forward`](super::forward).
 ///
 /// # Errors
-/// [`Error::NotConverged`]; `chi_bar` is then as it was.
+/// [`Error::NotConverged`]; `chi_bar` is then unchanged.
 pub fn pullback<T: Real>(
     equation: &Equation<'_, T>,
     level: &iso_value::Residual<T>,
@@ -23,7 +23,6 @@ pub fn pullback<T: Real>(
         plan,
         grid,
         samples,
-        order,
         ..
     } = *equation;
     scratch.start(equation);
@@ -41,7 +40,7 @@ pub fn pullback<T: Real>(
     scratch.field = field;
     let iterations = scratch.solve(equation)?;
     let added = |i: usize| scratch.root(i) * scratch.solution[i];
-    trilinear::spread(grid, samples.points, order, added, chi_bar);
+    trilinear::spread(grid, samples, added, chi_bar);
     green(chi_bar, scratch)?;
     equation.pull_matrix(&scratch.field, level, out);
     Ok(iterations)
@@ -55,10 +54,10 @@ impl<T: Real> Equation<'_, T> {
         level: &iso_value::Residual<T>,
         out: &mut SampleCotangent<T>,
     ) {
-        let (grid, points) = (self.grid, self.samples.points);
+        let (grid, points) = (self.grid, self.samples.samples.points);
         let at = |i: usize| Cube::new(grid, grid.to_index(points[i])).value_and_gradient(adjoint);
         let [sum, total] = parallel::sum_array(points.len(), |i| {
-            let a = self.area(i).f64();
+            let a = self.area_of(i).f64();
             [a * at(i).0.f64(), a]
         });
         let (mean, c) = (T::of(sum / total), T::of(level.value));
@@ -72,9 +71,9 @@ impl<T: Real> Equation<'_, T> {
                 vector::scale(chi.gradient, value),
                 vector::scale(gradient, offset),
             );
-            let point = vector::scale(both, -alpha * self.area(i) / h);
+            let point = vector::scale(both, -alpha * self.area_of(i) / h);
             (point, -alpha * value * offset)
         };
-        out.add(grid, self.samples, self.area_weights, of_sample);
+        out.add(grid, self.samples.samples, self.area, of_sample);
     }
 }

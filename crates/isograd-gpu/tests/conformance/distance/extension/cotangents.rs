@@ -85,17 +85,16 @@ fn pull_on_cpu<T: Scalar>(
     bars: &Bars<T>,
 ) -> (Pulled<T>, usize) {
     let mut out = cpu::Cotangent::default();
-    cpu::pullback(
-        scene.samples(),
+    let inputs = cpu::Inputs {
+        samples: scene.samples(),
         attribute,
-        scene.surface(),
+        surface: scene.surface(),
         residual,
         extension,
-        bars.vertices.as_deref(),
-        bars.cells.as_deref(),
-        &mut out,
-    )
-    .unwrap();
+        vertices_bar: bars.vertices.as_deref(),
+        values_bar: bars.cells.as_deref(),
+    };
+    cpu::pullback(&inputs, &mut out).unwrap();
     let pulled = [
         out.attribute,
         out.points.into_flattened(),

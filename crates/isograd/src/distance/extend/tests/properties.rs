@@ -1,7 +1,5 @@
 //! What an extension promises.
 
-use rayon::ThreadPoolBuilder;
-
 use super::super::Fit;
 use super::*;
 use crate::distance::NO_TRIANGLE;
@@ -244,17 +242,7 @@ fn coinciding_samples_and_samples_without_area_give_finite_values() {
 fn same_bits<T: Real>() {
     let scene = Scene::<T>::random(6000, 40);
     let attribute = scene.attribute(wavy);
-    let run = |threads| {
-        let pool = ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("threads");
-        pool.install(|| scene.extend(&attribute))
-    };
-    let one = run(1);
-    for threads in [2, 5] {
-        assert!(run(threads) == one, "{threads} threads");
-    }
+    crate::testing::assert_same_bits(|| scene.extend(&attribute));
 }
 
 #[test]

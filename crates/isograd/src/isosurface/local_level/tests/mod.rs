@@ -5,7 +5,8 @@ mod derivative;
 use super::*;
 use crate::isosurface::iso_value;
 use crate::neighbors::tests::{Random, torus};
-use crate::splat::{self, SampleCotangent, Samples, Weights};
+use crate::splat::{self, SampleCotangent, Samples, SortedSamples, Weights};
+use crate::testing::{numbers, product};
 use crate::{Field, Grid, Real, vector};
 
 /// Samples of a torus, their areas, and an indicator that is a little off on it.
@@ -66,24 +67,22 @@ impl<T: Real> Setting<T> {
         (level, order)
     }
 
-    /// What comes out, and the level it is for.
-    fn run(
-        &self,
-        area_weights: bool,
-        thin: bool,
-    ) -> (Field<T>, iso_value::Residual<T>, Residual<T>) {
+    /// The corrected indicator, and its level.
+    fn run(&self, area: bool, thin: bool) -> (Field<T>, iso_value::Residual<T>, Residual<T>) {
         let (mut chi, (level, order)) = (self.chi.clone(), self.level());
         let mut residual = Residual::default();
         forward(
             &mut chi,
-            self.samples(),
-            Choice {
-                area_weights,
+            SortedSamples {
+                samples: self.samples(),
+                order: &order,
+            },
+            Options {
+                area,
                 smoothing: self.smoothing,
                 thin,
             },
             &level,
-            &order,
             &mut Scratch::default(),
             &mut residual,
         );
@@ -255,7 +254,7 @@ fn samples_come_to_lie_at_the_level() {
         (squares.sum::<f64>() / 4000.0).sqrt()
     };
     let (before, after) = (rms(&setting.chi), rms(&chi));
-    // What is left varies within a cell.
+    // The rest varies within a cell.
     assert!(after < 0.2 * before, "{before} {after}");
 }
 
@@ -275,25 +274,12 @@ fn samples_scattered_over_a_thick_layer_are_not_followed() {
     assert!(kept > 0.7, "{kept} of the slope is left");
 }
 
-fn numbers(n: usize, random: &mut Random) -> Vec<f64> {
-    (0..n).map(|_| 2.0 * random.uniform() - 1.0).collect()
-}
-
-fn product(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
 fn same_bits<T: Real>() {
     let setting = Setting::<T>::new(5000, 0.1);
-    let run = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        pool.expect("threads").install(|| {
-            let (chi, _, residual) = setting.run(true, true);
-            (chi.values().to_vec(), residual)
-        })
-    };
-    let one = run(1);
-    assert!(one == run(2) && one == run(5));
+    crate::testing::assert_same_bits(|| {
+        let (chi, _, residual) = setting.run(true, true);
+        (chi.values().to_vec(), residual)
+    });
 }
 
 #[test]
@@ -302,7 +288,7 @@ fn threads_do_not_change_a_bit() {
     same_bits::<f64>();
 }
 
-/// Samples of no area, all at one place, and an indicator without slope: nothing to follow, and no harm.
+/// Samples without area, coinciding samples, and an indicator without slope.
 #[test]
 fn degenerate_samples_leave_finite_numbers() {
     let mut setting = Setting::<f32>::new(50, 0.0);

@@ -3,8 +3,9 @@
 mod properties;
 mod transposes;
 
-use super::super::{Cotangent, pullback};
+use super::super::{Cotangent, Inputs, pullback};
 use super::*;
+use crate::testing::product;
 
 fn values<T: Real>(n: usize, seed: u64) -> Vec<T> {
     let mut random = Random::new(seed);
@@ -53,13 +54,26 @@ impl<T: Real> Scene<T> {
     fn pull(&self, attribute: &Attribute<T>, at: &Bars<T>) -> Cotangent<T> {
         let (extension, residual) = self.extend(attribute);
         let mut out = Cotangent::default();
-        let (vertices, cells) = (Some(&at.vertices[..]), Some(&at.cells[..]));
-        let (samples, surface) = (self.samples(), self.surface());
-        pullback(
-            samples, attribute, surface, &residual, &extension, vertices, cells, &mut out,
-        )
-        .expect("pulls back");
+        let inputs = self.inputs(attribute, &residual, &extension);
+        pullback(&at.on(inputs), &mut out).expect("pulls back");
         out
+    }
+
+    fn inputs<'a>(
+        &'a self,
+        attribute: &'a Attribute<T>,
+        residual: &'a Residual<T>,
+        extension: &'a Extension<T>,
+    ) -> Inputs<'a, T> {
+        Inputs {
+            samples: self.samples(),
+            attribute,
+            surface: self.surface(),
+            residual,
+            extension,
+            vertices_bar: None,
+            values_bar: None,
+        }
     }
 }
 
@@ -76,12 +90,20 @@ impl<T: Real> Bars<T> {
             cells: values(extension.values.len(), 22),
         }
     }
+
+    /// The inputs with these cotangents.
+    fn on<'a>(&'a self, inputs: Inputs<'a, T>) -> Inputs<'a, T> {
+        Inputs {
+            vertices_bar: Some(&self.vertices),
+            values_bar: Some(&self.cells),
+            ..inputs
+        }
+    }
 }
 
 impl Bars<f64> {
     fn loss(&self, extension: &Extension<f64>) -> f64 {
-        let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        sum(&self.vertices, &extension.vertices) + sum(&self.cells, &extension.values)
+        product(&self.vertices, &extension.vertices) + product(&self.cells, &extension.values)
     }
 }
 

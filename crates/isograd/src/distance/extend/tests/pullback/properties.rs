@@ -1,7 +1,5 @@
 //! What must hold of any pullback.
 
-use rayon::ThreadPoolBuilder;
-
 use super::*;
 use crate::vector::{add, scale};
 
@@ -33,7 +31,7 @@ fn motion_of_everything_together_changes_nothing() {
     assert!(factor.abs() <= 1e-5 * size, "{factor} {size}");
 }
 
-/// The same scene in double precision.
+/// The scene in double precision.
 fn widened(scene: &Scene<f32>) -> Scene<f64> {
     let wide = |v: &[[f32; 3]]| v.iter().map(|&v| to_f64(v)).collect::<Vec<_>>();
     let grid = scene.phi.grid();
@@ -96,15 +94,7 @@ fn same_bits<T: Real>() {
     let scene = Scene::<T>::random(6000, 40);
     let attribute = scene.attribute(wavy);
     let bars = Bars::of(&scene.extend(&attribute).0);
-    let run = |threads| {
-        let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-        pool.expect("threads")
-            .install(|| numbers(&scene.pull(&attribute, &bars)))
-    };
-    let one = run(1);
-    for threads in [2, 5] {
-        assert!(run(threads) == one, "{threads} threads");
-    }
+    crate::testing::assert_same_bits(|| numbers(&scene.pull(&attribute, &bars)));
 }
 
 #[test]
@@ -178,13 +168,15 @@ fn what_is_left_out_counts_as_zero_and_memory_is_used_again() {
     let attribute = scene.attribute(wavy);
     let (extension, residual) = scene.extend(&attribute);
     let bars = Bars::of(&extension);
-    let (samples, surface) = (scene.samples(), scene.surface());
+    let inputs = scene.inputs(&attribute, &residual, &extension);
     let mut out = Cotangent::default();
-    let mut pull = |vertices: Option<&[f64]>, cells: Option<&[f64]>| {
-        pullback(
-            samples, &attribute, surface, &residual, &extension, vertices, cells, &mut out,
-        )
-        .expect("pulls back");
+    let mut pull = |vertices_bar: Option<&[f64]>, values_bar: Option<&[f64]>| {
+        let inputs = Inputs {
+            vertices_bar,
+            values_bar,
+            ..inputs
+        };
+        pullback(&inputs, &mut out).expect("pulls back");
         let memory = (
             out.attribute.as_ptr(),
             out.points.as_ptr(),
@@ -214,11 +206,8 @@ fn what_does_not_fit_together_is_refused() {
     let (extension, residual) = scene.extend(&attribute);
     let bars = Bars::of(&extension);
     let refused = |extension: &Extension<f32>, residual: &Residual<f32>, bars: &Bars<f32>| {
-        let (vertices, cells) = (Some(&bars.vertices[..]), Some(&bars.cells[..]));
-        let (samples, surface, out) = (scene.samples(), scene.surface(), &mut Cotangent::default());
-        pullback(
-            samples, &attribute, surface, residual, extension, vertices, cells, out,
-        )
+        let inputs = scene.inputs(&attribute, residual, extension);
+        pullback(&bars.on(inputs), &mut Cotangent::default())
     };
     assert_eq!(refused(&extension, &residual, &bars), Ok(()));
     let mismatch = |result| matches!(result, Err(Error::Mismatch { .. }));

@@ -1,6 +1,7 @@
 //! Against finite differences of the whole stage.
 
 use super::*;
+use crate::testing::{inner, product};
 use crate::vector::{add, dot, scale};
 
 const STEP: f64 = 2e-6;
@@ -46,10 +47,6 @@ fn assert_adjoint(
     assert!(expected.abs() > 1e-2);
 }
 
-fn sum_of(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| dot(*a, *b)).sum()
-}
-
 #[test]
 fn attribute_gets_the_transpose() {
     assert_adjoint(
@@ -58,14 +55,7 @@ fn attribute_gets_the_transpose() {
                 *v += t * d;
             }
         },
-        |bar, _| {
-            let direction = values::<f64>(5000, 31);
-            bar.attribute
-                .iter()
-                .zip(direction)
-                .map(|(a, d)| a * d)
-                .sum()
-        },
+        |bar, _| product(&bar.attribute, &values(5000, 31)),
     );
 }
 
@@ -79,7 +69,7 @@ fn points_get_the_transpose() {
             }
             scene.gather_within(radius);
         },
-        |bar, _| sum_of(&bar.points, &vectors(2500, 32)),
+        |bar, _| inner(&bar.points, &vectors(2500, 32)),
     );
 }
 
@@ -99,10 +89,7 @@ fn areas_get_the_transpose() {
                 *a += t * d;
             }
         },
-        |bar, scene| {
-            let direction = direction(scene);
-            bar.areas.iter().zip(direction).map(|(a, d)| a * d).sum()
-        },
+        |bar, scene| product(&bar.areas, &direction(scene)),
     );
 }
 
@@ -115,7 +102,7 @@ fn vertices_of_the_surface_get_the_transpose() {
                 *y = add(*y, scale(d, t));
             }
         },
-        |bar, _| sum_of(&bar.vertices, &vectors(bar.vertices.len(), 34)),
+        |bar, _| inner(&bar.vertices, &vectors(bar.vertices.len(), 34)),
     );
 }
 

@@ -1,8 +1,9 @@
-//! The cells near the samples, in blocks: memory for a layer of cells round the surface, not for the grid.
+//! The layer of cells near the samples, in blocks of 8³: memory in proportion to the surface, not to the grid.
 
 use rayon::prelude::*;
 
 use super::stencil::Stencil;
+use crate::splat::SortedSamples;
 use crate::{Grid, Real};
 
 /// Cells along each side of a block.
@@ -11,41 +12,42 @@ pub(super) const EDGE: usize = 8;
 /// Cells in a block.
 pub(super) const NODES: usize = EDGE * EDGE * EDGE;
 
-/// In the table: no sample is near.
+/// Table entry of a block that no sample is near.
 const NONE: u32 = u32::MAX;
 
-/// The blocks that hold a cell of the 3³ round some sample, and which samples those are.
+/// The blocks that contain a cell of the 3³ round some sample, with the samples of each.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Blocks {
+pub(super) struct Layer {
     /// Blocks of the grid along each axis.
     shape: [usize; 3],
-    /// Number of each block of the grid among those that are used.
+    /// Index in the layer of each block of the grid.
     table: Vec<u32>,
-    /// Place in the table of each block that is used.
+    /// Place in the table of each block of the layer.
     places: Vec<u32>,
-    /// Where the samples of each block begin and end.
+    /// Range of `samples` of each block.
     starts: Vec<usize>,
     samples: Vec<u32>,
-    /// Where the next sample of each block goes.
+    /// While sorting, where the next sample of each block goes.
     next: Vec<usize>,
 }
 
-/// Parts of the cells of a block that a cube of cells covers: places in the cube, per axis.
+/// Overlap of a cube of cells with a block: ranges of places in the cube, per axis.
 pub(super) struct Overlap {
     corner: [usize; 3],
     block: [usize; 3],
     ranges: [(usize, usize); 3],
 }
 
-impl Blocks {
-    /// Finds the blocks of these samples, which are visited in this order.
-    pub(super) fn build<T: Real>(&mut self, grid: &Grid<T>, points: &[[T; 3]], order: &[u32]) {
+impl Layer {
+    /// Builds the layer round the samples, in their sorted order.
+    pub(super) fn build<T: Real>(&mut self, grid: &Grid<T>, sorted: SortedSamples<'_, T>) {
+        let (points, order) = (sorted.samples.points, &sorted.order.order);
         self.shape = grid.shape().map(|n| n.div_ceil(EDGE));
         self.table.clear();
         self.table.resize(self.shape.iter().product(), 0);
         let stencils = || {
-            let near = |&i: &u32| Stencil::of(grid, points[i as usize]).map(|s| (i, s.corner));
-            order.iter().filter_map(near)
+            let stencil = |&i: &u32| Stencil::of(grid, points[i as usize]).map(|s| (i, s.corner));
+            order.iter().filter_map(stencil)
         };
         for (_, corner) in stencils() {
             for_each_touched(self.shape, corner, |place| self.table[place] += 1);
@@ -94,7 +96,7 @@ impl Blocks {
         [place / (y * z), place / z % y, place % z].map(|b| b * EDGE)
     }
 
-    /// Places of the cells of a cube of `N`³ cells, all of which are in some block.
+    /// Place in the layer of a cell of one of its blocks.
     #[inline(always)]
     fn place(&self, [x, y, z]: [usize; 3]) -> usize {
         let [_, ny, nz] = self.shape;
@@ -103,7 +105,7 @@ impl Blocks {
         self.table[table] as usize * NODES + local
     }
 
-    /// What stands at the cells of the cube of `N`³ cells from `corner` on, row by row along z.
+    /// The entries of the cube of `N`³ cells from `corner` on, row by row along z.
     #[inline(always)]
     pub(super) fn read<E: Copy + Default, const N: usize>(
         &self,
@@ -128,8 +130,8 @@ impl Blocks {
         out
     }
 
-    /// Runs `f(nodes, cells)` on the rows of cells along z that blocks and grid share; `field` is on a grid of
-    /// `shape`. Each task owns some planes of the field.
+    /// Runs `f(entries, cells)` on the rows of cells along z that blocks and grid share; `nodes` are entries of the
+    /// layer, `field` is on a grid of `shape`. Each task owns some planes of the field.
     pub(super) fn zip_rows<T: Real>(
         &self,
         nodes: &[T],
@@ -156,7 +158,8 @@ impl Blocks {
         });
     }
 
-    /// Start and length in memory of the row of cells at each row along z of a block; none beyond the grid.
+    /// For each row along z of a block, the place of its first cell in the field and the number of cells; `None`
+    /// beyond the grid.
     pub(super) fn rows(
         &self,
         block: usize,
@@ -172,7 +175,7 @@ impl Blocks {
 }
 
 impl Overlap {
-    /// What a block that begins at `block` has of the cube of `width`³ cells from `corner` on.
+    /// Of the cube of `width`³ cells from `corner` on with the block that begins at `block`.
     #[inline(always)]
     pub(super) fn new(corner: [usize; 3], width: usize, block: [usize; 3]) -> Self {
         let mut ranges = [(0, 0); 3];
@@ -189,23 +192,23 @@ impl Overlap {
         }
     }
 
-    /// Runs `f(i, j, k, place)` on the cells shared: places in the cube, and the place in the block.
+    /// Runs `f([i, j, k], place)` on the shared cells: the place in the cube, and the place in the block.
     #[inline(always)]
-    pub(super) fn for_each(&self, mut f: impl FnMut(usize, usize, usize, usize)) {
+    pub(super) fn for_each(&self, mut f: impl FnMut([usize; 3], usize)) {
         let [(x0, x1), (y0, y1), (z0, z1)] = self.ranges;
         let local = |a: usize, n: usize| self.corner[a] + n - self.block[a];
         for i in x0..x1 {
             for j in y0..y1 {
                 let row = (local(0, i) * EDGE + local(1, j)) * EDGE;
                 for k in z0..z1 {
-                    f(i, j, k, row + local(2, k));
+                    f([i, j, k], row + local(2, k));
                 }
             }
         }
     }
 }
 
-/// The blocks, by their place in the table, that the 3³ cells from `corner` on lie in.
+/// Visits the blocks that contain a cell of the 3³ from `corner` on, by their place in the table.
 #[inline(always)]
 fn for_each_touched([_, ny, nz]: [usize; 3], corner: [usize; 3], mut f: impl FnMut(usize)) {
     let [x, y, z] = corner.map(|c| (c / EDGE, (c + 2) / EDGE));
