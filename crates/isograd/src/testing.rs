@@ -30,6 +30,17 @@ pub(crate) fn assert_adjoint(what: &str, pulled: f64, step: f64, loss: impl Fn(f
     );
 }
 
+/// Stream of numbers in [−1, 1) from a seed.
+pub(crate) fn noise(seed: u64) -> impl FnMut() -> f64 {
+    let mut x = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    move || {
+        x ^= x << 13;
+        x ^= x >> 7;
+        x ^= x << 17;
+        (x >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+}
+
 /// `n` numbers between −1 and 1.
 pub(crate) fn numbers(n: usize, random: &mut Random) -> Vec<f64> {
     (0..n).map(|_| 2.0 * random.uniform() - 1.0).collect()

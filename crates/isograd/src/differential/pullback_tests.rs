@@ -7,16 +7,9 @@ use super::*;
 use crate::data::Field;
 use crate::testing::{inner, product};
 
-/// A reproducible stream of numbers in [−1, 1).
 fn noise<T: Real>(n: usize, seed: u64) -> Vec<T> {
-    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    let mut next = || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        T::of((state >> 11) as f64 / (1u64 << 52) as f64 - 1.0)
-    };
-    (0..n).map(|_| next()).collect()
+    let mut next = crate::testing::noise(seed);
+    (0..n).map(|_| T::of(next())).collect()
 }
 
 fn vectors<T: Real>(n: usize, seed: u64) -> Vec<[T; 3]> {

@@ -43,7 +43,7 @@ pub mod screened;
 pub mod smoothing;
 pub mod spectrum;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use axis::Axis;
 use pulp::Arch;

@@ -3,17 +3,7 @@
 use std::f64::consts::PI;
 
 use super::*;
-
-/// Numbers in [−1, 1) from a seed.
-fn noise(seed: u64) -> impl FnMut() -> f64 {
-    let mut x = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    move || {
-        x ^= x << 13;
-        x ^= x >> 7;
-        x ^= x << 17;
-        (x >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-}
+use crate::testing::noise;
 
 /// Random values whose sum is 0 up to rounding: a right-hand side that has a solution.
 fn right_hand_side(cells: usize, seed: u64) -> Vec<f64> {
@@ -90,7 +80,7 @@ fn backward_error<T: Real>(shape: [usize; 3], seed: u64) -> f64 {
 }
 
 /// Solves `matrix x = rhs` by elimination with row pivoting.
-pub(super) fn eliminate(mut matrix: Vec<Vec<f64>>, mut rhs: Vec<f64>) -> Vec<f64> {
+pub(crate) fn eliminate(mut matrix: Vec<Vec<f64>>, mut rhs: Vec<f64>) -> Vec<f64> {
     let n = rhs.len();
     for c in 0..n {
         let pivot = (c..n)

@@ -103,37 +103,3 @@ fn same_bits_for_any_number_of_threads() {
     let points: Vec<[f32; 3]> = torus(9000, 8).iter().map(|s| vector::of_f64(s.0)).collect();
     crate::testing::assert_same_bits(|| areas(&points).1);
 }
-
-#[test]
-fn the_pullback_on_the_page_agrees_with_finite_differences() {
-    let points: Vec<[f64; 3]> = torus(2000, 3).iter().map(|s| s.0).collect();
-    let (neighborhoods, found) = areas(&points);
-    for i in [0, 700, 1999] {
-        let (r2, area) = (neighborhoods.radius[i].powi(2), found[i]);
-        let mut moved = points.clone();
-        for j in 0..points.len() {
-            let d = vector::sub(points[j], points[i]);
-            let d2 = vector::norm_squared(d);
-            // Away from the radius, so that a step changes no neighborhood.
-            if j == i || d2 > 0.99 * r2 {
-                continue;
-            }
-            let factor = area * area * 12.0 / (std::f64::consts::PI * r2 * r2) * (1.0 - d2 / r2);
-            let step = 1e-4 * r2.sqrt();
-            let mut at = |s: f64| {
-                moved[j][1] = points[j][1] + s;
-                let value = plain_area(&moved, i, r2.sqrt());
-                moved[j] = points[j];
-                value
-            };
-            let numeric = (at(step) - at(-step)) / (2.0 * step);
-            // Truncation is of order (step/R)² of the largest slope.
-            let tolerance = 1e-6 * area / r2.sqrt();
-            assert!(
-                (numeric - factor * d[1]).abs() < tolerance,
-                "{numeric}, not {}",
-                factor * d[1]
-            );
-        }
-    }
-}

@@ -2,16 +2,7 @@
 
 use super::*;
 use crate::poisson;
-
-fn unit_noise(seed: u64) -> impl FnMut() -> f64 {
-    let mut x = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
-    move || {
-        x ^= x << 13;
-        x ^= x >> 7;
-        x ^= x << 17;
-        (x >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
+use crate::testing::noise;
 
 #[derive(Clone)]
 struct Cloud {
@@ -32,7 +23,8 @@ impl Cloud {
 
 /// Samples anywhere in the allowed part of the grid, with any vectors and areas.
 fn random_cloud(grid: &Grid<f64>, count: usize, seed: u64) -> Cloud {
-    let mut next = unit_noise(seed);
+    let mut signed = noise(seed);
+    let mut next = || 0.5 * (signed() + 1.0);
     let mut vector = |low: f64, high: [f64; 3]| -> [f64; 3] {
         std::array::from_fn(|a| low + (high[a] - low) * next())
     };

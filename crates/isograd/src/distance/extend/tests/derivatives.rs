@@ -1,12 +1,12 @@
-//! The formulas of the pullback that the head of the stage promises, against finite differences.
+//! The pullbacks of the fit and of the closest point against finite differences.
 
 use super::super::fit::{self, Neighbor};
 use super::super::fit_pullback::Adjoint;
 use super::*;
 use crate::distance::tangent::tangent;
-use crate::distance::triangle::{Feature, closest_point};
+use crate::distance::triangle::closest_point;
 use crate::element::fit::kernel;
-use crate::vector::{add, dot, norm_squared, scale, sub};
+use crate::vector::{dot, norm_squared, scale, sub};
 
 /// A vertex at `vertex`, samples round it with areas and one value each, and a radius held constant.
 #[derive(Clone)]
@@ -18,10 +18,6 @@ struct Patch {
 }
 
 const RADIUS: f64 = 1.3;
-
-/// `ε₀` and `ε₁`.
-const NOISE: f64 = 1e-5;
-const FADING: f64 = 1.0 / 256.0;
 
 impl Patch {
     /// A curved patch; far from the vertex where `away` is large.
@@ -67,75 +63,14 @@ impl Patch {
             .sum()
     }
 
-    /// `x̄_j`, `ā_j` and `v̄_j` for `ū = 1`, as printed.
+    /// `x̄_j`, `ā_j` and `v̄_j` for `ū = 1`.
     fn pullback(&self) -> Vec<([f64; 3], f64, f64)> {
-        let mut neighbors = self.neighbors();
-        let fit = fit::fit(RADIUS, &mut neighbors);
-        let (m, s) = (fit.mean, fit.tilt);
-        let e = |n: &Neighbor| scale(n.offset, RADIUS);
-        let v = |n: &Neighbor| self.values[n.sample as usize];
-        let mean: f64 = neighbors.iter().map(|n| n.weight * v(n)).sum();
-        let trace: f64 = neighbors
-            .iter()
-            .map(|n| n.weight * norm_squared(e(n)))
-            .sum();
-        let tau = norm_squared(m) / trace;
-        let g = self.slope(&neighbors, trace * (NOISE + FADING * tau * tau));
-        let of_trace = NOISE - FADING * tau * tau;
-        let (t, rho) = (
-            |n: &Neighbor| 1.0 - dot(s, e(n)),
-            |n: &Neighbor| v(n) - mean - dot(g, e(n)),
-        );
-        let d_of = |n: &Neighbor| {
-            let ridge = of_trace * norm_squared(e(n)) + 4.0 * FADING * tau * dot(m, e(n));
-            rho(n) * t(n) + dot(g, s) * ridge
-        };
-        let d_mean: f64 = neighbors.iter().map(|n| n.weight * d_of(n)).sum();
-        let of_sample = |n: &Neighbor| {
-            let w_bar = (d_of(n) - d_mean) / fit.weight;
-            let ridge = add(scale(m, 4.0 * FADING * tau), scale(e(n), 2.0 * of_trace));
-            let through_fit = add(
-                add(scale(g, -t(n)), scale(s, -rho(n))),
-                scale(ridge, dot(g, s)),
-            );
-            let d = add(e(n), m);
-            let rest = (1.0 - norm_squared(d) / (RADIUS * RADIUS)).max(0.0);
-            let area = self.areas[n.sample as usize];
-            let through_weight = w_bar * area * 4.0 / (RADIUS * RADIUS) * rest;
-            let point = sub(scale(through_fit, n.weight), scale(d, through_weight));
-            (point, w_bar * rest * rest, n.weight * t(n))
-        };
-        neighbors.iter().map(of_sample).collect()
-    }
-
-    /// `(C + ε I)⁻¹ Σ p e q` by Cramer's rule.
-    fn slope(&self, neighbors: &[Neighbor], ridge: f64) -> [f64; 3] {
-        let (mut a, mut b) = ([[0.0; 3]; 3], [0.0; 3]);
-        let mean: f64 = neighbors
-            .iter()
-            .map(|n| n.weight * self.values[n.sample as usize])
-            .sum();
-        for n in neighbors {
-            let (e, q) = (
-                scale(n.offset, RADIUS),
-                self.values[n.sample as usize] - mean,
-            );
-            for i in 0..3 {
-                b[i] += n.weight * e[i] * q;
-                for j in 0..3 {
-                    a[i][j] += n.weight * e[i] * e[j];
-                }
-            }
-        }
-        for k in 0..3 {
-            a[k][k] += ridge;
-        }
-        let determinant = |a: [[f64; 3]; 3]| dot(a[0], crate::vector::cross(a[1], a[2]));
-        std::array::from_fn(|k| {
-            let mut replaced = a;
-            replaced[k] = b;
-            determinant(replaced) / determinant(a)
-        })
+        let (mut neighbors, mut contracted) = (self.neighbors(), self.values.clone());
+        let adjoint = Adjoint::new(RADIUS, &mut neighbors, &mut contracted);
+        let samples = neighbors.iter().zip(&contracted).zip(&self.areas);
+        let shares = samples.map(|((n, &q), &area)| adjoint.share(n, q, area));
+        let bars = shares.map(|s| (scale(s.offset, 1.0 / RADIUS), s.area, s.value));
+        bars.collect()
     }
 }
 
@@ -146,7 +81,7 @@ fn slope_of(f: impl Fn(f64) -> f64) -> f64 {
 }
 
 #[test]
-fn printed_pullback_of_the_fit_agrees_with_finite_differences() {
+fn pullback_of_the_fit_agrees_with_finite_differences() {
     for (seed, away) in [(1, 0.0), (2, 0.2), (3, 0.5), (4, 0.8)] {
         let patch = Patch::new(seed, away);
         let mut of_vertex = [0.0; 3];
@@ -178,28 +113,6 @@ fn printed_pullback_of_the_fit_agrees_with_finite_differences() {
 }
 
 #[test]
-fn fast_pullback_of_the_fit_is_the_printed_one() {
-    for (seed, away) in [(1, 0.0), (2, 0.2), (3, 0.5), (4, 0.8), (5, 1.1)] {
-        let patch = Patch::new(seed, away);
-        let mut neighbors = patch.neighbors();
-        let mut contracted = patch.values.clone();
-        let adjoint = Adjoint::new(RADIUS, &mut neighbors, &mut contracted);
-        for (n, (point, area, value)) in neighbors.iter().zip(patch.pullback()) {
-            let j = n.sample as usize;
-            let share = adjoint.share(n, contracted[j], patch.areas[j]);
-            // The printed one solves by Cramer's rule, with a condition number of about 1e5.
-            let close =
-                |a: f64, b: f64| assert!((a - b).abs() <= 1e-9 * (1.0 + b.abs()), "{a} {b}");
-            close(share.value, value);
-            close(share.area, area);
-            for a in 0..3 {
-                close(share.offset[a] / RADIUS, point[a]);
-            }
-        }
-    }
-}
-
-#[test]
 fn samples_that_all_coincide_with_the_vertex_have_no_slope_to_differentiate() {
     let mut patch = Patch::new(1, 0.0);
     patch.points.fill(patch.vertex);
@@ -218,48 +131,8 @@ fn blended(q: [f64; 3], corners: [[f64; 3]; 3], values: [f64; 3]) -> f64 {
     dot(closest_point(q, corners).barycentric, values)
 }
 
-/// `q̄` and `ȳ_k` as printed, for `ū = 1`.
-fn blend_pullback(q: [f64; 3], corners: [[f64; 3]; 3], u: [f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
-    let closest = closest_point(q, corners);
-    let (o, beta) = (closest.offset, closest.barycentric);
-    let feature = match closest.feature {
-        Feature::Face => vec![0, 1, 2],
-        Feature::Edge(k) => vec![k, (k + 1) % 3],
-        Feature::Vertex(k) => vec![k],
-    };
-    let (first, others) = (feature[0], &feature[1..]);
-    let e: Vec<[f64; 3]> = others
-        .iter()
-        .map(|&k| sub(corners[k], corners[first]))
-        .collect();
-    let delta: Vec<f64> = others.iter().map(|&k| u[k] - u[first]).collect();
-    let gamma = match e.len() {
-        0 => vec![],
-        1 => vec![delta[0] / norm_squared(e[0])],
-        _ => {
-            let (a, b, c) = (norm_squared(e[0]), dot(e[0], e[1]), norm_squared(e[1]));
-            let det = a * c - b * b;
-            vec![
-                (c * delta[0] - b * delta[1]) / det,
-                (a * delta[1] - b * delta[0]) / det,
-            ]
-        }
-    };
-    let gradient = e
-        .iter()
-        .zip(&gamma)
-        .fold([0.0; 3], |sum, (&e, &g)| add(sum, scale(e, g)));
-    let mut corner_bar = [[0.0; 3]; 3];
-    for (&k, &g) in others.iter().zip(&gamma) {
-        corner_bar[k] = sub(scale(o, g), scale(gradient, beta[k]));
-    }
-    let total: f64 = gamma.iter().sum();
-    corner_bar[first] = scale(add(scale(o, total), scale(gradient, beta[first])), -1.0);
-    (gradient, corner_bar)
-}
-
 #[test]
-fn printed_pullback_of_the_closest_point_agrees_with_finite_differences() {
+fn pullback_of_the_closest_point_agrees_with_finite_differences() {
     let mut random = Random::new(11);
     let mut signed = || 2.0 * random.uniform() - 1.0;
     let mut seen = [0; 3];
@@ -273,15 +146,7 @@ fn printed_pullback_of_the_closest_point_agrees_with_finite_differences() {
             continue;
         }
         seen[closest.barycentric.iter().filter(|&&b| b > 0.0).count() - 1] += 1;
-        let (q_bar, corner_bar) = blend_pullback(q, corners, u);
-        let fast = tangent(&closest, corners, u, 0.0);
-        for a in 0..3 {
-            // Rounding, times the condition of the face.
-            assert!((fast.query[a] - q_bar[a]).abs() <= 1e-11);
-            for k in 0..3 {
-                assert!((fast.corners[k][a] - corner_bar[k][a]).abs() <= 1e-11);
-            }
-        }
+        let bar = tangent(&closest, corners, u, 0.0);
         for a in 0..3 {
             let moved = |t: f64| {
                 let mut q = q;
@@ -289,14 +154,14 @@ fn printed_pullback_of_the_closest_point_agrees_with_finite_differences() {
                 blended(q, corners, u)
             };
             // Second differences of a few tens, times the step squared; a vertex region may end nearby.
-            assert!((q_bar[a] - slope_of(moved)).abs() <= 1e-6);
+            assert!((bar.query[a] - slope_of(moved)).abs() <= 1e-6);
             for k in 0..3 {
                 let moved = |t: f64| {
                     let mut corners = corners;
                     corners[k][a] += t;
                     blended(q, corners, u)
                 };
-                assert!((corner_bar[k][a] - slope_of(moved)).abs() <= 1e-6);
+                assert!((bar.corners[k][a] - slope_of(moved)).abs() <= 1e-6);
             }
         }
     }

@@ -1,27 +1,8 @@
 //! The same fit in its plainest form: all samples, and the normal equations of the weighted least squares.
 
 use super::*;
+use crate::poisson::tests::eliminate;
 use crate::vector::{dot, norm_squared, scale, sub};
-
-/// Solves `A x = b` by elimination with row exchanges.
-fn eliminate<const N: usize>(mut a: [[f64; N]; N], mut b: [f64; N]) -> [f64; N] {
-    for k in 0..N {
-        let largest = |&i: &usize, &j: &usize| a[i][k].abs().total_cmp(&a[j][k].abs());
-        let pivot = (k..N).max_by(largest).expect("a row");
-        a.swap(k, pivot);
-        b.swap(k, pivot);
-        for i in 0..N {
-            if i != k {
-                let factor = a[i][k] / a[k][k];
-                for j in 0..N {
-                    a[i][j] -= factor * a[k][j];
-                }
-                b[i] -= factor * b[k];
-            }
-        }
-    }
-    std::array::from_fn(|k| b[k] / a[k][k])
-}
 
 /// `R_v` from all distances, sorted.
 fn radius(distances: &mut [f64], common: f64) -> f64 {
@@ -40,7 +21,7 @@ fn fitted_value(weights: &[f64], offsets: &[[f64; 3]], values: &[f64]) -> f64 {
     let trace: f64 = samples().map(spread).sum();
     let distance = dot(mean, mean) / trace;
     let ridge = trace * (1e-5 + distance * distance / 256.0);
-    let (mut a, mut b) = ([[0.0; 4]; 4], [0.0; 4]);
+    let (mut a, mut b) = (vec![vec![0.0; 4]; 4], vec![0.0; 4]);
     for ((w, d), v) in samples().zip(values) {
         let row = [1.0, d[0], d[1], d[2]];
         for i in 0..4 {
