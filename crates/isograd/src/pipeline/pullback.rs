@@ -10,7 +10,7 @@ use crate::distance::{extend, lattice};
 use crate::isosurface::{Level, local_level};
 use crate::orient::Method;
 use crate::poisson::screened;
-use crate::splat::{SampleCotangent, Samples, SortedSamples};
+use crate::splat::{SampleCotangent, SortedSamples};
 use crate::{Real, isosurface, normals, orient, poisson, splat, vector};
 
 /// Scratch buffers of the pullback: a field, an index for each cell whose φ has a cotangent, and some numbers
