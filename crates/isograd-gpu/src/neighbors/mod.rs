@@ -59,6 +59,27 @@ pub struct Neighborhoods<T> {
     pub(crate) links: Buffer<u32>,
 }
 
+/// [`Neighborhoods`] in kernels.
+#[derive(CubeLaunch, CubeType)]
+pub(crate) struct NeighborhoodArrays<F: Float + CubeElement> {
+    pub points: Array<F>,
+    pub radii: Array<F>,
+    pub nodes: Array<F>,
+    pub links: Array<u32>,
+}
+
+impl<T: Scalar> Neighborhoods<T> {
+    /// The neighborhoods as an argument of a kernel.
+    pub(crate) fn arg<R: Runtime>(&self) -> NeighborhoodArraysLaunch<T, R> {
+        NeighborhoodArraysLaunch::new(
+            self.points.arg(),
+            self.radii.arg(),
+            self.nodes.arg(),
+            self.links.arg(),
+        )
+    }
+}
+
 impl<T> Neighborhoods<T> {
     /// `N`.
     pub fn len(&self) -> usize {

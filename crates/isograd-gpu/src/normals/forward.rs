@@ -3,6 +3,7 @@
 use cubecl::prelude::*;
 
 use super::{CENTROID, PLANE, Residual, TANGENT, VALUES, WEIGHT};
+use crate::device::launch;
 use crate::element::eigen::{Eigen, Symmetric, eigen};
 use crate::element::plane::weight;
 use crate::neighbors::{BLOCK, Neighborhoods, end_of_leaf, first_of_leaf, next_leaf};
@@ -35,27 +36,28 @@ pub fn forward<R: Runtime, T: Scalar>(
         return Ok((normals, residual));
     }
     let moments: Buffer<T> = device.empty(MOMENTS * n)?;
-    let (groups, dim) = (device.groups(n, BLOCK), CubeDim::new_1d(BLOCK));
-    sum_moments::launch::<T, R>(
-        device.client(),
-        groups.clone(),
-        dim,
+    launch!(
+        device,
+        sum_moments::<T>,
+        n,
+        BLOCK,
         neighborhoods.points.arg(),
         neighborhoods.radii.arg(),
         neighborhoods.places.arg(),
         neighborhoods.nodes.arg(),
         neighborhoods.links.arg(),
         moments.arg(),
-        residual.count.arg(),
+        residual.count.arg()
     );
-    find_planes::launch::<T, R>(
-        device.client(),
-        groups,
-        dim,
+    launch!(
+        device,
+        find_planes::<T>,
+        n,
+        BLOCK,
         moments.arg(),
         neighborhoods.places.arg(),
         residual.planes.arg(),
-        normals.arg(),
+        normals.arg()
     );
     Ok((normals, residual))
 }

@@ -30,6 +30,7 @@ pub use widen::widen;
 
 use cubecl::prelude::*;
 
+use crate::device::launch;
 use crate::neighbors::{BLOCK, Neighborhoods};
 use crate::primitives::flags;
 use crate::{Buffer, Device, Error, Scalar};
@@ -68,13 +69,13 @@ impl<T: Scalar> Residual<T> {
             return Ok(0);
         }
         let guarded: Buffer<u32> = device.empty(n)?;
-        let (groups, dim) = (device.groups(n, BLOCK), CubeDim::new_1d(BLOCK));
-        flag_guarded::launch::<T, R>(
-            device.client(),
-            groups,
-            dim,
+        launch!(
+            device,
+            flag_guarded::<T>,
+            n,
+            BLOCK,
             self.planes.arg(),
-            guarded.arg(),
+            guarded.arg()
         );
         let total = flags::count(device, &guarded)?;
         Ok(device.download(&total)?[0] as usize)

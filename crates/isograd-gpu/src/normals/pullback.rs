@@ -7,7 +7,7 @@ use cubecl::prelude::*;
 
 use super::forward::epsilon;
 use super::{CENTROID, Residual, SMALLEST_GAP, TANGENT, VALUES, WEIGHT};
-use crate::device::check_length;
+use crate::device::{check_length, launch};
 use crate::element::plane;
 use crate::neighbors::{BLOCK, end_of_leaf, first_of_leaf, next_leaf};
 use crate::vector::Vector3;
@@ -31,27 +31,28 @@ pub fn pullback<R: Runtime, T: Scalar>(
         return Ok(points_bar);
     }
     let centers: Buffer<T> = device.empty(CENTER * n)?;
-    let (groups, dim) = (device.groups(n, BLOCK), CubeDim::new_1d(BLOCK));
-    fill_centers::launch::<T, R>(
-        device.client(),
-        groups.clone(),
-        dim,
+    launch!(
+        device,
+        fill_centers::<T>,
+        n,
+        BLOCK,
         residual.planes.arg(),
         near.places.arg(),
         normals_bar.arg(),
-        centers.arg(),
+        centers.arg()
     );
-    gather::launch::<T, R>(
-        device.client(),
-        groups,
-        dim,
+    launch!(
+        device,
+        gather::<T>,
+        n,
+        BLOCK,
         near.points.arg(),
         near.radii.arg(),
         near.places.arg(),
         near.nodes.arg(),
         near.links.arg(),
         centers.arg(),
-        points_bar.arg(),
+        points_bar.arg()
     );
     Ok(points_bar)
 }

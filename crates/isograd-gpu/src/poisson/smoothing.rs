@@ -5,7 +5,7 @@
 
 use cubecl::prelude::*;
 
-use crate::device::check_length;
+use crate::device::{check_length, launch};
 use crate::primitives::reduce::{self, BLOCK, sum_of_group};
 use crate::{Buffer, Device, Error, Scalar};
 
@@ -32,17 +32,18 @@ pub fn pullback<R: Runtime, T: Scalar>(
     }
     let [nx, ny, nz] = shape;
     let sums: Buffer<T> = device.empty(cells.div_ceil(BLOCK * OWN))?;
-    sum_products::launch::<T, R>(
-        device.client(),
-        device.groups(sums.len() * BLOCK, BLOCK as u32),
-        CubeDim::new_1d(BLOCK as u32),
+    launch!(
+        device,
+        sum_products::<T>,
+        sums.len() * BLOCK,
+        BLOCK as u32,
         chi.arg(),
         chi_bar.arg(),
         sums.arg(),
         T::of(-smoothing),
         nx,
         ny,
-        nz,
+        nz
     );
     reduce::sum(device, &sums)
 }

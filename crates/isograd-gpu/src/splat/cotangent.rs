@@ -20,7 +20,20 @@ pub struct SampleCotangent<T> {
     pub grid: Buffer<T>,
 }
 
+/// [`SampleCotangent`] in kernels, but for the grid.
+#[derive(CubeLaunch, CubeType)]
+pub(crate) struct CotangentArrays<F: Float + CubeElement> {
+    pub points: Array<F>,
+    pub normals: Array<F>,
+    pub areas: Array<F>,
+}
+
 impl<T: Scalar> SampleCotangent<T> {
+    /// The cotangents of the samples as an argument of a kernel.
+    pub(crate) fn arg<R: Runtime>(&self) -> CotangentArraysLaunch<T, R> {
+        CotangentArraysLaunch::new(self.points.arg(), self.normals.arg(), self.areas.arg())
+    }
+
     /// Zeros for `count` samples.
     ///
     /// # Errors

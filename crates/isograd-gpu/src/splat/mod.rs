@@ -30,7 +30,7 @@ mod pullback;
 mod stencil;
 
 pub use cotangent::SampleCotangent;
-pub(crate) use cotangent::subtract_from_grid;
+pub(crate) use cotangent::{CotangentArrays, subtract_from_grid};
 pub use forward::forward;
 pub use isograd::splat::Weights;
 pub use order::{Refused, SampleOrder};
@@ -39,7 +39,7 @@ pub(crate) use stencil::{bspline, bspline_slope, pick};
 
 use crate::device::check_length;
 use crate::{Buffer, Device, Error, Scalar};
-use cubecl::prelude::Runtime;
+use cubecl::prelude::*;
 
 /// Oriented samples.
 #[derive(Clone, Copy, Debug)]
@@ -63,11 +63,30 @@ impl<T: Scalar> Samples<'_, T> {
         self.areas.is_empty()
     }
 
+    /// The samples as an argument of a kernel.
+    pub(crate) fn arg<R: Runtime>(&self) -> SampleArraysLaunch<T, R> {
+        SampleArraysLaunch::new(
+            self.points.arg(),
+            self.normals.arg(),
+            self.areas.arg(),
+            self.len() as u32,
+        )
+    }
+
     /// There must be a point and a normal an area.
     pub(crate) fn check(&self) -> Result<(), Error> {
         check_length("the array of points", self.points, 3 * self.len())?;
         check_length("the array of normals", self.normals, 3 * self.len())
     }
+}
+
+/// [`Samples`] in kernels.
+#[derive(CubeLaunch, CubeType)]
+pub(crate) struct SampleArrays<F: Float + CubeElement> {
+    pub points: Array<F>,
+    pub normals: Array<F>,
+    pub areas: Array<F>,
+    pub count: u32,
 }
 
 /// What the pullback needs besides the inputs.
