@@ -7,6 +7,7 @@
 use cubecl::prelude::*;
 
 use super::{BLOCK, LEAF};
+use crate::device::launch;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Children of a node, and the power of two that they are.

@@ -6,12 +6,12 @@ use rayon::prelude::*;
 
 use super::Axes;
 use super::decide::{Beliefs, Domains, Place, Reading, Signs, Verdict};
+use super::evidence::{self, of_view};
 use super::fill::Fill;
 use super::graph::Graph;
 use super::groups::Groups;
 use super::winding;
 use crate::Real;
-use crate::element::evidence::{self, of_view};
 use crate::neighbors::Neighborhoods;
 use crate::vector;
 

@@ -53,9 +53,12 @@
 //! The signs are discrete; nothing of how they are chosen has a derivative. The confidence has none.
 
 mod auto;
+mod coupling;
 pub mod decide;
+mod disc;
 pub mod doubt;
 mod error;
+mod evidence;
 pub mod fill;
 mod flood;
 mod found;
@@ -76,6 +79,7 @@ mod settle;
 #[cfg(test)]
 mod shapes;
 mod sheet;
+mod sight;
 mod sky;
 #[cfg(test)]
 mod tests;
@@ -88,7 +92,6 @@ pub(crate) use pullback::hold;
 pub use pullback::{axes_pullback, given_pullback};
 
 use crate::data::Sensors;
-use crate::element::evidence;
 use crate::neighbors::Neighborhoods;
 use crate::normals::{self, Plane};
 use crate::{PointCloud, Real, vector};

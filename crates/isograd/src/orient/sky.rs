@@ -1,6 +1,6 @@
 //! How much of the sky every free cell sees.
 
-use crate::element::sight;
+use super::sight;
 
 /// Directions of one sweep: the neighbors of a cell that come before it in C order.
 const DIRECTIONS: u32 = 13;

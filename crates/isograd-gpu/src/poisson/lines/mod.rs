@@ -222,7 +222,8 @@ fn filter<F: Float + CubeElement>(
         k += tile.stride;
     }
     sync_cube();
-    to_fourier(&mut shared, tables, &tile, shared.half - at);
+    let other = shared.half - at;
+    to_fourier(&mut shared, tables, &tile, other);
     let end = transform_tile(&mut shared, tables, &tile, at, layout.chirped);
     store(output, &shared, &tile, end);
 }

@@ -1,19 +1,14 @@
 //! How the signs of two neighboring axes hang together, and what spreads along such ties: see
-//! `isograd::orient::graph`. Lengths are in sample spacings, so that single precision serves any unit.
-
-#[cfg(cube)]
-use cubecl::prelude::*;
-
-use super::Element;
+//! [`crate::orient::graph`]. Lengths are in sample spacings, so that single precision serves any unit.
 
 /// Neighbors of a point in the graph.
 pub const NEIGHBORS: usize = 16;
 
 /// The reach of a sample is its distance to this neighbor: the first ring round it.
-pub const RING: usize = 6;
+pub(super) const RING: usize = 6;
 
 /// Rounds in which every point takes the mean of its own evidence and what its neighbors say.
-pub const ROUNDS: usize = 60;
+pub(super) const ROUNDS: usize = 60;
 
 /// A sample reaches at most this many times as far as its neighbors do at the median: an outlier
 /// stands for no more surface than the samples that are nearest to it.
@@ -49,49 +44,45 @@ const SIDE: f32 = 2.0;
 const CERTAIN: f32 = 10.0;
 
 /// How far the patch extends that a sample stands for, from its own ring and the median of those round it.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn reach(ring: f32, median: f32) -> f32 {
+pub(super) fn reach(ring: f32, median: f32) -> f32 {
     let most = REACH_GROWTH * median;
     if most < ring { most } else { ring }
 }
 
 /// In −1..1, the side of a plane on which a sample lies; `height` in spreads.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn side(height: f32) -> f32 {
+pub(super) fn side(height: f32) -> f32 {
     let mut clear = SIDE * height;
-    let most = f32::new(CERTAIN);
+    let most = CERTAIN;
     if clear > most {
         clear = most;
     }
     if clear < -most {
         clear = -most;
     }
-    f32::tanh(clear)
+    clear.tanh()
 }
 
 /// The square of the height from which on one of two samples lies off the sheet of the other, whose sheets
 /// scatter so much; as good as infinite where a sheet is not known.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn least_gap(a: f32, b: f32) -> f32 {
-    if a > 0.0f32 && b > 0.0f32 {
+pub(super) fn least_gap(a: f32, b: f32) -> f32 {
+    if a > 0.0 && b > 0.0 {
         let mut larger = a;
         if b > a {
             larger = b;
         }
         (APART * larger) * (APART * larger)
     } else {
-        f32::new(UNKNOWN)
+        UNKNOWN
     }
 }
 
 /// What is added to the square of the distance between two samples: their `spreads` and `thicknesses` are
 /// products of those of the two.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn blur(reach: f32, spreads: f32, thicknesses: f32, gap: f32) -> f32 {
+pub(super) fn blur(reach: f32, spreads: f32, thicknesses: f32, gap: f32) -> f32 {
     let blunt = BLUNT * reach;
     let noise = NOISE * spreads;
     let mut rough = thicknesses;
@@ -115,61 +106,56 @@ pub fn blur(reach: f32, spreads: f32, thicknesses: f32, gap: f32) -> f32 {
 /// Source: the reflected transfer of H. Xie, K. McDonnell, H. Qin, "Surface reconstruction of noisy
 /// and defective data sets" (2004).
 #[allow(clippy::manual_clamp)] // a kernel has no such method
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn coupled(parallel: f32, heights: f32, square: f32, gap: f32) -> f32 {
+pub(super) fn coupled(parallel: f32, heights: f32, square: f32, gap: f32) -> f32 {
     let mut divisor = square;
-    if gap < square && heights * parallel > 0.0f32 {
+    if gap < square && heights * parallel > 0.0 {
         let second = parallel * parallel;
         let fourth = second * second;
         let share = fourth * fourth;
-        let full = share * (heights.abs() + gap) + (1.0f32 - share) * square;
+        let full = share * (heights.abs() + gap) + (1.0 - share) * square;
         if full < square {
             divisor = full;
         }
     }
     let mut tie = parallel;
-    if divisor > 0.0f32 {
-        tie = parallel - 2.0f32 * heights / divisor;
+    if divisor > 0.0 {
+        tie = parallel - 2.0 * heights / divisor;
     }
-    if tie < -1.0f32 {
-        tie = -1.0f32;
+    if tie < -1.0 {
+        tie = -1.0;
     }
-    if tie > 1.0f32 {
-        tie = 1.0f32;
+    if tie > 1.0 {
+        tie = 1.0;
     }
     tie
 }
 
 /// A coupling for a [tie](coupled), its fifth power: a half-hearted one, as between a sample of one sheet and one
 /// slantwise across on the other, is mostly wrong, and must not count for half.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn trusted(tie: f32) -> f32 {
+pub(super) fn trusted(tie: f32) -> f32 {
     let square = tie * tie;
     tie * (square * square)
 }
 
 /// The coupling of two samples in a layer that has air on both sides, as far as it has (`both`, in 0..1): they hang
 /// together as they lie, on one side of the middle or on both. `parallel` as in [`coupled`].
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn parted(coupling: f32, both: f32, parallel: f32, side: f32, other: f32) -> f32 {
+pub(super) fn parted(coupling: f32, both: f32, parallel: f32, side: f32, other: f32) -> f32 {
     coupling + both * (trusted(parallel * side * other) - coupling)
 }
 
 /// Whether a neighbor lies on the same sheet, and takes a share of its area.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn on_same_sheet(coupling: f32, parallel: f32) -> bool {
+pub(super) fn on_same_sheet(coupling: f32, parallel: f32) -> bool {
     coupling * parallel > SAME_SHEET
 }
 
 /// The area that a sample stands for with so many neighbors on the same sheet.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn area(reach: f32, same: f32) -> f32 {
-    let mut share = (1.0f32 + same) / ALL;
+pub(super) fn area(reach: f32, same: f32) -> f32 {
+    let mut share = (1.0 + same) / ALL;
     if share < LEAST_SHARE {
         share = LEAST_SHARE;
     }
@@ -178,15 +164,14 @@ pub fn area(reach: f32, same: f32) -> f32 {
 
 /// How much a neighbor lies off the sheet of a sample: above 0 where its `height`, along the axis, is. `square` is
 /// its squared distance, above 0.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn across(height: f32, square: f32, parallel: f32, gap: f32) -> f32 {
+pub(super) fn across(height: f32, square: f32, parallel: f32, gap: f32) -> f32 {
     let sine = height.abs() / f32::sqrt(square);
     let mut off = sine * sine * sine;
     if gap < UNKNOWN {
         off = height * height / (height * height + gap);
     }
-    if height < 0.0f32 {
+    if height < 0.0 {
         off = -off;
     }
     let second = parallel * parallel;
@@ -195,30 +180,23 @@ pub fn across(height: f32, square: f32, parallel: f32, gap: f32) -> f32 {
 
 /// Evidence for the sign of an axis from what lies [`across`] a second sheet close by: its sum, and that of its
 /// magnitudes. Positive where the axis points away from that sheet.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn sheet_evidence(signed: f32, total: f32) -> f32 {
-    if total > 0.0f32 {
+pub(super) fn sheet_evidence(signed: f32, total: f32) -> f32 {
+    if total > 0.0 {
         -signed * signed.abs() / (total * HEARD)
     } else {
-        f32::new(0.0)
+        0.0
     }
 }
 
 /// What a point's own evidence adds to the sum of beliefs, its strength being its weight.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn held(own: f32) -> f32 {
+pub(super) fn held(own: f32) -> f32 {
     own * own.abs()
 }
 
 /// The mean of evidence and beliefs; 0 where nothing has weight.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn belief(sum: f32, weight: f32) -> f32 {
-    if weight > 0.0f32 {
-        sum / weight
-    } else {
-        f32::new(0.0)
-    }
+pub(super) fn belief(sum: f32, weight: f32) -> f32 {
+    if weight > 0.0 { sum / weight } else { 0.0 }
 }

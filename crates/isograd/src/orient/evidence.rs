@@ -1,9 +1,4 @@
-//! What speaks for the sign of one axis, from −1 to 1, in the automatic orientation: see `isograd::orient`.
-
-#[cfg(cube)]
-use cubecl::prelude::*;
-
-use super::Element;
+//! What speaks for the sign of one axis, from −1 to 1, in the automatic orientation: see [`crate::orient`].
 
 /// What the evidence of a second sheet weighs.
 const SHEET: f32 = 4.0;
@@ -19,37 +14,34 @@ const SLIGHT: f32 = 0.05;
 const CLEAR_VIEW: f32 = 0.25;
 
 /// Within −1..1.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-fn held<F: Element>(x: F) -> F {
+fn held(x: f32) -> f32 {
     let mut held = x;
-    if x > F::new(1.0) {
-        held = F::new(1.0);
+    if x > 1.0 {
+        held = 1.0;
     }
-    if x < F::new(-1.0) {
-        held = F::new(-1.0);
+    if x < -1.0 {
+        held = -1.0;
     }
     held
 }
 
 /// The magnitude.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-fn size<F: Element>(x: F) -> F {
+fn size(x: f32) -> f32 {
     let mut size = x;
-    if x < F::new(0.0) {
+    if x < 0.0 {
         size = -x;
     }
     size
 }
 
 /// In 0..1, how open the side is on which the light is this: −1 in matter, 1 in the open air.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn openness<F: Element>(light: F) -> F {
-    let mut open = held::<F>(F::new(1.0) + light);
-    if open < F::new(0.0) {
-        open = F::new(0.0);
+pub(super) fn openness(light: f32) -> f32 {
+    let mut open = held(1.0 + light);
+    if open < 0.0 {
+        open = 0.0;
     }
     open
 }
@@ -57,45 +49,40 @@ pub fn openness<F: Element>(light: F) -> F {
 /// The evidence of a sample: what the fills say, a second `sheet` as far as the side is `open` that it makes the
 /// outer one, the side of its layer that it lies on (`slab` says how much of a layer that is, `side` how clearly it
 /// lies there), and before all these what sensors have `seen`.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn weighed<F: Element>(filled: F, sheet: F, open: F, slab: F, side: F, seen: F) -> F {
-    let found = filled + F::new(SHEET) * open * sheet + F::new(SLAB) * slab * side;
-    seen + (F::new(1.0) - size::<F>(seen)) * held::<F>(found)
+pub(super) fn weighed(filled: f32, sheet: f32, open: f32, slab: f32, side: f32, seen: f32) -> f32 {
+    let found = filled + SHEET * open * sheet + SLAB * slab * side;
+    seen + (1.0 - size(seen)) * held(found)
 }
 
 /// Whether it matters if a second sheet is on the far side of a thin body or of a narrow gap.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn differs<F: Element>(sheet: F, open: F) -> bool {
-    (F::new(1.0) - open) * size::<F>(sheet) > F::new(SLIGHT)
+pub(super) fn differs(sheet: f32, open: f32) -> bool {
+    (1.0 - open) * size(sheet) > SLIGHT
 }
 
 /// Whether a view decides alone.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn is_clear<F: Element>(view: F) -> bool {
-    size::<F>(view) >= F::new(CLEAR_VIEW)
+pub(super) fn is_clear(view: f32) -> bool {
+    size(view) >= CLEAR_VIEW
 }
 
 /// What a view adds to the evidence for the sign of an axis: all but all of it for a clear one.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn of_view<F: Element>(view: F) -> F {
-    held::<F>(view / F::new(CLEAR_VIEW))
+pub(super) fn of_view(view: f32) -> f32 {
+    held(view / CLEAR_VIEW)
 }
 
 /// Of two views by sensors of which it is not known which one saw the sample: the more grazing one, or none where
 /// they are on different sides.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn agreed<F: Element>(a: F, b: F) -> F {
+pub(super) fn agreed(a: f32, b: f32) -> f32 {
     let mut agreed = b;
-    if size::<F>(a) <= size::<F>(b) {
+    if size(a) <= size(b) {
         agreed = a;
     }
-    if a * b <= F::new(0.0) {
-        agreed = F::new(0.0);
+    if a * b <= 0.0 {
+        agreed = 0.0;
     }
     agreed
 }
