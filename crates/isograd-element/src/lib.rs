@@ -9,11 +9,10 @@
 pub mod crossing;
 pub mod eigen;
 pub mod fit;
-pub mod hat;
 pub mod linear;
 pub mod plane;
 pub mod plate;
-pub mod spline;
+pub mod stencil;
 pub mod turned;
 #[cfg(not(cube))]
 pub mod vector;

@@ -1,4 +1,4 @@
-//! The points that are asked for the automatic radius: those that the CPU asks.
+//! Points that are sampled for the automatic radius: those that the CPU samples.
 //!
 //! They are a fixed stride of the order of the CPU's k-d tree, which halves the points along the longest side of
 //! their box until no more than 16 are together. So that the device asks the same ones, it halves them in the same

@@ -51,7 +51,7 @@ pub struct Radii<T> {
     pub neighborhoods: Neighborhoods<T>,
 }
 
-/// What the neighborhoods hold, in input order.
+/// Sizes of the neighborhoods, in input order.
 #[derive(Clone, Debug)]
 pub struct Census {
     /// `(N,)` number of samples within `R_i`, the point itself included.

@@ -12,8 +12,8 @@
 //! cloud. `v₃ = n × v₂`. Of the pullback, `⟨B, C⟩ = 0`, and `B` is `n` and a vector `g` made of these.
 //!
 //! # Pullback
-//! As printed there. One walk over the tree gathers both what a point gets as a neighbor of others and what it
-//! hands out as a center, with the radius of each center. No atomics.
+//! That of [`isograd::normals`]. One walk over the tree gathers the cotangents of a point both as a neighbor of others and
+//! as a center, with the radius of each center. No atomics.
 //!
 //! # Not differentiable
 //! The neighborhoods, the radii, the sign. Where `λ₂ − λ₁` is at most `10⁻³ λ₃`, the pullback bounds
@@ -46,7 +46,7 @@ const WEIGHT: usize = 12;
 /// Parts of 1000 of `λ₃` up to which the gap `λ₂ − λ₁` is too small for a normal to mean anything: as on the CPU.
 const SMALLEST_GAP: f32 = 1.0;
 
-/// What the pullback needs of [`forward`].
+/// Residual of [`forward`].
 #[derive(Clone, Debug)]
 pub struct Residual<T> {
     pub(crate) neighborhoods: Neighborhoods<T>,

@@ -69,7 +69,7 @@ pub fn widen<R: Runtime, T: Scalar>(
     scatter(device, &widened, &near.places)
 }
 
-/// Of ascending eigenvalues; as good as infinite where the smallest is no smaller than another.
+/// Roughness of a neighborhood from its ascending eigenvalues; practically infinite if the smallest equals another.
 #[cube]
 fn roughness<F: Float>(values: Vector3<F>) -> F {
     let mut found = F::new(0.0);
@@ -134,14 +134,7 @@ fn try_wider<F: Float + CubeElement>(
         let center = Vector3::<F>::at(&near.points, at);
         let radius = step * near.radii[at];
         let mut sums = Array::<F>::new(MOMENTS);
-        moments_within::<F>(
-            &near.points,
-            &near.nodes,
-            &near.links,
-            center,
-            radius,
-            &mut sums,
-        );
+        moments_within::<F>(near, center, radius, &mut sums);
         let fit = fit::<F>(&sums, 0usize, 1usize);
         let second = fit.eigen.second.dot(fit.centroid);
         let third = fit.eigen.third.dot(fit.centroid);

@@ -38,11 +38,10 @@ use crate::{Buffer, Device, Error, Scalar};
 use axis::{Axis, Lines};
 use gain::Gains;
 
-/// What a grid's Poisson equation has that does not depend on its right-hand side: tables on the device. Made
-/// once, used for every solve.
+/// Plan of the Poisson equation of a grid: tables on the device that do not depend on the right-hand side.
 pub struct Solver<T> {
     shape: [usize; 3],
-    /// The same field with axes of one cell moved from the front to the end: the first one, where the gains
+    /// Shape of the field with axes of one cell moved from the front to the end: the first one, where the gains
     /// are applied, has more if any has.
     turned: [usize; 3],
     /// The first axis and others of more than one cell, of `turned`, in the order of the transforms back.
@@ -51,7 +50,7 @@ pub struct Solver<T> {
     spectrum: Buffer<T>,
 }
 
-/// What the pullback of a solve needs.
+/// Residual of a solve.
 pub struct Residual<T> {
     /// `σ` in cells.
     pub smoothing: f64,
@@ -59,7 +58,7 @@ pub struct Residual<T> {
     pub chi: Buffer<T>,
 }
 
-/// Cotangents of what a solve was given.
+/// Cotangents of the inputs of a solve.
 pub struct Cotangents<T> {
     /// `b̄`, one value per cell.
     pub b: Buffer<T>,
@@ -89,7 +88,7 @@ pub fn forward<R: Runtime, T: Scalar>(
 /// From `χ̄` to `b̄` and `σ̄`.
 ///
 /// # Errors
-/// As [`forward`].
+/// Like [`forward`].
 pub fn pullback<R: Runtime, T: Scalar>(
     device: &Device<R>,
     solver: &Solver<T>,
@@ -116,7 +115,7 @@ impl<T: Scalar> Solver<T> {
     /// Like [`Self::new`], with the sums that define the transforms, `O(n⁴)` for `n³` cells: an oracle.
     ///
     /// # Errors
-    /// As [`Self::new`].
+    /// Like [`Self::new`].
     pub fn by_definition<R: Runtime>(device: &Device<R>, shape: [usize; 3]) -> Result<Self, Error> {
         Self::of_axes(device, shape, Axis::by_definition)
     }
@@ -162,7 +161,7 @@ impl<T: Scalar> Solver<T> {
     /// `χ` for the right-hand side `b`: [`forward`] without its residual. Its own transpose.
     ///
     /// # Errors
-    /// As [`forward`].
+    /// Like [`forward`].
     pub fn solve<R: Runtime>(
         &self,
         device: &Device<R>,
@@ -226,10 +225,10 @@ impl<T: Scalar> Solver<T> {
     }
 }
 
-/// The fields of a solve: what the last kernel wrote, and room for the next.
+/// Fields of a solve: the output of the last kernel, and a buffer for the next.
 struct Fields<T> {
     last: Buffer<T>,
-    /// Whether `last` is what was given, not to be written.
+    /// Whether `last` is the caller's input, which is not written to.
     given: bool,
     spare: Option<Buffer<T>>,
 }

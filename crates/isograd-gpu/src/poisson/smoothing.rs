@@ -1,4 +1,4 @@
-//! What more smoothing would do: [`isograd::poisson::smoothing::pullback`] on a device.
+//! Cotangent of the smoothing: [`isograd::poisson::smoothing::pullback`] on a device.
 //!
 //! With `L` the sum of second differences along the axes, even at the walls, `χ·Lχ̄ = −Σ ∇χ·∇χ̄` over the
 //! differences of neighboring cells: fewer terms, and smaller ones.
@@ -48,7 +48,7 @@ pub fn pullback<R: Runtime, T: Scalar>(
     reduce::sum(device, &sums)
 }
 
-/// Of the cells of a group, `factor` times the sum of products of differences.
+/// `factor` times the sum of products of differences, for each group of cells.
 #[cube(launch)]
 fn sum_products<F: Float + CubeElement>(
     chi: &Array<F>,

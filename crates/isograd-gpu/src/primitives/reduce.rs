@@ -86,7 +86,7 @@ fn sum_spans<F: Float>(
     }
 }
 
-/// The sum of the values that the `BLOCK` units of a group have, by halves. Every unit must call it.
+/// Sum of the values of the `BLOCK` units of a group, by halves. Every unit must call it.
 #[cube]
 pub(crate) fn sum_of_group<N: Numeric>(value: N, shared: &mut SharedMemory<N>) -> N {
     let unit = UNIT_POS as usize;

@@ -17,10 +17,10 @@ const BLOCK: u32 = 256;
 /// Most elements of a piece.
 pub(crate) const PIECE: usize = 64;
 
-/// Stands for the segment of a piece that is not there.
+/// Segment of an unused row of the table of pieces.
 pub(crate) const NO_SEGMENT: u32 = u32::MAX;
 
-/// The pieces that segments are cut into. Clones share the memory.
+/// Pieces of segments. Clones share the memory.
 #[derive(Clone)]
 pub(crate) struct Pieces {
     /// `(P, 3)`: segment, first element, and one past the last; [`NO_SEGMENT`] in those that are too many.
@@ -112,7 +112,7 @@ pub(crate) fn sum_rows<T: Scalar, R: Runtime>(
     sum_rows_in(device, values, rows, places, pieces, elements)
 }
 
-/// The same for segments that are cut already.
+/// Like [`sum_rows`], for segments that are cut already.
 pub(crate) fn sum_rows_in<T: Scalar, R: Runtime>(
     device: &Device<R>,
     values: &Buffer<T>,

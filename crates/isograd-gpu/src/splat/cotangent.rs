@@ -55,8 +55,8 @@ impl<T: Scalar> SampleCotangent<T> {
     }
 }
 
-/// What the points' cotangents of a group mean for the grid, at fixed points: less their sum for the low
-/// corner, and less the sum of `spacing` for the cell size. Every unit must call it.
+/// Cotangent of the grid at fixed points, from the cotangents of the points of a group: their negative sum for the low
+/// corner, and the negative sum of `spacing` for the cell size. Every unit must call it.
 #[cube]
 pub(crate) fn subtract_from_grid<F: Float>(x: F, y: F, z: F, spacing: F, grid_sums: &mut Array<F>) {
     let mut shared = SharedMemory::<F>::new(BLOCK);

@@ -2,9 +2,10 @@
 
 use cubecl::prelude::*;
 
-use super::stencil::{BSpline, NUMBERS, Paper, REACH, hats, total};
+use super::stencil::{BSpline, NUMBERS, Paper, REACH, total};
 use super::{Residual, SampleArrays, SampleOrder, Samples, Weights};
 use crate::device::launch;
+use crate::element::stencil::hat;
 use crate::grid::{self, Lattice, cell_at, from_center, place};
 use crate::spread::{Before, spread};
 use crate::{Buffer, Device, Error, Scalar};
@@ -88,7 +89,7 @@ fn sort_samples<F: Float + CubeElement>(
         // One division after the other: h² may underflow where a/h² is fine.
         let mut scale = samples.areas[i] / grid.spacing / grid.spacing;
         if normalize {
-            scale /= total::<F>(hats::<F>(fx), hats::<F>(fy), hats::<F>(fz));
+            scale /= total::<F>(hat::<F>(fx), hat::<F>(fy), hat::<F>(fz));
         }
         let at = s * NUMBERS;
         sorted[at] = fx;

@@ -15,9 +15,8 @@
 //! `x̂ = (x − lower)/h` and `a/h²` depend.
 //!
 //! # Bad samples
-//! The CPU refuses a cloud with a sample that is less than 2 cells inside the grid, or not finite. To know
-//! costs a wait for the device: here such samples are left out, and [`Residual::refused`] tells of them when
-//! it is asked.
+//! The CPU refuses a cloud with a sample that is less than 2 cells inside the grid, or not finite. Here
+//! such samples are left out, as a check would wait for the device; [`Residual::refused`] reports them.
 //!
 //! # Not differentiable
 //! As on the CPU: nothing with [`Weights::BSpline`]; with [`Weights::Paper`], `b` jumps where a sample
@@ -29,13 +28,14 @@ mod order;
 mod pullback;
 mod stencil;
 
+pub(crate) use crate::element::stencil::{bspline, bspline_slope};
 pub use cotangent::SampleCotangent;
 pub(crate) use cotangent::{CotangentArrays, subtract_from_grid};
 pub use forward::forward;
 pub use isograd::splat::Weights;
 pub use order::{Refused, SampleOrder};
 pub use pullback::pullback;
-pub(crate) use stencil::{bspline, bspline_slope, pick};
+pub(crate) use stencil::pick;
 
 use crate::device::check_length;
 use crate::{Buffer, Device, Error, Scalar};
@@ -89,7 +89,7 @@ pub(crate) struct SampleArrays<F: Float + CubeElement> {
     pub count: u32,
 }
 
-/// What the pullback needs besides the inputs.
+/// Residual of [`forward`]; the pullback takes the inputs again.
 #[derive(Clone, Debug)]
 pub struct Residual<T> {
     /// The grid of `b`.

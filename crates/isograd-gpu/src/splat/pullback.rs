@@ -4,20 +4,18 @@ use cubecl::prelude::*;
 
 use super::cotangent::subtract_from_grid;
 use super::forward::sorted;
-use super::stencil::{
-    NUMBERS, REACH, Triple, WIDTH, along, bspline, bspline_slope, central, extra, hat_slopes, hats,
-    sum, total,
-};
+use super::stencil::{NUMBERS, REACH, WIDTH, along, central, extra, sum, total};
 use super::{CotangentArrays, Residual, SampleArrays, SampleCotangent, Samples, Weights};
 use crate::device::{check_length, launch};
+use crate::element::stencil::{Triple, bspline, bspline_slope, hat, hat_slope};
 use crate::grid::{self, Lattice, cell_at, check_field};
 use crate::primitives::fill::add;
 use crate::primitives::reduce::{BLOCK, sum_columns};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
-/// Adds to `out` what the cotangents `b_bar` of the right-hand side, `(nx, ny, nz)`, mean for the samples and
-/// the grid. The samples, and `residual`, are those of [`forward`](super::forward).
+/// Adds the cotangents of the samples and the grid to `out`, given the cotangents `b_bar` of the right-hand side,
+/// `(nx, ny, nz)`, and samples and residual of [`forward`](super::forward).
 ///
 /// # Errors
 /// [`Error::Length`] where the arrays do not match, [`Error::TooLarge`].
@@ -65,8 +63,8 @@ pub fn pullback<R: Runtime, T: Scalar>(
     Ok(())
 }
 
-/// What the cells round a sample hold for it, in index space: the cotangent of the vector that was spread,
-/// and that of the sample's index coordinates.
+/// Cotangents of a sample from the cells around it, in index space: of the vector that was spread, and of the sample's
+/// index coordinates.
 #[derive(CubeType, Clone, Copy)]
 struct Gathered<F: Float> {
     spread_x: F,
@@ -85,8 +83,8 @@ struct Weights3<F: Float> {
     z: Triple<F>,
 }
 
-/// Replaces the offset and vector of each sample by the cotangents of the vector `a n`, and of the point; and
-/// sums what they mean for the grid, a group at a time.
+/// Replaces the offset and vector of each sample by the cotangents of the vector `a n` and of the point, and
+/// sums the cotangent of the grid, a group at a time.
 #[cube(launch)]
 fn gather_samples<F: Float + CubeElement>(
     keys: &Array<u32>,
@@ -147,14 +145,14 @@ fn gather_sample<F: Float + CubeElement>(
 ) -> Gathered<F> {
     if comptime!(paper) {
         let w = Weights3::<F> {
-            x: hats::<F>(f.x),
-            y: hats::<F>(f.y),
-            z: hats::<F>(f.z),
+            x: hat::<F>(f.x),
+            y: hat::<F>(f.y),
+            z: hat::<F>(f.z),
         };
         let slopes = Weights3::<F> {
-            x: hat_slopes::<F>(f.x),
-            y: hat_slopes::<F>(f.y),
-            z: hat_slopes::<F>(f.z),
+            x: hat_slope::<F>(f.x),
+            y: hat_slope::<F>(f.y),
+            z: hat_slope::<F>(f.z),
         };
         gather_paper::<F>(b_bar, corner, grid, w, slopes, v)
     } else {

@@ -1,4 +1,4 @@
-//! How the signs of two neighboring axes hang together, and what spreads along such ties: see
+//! Coupling of the signs of two neighboring axes, and the beliefs that spread along it: see
 //! [`crate::orient::graph`]. Lengths are in sample spacings, so that single precision serves any unit.
 
 /// Neighbors of a point in the graph.
@@ -7,20 +7,20 @@ pub const NEIGHBORS: usize = 16;
 /// The reach of a sample is its distance to this neighbor: the first ring round it.
 pub(super) const RING: usize = 6;
 
-/// Rounds in which every point takes the mean of its own evidence and what its neighbors say.
+/// Rounds of belief propagation, in each of which a point takes the mean of its own evidence and its neighbors' beliefs.
 pub(super) const ROUNDS: usize = 60;
 
 /// A sample reaches at most this many times as far as its neighbors do at the median: an outlier
 /// stands for no more surface than the samples that are nearest to it.
 const REACH_GROWTH: f32 = 1.5;
 
-/// Offsets shorter than this share of the reach have no direction to speak of.
+/// Share of the reach below which the direction of an offset is mostly noise.
 const BLUNT: f32 = 0.22;
 
 /// A sample lies off a sheet from this many times as far as the samples of the sheet scatter.
 const APART: f32 = 3.0;
 
-/// Stands for the gap where a sheet is not known: no length reaches it.
+/// Gap of an unknown sheet: no length reaches it.
 const UNKNOWN: f32 = f32::MAX;
 
 /// A neighbor of a coupling above this along the same direction lies on the same sheet; and the least share
@@ -32,9 +32,9 @@ const LEAST_SHARE: f32 = 1.0 / 3.0;
 const ALL: f32 = NEIGHBORS as f32 + 1.0;
 const IN_RING: f32 = RING as f32 + 0.5;
 const PI: f32 = std::f32::consts::PI;
-const HEARD: f32 = NEIGHBORS as f32;
+const SOURCES: f32 = NEIGHBORS as f32;
 
-/// What the product of the spreads of two samples adds to the blur of their reflection.
+/// Factor of the product of the spreads of two samples in the blur of their reflection.
 const NOISE: f32 = 4.0;
 
 /// How soon it is clear on which side of a plane a sample lies, by its height in spreads.
@@ -79,7 +79,7 @@ pub(super) fn least_gap(a: f32, b: f32) -> f32 {
     }
 }
 
-/// What is added to the square of the distance between two samples: their `spreads` and `thicknesses` are
+/// Blur that is added to the square of the distance between two samples: their `spreads` and `thicknesses` are
 /// products of those of the two.
 #[inline(always)]
 pub(super) fn blur(reach: f32, spreads: f32, thicknesses: f32, gap: f32) -> f32 {
@@ -93,7 +93,7 @@ pub(super) fn blur(reach: f32, spreads: f32, thicknesses: f32, gap: f32) -> f32 
     blunt * blunt + rough
 }
 
-/// How the signs of two neighboring axes `a` and `b` hang together, `d` apart: `a` is reflected at the
+/// Coupling of the signs of two neighboring axes `a` and `b`, `d` apart: `a` is reflected at the
 /// plane half-way between the two samples and compared with `b`. Along a sheet that is `a·b`; round an
 /// edge it turns with the surface; and two sheets that face each other, whether matter or air is
 /// between them, have opposite outward normals. A [`blur`] takes the reflection back
@@ -183,13 +183,13 @@ pub(super) fn across(height: f32, square: f32, parallel: f32, gap: f32) -> f32 {
 #[inline(always)]
 pub(super) fn sheet_evidence(signed: f32, total: f32) -> f32 {
     if total > 0.0 {
-        -signed * signed.abs() / (total * HEARD)
+        -signed * signed.abs() / (total * SOURCES)
     } else {
         0.0
     }
 }
 
-/// What a point's own evidence adds to the sum of beliefs, its strength being its weight.
+/// Contribution of a point's own evidence to the sum of beliefs, weighted by its strength.
 #[inline(always)]
 pub(super) fn held(own: f32) -> f32 {
     own * own.abs()

@@ -15,22 +15,13 @@ pub(super) fn radius(reach: f32) -> f32 {
 /// Half the thickness of a disc with this axis: the least that no path through cell faces gets through.
 #[inline(always)]
 pub(super) fn half(x: f32, y: f32, z: f32) -> f32 {
-    0.5 * (absolute(x) + absolute(y) + absolute(z))
+    0.5 * (x.abs() + y.abs() + z.abs())
 }
 
 /// Whether a disc covers a cell whose center is so far from its own, squared, and so high above its plane.
 #[inline(always)]
 pub(super) fn covers(square: f32, height: f32, half: f32, radius: f32) -> bool {
     height <= half && -height <= half && square - height * height <= radius * radius
-}
-
-#[inline(always)]
-fn absolute(x: f32) -> f32 {
-    let mut absolute = x;
-    if x < 0.0 {
-        absolute = -x;
-    }
-    absolute
 }
 
 #[inline(always)]

@@ -1,9 +1,9 @@
-//! What speaks for the sign of one axis, from −1 to 1, in the automatic orientation: see [`crate::orient`].
+//! Evidence for the sign of one axis, from −1 to 1, in the automatic orientation: see [`crate::orient`].
 
-/// What the evidence of a second sheet weighs.
+/// Weight of the evidence of a second sheet.
 const SHEET: f32 = 4.0;
 
-/// What the side weighs on which a sample lies in a layer that scatters.
+/// Weight of the side on which a sample lies in a layer that scatters.
 const SLAB: f32 = 2.0;
 
 /// Evidence of a second sheet below this makes no difference.
@@ -13,72 +13,55 @@ const SLIGHT: f32 = 0.05;
 /// samples are 5 to 15 degrees off.
 const CLEAR_VIEW: f32 = 0.25;
 
-/// Within −1..1.
+/// `x` limited to −1..1.
 #[inline(always)]
-fn held(x: f32) -> f32 {
-    let mut held = x;
-    if x > 1.0 {
-        held = 1.0;
-    }
-    if x < -1.0 {
-        held = -1.0;
-    }
-    held
+fn limited(x: f32) -> f32 {
+    x.clamp(-1.0, 1.0)
 }
 
-/// The magnitude.
-#[inline(always)]
-fn size(x: f32) -> f32 {
-    let mut size = x;
-    if x < 0.0 {
-        size = -x;
-    }
-    size
-}
-
-/// In 0..1, how open the side is on which the light is this: −1 in matter, 1 in the open air.
+/// Openness of a side, in 0..1, from the light there: −1 in matter, 1 in the open air.
 #[inline(always)]
 pub(super) fn openness(light: f32) -> f32 {
-    let mut open = held(1.0 + light);
+    let mut open = limited(1.0 + light);
     if open < 0.0 {
         open = 0.0;
     }
     open
 }
 
-/// The evidence of a sample: what the fills say, a second `sheet` as far as the side is `open` that it makes the
-/// outer one, the side of its layer that it lies on (`slab` says how much of a layer that is, `side` how clearly it
-/// lies there), and before all these what sensors have `seen`.
+/// Evidence of a sample: that of the fills, of a second `sheet` (weighted by how `open` the side is that it makes the
+/// outer one), and of the side of the layer on which the sample lies (`slab` is how much of a layer there is, `side` how
+/// clearly the sample lies on one side). Views of sensors (`seen`) take precedence.
 #[inline(always)]
 pub(super) fn weighed(filled: f32, sheet: f32, open: f32, slab: f32, side: f32, seen: f32) -> f32 {
     let found = filled + SHEET * open * sheet + SLAB * slab * side;
-    seen + (1.0 - size(seen)) * held(found)
+    seen + (1.0 - seen.abs()) * limited(found)
 }
 
 /// Whether it matters if a second sheet is on the far side of a thin body or of a narrow gap.
 #[inline(always)]
 pub(super) fn differs(sheet: f32, open: f32) -> bool {
-    (1.0 - open) * size(sheet) > SLIGHT
+    (1.0 - open) * sheet.abs() > SLIGHT
 }
 
 /// Whether a view decides alone.
 #[inline(always)]
 pub(super) fn is_clear(view: f32) -> bool {
-    size(view) >= CLEAR_VIEW
+    view.abs() >= CLEAR_VIEW
 }
 
-/// What a view adds to the evidence for the sign of an axis: all but all of it for a clear one.
+/// Evidence of a view for the sign of an axis; a clear view decides alone.
 #[inline(always)]
 pub(super) fn of_view(view: f32) -> f32 {
-    held(view / CLEAR_VIEW)
+    limited(view / CLEAR_VIEW)
 }
 
-/// Of two views by sensors of which it is not known which one saw the sample: the more grazing one, or none where
-/// they are on different sides.
+/// Combined view of two sensors, either of which may have seen the sample: the more grazing one, or 0 if they are on
+/// different sides.
 #[inline(always)]
 pub(super) fn agreed(a: f32, b: f32) -> f32 {
     let mut agreed = b;
-    if size(a) <= size(b) {
+    if a.abs() <= b.abs() {
         agreed = a;
     }
     if a * b <= 0.0 {

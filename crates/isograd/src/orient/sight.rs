@@ -1,4 +1,4 @@
-//! What a sample sees along a ray, and what that says about its axis: see [`crate::orient::fill`]. Lengths in cells.
+//! Light that reaches a sample along a ray, and its evidence for the sign of the axis: see [`crate::orient::fill`]. Lengths in cells.
 
 /// Places along a ray to the nearest free cell.
 pub(super) const STEPS: usize = 8;
@@ -19,7 +19,7 @@ pub(super) fn open_air(free: f32, rays: f32) -> f32 {
     dark + (1.0 - dark) * (free / rays)
 }
 
-/// What is left of the light of a cell that is met at a place after so many of the [`STEPS`].
+/// Light of a cell, dimmed by the number of [`STEPS`] along the ray to it.
 #[inline(always)]
 pub(super) fn dimmed(light: f32, step: f32, steps: f32) -> f32 {
     light * (1.0 - 0.5 * step / steps)

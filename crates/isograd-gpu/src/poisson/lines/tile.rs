@@ -90,7 +90,7 @@ pub(super) fn first_pair(tile: &Tile) -> usize {
     }
 }
 
-/// The place of that.
+/// The place that a unit reads or writes first.
 #[cube]
 pub(super) fn first_place(tile: &Tile) -> usize {
     if comptime!(tile.contiguous) {
@@ -112,7 +112,7 @@ pub(super) fn next_pair(tile: &Tile, pair: usize, j: usize) -> usize {
     }
 }
 
-/// The place of that.
+/// The place that a unit reads or writes after place `j`.
 #[cube]
 pub(super) fn next_place(tile: &Tile, j: usize) -> usize {
     if comptime!(tile.contiguous) {

@@ -266,7 +266,7 @@ fn start<F: Float + CubeElement>(
     }
 }
 
-/// Has each sample spread `√â u`.
+/// Sets the number that each sample spreads to `√â u`.
 #[cube(launch)]
 fn carry<F: Float>(roots: &Array<F>, u: &Array<F>, carriers: &mut Array<F>) {
     let s = ABSOLUTE_POS;

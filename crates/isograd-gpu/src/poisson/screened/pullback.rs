@@ -12,12 +12,12 @@ use crate::splat::{CotangentArrays, SampleArrays, SampleCotangent, subtract_from
 use crate::spread::Before;
 use crate::{Buffer, Device, Scalar, iso_value};
 
-/// Turns the cotangents `chi_bar`, `(nx, ny, nz)`, of the screened solution into those of the plain one, adds what
-/// they mean for points, areas and grid to `out`, and returns the iterations it took. `level` is what the
-/// iso-value kept of `χ`; all else is as it was in [`forward`](super::forward). Waits for the device.
+/// Replaces the cotangents `chi_bar`, `(nx, ny, nz)`, of the screened solution by those of the plain one, adds the
+/// cotangents of points, areas and grid to `out`, and returns the number of iterations. `level` is the residual of the
+/// iso-value; all other arguments are those of [`forward`](super::forward). Waits for the device.
 ///
 /// # Errors
-/// As [`forward`](super::forward); `chi_bar` is then as it was.
+/// Like [`forward`](super::forward); `chi_bar` is then unchanged.
 pub fn pullback<R: Runtime, T: Scalar>(
     device: &Device<R>,
     equation: &Equation<'_, T>,
@@ -73,7 +73,8 @@ struct Factors<F: Float + CubeElement> {
     per_area: F,
 }
 
-/// What the derivative of the matrix has for each point and area, and summed a group at a time for the grid.
+/// Adds the cotangents of points and areas through the derivative of the matrix, and sums that of the grid a group at a
+/// time.
 #[cube(launch)]
 fn pull_matrix<F: Float + CubeElement>(
     samples: &SampleArrays<F>,
