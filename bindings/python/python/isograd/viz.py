@@ -212,5 +212,5 @@ def _arrows(points: np.ndarray | None, normals: ArrayLike | None) -> np.ndarray 
     if normals is None:
         return None
     if points is None:
-        raise ValueError("normals are drawn at points; give both")
+        raise ValueError("normals need points to be drawn at; give both")
     return floats(normals, "normals", (len(points), 3), points.dtype)
