@@ -2,6 +2,7 @@
 
 mod buffer;
 mod effort;
+mod launch;
 #[cfg(feature = "cuda")]
 mod libraries;
 mod open;
@@ -12,6 +13,7 @@ use effort::Counts;
 
 pub use buffer::Buffer;
 pub use effort::Effort;
+pub(crate) use launch::{Argument, BLOCK, Ready, launch};
 #[cfg(feature = "cuda")]
 pub use open::Cuda;
 #[cfg(feature = "wgpu")]

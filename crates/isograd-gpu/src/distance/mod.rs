@@ -35,7 +35,10 @@ mod triangle;
 
 pub use isograd::distance::{Band, NO_TRIANGLE};
 
-use crate::Buffer;
+use cubecl::prelude::*;
+
+use crate::device::Argument;
+use crate::{Buffer, Device, Scalar};
 
 /// A distance that no mesh has, squared.
 const FAR: f64 = 3e38;
@@ -48,6 +51,21 @@ pub struct Mesh<T> {
     /// `(F, 3)`: each names three vertices, from 0. Not checked: a kernel that reads beyond the vertices gets
     /// anything.
     pub faces: Buffer<u32>,
+}
+
+/// [`Mesh`] in kernels.
+#[derive(CubeLaunch, CubeType)]
+pub(crate) struct MeshArrays<F: Float + CubeElement> {
+    pub vertices: Array<F>,
+    pub faces: Array<u32>,
+}
+
+impl<R: Runtime, T: Scalar> Argument<R> for Mesh<T> {
+    type Parameter = MeshArraysLaunch<T, R>;
+
+    fn argument(&self, _: &Device<R>) -> Self::Parameter {
+        MeshArraysLaunch::new(self.vertices.arg(), self.faces.arg())
+    }
 }
 
 impl<T> Mesh<T> {

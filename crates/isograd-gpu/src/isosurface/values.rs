@@ -5,6 +5,7 @@ use isograd::isosurface::SMALLEST_DIFFERENCE;
 
 use super::Residual;
 use super::signs::Signs;
+use crate::device::Ready;
 use crate::element::crossing::crossing;
 use crate::{Device, Error, Scalar};
 
@@ -22,15 +23,12 @@ impl<T: Scalar> Residual<T> {
     pub(super) fn values<R: Runtime>(
         &self,
         device: &Device<R>,
-    ) -> Result<ValuesLaunch<T, R>, Error> {
+    ) -> Result<Ready<ValuesLaunch<T, R>>, Error> {
         let [x, y, z] = self.grid.lower();
         let smallest = T::of(SMALLEST_DIFFERENCE);
         let scales = device.upload(&[x, y, z, self.grid.spacing(), smallest])?;
-        Ok(ValuesLaunch::new(
-            self.chi.arg(),
-            self.level.arg(),
-            scales.arg(),
-        ))
+        let values = ValuesLaunch::new(self.chi.arg(), self.level.arg(), scales.arg());
+        Ok(Ready::new(values))
     }
 }
 

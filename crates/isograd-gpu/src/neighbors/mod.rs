@@ -34,7 +34,7 @@ pub(crate) use walk::{end_of_leaf, first_of_leaf, is_isolated, next_leaf};
 
 use cubecl::prelude::*;
 
-use crate::device::check_length;
+use crate::device::{Argument, check_length};
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Units of a group.
@@ -57,6 +57,35 @@ pub struct Neighborhoods<T> {
     pub(crate) nodes: Buffer<T>,
     /// Of a leaf, its number and [`tree::IS_LEAF`]; else the node after the subtree.
     pub(crate) links: Buffer<u32>,
+}
+
+/// [`Neighborhoods`] in kernels.
+#[derive(CubeLaunch, CubeType)]
+pub(crate) struct NeighborhoodArrays<F: Float + CubeElement> {
+    pub points: Array<F>,
+    pub radii: Array<F>,
+    pub nodes: Array<F>,
+    pub links: Array<u32>,
+}
+
+impl<T: Scalar> Neighborhoods<T> {
+    /// The neighborhoods as an argument of a kernel.
+    pub(crate) fn arg<R: Runtime>(&self) -> NeighborhoodArraysLaunch<T, R> {
+        NeighborhoodArraysLaunch::new(
+            self.points.arg(),
+            self.radii.arg(),
+            self.nodes.arg(),
+            self.links.arg(),
+        )
+    }
+}
+
+impl<R: Runtime, T: Scalar> Argument<R> for Neighborhoods<T> {
+    type Parameter = NeighborhoodArraysLaunch<T, R>;
+
+    fn argument(&self, _: &Device<R>) -> Self::Parameter {
+        self.arg()
+    }
 }
 
 impl<T> Neighborhoods<T> {

@@ -20,8 +20,8 @@ pub use isograd::orient::ParityOptions;
 
 use cubecl::prelude::*;
 
-use crate::device::check_length;
-use crate::neighbors::{BLOCK, Neighborhoods};
+use crate::device::{check_length, launch};
+use crate::neighbors::Neighborhoods;
 use crate::primitives::flags;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
@@ -113,14 +113,7 @@ fn count_flipped<R: Runtime, T: Scalar>(
 ) -> Result<Buffer<u32>, crate::Error> {
     let flipped = device.empty(axes.len() / 3)?;
     if !flipped.is_empty() {
-        flag_flipped::launch::<T, R>(
-            device.client(),
-            device.groups(flipped.len(), BLOCK),
-            CubeDim::new_1d(BLOCK),
-            axes.arg(),
-            normals.arg(),
-            flipped.arg(),
-        );
+        launch!(device, flipped.len() => flag_flipped<T>(axes, normals, flipped));
     }
     flags::count(device, &flipped)
 }

@@ -10,8 +10,9 @@ use isograd::orient::ParityOptions;
 use isograd_element::vector;
 
 use super::Error;
+use crate::device::{Ready, launch};
 use crate::neighbors::radius::bounds;
-use crate::neighbors::{BLOCK, Neighborhoods, SURE_SHARE, about_nearest, any_within, reaches};
+use crate::neighbors::{Neighborhoods, SURE_SHARE, about_nearest, any_within, reaches};
 use crate::primitives::ends::ends;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
@@ -52,32 +53,14 @@ pub(super) fn forward<R: Runtime, T: Scalar>(
     );
     let (crossings, leading): (Buffer<u32>, Buffer<u32>) =
         (device.empty(2 * n)?, device.empty(2 * n)?);
-    let dim = CubeDim::new_1d(BLOCK);
-    look_both_ways::launch::<T, R>(
-        device.client(),
-        device.groups(2 * n, BLOCK),
-        dim,
-        neighborhoods.points.arg(),
-        neighborhoods.places.arg(),
-        neighborhoods.nodes.arg(),
-        neighborhoods.links.arg(),
-        axes.arg(),
-        crossings.arg(),
-        leading.arg(),
-        ray,
-    );
-    choose_sides::launch::<T, R>(
-        device.client(),
-        device.groups(n, BLOCK),
-        dim,
-        crossings.arg(),
-        leading.arg(),
-        neighborhoods.places.arg(),
-        axes.arg(),
-        normals.arg(),
-        confidence.arg(),
+    launch!(device, 2 * n => look_both_ways<T>(
+        neighborhoods.points, neighborhoods.places, neighborhoods.nodes, neighborhoods.links, axes,
+        crossings, leading, Ready::new(ray),
+    ));
+    launch!(device, n => choose_sides<T>(
+        crossings, leading, neighborhoods.places, axes, normals, confidence,
         u32::try_from(options.tolerance).unwrap_or(u32::MAX),
-    );
+    ));
     Ok(radius)
 }
 

@@ -8,7 +8,7 @@ use isograd::orient::{self, Method, Orientation};
 use isograd::{PointCloud, Stage, normals};
 
 use super::{Error, Reconstruction};
-use crate::device::check_length;
+use crate::device::{check_length, launch};
 use crate::neighbors::radius;
 use crate::orient::previous::{self, Before, Followed};
 use crate::primitives::fill::zeros;
@@ -269,9 +269,6 @@ impl<T: Scalar> Held<T> {
     }
 }
 
-/// Units of a group.
-const BLOCK: u32 = 256;
-
 /// `vectors` `(N, 3)`, each multiplied by the sign that turns its axis to the side of `outward`. Its own
 /// pullback.
 pub(super) fn turn<R: Runtime, T: Scalar>(
@@ -283,16 +280,9 @@ pub(super) fn turn<R: Runtime, T: Scalar>(
     check_length("the outward vectors", outward, axes.len())?;
     check_length("the vectors to turn", vectors, axes.len())?;
     let turned = device.empty(axes.len())?;
-    turn_vectors::launch::<T, R>(
-        device.client(),
-        device.groups(axes.len() / 3, BLOCK),
-        CubeDim::new_1d(BLOCK),
-        vectors.arg(),
-        axes.arg(),
-        outward.arg(),
-        turned.arg(),
-        (axes.len() / 3) as u32,
-    );
+    launch!(device, axes.len() / 3 => turn_vectors<T>(
+        vectors, axes, outward, turned, (axes.len() / 3) as u32,
+    ));
     Ok(turned)
 }
 

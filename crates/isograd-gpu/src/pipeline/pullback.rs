@@ -3,16 +3,13 @@
 use cubecl::prelude::*;
 
 use super::{Error, Reconstruction, Reconstructor, Source, held};
-use crate::device::check_length;
+use crate::device::{check_length, launch};
 use crate::distance::extend;
 use crate::iso_value::local;
 use crate::primitives::fill::{add, zeros};
 use crate::primitives::flags;
 use crate::splat::{self, SampleCotangent, Samples};
 use crate::{Buffer, Scalar, area, distance, iso_value, isosurface, normals, orient, poisson};
-
-/// Units of a group.
-const BLOCK: u32 = 256;
 
 /// Cotangents of the results of a reconstruction: by how much a scalar (a loss) changes, a unit of each
 /// result. What is left out counts as zero.
@@ -292,17 +289,10 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             None => (&result.indicator, 0.0),
         };
         let bar = poisson::smoothing::pullback(device, cells, self.grid.shape(), chi, chi_bar)?;
-        share_smoothing::launch::<T, R>(
-            device.client(),
-            device.groups(bars.areas.len(), BLOCK),
-            CubeDim::new_1d(BLOCK),
-            bar.arg(),
-            bars.areas.arg(),
-            bars.grid.arg(),
-            T::of(by_level),
-            T::of(0.5 * cells / (mean * count as f64)),
+        launch!(device, bars.areas.len() => share_smoothing<T>(
+            bar, bars.areas, bars.grid, T::of(by_level), T::of(0.5 * cells / (mean * count as f64)),
             T::of(cells / self.grid.spacing().f64()),
-        );
+        ));
         Ok(())
     }
 }

@@ -36,14 +36,13 @@ mod samples;
 pub use forward::forward;
 pub use pullback::{Cotangent, pullback};
 
+use cubecl::prelude::*;
 use isograd::distance::extend as cpu;
 
 use super::Mesh;
+use crate::device::Argument;
 use crate::neighbors::Neighborhoods;
-use crate::{Buffer, Scalar};
-
-/// Units of a group.
-const BLOCK: u32 = 64;
+use crate::{Buffer, Device, Scalar};
 
 /// Components of an attribute that one kernel takes at a time.
 const WIDTH: usize = 4;
@@ -95,6 +94,23 @@ pub struct Extension<T> {
     pub cells: Buffer<u32>,
     /// `(B, components)` at those cells, row by row.
     pub values: Buffer<T>,
+}
+
+/// [`Extension`] in kernels, but for the values at the cells.
+#[derive(CubeLaunch, CubeType)]
+pub(crate) struct ExtensionArrays<F: Float + CubeElement> {
+    pub vertices: Array<F>,
+    pub cells: Array<u32>,
+    pub components: u32,
+}
+
+impl<R: Runtime, T: Scalar> Argument<R> for Extension<T> {
+    type Parameter = ExtensionArraysLaunch<T, R>;
+
+    fn argument(&self, _: &Device<R>) -> Self::Parameter {
+        let components = self.components as u32;
+        ExtensionArraysLaunch::new(self.vertices.arg(), self.cells.arg(), components)
+    }
 }
 
 /// What the pullback needs besides the inputs and the extension: [`isograd::distance::extend::Residual`].

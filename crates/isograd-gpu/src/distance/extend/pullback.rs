@@ -72,16 +72,8 @@ pub fn pullback<R: Runtime, T: Scalar>(
     let sorted = Sorted::new(device, samples, attribute, &residual.smallest_area)?;
     let vertices = &surface.mesh.vertices;
     let vertices_bar = of_cells.vertices;
-    let adjoints = adjoint::pullback(
-        device,
-        samples,
-        &sorted,
-        vertices,
-        &given,
-        &bars,
-        &vertices_bar,
-    )?;
-    let found = of_samples::gather(device, samples, &sorted, &adjoints)?;
+    let adjoints = adjoint::pullback(device, &sorted, vertices, &given, &bars, &vertices_bar)?;
+    let found = of_samples::gather(device, &sorted, &adjoints)?;
     let mut guarded: Vec<&Buffer<u32>> = of_cells.guarded.iter().collect();
     guarded.extend([&adjoints.guarded, &found.guarded]);
     Ok(Cotangent {

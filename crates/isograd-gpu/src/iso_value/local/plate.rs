@@ -5,6 +5,7 @@ use cubecl::prelude::*;
 use isograd::isosurface::local_level::{LEAST_THICKNESS, Step};
 
 use crate::Scalar;
+use crate::device::Ready;
 use crate::element::plate;
 
 /// The step of `χ` through the surface of a thick body.
@@ -25,9 +26,9 @@ pub(super) struct Usual<F: Float + CubeElement> {
 }
 
 /// A step as an argument of a kernel.
-pub(super) fn arg<R: Runtime, T: Scalar>(step: &Step, steepest: f64) -> UsualLaunch<T, R> {
+pub(super) fn arg<R: Runtime, T: Scalar>(step: &Step, steepest: f64) -> Ready<UsualLaunch<T, R>> {
     let [low, high] = step.range();
-    UsualLaunch::new(
+    Ready::new(UsualLaunch::new(
         T::of(step.usual),
         T::of(step.width),
         T::of(low),
@@ -35,7 +36,7 @@ pub(super) fn arg<R: Runtime, T: Scalar>(step: &Step, steepest: f64) -> UsualLau
         T::of(step.depth(LEAST_THICKNESS)),
         T::of(steepest),
         T::of(std::f64::consts::LN_2),
-    )
+    ))
 }
 
 /// What the slope of `χ` at a sample says of the body.

@@ -28,6 +28,17 @@ pub(super) struct Sample<F: Float> {
     pub trust: F,
 }
 
+/// Samples in sorted order, and the fields of a pass.
+#[derive(CubeLaunch, CubeType)]
+pub(crate) struct PassArrays<F: Float + CubeElement> {
+    /// Cells of the samples.
+    pub keys: Array<u32>,
+    pub samples: Array<F>,
+    /// `D − ε` and `M` at every cell.
+    pub areas: Array<F>,
+    pub sums: Array<F>,
+}
+
 #[cube]
 pub(super) fn sample<F: Float>(samples: &Array<F>, s: usize) -> Sample<F> {
     let at = s * SAMPLE;
