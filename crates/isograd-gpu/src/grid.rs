@@ -1,4 +1,4 @@
-//! A grid, as kernels see it.
+//! Grids in kernels.
 
 use cubecl::prelude::*;
 
@@ -74,7 +74,7 @@ pub(crate) fn cell_at(index: u32, ny: u32, nz: u32) -> Cell {
     }
 }
 
-/// How far `x` lies from the center of a cell, in cells.
+/// Offset of `x` from the center of a cell, in cells.
 #[cube]
 pub(crate) fn from_center<F: Float>(x: F, cell: u32) -> F {
     x - F::cast_from(cell) - F::new(0.5)

@@ -37,23 +37,23 @@ struct SortedSamples<F: Float + CubeElement> {
     nz: u32,
 }
 
-/// How a sample is spread: what it has for the cells at most `reach` away along each axis.
+/// Spreading of a sample over the cells at most `reach` away along each axis.
 #[cube]
 pub(crate) trait Spread: Send + Sync + 'static {
-    /// What sample `s` has for the cell that is `(x, y, z) − reach` cells from its own.
+    /// Part of sample `s` in the cell that is `(x, y, z) − reach` cells from its own.
     fn part<F: Float>(samples: &Array<F>, s: usize, x: u32, y: u32, z: u32) -> F;
 }
 
-/// What becomes of the values that are in the field.
+/// Treatment of the values in the field.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) enum Before {
-    /// They are lost.
+    /// They are overwritten.
     Replaced,
     /// The samples' parts are added to them.
     Kept,
 }
 
-/// Writes the sum of what the samples have for each cell to `out`, `(nx, ny, nz)`. `samples` are in the order
+/// Writes the sum of the samples' parts in each cell to `out`, `(nx, ny, nz)`. `samples` are in the order
 /// of `order`, in the form that `P` reads.
 pub(crate) fn spread<R: Runtime, T: Scalar, P: Spread>(
     device: &Device<R>,
@@ -108,7 +108,7 @@ pub(crate) fn first_at_least(keys: &Array<u32>, begin: u32, end: u32, key: u32) 
     low
 }
 
-/// What the samples of each run in one cell have for each of the cells round it, one unit a cell and run.
+/// Sums over each run of samples in one cell, for each of the cells round it: a unit for each run and cell.
 #[cube(launch)]
 fn sum_runs<F: Float, P: Spread>(
     samples: &Array<F>,
@@ -134,7 +134,7 @@ fn sum_runs<F: Float, P: Spread>(
     }
 }
 
-/// The same for runs of runs.
+/// Sums over runs of runs.
 #[cube(launch)]
 fn sum_long_runs<F: Float>(
     keys: &Array<u32>,
@@ -159,7 +159,7 @@ fn sum_long_runs<F: Float>(
     }
 }
 
-/// How many samples from `s` on, all in the cell `key`, are summed already: 1, 64 or 4096.
+/// Number of samples from `s` on, all in the cell `key`, that have a sum: 1, 64 or 4096.
 #[cube]
 fn summed(keys: &Array<u32>, s: u32, end: u32, key: u32) -> u32 {
     let mut step = 1u32.runtime();
@@ -221,7 +221,7 @@ fn gather_cells<F: Float + CubeElement, P: Spread>(
     }
 }
 
-/// What the samples in a row of `nz` cells have for the cell `(x, y)` of those that they reach, at height `k`.
+/// Sum over the samples in a row of `nz` cells for the cell `(x, y)` of those that they reach, at height `k`.
 #[cube]
 fn sum_of_row<F: Float + CubeElement, P: Spread>(
     samples: &SortedSamples<F>,
@@ -258,7 +258,7 @@ fn key_or_last(keys: &Array<u32>, s: u32, end: u32) -> u32 {
     key
 }
 
-/// What sample `s` has for a cell, or what the `step` samples from it on have.
+/// Part of sample `s` in a cell, or the sum of the `step` samples from it on.
 #[cube]
 fn part_or_sum<F: Float + CubeElement, P: Spread>(
     samples: &SortedSamples<F>,

@@ -23,14 +23,11 @@
 //! All is computed in the number type of the mesh, squares of lengths too: in `f32` lengths, and cells, should
 //! be between about 1e-15 and 1e15 of the unit.
 
+mod bvh;
 pub mod extend;
 pub mod lattice;
-mod morton;
-mod search;
-mod settle;
 mod shares;
 mod tangent;
-mod tree;
 mod triangle;
 
 pub use isograd::distance::{Band, NO_TRIANGLE};
@@ -86,7 +83,7 @@ impl<T> Mesh<T> {
     }
 }
 
-/// Why the distance stage refused its input.
+/// Errors of the distance stage.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// There is no triangle to be near to.

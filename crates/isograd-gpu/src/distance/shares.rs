@@ -1,4 +1,4 @@
-//! What queries give the corners of their closest faces, and what vertices get of it.
+//! Cotangents of the corners of closest faces, and their sums at the vertices.
 
 use cubecl::prelude::*;
 

@@ -1,4 +1,4 @@
-//! Why there is no surface: found on the device, told in the CPU's words.
+//! Errors of the isosurface stage: found on the device, worded as on the CPU.
 
 use cubecl::prelude::*;
 use isograd::{Grid, isosurface};
@@ -8,7 +8,7 @@ use crate::device::launch;
 use crate::primitives::ends::ends;
 use crate::{Buffer, Device, Scalar};
 
-/// Why there is no surface.
+/// Errors of the isosurface stage.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The field has none.

@@ -15,7 +15,7 @@ use crate::{Buffer, Device, Error, Scalar};
 /// Sums over the vertices: of the level, of the low corner, of the spacing.
 const SUMS: usize = 5;
 
-/// What the vertices mean for the field, the level and the grid.
+/// Cotangents of the field, the level and the grid.
 #[derive(Clone)]
 pub struct Cotangent<T> {
     /// `(nx, ny, nz)` cotangent of `χ`; 0 in cells without a vertex on any of their edges.
@@ -28,7 +28,7 @@ pub struct Cotangent<T> {
     pub guarded: Buffer<u32>,
 }
 
-/// What the cotangents `(V, 3)` of the vertices mean for what [`forward`](super::forward) made them of:
+/// Cotangents of the inputs of [`forward`](super::forward) from those of the vertices, `(V, 3)`:
 /// [`isograd::isosurface::pullback`], whose guard is used, with sums in `T`.
 ///
 /// # Errors

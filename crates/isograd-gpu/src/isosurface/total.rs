@@ -1,4 +1,4 @@
-//! What the signs add up to: four numbers, which are downloaded.
+//! Totals of the signs: four numbers, which are downloaded.
 
 use cubecl::prelude::*;
 use isograd::isosurface::Report;
@@ -9,7 +9,7 @@ use crate::device::launch;
 use crate::primitives::reduce::{groups_for, sum_of_group};
 use crate::{Buffer, Device, Error};
 
-/// How many there are of everything.
+/// Numbers of cells inside, vertices and faces.
 pub(super) struct Total {
     inside: usize,
     /// Bits 0 to 5: walls that inside cells touch, low before high, x before y before z. Bit 6: a value is not

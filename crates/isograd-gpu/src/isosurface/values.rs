@@ -1,4 +1,4 @@
-//! The field, the level and the grid, as kernels see them.
+//! The field, the level and the grid in kernels.
 
 use cubecl::prelude::*;
 use isograd::isosurface::SMALLEST_DIFFERENCE;
@@ -19,7 +19,7 @@ pub struct Values<F: Float + CubeElement> {
 }
 
 impl<T: Scalar> Residual<T> {
-    /// What the surface is made of, as an argument of a kernel.
+    /// Field, level and grid as an argument of a kernel.
     pub(super) fn values<R: Runtime>(
         &self,
         device: &Device<R>,
@@ -32,7 +32,7 @@ impl<T: Scalar> Residual<T> {
     }
 }
 
-/// How far along the lattice edge along `axis` from the cell at place `p` in memory the level is: as the CPU has it,
+/// Place of the level on the lattice edge along `axis` from the cell at place `p` in memory: as on the CPU,
 /// and between 0 and 1 also where the device divides less exactly.
 #[cube]
 pub(super) fn fraction_on<F: Float + CubeElement>(

@@ -41,7 +41,7 @@ pub fn forward<R: Runtime, T: Scalar>(
     }
 }
 
-/// What the cotangents `normals_bar` `(N, 3)` of the normals mean for the `given` vectors: `(N, 3)`; finite for every
+/// Cotangents `(N, 3)` of the `given` vectors from those of the normals, `normals_bar` `(N, 3)`; finite for every
 /// vector that [`forward`] takes.
 ///
 /// # Errors

@@ -2,7 +2,7 @@
 //! does it: the same probes, of which others are skipped.
 //!
 //! A probe needs no nearest sample, only whether one is in reach and how far it is safe to skip. A sample that is
-//! about the nearest says both but where it is a little out of reach: there the tree is asked for any in reach. So
+//! about the nearest decides both but where it is a little out of reach: there the tree is searched for any in reach. So
 //! a ray through the center of a sphere, from which all samples are equally far, is no more work than another.
 
 use cubecl::prelude::*;
@@ -109,7 +109,7 @@ fn look_both_ways<F: Float + CubeElement>(
             guess = near.point;
             let distance = F::sqrt(near.square);
             let mut detected = select(m <= ray.own, 1u32, 0u32);
-            // How far on the answer is the same.
+            // Distance along which the result stays the same.
             let mut same = F::new(0.0);
             if distance <= ray.radius {
                 detected = 1u32;

@@ -36,7 +36,7 @@ pub struct Followed<T> {
 }
 
 /// Turns each of the `(N, 3)` axes, which are of unit length and in input order, to the side of the step before.
-/// `radii` `(N,)`, in input order, are those within which neighbors are asked. Nothing waits.
+/// `radii` `(N,)`, in input order, are those of the neighbors that far turned axes follow. Nothing waits.
 ///
 /// # Errors
 /// [`crate::Error::Length`], [`crate::Error::TooLarge`].
@@ -131,7 +131,7 @@ fn follow<F: Float + CubeElement>(
     }
 }
 
-/// What the neighbors that have not turned say of an axis, from −1 to 1; 0 where there is none.
+/// Agreement of an axis with its neighbors that have not turned, from −1 to 1; 0 where there are none.
 #[cube]
 fn side_among_neighbors<F: Float + CubeElement>(
     near: &NeighborhoodArrays<F>,

@@ -1,4 +1,4 @@
-//! The pullback of the fits: to the vertices, and what the samples need of each.
+//! The pullback of the fits to the vertices, and the records of it that the samples gather.
 
 use cubecl::prelude::*;
 
@@ -189,7 +189,7 @@ impl<F: Float> Adjoint<F> {
         }
     }
 
-    /// What `d̄_j` has through the fit.
+    /// The part of `d̄_j` through the fit.
     fn through_fit(self, s: Seen<F>) -> Vector3<F> {
         let (m, e) = (self.mean, s.e);
         let (a, b) = (self.of_mean, self.of_offset);

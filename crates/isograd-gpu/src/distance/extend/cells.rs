@@ -1,8 +1,8 @@
-//! The cells of the band: which they are, and what they get from the vertices.
+//! The cells of the band, and their values from those at the vertices.
 
 use cubecl::prelude::*;
 
-use super::super::search::center;
+use super::super::bvh::center;
 use super::super::triangle::{closest, corners};
 use super::super::{MeshArrays, NO_TRIANGLE};
 use super::Surface;

@@ -3,7 +3,7 @@
 use cubecl::prelude::*;
 
 use super::super::MeshArrays;
-use super::super::search::center;
+use super::super::bvh::center;
 use super::super::shares::{ByFace, ByFaceArrays, Corners, by_face};
 use super::super::tangent::tangent;
 use super::super::triangle::{closest, corners};
@@ -25,7 +25,7 @@ pub(super) struct OfCells<T> {
     pub vertices: Buffer<T>,
     /// `(4,)` of the grid.
     pub grid: Buffer<T>,
-    /// How often something was bounded.
+    /// Numbers of bounded derivatives.
     pub guarded: Vec<Buffer<u32>>,
 }
 
@@ -40,7 +40,7 @@ impl<T: Scalar> OfCells<T> {
     }
 }
 
-/// Adds to `bars` `(V, components)` what the values at the vertices get from the cells.
+/// Adds to `bars` `(V, components)` the cotangents of the values at the vertices through the cells.
 pub(super) fn pullback<R: Runtime, T: Scalar>(
     device: &Device<R>,
     surface: Surface<'_, T>,
@@ -97,7 +97,7 @@ fn pull_columns<R: Runtime, T: Scalar>(
     join_pieces(device, sums, 3 * width, pieces, cells)
 }
 
-/// What each face and the grid get through `β`, `(F, 13)`, and how many cells of each piece were bounded.
+/// Cotangents of each face and of the grid through `β`, `(F, 13)`, and the number of bounded cells of each piece.
 fn pull_weights<R: Runtime, T: Scalar>(
     device: &Device<R>,
     surface: Surface<'_, T>,

@@ -99,7 +99,7 @@ pub(super) fn refuse_face<R: Runtime>(
     Ok(Refused::Face { face }.into())
 }
 
-/// What the pullback is given besides.
+/// Further inputs of the pullback.
 pub(super) struct Given<'a, T> {
     pub residual: &'a Residual<T>,
     pub extension: &'a Extension<T>,

@@ -1,4 +1,4 @@
-//! The fits at the vertices, and what they say of the attribute.
+//! The fits at the vertices, and the values of the attribute there.
 
 use cubecl::prelude::*;
 use isograd::distance::extend::rule::{ENOUGH, MARGIN, MOST, REACH, SMALLEST_AREA};
@@ -166,7 +166,7 @@ pub(super) fn in_frame<F: Float>(axes: Eigen<F>, v: Vector3<F>) -> Vector3<F> {
     }
 }
 
-/// `C + ε I` in a frame, and what its pullback needs.
+/// `C + ε I` in a frame, with the intermediates of its pullback.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Ridge<F: Float> {
     /// Whether there is one: samples that coincide have no slope.

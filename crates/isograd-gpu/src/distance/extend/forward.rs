@@ -13,7 +13,7 @@ use crate::{Device, Scalar};
 /// the checks, and how many cells there are.
 ///
 /// # Errors
-/// What [`isograd::distance::extend::forward`] says of the same arrays; those of the device.
+/// Errors of [`isograd::distance::extend::forward`]; errors of the device.
 pub fn forward<R: Runtime, T: Scalar>(
     device: &Device<R>,
     samples: Samples<'_, T>,

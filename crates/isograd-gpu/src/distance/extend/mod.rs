@@ -113,7 +113,7 @@ impl<R: Runtime, T: Scalar> Argument<R> for Extension<T> {
     }
 }
 
-/// What the pullback needs besides the inputs and the extension: [`isograd::distance::extend::Residual`].
+/// Residual of the pullback, besides the inputs and the extension: [`isograd::distance::extend::Residual`].
 #[derive(Clone, Debug)]
 pub struct Residual<T> {
     /// `(V, 8)` the fit at each vertex: `R_v`, `W`, `m` and `s`, in the units of
@@ -125,10 +125,10 @@ pub struct Residual<T> {
     pub barycentric: Buffer<T>,
 }
 
-/// Why an attribute was not extended.
+/// Errors of the extension.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// What was given can't be.
+    /// Invalid input.
     #[error(transparent)]
     Refused(#[from] cpu::Error),
     /// The device can't, or fails.

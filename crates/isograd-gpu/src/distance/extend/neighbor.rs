@@ -10,7 +10,7 @@ use crate::normals::{MOMENTS, add_moments};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
-/// What is known of the samples, in the order of their tree.
+/// Samples with areas and values, in the order of their tree.
 pub(super) struct Sorted<T> {
     tree: Neighborhoods<T>,
     /// `(N,)` `a_j + a₀`.

@@ -36,7 +36,7 @@ pub struct Cotangent<T> {
 /// The radii `R_v`, `a₀`, φ (which chooses the band) and the closest faces are held constant.
 ///
 /// # Errors
-/// What [`isograd::distance::extend::pullback`] says of the same arrays; those of the device.
+/// Errors of [`isograd::distance::extend::pullback`]; errors of the device.
 #[expect(clippy::too_many_arguments, reason = "inputs, outputs and cotangents")]
 pub fn pullback<R: Runtime, T: Scalar>(
     device: &Device<R>,

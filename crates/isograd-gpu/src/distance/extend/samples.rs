@@ -1,4 +1,4 @@
-//! What the samples get from the fits: each gathers over the vertices whose radius reaches it.
+//! Cotangents of the samples through the fits: each gathers over the vertices whose radius reaches it.
 
 use cubecl::prelude::*;
 

@@ -3,10 +3,9 @@
 use cubecl::prelude::*;
 use isograd::Grid;
 
-use super::super::search::center;
-use super::super::tree::{NONE, Tree};
+use super::super::bvh::{self, NONE, Tree, center};
 use super::super::triangle::{closest, corners};
-use super::super::{Band, Error, FAR, Mesh, MeshArrays, search};
+use super::super::{Band, Error, FAR, Mesh, MeshArrays};
 use super::Residual;
 use crate::device::{check_length, launch};
 use crate::grid::{Lattice, low_corner};
@@ -41,7 +40,7 @@ pub fn forward<T: Scalar, R: Runtime>(
         Band::Within(width) => return Err(Error::Band { width }),
     };
     let tree = Tree::new(device, mesh, grid)?;
-    let closest = search::cells(device, &tree, grid.shape(), spacing.f64(), width)?;
+    let closest = bvh::cells(device, &tree, grid.shape(), spacing.f64(), width)?;
     let phi = device.empty(grid.cells())?;
     launch!(device, grid.cells() => measure_cells<T>(
         mesh, chi, level, closest, phi, grid, T::of(width.unwrap_or(FAR)), smallest::<T>(),

@@ -5,7 +5,7 @@
 
 use cubecl::prelude::*;
 
-use super::super::search::center;
+use super::super::bvh::center;
 use super::super::shares::{ByFaceArrays, FACE, add_share, by_face, gather_corners};
 use super::super::triangle::{closest, corners};
 use super::super::{Error, MeshArrays};
@@ -19,7 +19,7 @@ use crate::{Buffer, Device, Scalar};
 /// beyond the band count for nothing: there `φ` is constant.
 ///
 /// # Errors
-/// Those of the device.
+/// Errors of the device.
 pub fn pullback<T: Scalar, R: Runtime>(
     device: &Device<R>,
     residual: &Residual<T>,
@@ -37,7 +37,7 @@ pub fn pullback<T: Scalar, R: Runtime>(
     })
 }
 
-/// What each face gets from its cells, `(F, 10)`.
+/// Sums over the cells of each face, `(F, 10)`.
 fn pull_faces<T: Scalar, R: Runtime>(
     device: &Device<R>,
     residual: &Residual<T>,

@@ -6,11 +6,12 @@ use super::gradients::System;
 use super::{Equation, Error};
 use crate::device::check_length;
 use crate::grid::{self, Lattice, check_field, place};
+use crate::isosurface::iso_value;
 use crate::primitives::fill::add;
 use crate::primitives::reduce::{BLOCK, sum_columns};
 use crate::splat::{SampleCotangent, subtract_from_grid};
 use crate::spread::Before;
-use crate::{Buffer, Device, Scalar, iso_value};
+use crate::{Buffer, Device, Scalar};
 
 /// Turns the cotangents `chi_bar`, `(nx, ny, nz)`, of the screened solution into those of the plain one, adds what
 /// they mean for points, areas and grid to `out`, and returns the iterations it took. `level` is what the

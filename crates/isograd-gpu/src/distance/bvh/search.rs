@@ -9,10 +9,10 @@
 
 use cubecl::prelude::*;
 
+use super::super::triangle::{distance_squared, load_frame};
+use super::super::{Error, FAR};
+use super::build::{LEAF, NONE, Tree, TreeArrays};
 use super::settle::settle;
-use super::tree::{LEAF, NONE, Tree, TreeArrays};
-use super::triangle::{distance_squared, load_frame};
-use super::{Error, FAR};
 use crate::device::{Ready, launch};
 use crate::grid::{Cell, cell_at};
 use crate::vector::Vector3;
@@ -65,7 +65,7 @@ impl Level {
 
 /// The face closest to each cell center of a lattice whose low corner is the origin of the tree, or [`NONE`]
 /// where it is further than `width`.
-pub(super) fn cells<T: Scalar, R: Runtime>(
+pub(crate) fn cells<T: Scalar, R: Runtime>(
     device: &Device<R>,
     tree: &Tree<T>,
     shape: [usize; 3],
@@ -264,7 +264,7 @@ fn nearest_of_cells<F: Float + CubeElement>(
 
 /// The center of a cell in memory order, from the low corner of the grid.
 #[cube]
-pub(super) fn center<F: Float>(cell: u32, spacing: F, ny: u32, nz: u32) -> Vector3<F> {
+pub(crate) fn center<F: Float>(cell: u32, spacing: F, ny: u32, nz: u32) -> Vector3<F> {
     center_of::<F>(cell_at(cell, ny, nz), spacing)
 }
 

@@ -9,7 +9,7 @@ use super::sample::{PassArrays, SAMPLE, SEEN, STATE, corner, is_held, sample, se
 use super::{Pass, Residual};
 use crate::device::{check_length, launch};
 use crate::grid::{Lattice, check_field};
-use crate::iso_value;
+use crate::isosurface::iso_value;
 use crate::primitives::reduce::{BLOCK, sum_columns, sum_of_group};
 use crate::splat::{self, Samples};
 use crate::{Buffer, Device, Error, Scalar};
@@ -102,7 +102,7 @@ impl<R: Runtime, T: Scalar> Near<'_, R, T> {
         Ok(state)
     }
 
-    /// `(N, 3)` what a pass says at the samples, and the sums that its gain is made of.
+    /// `(N, 3)` results of a pass at the samples, and the sums that its gain is made of.
     fn see(
         &self,
         areas: &Buffer<T>,
@@ -165,7 +165,7 @@ fn weigh_samples<F: Float + CubeElement>(
     }
 }
 
-/// What a pass says at each sample; `w u`, `u²`, `s p`, `s²`, `p²`, each times `â`, summed a group at a time.
+/// Results of a pass at each sample; `w u`, `u²`, `s p`, `s²`, `p²`, each times `â`, summed a group at a time.
 #[cube(launch)]
 fn see_means<F: Float + CubeElement>(
     pass: &PassArrays<F>,

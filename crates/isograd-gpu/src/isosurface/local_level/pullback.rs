@@ -21,9 +21,9 @@ use crate::splat::{self, SampleCotangent, Samples};
 use crate::spread::Before;
 use crate::{Buffer, Device, Error, Scalar};
 
-/// What the pullback finds besides what it adds.
+/// Cotangents that are returned, besides those that are added.
 #[derive(Clone, Debug)]
-pub struct Found<T> {
+pub struct Cotangents<T> {
     /// `(nx, ny, nz)` the indicator that went in, to rounding; the array of the one that came out, if that is the same.
     pub chi: Buffer<T>,
     /// `(N,)` cotangents of `χ(x_i)`, which the pullback of the mean takes.
@@ -36,7 +36,7 @@ pub struct Found<T> {
 
 /// Adds to `out` what the cotangents `chi_bar` `(nx, ny, nz)` of the indicator `chi` that came out mean for points,
 /// normals, areas and grid. `chi_bar` becomes that of the indicator that went in, but for what
-/// [`Found::values`] means for it. All else is as it was in [`forward`](super::forward()). Waits for the device once,
+/// [`Cotangents::values`] means for it. All else is as it was in [`forward`](super::forward()). Waits for the device once,
 /// and once a pass; not at all if there was none.
 ///
 /// # Errors
@@ -49,7 +49,7 @@ pub fn pullback<R: Runtime, T: Scalar>(
     chi: &Buffer<T>,
     chi_bar: &Buffer<T>,
     out: &SampleCotangent<T>,
-) -> Result<Found<T>, Error> {
+) -> Result<Cotangents<T>, Error> {
     let (grid, order, count) = (&splat.grid, &splat.order, samples.len());
     samples.check()?;
     check_length("the array of areas", samples.areas, order.keys.len())?;
@@ -59,7 +59,7 @@ pub fn pullback<R: Runtime, T: Scalar>(
     out.check(count)?;
     let values: Buffer<T> = zeros(device, count)?;
     let Some(first) = residual.passes.first() else {
-        return Ok(Found {
+        return Ok(Cotangents {
             chi: chi.clone(),
             values,
             level: zeros(device, 1)?,
@@ -87,7 +87,7 @@ pub fn pullback<R: Runtime, T: Scalar>(
     let smoothing = pulled.pull_trust(&near, &first.state, residual)?;
     near.spread::<Tilt>(&pulled.forms, Before::Kept, chi_bar)?;
     let level = pulled.add(&near, residual.area_weights, &values, out)?;
-    Ok(Found {
+    Ok(Cotangents {
         chi: pulled.chi,
         values,
         level,
@@ -95,7 +95,7 @@ pub fn pullback<R: Runtime, T: Scalar>(
     })
 }
 
-/// What goes from pass to pass.
+/// State carried from pass to pass.
 struct Pulled<T> {
     /// `(N, 10)` cotangents of the samples.
     bars: Buffer<T>,
@@ -138,7 +138,7 @@ impl<T: Scalar> Pulled<T> {
         Ok(before_bar)
     }
 
-    /// `(N, 3)` what the pass said at the samples, and `λ̄` but for the share of the slope. `χ` becomes that before
+    /// `(N, 3)` results of the pass at the samples, and `λ̄` but for the share of the slope. `χ` becomes that before
     /// the pass.
     fn see_again<R: Runtime>(
         &mut self,

@@ -2,10 +2,10 @@
 
 use cubecl::prelude::*;
 
-use super::Error;
+use super::super::Error;
+use super::super::triangle::{distance_squared, load_frame};
+use super::build::{NONE, Tree, TreeArrays};
 use super::search::{Centers, Level, NOTHING_YET, UNPROVEN, box_distance_squared, center};
-use super::tree::{NONE, Tree, TreeArrays};
-use super::triangle::{distance_squared, load_frame};
 use crate::device::launch;
 use crate::primitives::scan::exclusive_sum;
 use crate::vector::Vector3;
@@ -16,7 +16,7 @@ const SETTLERS: u32 = 1024;
 const SETTLER_UNITS: usize = 256;
 const TAKEN: usize = 64;
 
-/// What [`UNPROVEN`] marks, without the mark.
+/// Mask of the place in a result marked [`UNPROVEN`].
 const NOT_UNPROVEN: u32 = UNPROVEN - 1;
 
 /// Solves what descents to the cells of `level` have left in `found`, a group each; faces are written where `last`.

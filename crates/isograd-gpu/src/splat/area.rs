@@ -22,7 +22,7 @@ use crate::primitives::reduce::{self, sum_of_group};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
-/// What the pullback needs of [`forward`].
+/// Residual of [`forward`] for [`pullback`].
 #[derive(Clone, Debug)]
 pub struct Residual<T> {
     neighborhoods: Neighborhoods<T>,
@@ -55,7 +55,7 @@ pub fn forward<R: Runtime, T: Scalar>(
     Ok((areas, residual))
 }
 
-/// What the cotangents `areas_bar` `(N,)` of the areas mean for the points: `(N, 3)`. Both in input order.
+/// Cotangents `(N, 3)` of the points from those of the areas, `areas_bar` `(N,)`. Both in input order.
 ///
 /// # Errors
 /// [`Error::Length`], [`Error::TooLarge`].
@@ -85,7 +85,7 @@ pub fn pullback<R: Runtime, T: Scalar>(
 /// device.
 ///
 /// # Errors
-/// Those of the device.
+/// Errors of the device.
 pub fn mean<R: Runtime, T: Scalar>(
     device: &Device<R>,
     areas: &Buffer<T>,

@@ -9,7 +9,7 @@ use super::sample::{SAMPLE, STATE, corner, derivatives, is_held, sample};
 use crate::device::launch;
 use crate::element::plate::trust;
 use crate::grid::{Lattice, cell_at, from_center, place};
-use crate::iso_value;
+use crate::isosurface::iso_value;
 use crate::primitives::reduce::{BLOCK, sum_columns, sum_of_group};
 use crate::splat::Samples;
 use crate::vector::Vector3;

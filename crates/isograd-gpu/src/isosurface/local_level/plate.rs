@@ -1,4 +1,4 @@
-//! How far a sample is followed, and where the surface is to be seen from it: by how thick the body is there. See
+//! Weight of a sample and shift of the surface there, from the thickness of the body. See
 //! [`isograd::isosurface::local_level::Step`].
 
 use cubecl::prelude::*;
@@ -39,7 +39,7 @@ pub(super) fn arg<R: Runtime, T: Scalar>(step: &Step, steepest: f64) -> Ready<Us
     ))
 }
 
-/// What the slope of `χ` at a sample says of the body.
+/// Thickness of the body at a sample, from the slope of `χ`.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Plate<F: Float> {
     /// `q`: the slope over that of a thick body.
@@ -102,7 +102,7 @@ pub(super) fn shift<F: Float + CubeElement>(of: Plate<F>, usual: &Usual<F>) -> F
     usual.slope * of.thickness * plate::rise::<F>(of.depth, usual.least_depth)
 }
 
-/// Cotangents of what a plate is told by.
+/// Cotangents of the inputs of a plate.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct PlateBar<F: Float> {
     /// Of the slope at the sample.

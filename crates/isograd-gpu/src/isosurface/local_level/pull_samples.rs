@@ -15,7 +15,7 @@ use crate::vector::Vector3;
 /// Cotangents of a sample: `r̄`, `ū`, `ω̄`, of its index coordinates, of its normal, of `â`.
 pub(super) const BARS: usize = 10;
 
-/// What the pass said at each sample; and `−(r̄ m + ū w)`, summed a group at a time, in the first places of
+/// Results of the pass at each sample; and `−(r̄ m + ū w)`, summed a group at a time, in the first places of
 /// `partial`.
 #[cube(launch)]
 pub(super) fn see_means_again<F: Float + CubeElement>(
@@ -82,8 +82,8 @@ fn add_to_bars<F: Float>(
     bars[at + 9] += area;
 }
 
-/// Cotangents of what the pass said at the samples, from there to the samples themselves; what they mean for the cells
-/// becomes forms to spread.
+/// Cotangents of the pass's results at the samples, pulled to the samples themselves; those of the cells
+/// become forms to spread.
 #[cube(launch)]
 pub(super) fn pull_seen_means<F: Float + CubeElement>(
     pass: &PassArrays<F>,
@@ -381,7 +381,7 @@ pub(super) fn add_bars<F: Float + CubeElement>(
     }
 }
 
-/// What the cotangents of a group mean for the grid, and for the iso-value: less the sum of `r̄`.
+/// Cotangents of the grid from those of a group, and of the iso-value: less the sum of `r̄`.
 #[cube(launch)]
 pub(super) fn add_bars_of_grid<F: Float + CubeElement>(
     keys: &Array<u32>,

@@ -9,16 +9,16 @@
 use cubecl::prelude::*;
 use isograd::Grid;
 
+use super::super::triangle::{FRAME, corners, frame, store_frame};
+use super::super::{Error, Mesh, MeshArrays};
 use super::morton::face_order;
-use super::triangle::{FRAME, corners, frame, store_frame};
-use super::{Error, Mesh, MeshArrays};
 use crate::device::{Argument, launch};
 use crate::grid::{Lattice, low_corner};
 use crate::primitives::ends::ends;
 use crate::{Buffer, Device, Scalar};
 
 /// Stands in `lowest` where there is no triangle; and for a cell without a seed or a result.
-pub(super) const NONE: u32 = u32::MAX;
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// Marks a child that is a run of triangles: above it, one less than their number, from bit 28 on; below, the
 /// first of them.
@@ -28,7 +28,7 @@ pub(super) const LEAF: u32 = 1 << 31;
 const RUN: u32 = 2;
 
 /// The hierarchy. Places are seen from the low corner of a grid.
-pub(super) struct Tree<T> {
+pub(crate) struct Tree<T> {
     /// For each node the boxes of its two children: low corner, high corner. Node 0 is the root.
     pub boxes: Buffer<T>,
     /// For each node: its two children, and the lowest face below each.

@@ -1,4 +1,4 @@
-//! What samples have for the cells round them, and what becomes of fields cell by cell.
+//! Spread forms of the samples, and updates of fields cell by cell.
 
 use cubecl::prelude::*;
 
@@ -120,7 +120,7 @@ pub(super) fn take_means<F: Float + CubeElement>(
     }
 }
 
-/// The same, and `Σ Ē_o e_o` a group at a time, with `Ē = −χ̄`, in the last places of `partial`.
+/// `χ + λ e`, into `out`, and `Σ Ē_o e_o` a group at a time, with `Ē = −χ̄`, in the last places of `partial`.
 #[cube(launch)]
 pub(super) fn put_means_back<F: Float + CubeElement>(
     chi: &Array<F>,

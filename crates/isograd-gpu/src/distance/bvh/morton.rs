@@ -2,8 +2,8 @@
 
 use cubecl::prelude::*;
 
-use super::triangle::corners;
-use super::{Error, Mesh, MeshArrays};
+use super::super::triangle::corners;
+use super::super::{Error, Mesh, MeshArrays};
 use crate::device::launch;
 use crate::primitives::morton::spread_bits;
 use crate::primitives::sort;
