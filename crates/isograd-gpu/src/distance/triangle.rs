@@ -320,11 +320,3 @@ pub(super) fn turned_back<F: Float>(w: Vector3<F>, first: u32) -> Vector3<F> {
         z: select(first == 0u32, w.z, select(first == 1u32, w.y, w.x)),
     }
 }
-
-/// `Σ β_k y_k`, from the first corner.
-#[cube]
-pub(super) fn combine<F: Float>(t: Corners<F>, weights: Vector3<F>) -> Vector3<F> {
-    let b = t.ab.scale(weights.y);
-    let c = t.ca.scale(weights.z);
-    t.a.add(b.sub(c))
-}

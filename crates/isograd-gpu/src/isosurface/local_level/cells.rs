@@ -145,7 +145,7 @@ pub(super) fn put_means_back<F: Float + CubeElement>(
     }
     let mut shared = SharedMemory::<F>::new(BLOCK);
     let total = sum_of_group::<F>(product, &mut shared);
-    let own = CUBE_POS + partial.len() - (out.len() + BLOCK - 1) / BLOCK;
+    let own = CUBE_POS + partial.len() - (out.len() - 1) / BLOCK - 1;
     if UNIT_POS == 0 && own < partial.len() {
         partial[own] = total;
     }

@@ -40,7 +40,7 @@ pub(super) fn see_means_again<F: Float + CubeElement>(
     }
     let mut shared = SharedMemory::<F>::new(BLOCK);
     let total = sum_of_group::<F>(product, &mut shared);
-    if UNIT_POS == 0 && CUBE_POS < (pass.keys.len() + BLOCK - 1) / BLOCK {
+    if UNIT_POS == 0 && CUBE_POS <= (pass.keys.len() - 1) / BLOCK {
         partial[CUBE_POS] = total;
     }
 }
