@@ -20,16 +20,6 @@ pub(super) struct Tangent<F: Float> {
     pub guarded: bool,
 }
 
-/// Differences of `bar·y` along each edge.
-#[cube]
-pub(super) fn gains<F: Float>(corners: Corners<F>, bar: Vector3<F>) -> Vector3<F> {
-    Vector3::<F> {
-        x: bar.dot(corners.ab),
-        y: bar.dot(corners.bc),
-        z: bar.dot(corners.ca),
-    }
-}
-
 /// Gradient of `Σ β_k u_k`, `β` the weights of the closest point `found`, for corner values that gain `gains` along
 /// each edge (ab, bc, ca). A direction in which the feature is thinner than `thinnest` is left out.
 #[cube]
