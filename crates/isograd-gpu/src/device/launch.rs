@@ -7,6 +7,7 @@ use isograd::Grid;
 
 use super::{Buffer, Device, Scalar};
 use crate::grid::LatticeLaunch;
+use crate::neighbors::{NeighborhoodArraysLaunch, Neighborhoods};
 
 /// Units of a group where a kernel does not depend on it.
 pub(crate) const BLOCK: usize = 64;
@@ -75,6 +76,14 @@ impl<R: Runtime, T: Scalar> Argument<R> for Grid<T> {
 
     fn argument(&self, _: &Device<R>) -> Self::Parameter {
         crate::grid::arg(self)
+    }
+}
+
+impl<R: Runtime, T: Scalar> Argument<R> for Neighborhoods<T> {
+    type Parameter = NeighborhoodArraysLaunch<T, R>;
+
+    fn argument(&self, _: &Device<R>) -> Self::Parameter {
+        self.arg()
     }
 }
 

@@ -10,10 +10,11 @@ mod open;
 use cubecl::prelude::*;
 
 use effort::Counts;
+pub(crate) use launch::launch;
 
 pub use buffer::Buffer;
 pub use effort::Effort;
-pub(crate) use launch::{Argument, BLOCK, Ready, launch};
+pub(crate) use launch::{Argument, BLOCK, Ready};
 #[cfg(feature = "cuda")]
 pub use open::Cuda;
 #[cfg(feature = "wgpu")]

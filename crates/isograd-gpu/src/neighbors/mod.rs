@@ -34,7 +34,7 @@ pub(crate) use walk::{end_of_leaf, first_of_leaf, is_isolated, next_leaf};
 
 use cubecl::prelude::*;
 
-use crate::device::{Argument, check_length};
+use crate::device::check_length;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Units of a group.
@@ -64,6 +64,7 @@ pub struct Neighborhoods<T> {
 pub(crate) struct NeighborhoodArrays<F: Float + CubeElement> {
     pub points: Array<F>,
     pub radii: Array<F>,
+    pub places: Array<u32>,
     pub nodes: Array<F>,
     pub links: Array<u32>,
 }
@@ -74,17 +75,10 @@ impl<T: Scalar> Neighborhoods<T> {
         NeighborhoodArraysLaunch::new(
             self.points.arg(),
             self.radii.arg(),
+            self.places.arg(),
             self.nodes.arg(),
             self.links.arg(),
         )
-    }
-}
-
-impl<R: Runtime, T: Scalar> Argument<R> for Neighborhoods<T> {
-    type Parameter = NeighborhoodArraysLaunch<T, R>;
-
-    fn argument(&self, _: &Device<R>) -> Self::Parameter {
-        self.arg()
     }
 }
 

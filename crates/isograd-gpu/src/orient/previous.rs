@@ -58,7 +58,7 @@ pub fn forward<R: Runtime, T: Scalar>(
     launch!(device, n => compare<T>(axes, before.outward, cosines, far));
     let step = StepLaunch::new(radii.arg(), cosines.arg(), before.confidence.arg());
     launch!(device, n => follow<T>(
-        neighborhoods, neighborhoods.places, axes, Ready::new(step), normals, confidence, kept,
+        neighborhoods, axes, Ready::new(step), normals, confidence, kept,
     ));
     Ok(Followed {
         normals,
@@ -104,22 +104,21 @@ struct Step<F: Float + CubeElement> {
 #[cube(launch)]
 fn follow<F: Float + CubeElement>(
     near: &NeighborhoodArrays<F>,
-    places: &Array<u32>,
     axes: &Array<F>,
     before: &Step<F>,
     normals: &mut Array<F>,
     confidence: &mut Array<F>,
     kept: &mut Array<F>,
 ) {
-    if ABSOLUTE_POS < places.len() {
-        let i = places[ABSOLUTE_POS] as usize;
+    if ABSOLUTE_POS < near.places.len() {
+        let i = near.places[ABSOLUTE_POS] as usize;
         let axis = Vector3::<F>::at(axes, i);
         let zero = F::new(0.0);
         let mut side = before.cosines[i];
         let mut sure = min(before.confidence[i], F::abs(side));
         let mut keep = before.confidence[i];
         if !is_near::<F>(side) {
-            let said = side_among_neighbors::<F>(near, places, axes, before, ABSOLUTE_POS);
+            let said = side_among_neighbors::<F>(near, axes, before, ABSOLUTE_POS);
             side = select(said == zero, side, said);
             sure = min(F::abs(said), F::new(1.0));
             keep = sure;
@@ -135,14 +134,13 @@ fn follow<F: Float + CubeElement>(
 #[cube]
 fn side_among_neighbors<F: Float + CubeElement>(
     near: &NeighborhoodArrays<F>,
-    places: &Array<u32>,
     axes: &Array<F>,
     before: &Step<F>,
     own: usize,
 ) -> F {
     let zero = F::new(0.0);
     let x = Vector3::<F>::at(&near.points, own);
-    let i = places[own] as usize;
+    let i = near.places[own] as usize;
     let axis = Vector3::<F>::at(axes, i);
     let radius = before.radii[i];
     let blunt = turned::blunt::<F>(radius);
@@ -151,10 +149,10 @@ fn side_among_neighbors<F: Float + CubeElement>(
     let mut node = next_leaf::<F>(&near.nodes, &near.links, x, radius, 0usize.runtime(), false);
     while node < near.links.len() {
         let first = first_of_leaf(&near.links, node);
-        for position in first..end_of_leaf(first, places.len()) {
+        for position in first..end_of_leaf(first, near.places.len()) {
             let offset = Vector3::<F>::at(&near.points, position).sub(x);
             let square = offset.dot(offset);
-            let j = places[position] as usize;
+            let j = near.places[position] as usize;
             if square <= radius * radius && is_near::<F>(before.cosines[j]) {
                 let sign = select(before.cosines[j] < zero, F::new(-1.0), F::new(1.0));
                 let normal = Vector3::<F>::at(axes, j).scale(sign);

@@ -71,7 +71,7 @@ pub(super) fn pullback<R: Runtime, T: Scalar>(
         bars, values, found.near.places, found.bars, components as u32,
     ));
     launch!(device, count => pull_fits<T>(
-        sorted, found.near, found.near.places, fits, found.bars, found.records, vertices_bar,
+        sorted, found.near, fits, found.bars, found.records, vertices_bar,
         found.guarded,
     ));
     Ok(found)
@@ -221,7 +221,6 @@ impl<F: Float> Adjoint<F> {
 fn pull_fits<F: Float + CubeElement>(
     samples: &SampleArrays<F>,
     near: &NeighborhoodArrays<F>,
-    places: &Array<u32>,
     fits: &Array<F>,
     bars: &Array<F>,
     records: &mut Array<F>,
@@ -230,7 +229,7 @@ fn pull_fits<F: Float + CubeElement>(
 ) {
     let k = ABSOLUTE_POS;
     if k < near.radii.len() {
-        let vertex = places[k] as usize;
+        let vertex = near.places[k] as usize;
         let through_surface = Vector3::<F>::at(vertices_bar, vertex);
         let mut sums = Array::<F>::new(3usize);
         through_surface.store(&mut sums, 0usize);
