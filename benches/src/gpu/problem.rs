@@ -8,7 +8,7 @@ use isograd::Stage;
 use isograd::neighbors::Radius;
 use isograd_element::vector;
 use isograd_gpu::orient::Method;
-use isograd_gpu::pipeline::{Cotangent, Held, Options, Reconstruction, Reconstructor};
+use isograd_gpu::pipeline::{Cotangent, Options, RadiiAndSigns, Reconstruction, Reconstructor};
 use isograd_gpu::{Buffer, Device, Effort};
 use isograd_shapes::by_name;
 use serde::Serialize;
@@ -127,9 +127,10 @@ impl<R: Runtime> Loaded<R> {
         })
     }
 
-    fn hold(&self) -> Outcome<Held<f32>> {
+    fn hold(&self) -> Outcome<RadiiAndSigns<f32>> {
         let method = Method::Signs(self.normals.clone());
-        let held = Held::find_on_device(&self.device, &self.points, Radius::Auto, &method)?;
+        let held =
+            RadiiAndSigns::find_on_device(&self.device, &self.points, Radius::Auto, &method)?;
         self.device.wait()?;
         Ok(held)
     }
@@ -149,7 +150,7 @@ impl<R: Runtime> Loaded<R> {
         Ok(self.device.wait()?)
     }
 
-    fn time(&self, held: &Held<f32>, repeats: usize, size: &mut Size) -> Outcome {
+    fn time(&self, held: &RadiiAndSigns<f32>, repeats: usize, size: &mut Size) -> Outcome {
         let seconds = |work: &dyn Fn() -> Outcome| -> Outcome<f64> {
             let mut taken = Vec::new();
             for _ in 0..repeats {
@@ -172,7 +173,11 @@ impl<R: Runtime> Loaded<R> {
         Ok(())
     }
 
-    fn stages(&self, held: &Held<f32>, repeats: usize) -> Outcome<Vec<(&'static str, f64)>> {
+    fn stages(
+        &self,
+        held: &RadiiAndSigns<f32>,
+        repeats: usize,
+    ) -> Outcome<Vec<(&'static str, f64)>> {
         let mut taken: [Vec<f64>; STAGES.len()] = Default::default();
         for _ in 0..repeats {
             let mut marks = Vec::new();

@@ -1,8 +1,9 @@
-//! A grid, as kernels see it.
+//! Grids in kernels.
 
 use cubecl::prelude::*;
 
 use crate::device::check_length;
+use crate::vector::Vector3;
 use crate::{Buffer, Error, Scalar};
 
 /// Low corner, cell size and numbers of cells.
@@ -21,6 +22,16 @@ pub(crate) struct Lattice<F: Float + CubeElement> {
 pub(crate) fn arg<R: Runtime, T: Scalar>(grid: &isograd::Grid<T>) -> LatticeLaunch<T, R> {
     let ([x, y, z], [nx, ny, nz]) = (grid.lower(), grid.shape().map(|n| n as u32));
     LatticeLaunch::new(x, y, z, grid.spacing(), nx, ny, nz)
+}
+
+/// Low corner of a grid.
+#[cube]
+pub(crate) fn low_corner<F: Float + CubeElement>(grid: &Lattice<F>) -> Vector3<F> {
+    Vector3::<F> {
+        x: grid.x,
+        y: grid.y,
+        z: grid.z,
+    }
 }
 
 /// Index coordinates of a point.
@@ -63,7 +74,7 @@ pub(crate) fn cell_at(index: u32, ny: u32, nz: u32) -> Cell {
     }
 }
 
-/// How far `x` lies from the center of a cell, in cells.
+/// Offset of `x` from the center of a cell, in cells.
 #[cube]
 pub(crate) fn from_center<F: Float>(x: F, cell: u32) -> F {
     x - F::cast_from(cell) - F::new(0.5)

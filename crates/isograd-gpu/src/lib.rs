@@ -2,7 +2,7 @@
 //! others through Vulkan.
 //!
 //! A stage is one file, forward and pullback side by side, as in [`isograd`]; data stay in [`Buffer`]s on a
-//! [`Device`] from the points to φ and back, and only what [`Device::download`] asks for is copied. Formulas
+//! [`Device`] from the points to φ and back, and only [`Device::download`] copies to the host. Formulas
 //! of single elements are those of [`isograd_element`], compiled a second time as parts of kernels.
 //!
 //! # Determinism
@@ -12,12 +12,10 @@
 // The macro makes a public module of every kernel, documented or not.
 #![allow(missing_docs)]
 
-pub mod area;
 mod device;
 pub mod distance;
 mod grid;
 pub mod host;
-pub mod iso_value;
 pub mod isosurface;
 pub mod neighbors;
 pub mod normals;

@@ -8,11 +8,9 @@
 
 use cubecl::prelude::*;
 
+use crate::device::{Ready, launch};
 use crate::splat::SampleOrder;
 use crate::{Buffer, Device, Error, Scalar};
-
-/// Units of a group.
-const BLOCK: u32 = 256;
 
 /// Samples in a run that is summed before, and runs in a run of runs.
 const RUN: u32 = 64;
@@ -23,23 +21,39 @@ const BRICK_X: u32 = 4;
 const BRICK_Y: u32 = 8;
 const BRICK_Z: u32 = 8;
 
-/// How a sample is spread: what it has for the cells at most `reach` away along each axis.
+/// Cells of a group, a unit for each.
+const BRICK: usize = (BRICK_X * BRICK_Y * BRICK_Z) as usize;
+
+/// Samples in the order of their cells, and sums over runs of them.
+#[derive(CubeLaunch, CubeType)]
+struct SortedSamples<F: Float + CubeElement> {
+    values: Array<F>,
+    keys: Array<u32>,
+    rows: Array<u32>,
+    runs: Array<F>,
+    long_runs: Array<F>,
+    nx: u32,
+    ny: u32,
+    nz: u32,
+}
+
+/// Spreading of a sample over the cells at most `reach` away along each axis.
 #[cube]
 pub(crate) trait Spread: Send + Sync + 'static {
-    /// What sample `s` has for the cell that is `(x, y, z) − reach` cells from its own.
+    /// Part of sample `s` in the cell that is `(x, y, z) − reach` cells from its own.
     fn part<F: Float>(samples: &Array<F>, s: usize, x: u32, y: u32, z: u32) -> F;
 }
 
-/// What becomes of the values that are in the field.
+/// Treatment of the values in the field.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) enum Before {
-    /// They are lost.
+    /// They are overwritten.
     Replaced,
     /// The samples' parts are added to them.
     Kept,
 }
 
-/// Writes the sum of what the samples have for each cell to `out`, `(nx, ny, nz)`. `samples` are in the order
+/// Writes the sum of the samples' parts in each cell to `out`, `(nx, ny, nz)`. `samples` are in the order
 /// of `order`, in the form that `P` reads.
 pub(crate) fn spread<R: Runtime, T: Scalar, P: Spread>(
     device: &Device<R>,
@@ -52,51 +66,29 @@ pub(crate) fn spread<R: Runtime, T: Scalar, P: Spread>(
     let cells = (2 * reach as usize + 1).pow(3);
     let count = order.keys.len();
     let runs: Buffer<T> = device.empty(count / RUN as usize * cells)?;
-    let dim = CubeDim::new_1d(BLOCK);
-    sum_runs::launch::<T, P, R>(
-        device.client(),
-        device.groups(runs.len(), BLOCK),
-        dim,
-        samples.arg(),
-        order.keys.arg(),
-        runs.arg(),
-        (count / RUN as usize) as u32,
-        reach,
-    );
+    launch!(device, runs.len() => sum_runs<T, P>(
+        samples, order.keys, runs, (count / RUN as usize) as u32, reach,
+    ));
     let long = count / (RUN * RUN) as usize;
     let long_runs: Buffer<T> = device.empty(long * cells)?;
-    sum_long_runs::launch::<T, R>(
-        device.client(),
-        device.groups(long_runs.len(), BLOCK),
-        dim,
-        order.keys.arg(),
-        runs.arg(),
-        long_runs.arg(),
-        long as u32,
-        cells as u32,
-    );
+    launch!(device, long_runs.len() => sum_long_runs<T>(
+        order.keys, runs, long_runs, long as u32, cells as u32,
+    ));
     let [nx, ny, nz] = order.shape.map(|n| n as u32);
-    let bricks_x = nx.div_ceil(BRICK_X);
-    let (bricks_y, bricks_z) = (ny.div_ceil(BRICK_Y), nz.div_ceil(BRICK_Z));
-    let bricks = bricks_x as usize * bricks_y as usize * bricks_z as usize;
-    gather_cells::launch::<T, P, R>(
-        device.client(),
-        device.groups(bricks * BLOCK as usize, BLOCK),
-        dim,
+    let bricks = nx.div_ceil(BRICK_X) * ny.div_ceil(BRICK_Y) * nz.div_ceil(BRICK_Z);
+    let samples = SortedSamplesLaunch::new(
         samples.arg(),
         order.keys.arg(),
         order.rows.arg(),
         runs.arg(),
         long_runs.arg(),
-        out.arg(),
         nx,
         ny,
         nz,
-        bricks_y,
-        bricks_z,
-        reach,
-        before == Before::Kept,
     );
+    launch!(device, bricks as usize * BRICK, BRICK => gather_cells<T, P>(
+        Ready::new(samples), out, reach, before == Before::Kept,
+    ));
     Ok(())
 }
 
@@ -116,7 +108,7 @@ pub(crate) fn first_at_least(keys: &Array<u32>, begin: u32, end: u32, key: u32) 
     low
 }
 
-/// What the samples of each run in one cell have for each of the cells round it, one unit a cell and run.
+/// Sums over each run of samples in one cell, for each of the cells round it: a unit for each run and cell.
 #[cube(launch)]
 fn sum_runs<F: Float, P: Spread>(
     samples: &Array<F>,
@@ -142,7 +134,7 @@ fn sum_runs<F: Float, P: Spread>(
     }
 }
 
-/// The same for runs of runs.
+/// Sums over runs of runs.
 #[cube(launch)]
 fn sum_long_runs<F: Float>(
     keys: &Array<u32>,
@@ -167,7 +159,7 @@ fn sum_long_runs<F: Float>(
     }
 }
 
-/// How many samples from `s` on, all in the cell `key`, are summed already: 1, 64 or 4096.
+/// Number of samples from `s` on, all in the cell `key`, that have a sum: 1, 64 or 4096.
 #[cube]
 fn summed(keys: &Array<u32>, s: u32, end: u32, key: u32) -> u32 {
     let mut step = 1u32.runtime();
@@ -192,21 +184,15 @@ fn is_run(keys: &Array<u32>, s: u32, length: u32, end: u32, key: u32) -> bool {
 
 /// Each cell adds up what the samples near it have for it.
 #[cube(launch)]
-fn gather_cells<F: Float, P: Spread>(
-    samples: &Array<F>,
-    keys: &Array<u32>,
-    rows: &Array<u32>,
-    runs: &Array<F>,
-    long_runs: &Array<F>,
+fn gather_cells<F: Float + CubeElement, P: Spread>(
+    samples: &SortedSamples<F>,
     out: &mut Array<F>,
-    nx: u32,
-    ny: u32,
-    nz: u32,
-    bricks_y: u32,
-    bricks_z: u32,
     #[comptime] reach: u32,
     #[comptime] keep: bool,
 ) {
+    let (nx, ny, nz) = (samples.nx, samples.ny, samples.nz);
+    let bricks_y = (ny - 1u32) / BRICK_Y + 1u32;
+    let bricks_z = (nz - 1u32) / BRICK_Z + 1u32;
     let brick = CUBE_POS as u32;
     let i = brick / (bricks_y * bricks_z) * BRICK_X + UNIT_POS / (BRICK_Y * BRICK_Z);
     let j = brick / bricks_z % bricks_y * BRICK_Y + UNIT_POS / BRICK_Z % BRICK_Y;
@@ -217,15 +203,13 @@ fn gather_cells<F: Float, P: Spread>(
         let high_j = min(j + reach, ny - 1u32);
         for p in i - min(i, reach)..min(i + reach, nx - 1u32) + 1u32 {
             // The rows of a plane follow each other: most have no samples.
-            let begin = rows[(p * ny + low_j) as usize];
-            if begin < rows[(p * ny + high_j + 1u32) as usize] {
+            let begin = samples.rows[(p * ny + low_j) as usize];
+            if begin < samples.rows[(p * ny + high_j + 1u32) as usize] {
                 let x = i + reach - p;
                 for q in low_j..high_j + 1u32 {
                     let y = j + reach - q;
                     let row = p * ny + q;
-                    sum += sum_of_row::<F, P>(
-                        samples, keys, rows, runs, long_runs, row, nz, x, y, k, reach,
-                    );
+                    sum += sum_of_row::<F, P>(samples, row, x, y, k, reach);
                 }
             }
         }
@@ -237,34 +221,29 @@ fn gather_cells<F: Float, P: Spread>(
     }
 }
 
-/// What the samples in a row of `nz` cells have for the cell `(x, y)` of those that they reach, at height `k`.
+/// Sum over the samples in a row of `nz` cells for the cell `(x, y)` of those that they reach, at height `k`.
 #[cube]
-fn sum_of_row<F: Float, P: Spread>(
-    samples: &Array<F>,
-    keys: &Array<u32>,
-    rows: &Array<u32>,
-    runs: &Array<F>,
-    long_runs: &Array<F>,
+fn sum_of_row<F: Float + CubeElement, P: Spread>(
+    samples: &SortedSamples<F>,
     row: u32,
-    nz: u32,
     x: u32,
     y: u32,
     k: u32,
     #[comptime] reach: u32,
 ) -> F {
     let mut sum = F::new(0.0);
-    let first = row * nz;
-    let last = first + min(k + reach, nz - 1u32);
-    let end = rows[row as usize + 1];
+    let first = row * samples.nz;
+    let last = first + min(k + reach, samples.nz - 1u32);
+    let end = samples.rows[row as usize + 1];
     let least = first + (k - min(k, reach));
-    let mut s = first_at_least(keys, rows[row as usize], end, least);
-    let mut key = key_or_last(keys, s, end);
+    let mut s = first_at_least(&samples.keys, samples.rows[row as usize], end, least);
+    let mut key = key_or_last(&samples.keys, s, end);
     while key <= last {
         let z = k + reach - (key - first);
-        let step = summed(keys, s, end, key);
-        sum += part_or_sum::<F, P>(samples, runs, long_runs, s, step, x, y, z, reach);
+        let step = summed(&samples.keys, s, end, key);
+        sum += part_or_sum::<F, P>(samples, s, step, x, y, z, reach);
         s += step;
-        key = key_or_last(keys, s, end);
+        key = key_or_last(&samples.keys, s, end);
     }
     sum
 }
@@ -279,12 +258,10 @@ fn key_or_last(keys: &Array<u32>, s: u32, end: u32) -> u32 {
     key
 }
 
-/// What sample `s` has for a cell, or what the `step` samples from it on have.
+/// Part of sample `s` in a cell, or the sum of the `step` samples from it on.
 #[cube]
-fn part_or_sum<F: Float, P: Spread>(
-    samples: &Array<F>,
-    runs: &Array<F>,
-    long_runs: &Array<F>,
+fn part_or_sum<F: Float + CubeElement, P: Spread>(
+    samples: &SortedSamples<F>,
     s: u32,
     step: u32,
     x: u32,
@@ -296,10 +273,10 @@ fn part_or_sum<F: Float, P: Spread>(
     let cells = comptime!((width * width * width) as usize);
     let cell = ((x * width + y) * width + z) as usize;
     if step == 1u32 {
-        P::part::<F>(samples, s as usize, x, y, z)
+        P::part::<F>(&samples.values, s as usize, x, y, z)
     } else if step == RUN {
-        runs[(s / RUN) as usize * cells + cell]
+        samples.runs[(s / RUN) as usize * cells + cell]
     } else {
-        long_runs[(s / (RUN * RUN)) as usize * cells + cell]
+        samples.long_runs[(s / (RUN * RUN)) as usize * cells + cell]
     }
 }

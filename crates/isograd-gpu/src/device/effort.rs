@@ -1,9 +1,9 @@
-//! What work costs before the device has done any of it.
+//! Launches and waits: the overhead of work on a device.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// How often a device was asked: each time costs some microseconds, however little there is to do.
+/// Counts of launches and waits, each of which costs some microseconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Effort {
     /// Kernels that were queued.

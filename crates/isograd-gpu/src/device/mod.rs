@@ -14,6 +14,7 @@ pub(crate) use launch::launch;
 
 pub use buffer::Buffer;
 pub use effort::Effort;
+pub(crate) use launch::{Argument, BLOCK, Ready};
 #[cfg(feature = "cuda")]
 pub use open::Cuda;
 #[cfg(feature = "wgpu")]
@@ -25,7 +26,7 @@ pub trait Scalar: isograd::Pipeline + Float + CubeElement {}
 impl Scalar for f32 {}
 impl Scalar for f64 {}
 
-/// Why a device can't do what it was asked to.
+/// Errors of a device.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// There is no such device here.
@@ -33,9 +34,9 @@ pub enum Error {
     NoDevice {
         /// `Vulkan` or `CUDA`.
         backend: &'static str,
-        /// What was found instead.
+        /// Reason, such as a missing library.
         reason: String,
-        /// What to do about it.
+        /// Remedy.
         remedy: &'static str,
     },
     /// The device has no double precision.
@@ -53,12 +54,12 @@ pub enum Error {
     TooLarge {
         /// Name of the device.
         device: String,
-        /// Bytes asked for.
+        /// Size of the array in bytes.
         bytes: u64,
         /// Most that one array may have.
         limit: u64,
     },
-    /// What is given does not fit together.
+    /// Array lengths that do not match.
     #[error("{what} has {found} elements, but {expected} are needed")]
     Length {
         /// Which array.
@@ -71,7 +72,7 @@ pub enum Error {
     /// The smoothing is negative or not finite.
     #[error("the smoothing is {smoothing} cells; it must be finite and 0 or more")]
     Smoothing {
-        /// What was given.
+        /// Smoothing passed by the caller, in cells.
         smoothing: f64,
     },
     /// The device failed while it worked.
@@ -79,7 +80,7 @@ pub enum Error {
     Failed {
         /// Name of the device.
         device: String,
-        /// What the driver says.
+        /// Message of the driver.
         reason: String,
     },
 }
@@ -117,7 +118,7 @@ impl<R: Runtime> Device<R> {
         }
     }
 
-    /// The same, with double precision: CubeCL does not list it for CUDA, where every device has it.
+    /// This device, marked as having double precision: CubeCL does not list it for CUDA, where every device has it.
     pub fn with_f64(self) -> Self {
         Self {
             has_f64: true,
@@ -199,7 +200,7 @@ impl<R: Runtime> Device<R> {
         cubecl::future::block_on(self.client.sync()).map_err(|e| self.failed(&e))
     }
 
-    /// What was asked of the device since it was opened, by this value and its clones.
+    /// Launches and waits since the device was opened, by this value and its clones.
     pub fn effort(&self) -> Effort {
         self.counts.effort()
     }
@@ -209,7 +210,7 @@ impl<R: Runtime> Device<R> {
         self.client.properties().hardware.max_shared_memory_size
     }
 
-    /// What this program has of the device's memory.
+    /// Device memory held by this program.
     ///
     /// # Errors
     /// [`Error::Failed`].

@@ -20,7 +20,7 @@ mod vulkan {
 
     const REMEDY: &str = "install a Vulkan driver (Debian: mesa-vulkan-drivers libvulkan1 has one that needs no GPU)";
 
-    /// What the driver says of the device that was opened.
+    /// The open device, as its driver describes it.
     struct Opened {
         name: String,
         /// It computes on the CPU.
@@ -38,7 +38,7 @@ mod vulkan {
             Ok(Self::new(client, name))
         }
 
-        /// The same, where it is a GPU: a driver that computes on the CPU is slower than the CPU's own code.
+        /// [`Self::vulkan`], but only on a GPU: a driver that computes on the CPU is slower than the CPU's own code.
         ///
         /// # Errors
         /// [`Error::NoDevice`].

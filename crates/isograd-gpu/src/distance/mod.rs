@@ -23,19 +23,19 @@
 //! All is computed in the number type of the mesh, squares of lengths too: in `f32` lengths, and cells, should
 //! be between about 1e-15 and 1e15 of the unit.
 
+mod bvh;
 pub mod extend;
 pub mod lattice;
-mod morton;
-mod search;
-mod settle;
 mod shares;
 mod tangent;
-mod tree;
 mod triangle;
 
 pub use isograd::distance::{Band, NO_TRIANGLE};
 
-use crate::Buffer;
+use cubecl::prelude::*;
+
+use crate::device::Argument;
+use crate::{Buffer, Device, Scalar};
 
 /// A distance that no mesh has, squared.
 const FAR: f64 = 3e38;
@@ -48,6 +48,21 @@ pub struct Mesh<T> {
     /// `(F, 3)`: each names three vertices, from 0. Not checked: a kernel that reads beyond the vertices gets
     /// anything.
     pub faces: Buffer<u32>,
+}
+
+/// [`Mesh`] in kernels.
+#[derive(CubeLaunch, CubeType)]
+pub(crate) struct MeshArrays<F: Float + CubeElement> {
+    pub vertices: Array<F>,
+    pub faces: Array<u32>,
+}
+
+impl<R: Runtime, T: Scalar> Argument<R> for Mesh<T> {
+    type Parameter = MeshArraysLaunch<T, R>;
+
+    fn argument(&self, _: &Device<R>) -> Self::Parameter {
+        MeshArraysLaunch::new(self.vertices.arg(), self.faces.arg())
+    }
 }
 
 impl<T> Mesh<T> {
@@ -68,7 +83,7 @@ impl<T> Mesh<T> {
     }
 }
 
-/// Why the distance stage refused its input.
+/// Errors of the distance stage.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// There is no triangle to be near to.

@@ -1,18 +1,39 @@
-//! What queries give the corners of their closest faces, and what vertices get of it.
+//! Cotangents of the corners of closest faces, and their sums at the vertices.
 
 use cubecl::prelude::*;
 
 use super::Mesh;
 use super::triangle::Closest;
+use crate::device::{Argument, launch};
 use crate::primitives::segments::{Pieces, Rows, sum_rows};
 use crate::primitives::sort;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
-const BLOCK: u32 = 64;
-
 /// Numbers that a face has: the cotangents of its three corners, and one for the caller.
 pub(super) const FACE: usize = 10;
+
+/// Queries in the order of their closest faces.
+pub(super) struct ByFace {
+    order: Buffer<u32>,
+    pub pieces: Pieces,
+}
+
+/// [`ByFace`] in kernels, with a unit for each piece.
+#[derive(CubeLaunch, CubeType)]
+pub(crate) struct ByFaceArrays {
+    pub order: Array<u32>,
+    /// `(P, 3)` face, first place in the order, and one past the last.
+    pub table: Array<u32>,
+}
+
+impl<R: Runtime> Argument<R> for ByFace {
+    type Parameter = ByFaceArraysLaunch<R>;
+
+    fn argument(&self, _: &Device<R>) -> Self::Parameter {
+        ByFaceArraysLaunch::new(self.order.arg(), self.pieces.table.arg())
+    }
+}
 
 /// The queries in the order of their closest faces, without those whose cotangent is zero where `bar` is given, and
 /// the pieces that they are summed in.
@@ -21,23 +42,17 @@ pub(super) fn by_face<T: Scalar, R: Runtime>(
     mesh: &Mesh<T>,
     closest: &Buffer<u32>,
     bar: Option<&Buffer<T>>,
-) -> Result<(Buffer<u32>, Pieces), Error> {
+) -> Result<ByFace, Error> {
     let (count, faces) = (closest.len(), mesh.faces.len() as u32 / 3);
     let keys = device.empty(count)?;
-    key_queries::launch::<T, R>(
-        device.client(),
-        device.groups(count, BLOCK),
-        CubeDim::new_1d(BLOCK),
-        closest.arg(),
-        bar.unwrap_or(&device.empty(0)?).arg(),
-        keys.arg(),
-        faces,
-        bar.is_none(),
-    );
+    launch!(device, count => key_queries<T>(
+        closest, bar.unwrap_or(&device.empty(0)?), keys, faces, bar.is_none(),
+    ));
     let order = sort::order(device, &keys, faces + 1)?;
     let starts = sort::starts(device, &order.keys, faces)?;
     let pieces = Pieces::new(device, &starts, count)?;
-    Ok((order.places, pieces))
+    let order = order.places;
+    Ok(ByFace { order, pieces })
 }
 
 /// The corners of the faces, by vertex.

@@ -1,4 +1,4 @@
-//! How the closest point of a triangle moves: the derivative of what is interpolated there, as on the CPU
+//! Motion of the closest point of a triangle: the derivative of a value interpolated there, as on the CPU
 //! (`isograd::distance::tangent`).
 //!
 //! With `o` the offset of the query from the closest point, `Σ β_k u_k` has the gradient `G` with respect to the
@@ -18,16 +18,6 @@ pub(super) struct Tangent<F: Float> {
     pub gamma: Vector3<F>,
     /// Whether a bounded gradient was taken where the true one has no useful bound.
     pub guarded: bool,
-}
-
-/// What `bar·y` gains along each edge.
-#[cube]
-pub(super) fn gains<F: Float>(corners: Corners<F>, bar: Vector3<F>) -> Vector3<F> {
-    Vector3::<F> {
-        x: bar.dot(corners.ab),
-        y: bar.dot(corners.bc),
-        z: bar.dot(corners.ca),
-    }
 }
 
 /// Gradient of `Σ β_k u_k`, `β` the weights of the closest point `found`, for corner values that gain `gains` along

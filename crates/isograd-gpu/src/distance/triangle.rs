@@ -7,6 +7,7 @@
 
 use cubecl::prelude::*;
 
+use super::MeshArrays;
 use crate::vector::Vector3;
 
 /// Numbers of a frame in memory: origin, `u`, `v`, foot, back, height.
@@ -54,16 +55,15 @@ pub(super) struct Closest<F: Float> {
 
 /// The corners of a face, as seen from `origin`.
 #[cube]
-pub(super) fn corners<F: Float>(
-    vertices: &Array<F>,
-    faces: &Array<u32>,
+pub(super) fn corners<F: Float + CubeElement>(
+    mesh: &MeshArrays<F>,
     face: u32,
     origin: Vector3<F>,
 ) -> Corners<F> {
     let at = face as usize * 3;
-    let a = Vector3::<F>::at(vertices, faces[at] as usize);
-    let b = Vector3::<F>::at(vertices, faces[at + 1] as usize);
-    let c = Vector3::<F>::at(vertices, faces[at + 2] as usize);
+    let a = Vector3::<F>::at(&mesh.vertices, mesh.faces[at] as usize);
+    let b = Vector3::<F>::at(&mesh.vertices, mesh.faces[at + 1] as usize);
+    let c = Vector3::<F>::at(&mesh.vertices, mesh.faces[at + 2] as usize);
     Corners::<F> {
         a: a.sub(origin),
         b: b.sub(origin),
@@ -319,12 +319,4 @@ pub(super) fn turned_back<F: Float>(w: Vector3<F>, first: u32) -> Vector3<F> {
         y: select(first == 0u32, w.y, select(first == 1u32, w.x, w.z)),
         z: select(first == 0u32, w.z, select(first == 1u32, w.y, w.x)),
     }
-}
-
-/// `Σ β_k y_k`, from the first corner.
-#[cube]
-pub(super) fn combine<F: Float>(t: Corners<F>, weights: Vector3<F>) -> Vector3<F> {
-    let b = t.ab.scale(weights.y);
-    let c = t.ca.scale(weights.z);
-    t.a.add(b.sub(c))
 }

@@ -1,12 +1,12 @@
-//! Which device is meant.
+//! Choice of the backend.
 
 use isograd::{Backend, Grid, Options};
 
 use super::{Error, Number, Plan};
 
-/// Who computes.
+/// The CPU or a device.
 pub enum Choice<T: Number> {
-    /// The CPU, by [`isograd::Reconstructor`]; why, where it was left to this program.
+    /// The CPU, by [`isograd::Reconstructor`]; with [`Backend::Auto`], the reason.
     Cpu(Option<String>),
     /// A device.
     Device(Box<Plan<T>>),

@@ -1,11 +1,11 @@
-//! Why a host gets nothing.
+//! Errors of the front for hosts.
 
 use isograd::distance::extend;
 use isograd::{Backend, PointCloudError, PullbackError, RestoreError, Stage};
 
 use crate::pipeline;
 
-/// Why there is no plan, no result or no gradient.
+/// Errors of plans, results and gradients.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -21,16 +21,16 @@ pub enum Error {
     /// The device's stages.
     #[error(transparent)]
     Pipeline(pipeline::Error),
-    /// What the CPU says of the same cloud.
+    /// An error that the CPU reports for such a cloud too.
     #[error(transparent)]
     Host(#[from] isograd::Error),
     /// Cotangents.
     #[error(transparent)]
     Pullback(#[from] PullbackError),
-    /// What was saved makes no result.
+    /// Saved data that do not match the plan.
     #[error(transparent)]
     Restore(#[from] RestoreError),
-    /// What was saved makes no cloud.
+    /// Saved normals that do not match the cloud.
     #[error(transparent)]
     Cloud(#[from] PointCloudError),
     /// An attribute that was to be extended, or what was extended.
@@ -39,12 +39,12 @@ pub enum Error {
     /// Stopped by the observer.
     #[error("stopped before the stage '{}'", .0.name())]
     Interrupted(Stage),
-    /// What came back from the device makes no result.
+    /// Invalid results from the device.
     #[error("{device} gave a result that is none ({reason}); compute on the CPU")]
     Result {
         /// Its name.
         device: String,
-        /// What is wrong.
+        /// Reason.
         reason: String,
     },
 }

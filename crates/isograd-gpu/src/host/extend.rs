@@ -13,7 +13,7 @@ use crate::{Buffer, Device, Scalar};
 /// [`Reconstructor::extend`] for arrays in the host's memory.
 ///
 /// # Errors
-/// Those of the pipeline.
+/// Errors of the pipeline.
 pub fn forward<R: Runtime, T: Scalar>(
     plan: &Reconstructor<R, T>,
     result: &Reconstruction<T>,
@@ -78,7 +78,7 @@ impl<T: Scalar> Uploaded<T> {
     /// Uploads all of it.
     ///
     /// # Errors
-    /// An extension over another grid than one of this `shape`; those of the device.
+    /// An extension over another grid than one of this `shape`; errors of the device.
     pub fn new<R: Runtime>(
         device: &Device<R>,
         shape: [usize; 3],
@@ -103,7 +103,7 @@ impl<T: Scalar> Uploaded<T> {
         })
     }
 
-    /// The same as a cotangent on the device; `given` is what was uploaded.
+    /// The uploaded arrays of `given` as a cotangent on the device.
     pub fn cotangent(
         &self,
         given: &ExtensionCotangent<'_, T>,

@@ -7,11 +7,11 @@ use std::time::Instant;
 use isograd::orient::Method;
 use isograd::{Backend, Grid, Options, PointCloud, Report, Saved, Seconds, Stage};
 
-use super::work::{Begun, Work};
+use super::work::{CallStart, Work};
 use super::{Error, Number, Reconstruction};
 use crate::Buffer;
 use crate::element::turned;
-use crate::pipeline::Held;
+use crate::pipeline::RadiiAndSigns;
 
 /// [`isograd::Reconstructor`] on a device: a plan for one grid and one set of options.
 pub struct Plan<T: Number> {
@@ -19,8 +19,8 @@ pub struct Plan<T: Number> {
     name: String,
     grid: Grid<T>,
     options: Options,
-    /// With [`Method::Previous`], what the next call starts from.
-    before: Option<Begun<T>>,
+    /// Start of the next call, with [`Method::Previous`].
+    before: Option<CallStart<T>>,
 }
 
 impl<T: Number> Plan<T> {
@@ -28,7 +28,7 @@ impl<T: Number> Plan<T> {
     /// here, and nowhere before.
     ///
     /// # Errors
-    /// A device that can't be had, with the reason and the remedy; options that are not for devices.
+    /// An unavailable device, with the reason and the remedy; invalid options.
     pub fn new(backend: Backend, grid: Grid<T>, options: Options) -> Result<Self, Error> {
         let device = T::open(backend, grid, (&options).into())?;
         Ok(Self {
@@ -63,8 +63,8 @@ impl<T: Number> Plan<T> {
         self.reconstruct_observed(cloud, &mut |_| ControlFlow::Continue(()))
     }
 
-    /// The same, calling `observer` before each stage but the checks, which are made when their report is asked
-    /// for; where it breaks, so does the work.
+    /// [`Self::reconstruct`], calling `observer` before each stage; it stops the work by breaking. The checks run with
+    /// the first request for the report.
     ///
     /// # Errors
     /// As [`Self::reconstruct`], and [`Error::Interrupted`] where the observer breaks.
@@ -96,10 +96,10 @@ impl<T: Number> Plan<T> {
     }
 
     /// The result again that a plan with the same grid and options made of `cloud`: [`isograd::Reconstructor::restore`].
-    /// Of what was saved only the normals are used, which tell the sides; all else is computed anew.
+    /// Only the saved normals are used, for the signs; all else is computed anew.
     ///
     /// # Errors
-    /// As [`Self::reconstruct`]; what was saved of another result.
+    /// As [`Self::reconstruct`]; saved data of another result.
     pub fn restore(
         &self,
         cloud: &PointCloud<T>,
@@ -118,14 +118,14 @@ impl<T: Number> Plan<T> {
         Ok(self.run(&points, None, begun, &mut observer)?.0)
     }
 
-    /// All stages but the orientation; and what was held.
+    /// All stages after the orientation; returns the radii and signs too.
     fn run(
         &self,
         points: &Buffer<T>,
         given: Option<&[[T; 3]]>,
-        begun: Begun<T>,
+        begun: CallStart<T>,
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
-    ) -> Result<(Reconstruction<T>, Held<T>), Error> {
+    ) -> Result<(Reconstruction<T>, RadiiAndSigns<T>), Error> {
         let (held, mut report) = (begun.held.clone(), begun.report.clone());
         let mut clock = Clock::new();
         let mut stage_before = Stage::Normals;
@@ -133,7 +133,7 @@ impl<T: Number> Plan<T> {
             clock.note(&mut report, stage_before);
             stage_before = stage;
             match stage {
-                // Begun before.
+                // CallStart before.
                 Stage::Normals => ControlFlow::Continue(()),
                 stage => observer(stage),
             }
@@ -151,14 +151,14 @@ impl<T: Number> Plan<T> {
         Ok((result, held))
     }
 
-    /// Radii and sides.
+    /// Radii and signs.
     fn find(
         &self,
         cloud: &PointCloud<T>,
         points: &Buffer<T>,
         method: Method,
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
-    ) -> Result<Begun<T>, Error> {
+    ) -> Result<CallStart<T>, Error> {
         let (mut clock, mut of_normals) = (Clock::new(), Report::default());
         let mut begin = || {
             clock.note(&mut of_normals, Stage::Normals);
@@ -183,15 +183,18 @@ impl<T: Number> Plan<T> {
     }
 }
 
-/// What a call starts from that follows the one that made `result`.
-fn next<T: Number>(held: Held<T>, result: &Reconstruction<T>) -> Result<Begun<T>, Error> {
+/// Start of the call after the one that made `result`.
+fn next<T: Number>(
+    held: RadiiAndSigns<T>,
+    result: &Reconstruction<T>,
+) -> Result<CallStart<T>, Error> {
     let report = Report {
         orientation: "previous",
         flipped: 0,
         seconds: Seconds::default(),
         ..result.begun().clone()
     };
-    Ok(Begun {
+    Ok(CallStart {
         held: result.hold_after(held)?,
         axes: None,
         report,

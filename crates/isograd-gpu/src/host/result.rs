@@ -14,51 +14,75 @@ use isograd::{
 
 use super::work::{Work, vectors_of};
 use super::{Error, Number};
-use crate::pipeline::Held;
+use crate::pipeline::RadiiAndSigns;
 use crate::{Buffer, pipeline};
 
-/// What a plan made of a cloud, on the device: [`isograd::Reconstruction`] there. What is asked for is copied, once.
+/// [`isograd::Reconstruction`] on a device. Each result is copied at its first request.
 pub struct Reconstruction<T: Number> {
     device: Arc<dyn Work<T>>,
     result: pipeline::Reconstruction<T>,
     grid: Grid<T>,
     checks: bool,
-    /// As far as nothing has to be copied for it.
+    /// The report, without what needs copies of results.
     begun: Report,
-    /// What the radii are.
-    held: Held<T>,
+    /// Radii and signs.
+    held: RadiiAndSigns<T>,
     copies: Copies<T>,
 }
 
-/// What was asked for.
-struct Copies<T> {
-    sdf: OnceLock<Field<T>>,
-    indicator: OnceLock<Field<T>>,
-    iso_value: OnceLock<T>,
-    mesh: OnceLock<Mesh<T>>,
-    closest: OnceLock<Vec<u32>>,
-    normals: OnceLock<Vec<[T; 3]>>,
-    confidence: OnceLock<Vec<T>>,
-    areas: OnceLock<Vec<T>>,
-    neighborhoods: OnceLock<Neighborhoods<T>>,
-    report: OnceLock<Report>,
+/// Copies of the results, each made at its first request; and a method for each.
+macro_rules! results {
+    ($($(#[$doc:meta])+ $name:ident: $kind:ty => $view:ty, |$of:ident| $copy:expr;)*) => {
+        struct Copies<T> {
+            $($name: OnceLock<$kind>,)*
+            neighborhoods: OnceLock<Neighborhoods<T>>,
+            report: OnceLock<Report>,
+        }
+
+        impl<T> Default for Copies<T> {
+            fn default() -> Self {
+                Self {
+                    $($name: OnceLock::new(),)*
+                    neighborhoods: OnceLock::new(),
+                    report: OnceLock::new(),
+                }
+            }
+        }
+
+        impl<T: Number> Reconstruction<T> {
+            $(
+                $(#[$doc])+
+                ///
+                /// # Errors
+                /// Errors of the device.
+                pub fn $name(&self) -> Result<&$view, Error> {
+                    let $of = self;
+                    let copy = once(&self.copies.$name, || $copy)?;
+                    Ok(copy)
+                }
+            )*
+        }
+    };
 }
 
-impl<T> Default for Copies<T> {
-    fn default() -> Self {
-        Self {
-            sdf: OnceLock::new(),
-            indicator: OnceLock::new(),
-            iso_value: OnceLock::new(),
-            mesh: OnceLock::new(),
-            closest: OnceLock::new(),
-            normals: OnceLock::new(),
-            confidence: OnceLock::new(),
-            areas: OnceLock::new(),
-            neighborhoods: OnceLock::new(),
-            report: OnceLock::new(),
-        }
-    }
+results! {
+    /// The signed distance φ at every cell center, in the cloud's unit, negative inside.
+    sdf: Field<T> => Field<T>, |of| of.field(&of.result.sdf);
+    /// The indicator χ at every cell center: below the iso-value inside, above it outside.
+    indicator: Field<T> => Field<T>, |of| of.field(&of.result.indicator);
+    /// The surface, in the cloud's coordinates; its vertices do not name their lattice edges.
+    mesh: Mesh<T> => Mesh<T>, |of| of.copy_mesh();
+    /// For each cell, in C order, the face of the surface closest to its center;
+    /// [`NO_TRIANGLE`](crate::distance::NO_TRIANGLE) outside the band.
+    closest: Vec<u32> => [u32], |of| of.device.indices(of.result.closest());
+    /// `(N, 3)` outward unit normals of the samples, in their order.
+    normals: Vec<[T; 3]> => [[T; 3]], |of| of.vectors(&of.result.normals);
+    /// `(N,)` area of surface that each sample stands for, in unit length²; 1 without area weights.
+    areas: Vec<T> => [T], |of| of.device.numbers(&of.result.areas);
+    /// `(N,)` confidence in the sign of each normal, from 0 to 1.
+    confidence: Vec<T> => [T], |of| of.device.numbers(&of.result.confidence);
+    /// `(1,)` the level of the surface.
+    level: Vec<T> => [T], |of| of.device.numbers(&of.result.iso_value);
 }
 
 impl<T: Number> Reconstruction<T> {
@@ -67,7 +91,7 @@ impl<T: Number> Reconstruction<T> {
         result: pipeline::Reconstruction<T>,
         options: &Options,
         grid: Grid<T>,
-        held: Held<T>,
+        held: RadiiAndSigns<T>,
         begun: Report,
     ) -> Self {
         Self {
@@ -91,98 +115,28 @@ impl<T: Number> Reconstruction<T> {
         self.begun.points
     }
 
-    /// The signed distance φ at every cell center, in the cloud's unit, negative inside.
-    ///
-    /// # Errors
-    /// Those of the device.
-    pub fn sdf(&self) -> Result<&Field<T>, Error> {
-        once(&self.copies.sdf, || self.field(&self.result.sdf))
-    }
-
-    /// The indicator χ at every cell center: below the iso-value inside, above it outside.
-    ///
-    /// # Errors
-    /// Those of the device.
-    pub fn indicator(&self) -> Result<&Field<T>, Error> {
-        once(&self.copies.indicator, || {
-            self.field(&self.result.indicator)
-        })
-    }
-
     /// The level `c` of the surface `χ = c`.
     ///
     /// # Errors
-    /// Those of the device.
+    /// Errors of the device.
     pub fn iso_value(&self) -> Result<T, Error> {
-        once(&self.copies.iso_value, || {
-            Ok(self.device.numbers(&self.result.iso_value)?[0])
-        })
-        .copied()
+        Ok(self.level()?[0])
     }
 
-    /// The surface, in the cloud's coordinates; its vertices do not name their lattice edges.
-    ///
-    /// # Errors
-    /// Those of the device.
-    pub fn mesh(&self) -> Result<&Mesh<T>, Error> {
-        once(&self.copies.mesh, || {
-            let surface = &self.result.surface;
-            let vertices = self.vectors(&surface.vertices)?;
-            let faces = vectors_of(&self.device.indices(&surface.faces)?);
-            Mesh::new(vertices, faces).map_err(|e| self.none(&e))
-        })
+    fn copy_mesh(&self) -> Result<Mesh<T>, Error> {
+        let surface = &self.result.surface;
+        let vertices = self.vectors(&surface.vertices)?;
+        let faces = vectors_of(&self.device.indices(&surface.faces)?);
+        Mesh::new(vertices, faces).map_err(|e| self.none(&e))
     }
 
-    /// For each cell, in C order, the face of the surface closest to its center;
-    /// [`NO_TRIANGLE`](crate::distance::NO_TRIANGLE) outside the band.
-    ///
-    /// # Errors
-    /// Those of the device.
-    pub fn closest(&self) -> Result<&[u32], Error> {
-        let closest = once(&self.copies.closest, || {
-            self.device.indices(self.result.closest())
-        });
-        closest.map(Vec::as_slice)
-    }
-
-    /// `(N, 3)` outward unit normals of the samples, in their order.
-    ///
-    /// # Errors
-    /// Those of the device.
-    pub fn normals(&self) -> Result<&[[T; 3]], Error> {
-        let normals = once(&self.copies.normals, || self.vectors(&self.result.normals));
-        normals.map(Vec::as_slice)
-    }
-
-    /// `(N,)` area of surface that each sample stands for, in unit length²; 1 without area weights.
-    ///
-    /// # Errors
-    /// Those of the device.
-    pub fn areas(&self) -> Result<&[T], Error> {
-        let areas = once(&self.copies.areas, || {
-            self.device.numbers(&self.result.areas)
-        });
-        areas.map(Vec::as_slice)
-    }
-
-    /// `(N,)` confidence in the sign of each normal, from 0 to 1.
-    ///
-    /// # Errors
-    /// Those of the device.
-    pub fn confidence(&self) -> Result<&[T], Error> {
-        let confidence = once(&self.copies.confidence, || {
-            self.device.numbers(&self.result.confidence)
-        });
-        confidence.map(Vec::as_slice)
-    }
-
-    /// What was known of the samples, and the time that it took.
+    /// The report without what needs copies of results.
     pub(super) fn begun(&self) -> &Report {
         &self.begun
     }
 
-    /// What the next step of a body that moves holds.
-    pub(super) fn hold_after(&self, held: Held<T>) -> Result<Held<T>, Error> {
+    /// Radii and signs for the next step of a moving body.
+    pub(super) fn hold_after(&self, held: RadiiAndSigns<T>) -> Result<RadiiAndSigns<T>, Error> {
         Ok(held.after(&self.result)?)
     }
 
@@ -194,7 +148,7 @@ impl<T: Number> Reconstruction<T> {
     /// `(N,)` number of samples in the neighborhood of each, itself included.
     ///
     /// # Errors
-    /// Those of the device.
+    /// Errors of the device.
     pub fn neighbor_counts(&self) -> Result<&[u32], Error> {
         Ok(&self.neighborhoods()?.count)
     }
@@ -218,7 +172,7 @@ impl<T: Number> Reconstruction<T> {
     /// Numbers, times and warnings. With [`Options::checks`] points, φ, the surface and the normals are copied for them.
     ///
     /// # Errors
-    /// Those of the device.
+    /// Errors of the device.
     pub fn report(&self) -> Result<&Report, Error> {
         once(&self.copies.report, || self.make_report())
     }
@@ -253,7 +207,7 @@ impl<T: Number> Reconstruction<T> {
     /// the surface as it is at the closest surface point: [`isograd::Reconstruction::extend`], on the device.
     ///
     /// # Errors
-    /// What that says; those of the device.
+    /// Errors of that, and of the device.
     pub fn extend(
         &self,
         cloud: &PointCloud<T>,
@@ -269,7 +223,7 @@ impl<T: Number> Reconstruction<T> {
         Ok(self.extend_with_residual(attribute, band)?.0)
     }
 
-    /// The same for one value per sample that was reconstructed, with what the pullback needs.
+    /// [`Self::extend`] for any attribute of the samples, with the residual of its pullback.
     ///
     /// # Errors
     /// As [`Self::extend`].
@@ -286,7 +240,7 @@ impl<T: Number> Reconstruction<T> {
     /// counted, those without a cotangent too.
     ///
     /// # Errors
-    /// Those of the device; a cotangent of another length, or that is not finite; an extension of another result.
+    /// Errors of the device; a cotangent of another length, or that is not finite; an extension of another result.
     pub fn pullback(&self, cotangent: &Cotangent<'_, T>) -> Result<CloudCotangent<T>, Error> {
         let vertices = self.result.surface.vertices.len() / 3;
         cotangent.check(self.grid.cells(), vertices, self.points())?;
@@ -312,7 +266,7 @@ impl<T: Number> Reconstruction<T> {
     }
 }
 
-/// What is there already, or what `make` makes.
+/// The value in `place`, made at the first request.
 fn once<V>(place: &OnceLock<V>, make: impl FnOnce() -> Result<V, Error>) -> Result<&V, Error> {
     if let Some(value) = place.get() {
         return Ok(value);

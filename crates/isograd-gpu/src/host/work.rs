@@ -15,11 +15,11 @@ use super::Error;
 use super::extend::{self, Uploaded};
 use crate::orient as on_device;
 use crate::pipeline::{
-    self, FoundAxes, Held, Options, Reconstruction, Reconstructor, Search, Start,
+    self, Options, RadiiAndSigns, Reconstruction, Reconstructor, SampleAxes, SearchResult, Start,
 };
 use crate::{Buffer, Device, Scalar};
 
-/// What is done on a device, whose runtime is not named.
+/// A pipeline on a device, with its runtime erased.
 pub trait Work<T: Scalar>: Send + Sync {
     /// The name that its driver gives the device.
     fn name(&self) -> &str;
@@ -27,14 +27,14 @@ pub trait Work<T: Scalar>: Send + Sync {
     /// `(N, 3)` vectors, there.
     ///
     /// # Errors
-    /// Those of the device.
+    /// Errors of the device.
     fn upload(&self, vectors: &[[T; 3]]) -> Result<Buffer<T>, Error>;
 
     /// The radii of a cloud, whose `points` are there, and the signs of its axes; `begin` is called before the signs are
     /// chosen. What the device has no method for is found on the CPU, as is all with `on_cpu`.
     ///
     /// # Errors
-    /// Those of the pipeline; [`Error::Interrupted`] where `begin` breaks.
+    /// Errors of the pipeline; [`Error::Interrupted`] where `begin` breaks.
     fn find(
         &self,
         cloud: &PointCloud<T>,
@@ -43,24 +43,24 @@ pub trait Work<T: Scalar>: Send + Sync {
         method: Method,
         on_cpu: bool,
         begin: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Result<Begun<T>, Error>;
+    ) -> Result<CallStart<T>, Error>;
 
     /// All stages, with given normals or without; `observer` is called before each, when those before it are done.
     ///
     /// # Errors
-    /// Those of the pipeline.
+    /// Errors of the pipeline.
     fn reconstruct(
         &self,
         points: &Buffer<T>,
         given: Option<&[[T; 3]]>,
-        begun: Begun<T>,
+        begun: CallStart<T>,
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
     ) -> Result<Reconstruction<T>, Error>;
 
     /// Cotangents in the host's memory to such cotangents.
     ///
     /// # Errors
-    /// Those of the pipeline.
+    /// Errors of the pipeline.
     fn pullback(
         &self,
         result: &Reconstruction<T>,
@@ -70,7 +70,7 @@ pub trait Work<T: Scalar>: Send + Sync {
     /// An attribute on the surface and round it.
     ///
     /// # Errors
-    /// Those of the pipeline.
+    /// Errors of the pipeline.
     fn extend(
         &self,
         result: &Reconstruction<T>,
@@ -81,23 +81,23 @@ pub trait Work<T: Scalar>: Send + Sync {
     /// A copy of numbers.
     ///
     /// # Errors
-    /// Those of the device.
+    /// Errors of the device.
     fn numbers(&self, buffer: &Buffer<T>) -> Result<Vec<T>, Error>;
 
     /// A copy of indices.
     ///
     /// # Errors
-    /// Those of the device.
+    /// Errors of the device.
     fn indices(&self, buffer: &Buffer<u32>) -> Result<Vec<u32>, Error>;
 }
 
-/// What a reconstruction starts from.
-pub struct Begun<T: Scalar> {
+/// Start of a reconstruction.
+pub struct CallStart<T: Scalar> {
     /// Radii and sides.
-    pub held: Held<T>,
+    pub held: RadiiAndSigns<T>,
     /// The axes that the sides were looked for with, where they were.
-    pub axes: Option<FoundAxes<T>>,
-    /// What a report says of the samples.
+    pub axes: Option<SampleAxes<T>>,
+    /// Part of the report about the samples.
     pub report: Report,
 }
 
@@ -106,7 +106,7 @@ pub trait Number: Scalar {
     /// A pipeline on a device.
     ///
     /// # Errors
-    /// Those of the device and the pipeline.
+    /// Errors of the device and the pipeline.
     #[doc(hidden)]
     fn open(
         backend: Backend,
@@ -173,7 +173,7 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
         method: Method,
         on_cpu: bool,
         begin: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Result<Begun<T>, Error> {
+    ) -> Result<CallStart<T>, Error> {
         let device = self.device();
         let refused = |reason: orient::Error| Error::Host(reason.into());
         let normals = || {
@@ -186,19 +186,19 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
                 if begin().is_break() {
                     return Err(Error::Interrupted(Stage::Orient));
                 }
-                Held::search_radii(device, points, radius)?
+                RadiiAndSigns::search_radii(device, points, radius)?
             }
             Method::Parity(options) if !on_cpu => {
                 let method = on_device::Method::Parity(options);
-                Held::search_on_device(device, points, radius, &method, begin)?
+                RadiiAndSigns::search_on_device(device, points, radius, &method, begin)?
             }
             Method::Signs if !on_cpu => {
                 let method = on_device::Method::Signs(self.upload(normals()?)?);
-                Held::search_on_device(device, points, radius, &method, begin)?
+                RadiiAndSigns::search_on_device(device, points, radius, &method, begin)?
             }
-            _ => Held::search_on_cpu(device, cloud, radius, &method, begin)?,
+            _ => RadiiAndSigns::search_on_cpu(device, cloud, radius, &method, begin)?,
         };
-        let Search {
+        let SearchResult {
             held,
             axes,
             method,
@@ -218,14 +218,14 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
             guarded,
             ..Report::default()
         };
-        Ok(Begun { held, axes, report })
+        Ok(CallStart { held, axes, report })
     }
 
     fn reconstruct(
         &self,
         points: &Buffer<T>,
         given: Option<&[[T; 3]]>,
-        begun: Begun<T>,
+        begun: CallStart<T>,
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
     ) -> Result<Reconstruction<T>, Error> {
         let device = self.device();
@@ -327,7 +327,7 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
 /// A copy on the device of what is there.
 ///
 /// # Errors
-/// Those of the device.
+/// Errors of the device.
 pub fn upload<R: Runtime, E: CubeElement>(
     device: &Device<R>,
     given: Option<&[E]>,

@@ -1,13 +1,14 @@
-//! Why there is no surface: found on the device, told in the CPU's words.
+//! Errors of the isosurface stage: found on the device, worded as on the CPU.
 
 use cubecl::prelude::*;
 use isograd::{Grid, isosurface};
 
 use super::signs::{BLOCK, not_finite};
+use crate::device::launch;
 use crate::primitives::ends::ends;
 use crate::{Buffer, Device, Scalar};
 
-/// Why there is no surface.
+/// Errors of the isosurface stage.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The field has none.
@@ -38,17 +39,9 @@ pub(super) fn bad_value<R: Runtime, T: Scalar>(
 ) -> Error {
     let find = || -> Result<Error, crate::Error> {
         let (place, value): (Buffer<u32>, Buffer<T>) = (device.empty(1)?, device.empty(1)?);
-        first_bad::launch::<T, R>(
-            device.client(),
-            CubeCount::Static(1, 1, 1),
-            CubeDim::new_1d(BLOCK as u32),
-            chi.arg(),
-            faults.arg(),
-            place.arg(),
-            value.arg(),
-            grid.shape()[2] as u32,
-            BLOCK,
-        );
+        launch!(device, [1; BLOCK] => first_bad<T>(
+            chi, faults, place, value, grid.shape()[2] as u32, BLOCK,
+        ));
         let cell = grid.cell(device.download(&place)?[0] as usize);
         let value = device.download(&value)?[0].f64();
         Ok(isosurface::Error::NotFinite { cell, value }.into())

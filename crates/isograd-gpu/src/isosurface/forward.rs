@@ -11,7 +11,7 @@ use super::signs::{
 use super::total::Total;
 use super::values::{Values, fraction_on};
 use super::{Plan, Residual, Surface};
-use crate::device::check_length;
+use crate::device::{check_length, launch};
 use crate::primitives::scan::exclusive_sum;
 use crate::{Buffer, Device, Scalar};
 
@@ -105,15 +105,7 @@ fn counts<R: Runtime>(
     signs: &Bits,
 ) -> Result<(Buffer<u32>, Buffer<u32>), crate::Error> {
     let (vertices, faces) = (device.empty(signs.len())?, device.empty(signs.len())?);
-    count_words::launch::<R>(
-        device.client(),
-        device.groups(signs.len(), BLOCK as u32),
-        CubeDim::new_1d(BLOCK as u32),
-        signs.arg(),
-        plan.table.arg(),
-        vertices.arg(),
-        faces.arg(),
-    );
+    launch!(device, signs.len(), BLOCK => count_words(signs, plan.table, vertices, faces));
     Ok((vertices, faces))
 }
 
@@ -121,16 +113,9 @@ impl<T: Scalar> Residual<T> {
     /// The vertices; fills the edges.
     fn vertices<R: Runtime>(&self, device: &Device<R>) -> Result<Buffer<T>, crate::Error> {
         let vertices = device.empty(3 * self.edges.len())?;
-        emit_vertices::launch::<T, R>(
-            device.client(),
-            device.groups(self.signs.units(), BLOCK as u32),
-            CubeDim::new_1d(BLOCK as u32),
-            self.signs.arg(),
-            self.before.arg(),
-            self.values(device)?,
-            vertices.arg(),
-            self.edges.arg(),
-        );
+        launch!(device, self.signs.units(), BLOCK => emit_vertices<T>(
+            self.signs, self.before, self.values(device)?, vertices, self.edges,
+        ));
         Ok(vertices)
     }
 
@@ -142,17 +127,9 @@ impl<T: Scalar> Residual<T> {
         count: usize,
     ) -> Result<Buffer<u32>, crate::Error> {
         let faces = device.empty(3 * count)?;
-        emit_faces::launch::<R>(
-            device.client(),
-            device.groups(self.signs.units(), BLOCK as u32),
-            CubeDim::new_1d(BLOCK as u32),
-            self.signs.arg(),
-            self.before.arg(),
-            before.arg(),
-            plan.table.arg(),
-            faces.arg(),
-            BLOCK,
-        );
+        launch!(device, self.signs.units(), BLOCK => emit_faces(
+            self.signs, self.before, before, plan.table, faces, BLOCK,
+        ));
         Ok(faces)
     }
 }

@@ -17,6 +17,8 @@
 
 mod error;
 mod forward;
+pub mod iso_value;
+pub mod local_level;
 mod pullback;
 mod signs;
 mod sums;
@@ -33,7 +35,7 @@ pub use error::Error;
 pub use forward::{forward, forward_at};
 pub use pullback::{Cotangent, pullback};
 
-/// What every surface needs, made once.
+/// Tables of the stage, uploaded once.
 #[derive(Clone)]
 pub struct Plan {
     /// Where the triangles of each of the 256 sign patterns begin, the end of the last, then the triangles: three
@@ -71,11 +73,11 @@ pub struct Surface<T> {
     /// `(V,)` the lattice edge of each vertex, ascending: `3·cell + axis`, from the cell at that place in memory to
     /// the next one along the axis. [`isograd::LatticeEdge`] of the two.
     pub edges: Buffer<u32>,
-    /// What there is to say about it.
+    /// Whether it touches the walls of the grid.
     pub report: Report,
 }
 
-/// What the pullback needs.
+/// Residual of [`forward`] for [`pullback`].
 #[derive(Clone)]
 pub struct Residual<T> {
     grid: Grid<T>,

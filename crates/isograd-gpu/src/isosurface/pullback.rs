@@ -6,7 +6,7 @@ use super::Residual;
 use super::signs::{BLOCK, Signs, inside, vertex_on};
 use super::sums::fold;
 use super::values::{Values, fraction_on, stride};
-use crate::device::check_length;
+use crate::device::{Ready, check_length, launch};
 use crate::element::crossing::bounded;
 use crate::primitives::ends::ends;
 use crate::primitives::reduce::{groups_for, sum_of_group};
@@ -15,7 +15,7 @@ use crate::{Buffer, Device, Error, Scalar};
 /// Sums over the vertices: of the level, of the low corner, of the spacing.
 const SUMS: usize = 5;
 
-/// What the vertices mean for the field, the level and the grid.
+/// Cotangents of the field, the level and the grid.
 #[derive(Clone)]
 pub struct Cotangent<T> {
     /// `(nx, ny, nz)` cotangent of `χ`; 0 in cells without a vertex on any of their edges.
@@ -28,7 +28,7 @@ pub struct Cotangent<T> {
     pub guarded: Buffer<u32>,
 }
 
-/// What the cotangents `(V, 3)` of the vertices mean for what [`forward`](super::forward) made them of:
+/// Cotangents of the inputs of [`forward`](super::forward) from those of the vertices, `(V, 3)`:
 /// [`isograd::isosurface::pullback`], whose guard is used, with sums in `T`.
 ///
 /// # Errors
@@ -41,7 +41,6 @@ pub fn pullback<R: Runtime, T: Scalar>(
     let count = residual.edges.len();
     check_length("the cotangent of the vertices", vertices_bar, 3 * count)?;
     let ends = ends(device, &residual.chi, 1)?;
-    let dim = CubeDim::new_1d(BLOCK as u32);
     let groups = groups_for(count);
     let partial: Buffer<T> = device.empty(SUMS * groups)?;
     let partly_guarded: Buffer<u32> = device.empty(groups)?;
@@ -51,36 +50,25 @@ pub fn pullback<R: Runtime, T: Scalar>(
         grid: device.empty(4)?,
         guarded: device.empty(1)?,
     };
-    gather_chi::launch::<T, R>(
-        device.client(),
-        device.groups(residual.signs.units(), BLOCK as u32),
-        dim,
-        residual.signs.arg(),
-        residual.before.arg(),
-        residual.values(device)?,
-        ends.arg(),
-        vertices_bar.arg(),
-        out.chi.arg(),
-    );
-    add_vertices::launch::<T, R>(
-        device.client(),
-        CubeCount::Static(groups as u32, 1, 1),
-        dim,
-        residual.signs.arg(),
-        residual.edges.arg(),
-        residual.values(device)?,
-        ends.arg(),
-        vertices_bar.arg(),
-        partial.arg(),
-        partly_guarded.arg(),
-        count as u32,
-        groups as u32,
+    let bars = || Ready::new(BarsLaunch::new(ends.arg(), vertices_bar.arg()));
+    launch!(device, residual.signs.units(), BLOCK => gather_chi<T>(
+        residual.signs, residual.before, residual.values(device)?, bars(), out.chi,
+    ));
+    launch!(device, [groups; BLOCK] => add_vertices<T>(
+        residual.signs, residual.edges, residual.values(device)?, bars(), partial, partly_guarded,
         BLOCK,
-    );
+    ));
     fold(device, &partial, groups, 0, &out.level);
     fold(device, &partial, groups, 1, &out.grid);
     fold(device, &partly_guarded, groups, 0, &out.guarded);
     Ok(out)
+}
+
+/// Cotangents of the vertices, and the ends of the range of `χ`.
+#[derive(CubeLaunch, CubeType)]
+struct Bars<F: Float + CubeElement> {
+    ends: Array<F>,
+    vertices: Array<F>,
 }
 
 /// A vertex seen from its edge.
@@ -98,15 +86,14 @@ struct OnEdge<F: Float + CubeElement> {
 fn on_edge<F: Float + CubeElement>(
     signs: &Signs,
     values: &Values<F>,
-    ends: &Array<F>,
-    bars: &Array<F>,
+    bars: &Bars<F>,
     p: usize,
     axis: u32,
     vertex: u32,
 ) -> OnEdge<F> {
     let difference = values.chi[p + stride(signs, axis)] - values.chi[p];
-    let smallest = values.scales[4] * (ends[1] - ends[0]);
-    let s = bars[3 * vertex as usize + axis as usize] * values.scales[3];
+    let smallest = values.scales[4] * (bars.ends[1] - bars.ends[0]);
+    let s = bars.vertices[3 * vertex as usize + axis as usize] * values.scales[3];
     OnEdge::<F> {
         eta: fraction_on::<F>(signs, values, p, axis),
         pull: s / bounded::<F>(difference, smallest),
@@ -124,8 +111,7 @@ fn gather_chi<F: Float + CubeElement>(
     signs: &Signs,
     before: &Array<u32>,
     values: &Values<F>,
-    ends: &Array<F>,
-    bars: &Array<F>,
+    bars: &Bars<F>,
     chi_bar: &mut Array<F>,
 ) {
     let word = ABSOLUTE_POS as u32 / 32u32;
@@ -137,24 +123,24 @@ fn gather_chi<F: Float + CubeElement>(
         let mut sum = F::new(0.0);
         if i > 0u32 {
             let below = row - signs.ny;
-            sum += part::<F>(signs, before, values, ends, bars, below, k, 0u32, true);
+            sum += part::<F>(signs, before, values, bars, below, k, 0u32, true);
         }
         if j > 0u32 {
             let below = row - 1u32;
-            sum += part::<F>(signs, before, values, ends, bars, below, k, 1u32, true);
+            sum += part::<F>(signs, before, values, bars, below, k, 1u32, true);
         }
         if k > 0u32 {
             let below = k - 1u32;
-            sum += part::<F>(signs, before, values, ends, bars, row, below, 2u32, true);
+            sum += part::<F>(signs, before, values, bars, row, below, 2u32, true);
         }
         if i + 1u32 < signs.nx {
-            sum += part::<F>(signs, before, values, ends, bars, row, k, 0u32, false);
+            sum += part::<F>(signs, before, values, bars, row, k, 0u32, false);
         }
         if j + 1u32 < signs.ny {
-            sum += part::<F>(signs, before, values, ends, bars, row, k, 1u32, false);
+            sum += part::<F>(signs, before, values, bars, row, k, 1u32, false);
         }
         if k + 1u32 < signs.nz {
-            sum += part::<F>(signs, before, values, ends, bars, row, k, 2u32, false);
+            sum += part::<F>(signs, before, values, bars, row, k, 2u32, false);
         }
         chi_bar[(row * signs.nz + k) as usize] = sum;
     }
@@ -167,8 +153,7 @@ fn part<F: Float + CubeElement>(
     signs: &Signs,
     before: &Array<u32>,
     values: &Values<F>,
-    ends: &Array<F>,
-    bars: &Array<F>,
+    bars: &Bars<F>,
     row: u32,
     k: u32,
     #[comptime] axis: u32,
@@ -180,7 +165,7 @@ fn part<F: Float + CubeElement>(
     if inside(signs, row, k) != inside(signs, next_row, next_k) {
         let vertex = vertex_on(signs, before, row, k, axis);
         let p = (row * signs.nz + k) as usize;
-        let edge = on_edge::<F>(signs, values, ends, bars, p, axis, vertex);
+        let edge = on_edge::<F>(signs, values, bars, p, axis, vertex);
         if at_end {
             part = -edge.pull * edge.eta;
         } else {
@@ -196,14 +181,12 @@ fn add_vertices<F: Float + CubeElement>(
     signs: &Signs,
     edges: &Array<u32>,
     values: &Values<F>,
-    ends: &Array<F>,
-    bars: &Array<F>,
+    bars: &Bars<F>,
     partial: &mut Array<F>,
     partly_guarded: &mut Array<u32>,
-    count: u32,
-    groups: u32,
     #[comptime] block: usize,
 ) {
+    let groups = partly_guarded.len();
     let mut level = F::new(0.0);
     let mut lower_x = F::new(0.0);
     let mut lower_y = F::new(0.0);
@@ -211,14 +194,14 @@ fn add_vertices<F: Float + CubeElement>(
     let mut spacing = F::new(0.0);
     let mut guarded = 0u32;
     let mut vertex = ABSOLUTE_POS;
-    while vertex < count as usize {
+    while vertex < edges.len() {
         let p = edges[vertex] / 3u32;
         let axis = edges[vertex] % 3u32;
-        let edge = on_edge::<F>(signs, values, ends, bars, p as usize, axis, vertex as u32);
+        let edge = on_edge::<F>(signs, values, bars, p as usize, axis, vertex as u32);
         let row = p / signs.nz;
-        let x = bars[3 * vertex];
-        let y = bars[3 * vertex + 1];
-        let z = bars[3 * vertex + 2];
+        let x = bars.vertices[3 * vertex];
+        let y = bars.vertices[3 * vertex + 1];
+        let z = bars.vertices[3 * vertex + 2];
         level += edge.pull;
         lower_x += x;
         lower_y += y;
@@ -230,7 +213,7 @@ fn add_vertices<F: Float + CubeElement>(
             + z * (F::cast_from(p % signs.nz) + F::new(0.5))
             + along * edge.eta;
         guarded += edge.guarded;
-        vertex += groups as usize * block;
+        vertex += groups * block;
     }
     let mut shared = SharedMemory::<F>::new(block);
     let mut counts = SharedMemory::<u32>::new(block);
@@ -241,7 +224,7 @@ fn add_vertices<F: Float + CubeElement>(
     let spacing = sum_of_group::<F>(spacing, &mut shared);
     let guarded = sum_of_group::<u32>(guarded, &mut counts);
     if UNIT_POS == 0u32 {
-        let next = groups as usize;
+        let next = groups;
         partial[CUBE_POS] = level;
         partial[CUBE_POS + next] = lower_x;
         partial[CUBE_POS + 2 * next] = lower_y;

@@ -6,6 +6,7 @@
 
 use cubecl::prelude::*;
 
+use crate::device::{Argument, launch};
 pub(super) use crate::primitives::reduce::BLOCK;
 use crate::{Buffer, Device, Error, Scalar};
 
@@ -51,18 +52,9 @@ impl Bits {
             words,
         };
         let faults = device.empty(signs.len())?;
-        pack::launch::<T, R>(
-            device.client(),
-            device.groups(units, BLOCK as u32),
-            CubeDim::new_1d(BLOCK as u32),
-            chi.arg(),
-            level.arg(),
-            signs.bits.arg(),
-            faults.arg(),
-            nz as u32,
-            words as u32,
-            BLOCK,
-        );
+        launch!(device, units, BLOCK => pack<T>(
+            chi, level, signs.bits, faults, nz as u32, words as u32, BLOCK,
+        ));
         Ok((signs, faults))
     }
 
@@ -75,9 +67,12 @@ impl Bits {
     pub(super) fn units(&self) -> usize {
         self.len() * WORD
     }
+}
 
-    /// As an argument of a kernel.
-    pub(super) fn arg<R: Runtime>(&self) -> SignsLaunch<R> {
+impl<R: Runtime> Argument<R> for Bits {
+    type Parameter = SignsLaunch<R>;
+
+    fn argument(&self, _: &Device<R>) -> SignsLaunch<R> {
         let [nx, ny, nz] = self.shape.map(|n| n as u32);
         SignsLaunch::new(self.bits.arg(), nx, ny, nz, self.words as u32)
     }

@@ -3,6 +3,7 @@
 
 use cubecl::prelude::*;
 
+use crate::device::launch;
 use crate::primitives::reduce::{BLOCK, sum_of_group};
 use crate::{Buffer, Device};
 
@@ -15,16 +16,9 @@ pub(super) fn fold<R: Runtime, N: Numeric + CubeElement>(
     first: usize,
     sums: &Buffer<N>,
 ) {
-    fold_groups::launch::<N, R>(
-        device.client(),
-        CubeCount::Static(sums.len() as u32, 1, 1),
-        CubeDim::new_1d(BLOCK as u32),
-        partial.arg(),
-        sums.arg(),
-        groups as u32,
-        first as u32,
-        BLOCK,
-    );
+    launch!(device, [sums.len(); BLOCK] => fold_groups<N>(
+        partial, sums, groups as u32, first as u32, BLOCK,
+    ));
 }
 
 #[cube(launch)]

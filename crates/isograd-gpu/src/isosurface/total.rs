@@ -1,14 +1,15 @@
-//! What the signs add up to: four numbers, which are downloaded.
+//! Totals of the signs: four numbers, which are downloaded.
 
 use cubecl::prelude::*;
 use isograd::isosurface::Report;
 
 use super::signs::{BLOCK, Bits, Signs, WORD, word_of};
 
+use crate::device::launch;
 use crate::primitives::reduce::{groups_for, sum_of_group};
 use crate::{Buffer, Device, Error};
 
-/// How many there are of everything.
+/// Numbers of cells inside, vertices and faces.
 pub(super) struct Total {
     inside: usize,
     /// Bits 0 to 5: walls that inside cells touch, low before high, x before y before z. Bit 6: a value is not
@@ -30,28 +31,12 @@ impl Total {
         let groups = groups_for(signs.len());
         let partial: Buffer<u32> = device.empty(2 * groups)?;
         let total: Buffer<u32> = device.empty(4)?;
-        let dim = CubeDim::new_1d(BLOCK as u32);
-        add_words::launch::<R>(
-            device.client(),
-            CubeCount::Static(groups as u32, 1, 1),
-            dim,
-            signs.arg(),
-            faults.arg(),
-            partial.arg(),
-            groups as u32,
-            BLOCK,
-        );
-        add_groups::launch::<R>(
-            device.client(),
-            CubeCount::Static(1, 1, 1),
-            dim,
-            partial.arg(),
-            vertices.arg(),
-            faces.arg(),
-            total.arg(),
-            groups as u32,
-            BLOCK,
-        );
+        launch!(device, [groups; BLOCK] => add_words(
+            signs, faults, partial, groups as u32, BLOCK,
+        ));
+        launch!(device, [1; BLOCK] => add_groups(
+            partial, vertices, faces, total, groups as u32, BLOCK,
+        ));
         let total = device.download(&total)?;
         Ok(Self {
             inside: total[0] as usize,

@@ -1,10 +1,11 @@
-//! The field, the level and the grid, as kernels see them.
+//! The field, the level and the grid in kernels.
 
 use cubecl::prelude::*;
 use isograd::isosurface::SMALLEST_DIFFERENCE;
 
 use super::Residual;
 use super::signs::Signs;
+use crate::device::Ready;
 use crate::element::crossing::crossing;
 use crate::{Device, Error, Scalar};
 
@@ -18,23 +19,20 @@ pub struct Values<F: Float + CubeElement> {
 }
 
 impl<T: Scalar> Residual<T> {
-    /// What the surface is made of, as an argument of a kernel.
+    /// Field, level and grid as an argument of a kernel.
     pub(super) fn values<R: Runtime>(
         &self,
         device: &Device<R>,
-    ) -> Result<ValuesLaunch<T, R>, Error> {
+    ) -> Result<Ready<ValuesLaunch<T, R>>, Error> {
         let [x, y, z] = self.grid.lower();
         let smallest = T::of(SMALLEST_DIFFERENCE);
         let scales = device.upload(&[x, y, z, self.grid.spacing(), smallest])?;
-        Ok(ValuesLaunch::new(
-            self.chi.arg(),
-            self.level.arg(),
-            scales.arg(),
-        ))
+        let values = ValuesLaunch::new(self.chi.arg(), self.level.arg(), scales.arg());
+        Ok(Ready::new(values))
     }
 }
 
-/// How far along the lattice edge along `axis` from the cell at place `p` in memory the level is: as the CPU has it,
+/// Place of the level on the lattice edge along `axis` from the cell at place `p` in memory: as on the CPU,
 /// and between 0 and 1 also where the device divides less exactly.
 #[cube]
 pub(super) fn fraction_on<F: Float + CubeElement>(

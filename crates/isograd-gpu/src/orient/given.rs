@@ -9,8 +9,7 @@
 use cubecl::prelude::*;
 
 use super::Error;
-use crate::device::check_length;
-use crate::neighbors::BLOCK;
+use crate::device::{check_length, launch};
 use crate::primitives::flags;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
@@ -31,14 +30,7 @@ pub fn forward<R: Runtime, T: Scalar>(
         return Ok(normals);
     }
     let bad: Buffer<u32> = device.empty(n)?;
-    normalize::launch::<T, R>(
-        device.client(),
-        device.groups(n, BLOCK),
-        CubeDim::new_1d(BLOCK),
-        given.arg(),
-        normals.arg(),
-        bad.arg(),
-    );
+    launch!(device, n => normalize<T>(given, normals, bad));
     match flags::first(device, &bad)? {
         Some(index) => Err(isograd::orient::Error::NoDirection {
             index,
@@ -49,7 +41,7 @@ pub fn forward<R: Runtime, T: Scalar>(
     }
 }
 
-/// What the cotangents `normals_bar` `(N, 3)` of the normals mean for the `given` vectors: `(N, 3)`; finite for every
+/// Cotangents `(N, 3)` of the `given` vectors from those of the normals, `normals_bar` `(N, 3)`; finite for every
 /// vector that [`forward`] takes.
 ///
 /// # Errors
@@ -62,15 +54,9 @@ pub fn pullback<R: Runtime, T: Scalar>(
     check_length("normals_bar", normals_bar, given.len())?;
     let given_bar = device.empty(given.len())?;
     if !given.is_empty() {
-        pull_normalized::launch::<T, R>(
-            device.client(),
-            device.groups(given.len() / 3, BLOCK),
-            CubeDim::new_1d(BLOCK),
-            given.arg(),
-            normals_bar.arg(),
-            given_bar.arg(),
-            (given.len() / 3) as u32,
-        );
+        launch!(device, given.len() / 3 => pull_normalized<T>(
+            given, normals_bar, given_bar, (given.len() / 3) as u32,
+        ));
     }
     Ok(given_bar)
 }
@@ -86,15 +72,7 @@ pub(super) fn turn_to<R: Runtime, T: Scalar>(
     let units = forward(device, given)?;
     let n = axes.len() / 3;
     if n > 0 {
-        turn_axes::launch::<T, R>(
-            device.client(),
-            device.groups(n, BLOCK),
-            CubeDim::new_1d(BLOCK),
-            axes.arg(),
-            units.arg(),
-            normals.arg(),
-            confidence.arg(),
-        );
+        launch!(device, n => turn_axes<T>(axes, units, normals, confidence));
     }
     Ok(())
 }

@@ -4,7 +4,7 @@
 //! Axes `(N, 3)` of unit length and arbitrary sign → outward unit normals `(N, 3)` and a confidence for each, by
 //! those methods of [`isograd::orient`] that a time loop needs: [`Method::Parity`], the paper's, and
 //! [`Method::Signs`]. [`given`] takes normals that the cloud brings, and [`previous`] the signs of the step before.
-//! The other methods orient a cloud once, on the CPU: see [`Held::find`](crate::pipeline::Held::find).
+//! The other methods orient a cloud once, on the CPU: see [`RadiiAndSigns::find`](crate::pipeline::RadiiAndSigns::find).
 //!
 //! # Pullback
 //! The signs are held constant: cotangents of the axes are those of the normals, with the same signs.
@@ -20,8 +20,8 @@ pub use isograd::orient::ParityOptions;
 
 use cubecl::prelude::*;
 
-use crate::device::check_length;
-use crate::neighbors::{BLOCK, Neighborhoods};
+use crate::device::{check_length, launch};
+use crate::neighbors::Neighborhoods;
 use crate::primitives::flags;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
@@ -47,7 +47,7 @@ impl<T> Method<T> {
     }
 }
 
-/// Why there is no orientation.
+/// Errors of the orientation.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The cloud or the options have none.
@@ -113,14 +113,7 @@ fn count_flipped<R: Runtime, T: Scalar>(
 ) -> Result<Buffer<u32>, crate::Error> {
     let flipped = device.empty(axes.len() / 3)?;
     if !flipped.is_empty() {
-        flag_flipped::launch::<T, R>(
-            device.client(),
-            device.groups(flipped.len(), BLOCK),
-            CubeDim::new_1d(BLOCK),
-            axes.arg(),
-            normals.arg(),
-            flipped.arg(),
-        );
+        launch!(device, flipped.len() => flag_flipped<T>(axes, normals, flipped));
     }
     flags::count(device, &flipped)
 }

@@ -2,7 +2,7 @@
 //! does it: the same probes, of which others are skipped.
 //!
 //! A probe needs no nearest sample, only whether one is in reach and how far it is safe to skip. A sample that is
-//! about the nearest says both but where it is a little out of reach: there the tree is asked for any in reach. So
+//! about the nearest decides both but where it is a little out of reach: there the tree is searched for any in reach. So
 //! a ray through the center of a sphere, from which all samples are equally far, is no more work than another.
 
 use cubecl::prelude::*;
@@ -10,8 +10,9 @@ use isograd::orient::ParityOptions;
 use isograd_element::vector;
 
 use super::Error;
+use crate::device::{Ready, launch};
 use crate::neighbors::radius::bounds;
-use crate::neighbors::{BLOCK, Neighborhoods, SURE_SHARE, about_nearest, any_within, reaches};
+use crate::neighbors::{Neighborhoods, SURE_SHARE, about_nearest, any_within, reaches};
 use crate::primitives::ends::ends;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
@@ -52,32 +53,14 @@ pub(super) fn forward<R: Runtime, T: Scalar>(
     );
     let (crossings, leading): (Buffer<u32>, Buffer<u32>) =
         (device.empty(2 * n)?, device.empty(2 * n)?);
-    let dim = CubeDim::new_1d(BLOCK);
-    look_both_ways::launch::<T, R>(
-        device.client(),
-        device.groups(2 * n, BLOCK),
-        dim,
-        neighborhoods.points.arg(),
-        neighborhoods.places.arg(),
-        neighborhoods.nodes.arg(),
-        neighborhoods.links.arg(),
-        axes.arg(),
-        crossings.arg(),
-        leading.arg(),
-        ray,
-    );
-    choose_sides::launch::<T, R>(
-        device.client(),
-        device.groups(n, BLOCK),
-        dim,
-        crossings.arg(),
-        leading.arg(),
-        neighborhoods.places.arg(),
-        axes.arg(),
-        normals.arg(),
-        confidence.arg(),
+    launch!(device, 2 * n => look_both_ways<T>(
+        neighborhoods.points, neighborhoods.places, neighborhoods.nodes, neighborhoods.links, axes,
+        crossings, leading, Ready::new(ray),
+    ));
+    launch!(device, n => choose_sides<T>(
+        crossings, leading, neighborhoods.places, axes, normals, confidence,
         u32::try_from(options.tolerance).unwrap_or(u32::MAX),
-    );
+    ));
     Ok(radius)
 }
 
@@ -126,7 +109,7 @@ fn look_both_ways<F: Float + CubeElement>(
             guess = near.point;
             let distance = F::sqrt(near.square);
             let mut detected = select(m <= ray.own, 1u32, 0u32);
-            // How far on the answer is the same.
+            // Distance along which the result stays the same.
             let mut same = F::new(0.0);
             if distance <= ray.radius {
                 detected = 1u32;

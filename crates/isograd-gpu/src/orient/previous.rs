@@ -4,9 +4,9 @@
 use cubecl::prelude::*;
 
 use super::Error;
-use crate::device::check_length;
+use crate::device::{Ready, check_length, launch};
 use crate::element::turned;
-use crate::neighbors::{BLOCK, Neighborhoods, end_of_leaf, first_of_leaf, next_leaf};
+use crate::neighbors::{NeighborhoodArrays, Neighborhoods, end_of_leaf, first_of_leaf, next_leaf};
 use crate::primitives::flags;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
@@ -36,7 +36,7 @@ pub struct Followed<T> {
 }
 
 /// Turns each of the `(N, 3)` axes, which are of unit length and in input order, to the side of the step before.
-/// `radii` `(N,)`, in input order, are those within which neighbors are asked. Nothing waits.
+/// `radii` `(N,)`, in input order, are those of the neighbors that far turned axes follow. Nothing waits.
 ///
 /// # Errors
 /// [`crate::Error::Length`], [`crate::Error::TooLarge`].
@@ -55,34 +55,11 @@ pub fn forward<R: Runtime, T: Scalar>(
     let (cosines, far): (Buffer<T>, Buffer<u32>) = (device.empty(n)?, device.empty(n)?);
     let [confidence, kept] = [device.empty(n)?, device.empty(n)?];
     let normals = device.empty(3 * n)?;
-    let (groups, dim) = (device.groups(n, BLOCK), CubeDim::new_1d(BLOCK));
-    if n > 0 {
-        compare::launch::<T, R>(
-            device.client(),
-            groups.clone(),
-            dim,
-            axes.arg(),
-            before.outward.arg(),
-            cosines.arg(),
-            far.arg(),
-        );
-        follow::launch::<T, R>(
-            device.client(),
-            groups,
-            dim,
-            neighborhoods.points.arg(),
-            neighborhoods.places.arg(),
-            neighborhoods.nodes.arg(),
-            neighborhoods.links.arg(),
-            radii.arg(),
-            axes.arg(),
-            cosines.arg(),
-            before.confidence.arg(),
-            normals.arg(),
-            confidence.arg(),
-            kept.arg(),
-        );
-    }
+    launch!(device, n => compare<T>(axes, before.outward, cosines, far));
+    let step = StepLaunch::new(radii.arg(), cosines.arg(), before.confidence.arg());
+    launch!(device, n => follow<T>(
+        neighborhoods, axes, Ready::new(step), normals, confidence, kept,
+    ));
     Ok(Followed {
         normals,
         confidence,
@@ -113,33 +90,35 @@ fn is_near<F: Float>(cosine: F) -> bool {
     F::abs(cosine) >= F::new(turned::FAR)
 }
 
+/// The step before, in input order.
+#[derive(CubeLaunch, CubeType)]
+struct Step<F: Float + CubeElement> {
+    /// Within which the neighbors of an axis that has turned far are.
+    radii: Array<F>,
+    /// Between the axis and its vector before.
+    cosines: Array<F>,
+    confidence: Array<F>,
+}
+
 /// A unit for each sorted point.
 #[cube(launch)]
-fn follow<F: Float>(
-    points: &Array<F>,
-    places: &Array<u32>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
-    radii: &Array<F>,
+fn follow<F: Float + CubeElement>(
+    near: &NeighborhoodArrays<F>,
     axes: &Array<F>,
-    cosines: &Array<F>,
-    before: &Array<F>,
+    before: &Step<F>,
     normals: &mut Array<F>,
     confidence: &mut Array<F>,
     kept: &mut Array<F>,
 ) {
-    if ABSOLUTE_POS < places.len() {
-        let i = places[ABSOLUTE_POS] as usize;
+    if ABSOLUTE_POS < near.places.len() {
+        let i = near.places[ABSOLUTE_POS] as usize;
         let axis = Vector3::<F>::at(axes, i);
         let zero = F::new(0.0);
-        let mut side = cosines[i];
-        let mut sure = min(before[i], F::abs(side));
-        let mut keep = before[i];
+        let mut side = before.cosines[i];
+        let mut sure = min(before.confidence[i], F::abs(side));
+        let mut keep = before.confidence[i];
         if !is_near::<F>(side) {
-            let x = Vector3::<F>::at(points, ABSOLUTE_POS);
-            let said = side_among_neighbors::<F>(
-                points, places, nodes, links, axes, cosines, x, axis, radii[i],
-            );
+            let said = side_among_neighbors::<F>(near, axes, before, ABSOLUTE_POS);
             side = select(said == zero, side, said);
             sure = min(F::abs(said), F::new(1.0));
             keep = sure;
@@ -151,45 +130,44 @@ fn follow<F: Float>(
     }
 }
 
-/// What the neighbors that have not turned say of an axis, from −1 to 1; 0 where there is none.
+/// Agreement of an axis with its neighbors that have not turned, from −1 to 1; 0 where there are none.
 #[cube]
-fn side_among_neighbors<F: Float>(
-    points: &Array<F>,
-    places: &Array<u32>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
+fn side_among_neighbors<F: Float + CubeElement>(
+    near: &NeighborhoodArrays<F>,
     axes: &Array<F>,
-    cosines: &Array<F>,
-    x: Vector3<F>,
-    axis: Vector3<F>,
-    radius: F,
+    before: &Step<F>,
+    own: usize,
 ) -> F {
     let zero = F::new(0.0);
+    let x = Vector3::<F>::at(&near.points, own);
+    let i = near.places[own] as usize;
+    let axis = Vector3::<F>::at(axes, i);
+    let radius = before.radii[i];
     let blunt = turned::blunt::<F>(radius);
     let mut sum = F::new(0.0);
     let mut weight = F::new(0.0);
-    let mut node = next_leaf::<F>(nodes, links, x, radius, 0usize.runtime(), false);
-    while node < links.len() {
-        let first = first_of_leaf(links, node);
-        for position in first..end_of_leaf(first, places.len()) {
-            let offset = Vector3::<F>::at(points, position).sub(x);
+    let mut node = next_leaf::<F>(&near.nodes, &near.links, x, radius, 0usize.runtime(), false);
+    while node < near.links.len() {
+        let first = first_of_leaf(&near.links, node);
+        for position in first..end_of_leaf(first, near.places.len()) {
+            let offset = Vector3::<F>::at(&near.points, position).sub(x);
             let square = offset.dot(offset);
-            let j = places[position] as usize;
-            if square <= radius * radius && is_near::<F>(cosines[j]) {
-                let sign = select(cosines[j] < zero, F::new(-1.0), F::new(1.0));
+            let j = near.places[position] as usize;
+            if square <= radius * radius && is_near::<F>(before.cosines[j]) {
+                let sign = select(before.cosines[j] < zero, F::new(-1.0), F::new(1.0));
                 let normal = Vector3::<F>::at(axes, j).scale(sign);
-                let near = turned::weight::<F>(square, blunt);
+                let weighted = turned::weight::<F>(square, blunt);
                 let carried = turned::carried::<F>(
                     axis.dot(normal),
                     axis.dot(offset),
                     normal.dot(offset),
-                    near,
+                    weighted,
                 );
-                sum += near * carried;
-                weight += near;
+                sum += weighted * carried;
+                weight += weighted;
             }
         }
-        node = next_leaf::<F>(nodes, links, x, radius, node + 1, false);
+        node = next_leaf::<F>(&near.nodes, &near.links, x, radius, node + 1, false);
     }
     select(
         weight > zero,

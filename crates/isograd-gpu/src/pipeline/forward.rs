@@ -7,25 +7,27 @@ use isograd::Stage;
 use isograd::isosurface::Level;
 use isograd::poisson::Smoothing;
 
-use super::{Error, FoundAxes, Held, Reconstruction, Reconstructor, Residuals, Source, Width};
+use super::{
+    Error, RadiiAndSigns, Reconstruction, Reconstructor, Residuals, SampleAxes, Source, Width,
+};
 use crate::distance::{self, Mesh};
-use crate::iso_value::local;
+use crate::isosurface::{self, iso_value, local_level as local};
 use crate::orient::previous::Followed;
-use crate::splat::{self, Refused, Samples};
-use crate::{Buffer, Scalar, area, iso_value, isosurface, neighbors, normals, orient, poisson};
+use crate::splat::{self, Refused, Samples, area};
+use crate::{Buffer, Scalar, neighbors, normals, orient, poisson};
 
 /// Called before each stage is queued; where it breaks, so does the work. One that wants to know how long a stage
 /// takes must [wait](crate::Device::wait).
 pub type Observer<'a> = dyn FnMut(Stage) -> ControlFlow<()> + 'a;
 
-/// What is known of the normals before the stages begin.
+/// Normals that are known before the stages begin.
 pub(crate) enum Start<'a, T: Scalar> {
     /// Nothing.
     Points,
     /// They are given.
     Given(&'a Buffer<T>),
     /// Their axes, which the sides were looked for with.
-    Axes(FoundAxes<T>),
+    Axes(SampleAxes<T>),
 }
 
 /// Outward normals, the neighborhoods, and where the normals come from.
@@ -35,8 +37,8 @@ struct Normals<T> {
     source: Source<T>,
 }
 
-/// What the first stages found of the samples.
-struct Found<T> {
+/// Normals and areas of the samples.
+struct SampleFields<T> {
     normals: Normals<T>,
     areas: Buffer<T>,
     of_areas: Option<area::Residual<T>>,
@@ -59,12 +61,12 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
     pub fn reconstruct(
         &self,
         points: &Buffer<T>,
-        held: &Held<T>,
+        held: &RadiiAndSigns<T>,
     ) -> Result<Reconstruction<T>, Error> {
         self.reconstruct_observed(points, None, held, &mut |_| ControlFlow::Continue(()))
     }
 
-    /// The same with outward normals that are `given`: `(N, 3)` of any length but 0. Of `held`, what areas need is used.
+    /// [`Self::reconstruct`] with `given` outward normals: `(N, 3)` of any length but 0. Of `held`, the areas' radii are used.
     ///
     /// # Errors
     /// As [`Error`] lists.
@@ -72,13 +74,13 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         &self,
         points: &Buffer<T>,
         given: &Buffer<T>,
-        held: &Held<T>,
+        held: &RadiiAndSigns<T>,
     ) -> Result<Reconstruction<T>, Error> {
         let observer = &mut |_| ControlFlow::Continue(());
         self.reconstruct_observed(points, Some(given), held, observer)
     }
 
-    /// The same, with or without given normals, and an observer.
+    /// [`Self::reconstruct`] with or without given normals, and an observer.
     ///
     /// # Errors
     /// As [`Error`] lists; [`Error::Interrupted`] where the observer breaks.
@@ -86,19 +88,19 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         &self,
         points: &Buffer<T>,
         given: Option<&Buffer<T>>,
-        held: &Held<T>,
+        held: &RadiiAndSigns<T>,
         observer: &mut Observer<'_>,
     ) -> Result<Reconstruction<T>, Error> {
         let start = given.map_or(Start::Points, Start::Given);
         self.reconstruct_from(points, start, held, observer)
     }
 
-    /// The same, with what is known of the normals.
+    /// [`Self::reconstruct_observed`] with any start.
     pub(crate) fn reconstruct_from(
         &self,
         points: &Buffer<T>,
         start: Start<'_, T>,
-        held: &Held<T>,
+        held: &RadiiAndSigns<T>,
         observer: &mut Observer<'_>,
     ) -> Result<Reconstruction<T>, Error> {
         let mut begin = |stage| match observer(stage) {
@@ -166,8 +168,8 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         &self,
         points: &Buffer<T>,
         start: Start<'_, T>,
-        held: &Held<T>,
-    ) -> Result<Found<T>, Error> {
+        held: &RadiiAndSigns<T>,
+    ) -> Result<SampleFields<T>, Error> {
         let device = &self.device;
         let normals = match start {
             Start::Given(given) => Normals {
@@ -179,13 +181,13 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
                 let near = neighbors::forward(device, points, &held.radii)?;
                 let (axes, residual) = normals::forward(device, &near)?;
                 let residual = residual.into();
-                self.turn(FoundAxes { axes, residual }, held)?
+                self.turn(SampleAxes { axes, residual }, held)?
             }
             Start::Axes(found) => self.turn(found, held)?,
         };
         let (areas, of_areas) = self.areas(&normals.near, held)?;
         let width = self.width(&areas, held)?;
-        Ok(Found {
+        Ok(SampleFields {
             normals,
             areas,
             of_areas,
@@ -193,11 +195,11 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         })
     }
 
-    /// Axes, turned to the sides that are held.
+    /// Axes, turned to the held signs.
     fn turn(
         &self,
-        FoundAxes { axes, residual }: FoundAxes<T>,
-        held: &Held<T>,
+        SampleAxes { axes, residual }: SampleAxes<T>,
+        held: &RadiiAndSigns<T>,
     ) -> Result<Normals<T>, Error> {
         let near = residual.neighborhoods.clone();
         let sides = held.turn(&self.device, &near, &axes)?;
@@ -213,7 +215,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         })
     }
 
-    /// Normals that are trusted as they are.
+    /// Given normals.
     fn take_given(&self, given: &Buffer<T>) -> Result<Followed<T>, Error> {
         let sure = self.device.upload(&vec![T::of(1.0); given.len() / 3])?;
         Ok(Followed {
@@ -228,7 +230,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
     fn areas(
         &self,
         near: &neighbors::Neighborhoods<T>,
-        held: &Held<T>,
+        held: &RadiiAndSigns<T>,
     ) -> Result<(Buffer<T>, Option<area::Residual<T>>), Error> {
         let device = &self.device;
         if !self.options.area_weights {
@@ -300,8 +302,8 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         Ok((chi, Some(residual)))
     }
 
-    /// How much the indicator is smoothed.
-    fn width(&self, areas: &Buffer<T>, held: &Held<T>) -> Result<Width, Error> {
+    /// Width of the smoothing.
+    fn width(&self, areas: &Buffer<T>, held: &RadiiAndSigns<T>) -> Result<Width, Error> {
         let automatic = self.options.smoothing == Smoothing::Auto;
         let areas = match automatic && self.options.area_weights {
             true => area::mean(&self.device, areas)?,

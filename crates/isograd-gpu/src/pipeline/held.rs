@@ -1,4 +1,4 @@
-//! What is found in a cloud once, on the CPU or on the device, and then held: no derivative goes through it.
+//! Radii and signs, found once, on the CPU or on the device, and then held: no derivative goes through them.
 
 use std::ops::ControlFlow;
 
@@ -8,16 +8,16 @@ use isograd::orient::{self, Method, Orientation};
 use isograd::{PointCloud, Stage, normals};
 
 use super::{Error, Reconstruction};
-use crate::device::check_length;
+use crate::device::{check_length, launch};
 use crate::neighbors::radius;
 use crate::orient::previous::{self, Before, Followed};
 use crate::primitives::fill::zeros;
 use crate::{Buffer, Device, Scalar};
 
 /// The radii of a cloud's neighborhoods, and which way is out at each of its points. Of a body that moves a
-/// little, those of an earlier step will do: see [`Held::after`].
+/// little, those of an earlier step will do: see [`RadiiAndSigns::after`].
 #[derive(Clone, Debug)]
-pub struct Held<T> {
+pub struct RadiiAndSigns<T> {
     /// `(N,)` within which normals are found, in the user's unit.
     pub radii: Buffer<T>,
     /// `(N,)` within which areas are found.
@@ -36,10 +36,10 @@ pub struct Held<T> {
 }
 
 /// Radii and signs of a cloud, with statistics of the search.
-pub(crate) struct Search<T: Scalar> {
-    pub held: Held<T>,
+pub(crate) struct SearchResult<T: Scalar> {
+    pub held: RadiiAndSigns<T>,
     /// The axes that were oriented, if they are on the device.
-    pub axes: Option<FoundAxes<T>>,
+    pub axes: Option<SampleAxes<T>>,
     /// Name of the method, for a report.
     pub method: &'static str,
     /// Points whose axis is ill defined.
@@ -49,18 +49,18 @@ pub(crate) struct Search<T: Scalar> {
 }
 
 /// The axes of a cloud's samples, and the neighborhoods that they were found in.
-pub struct FoundAxes<T: Scalar> {
+pub struct SampleAxes<T: Scalar> {
     pub(crate) axes: Buffer<T>,
     pub(crate) residual: Box<crate::normals::Residual<T>>,
 }
 
-impl<T: Scalar> Held<T> {
+impl<T: Scalar> RadiiAndSigns<T> {
     /// Finds all of it on the CPU. `method` is any but [`Method::Previous`], which [`Self::after`] takes the place
     /// of. With [`Method::Given`] there are no axes to turn: it is what
     /// [`reconstruct_given`](super::Reconstructor::reconstruct_given) holds.
     ///
     /// # Errors
-    /// What neighbors, normals or orientation say of the cloud; [`Error::Device`].
+    /// Errors of the neighbors, the normals or the orientation; [`Error::Device`].
     pub fn find<R: Runtime>(
         device: &Device<R>,
         cloud: &PointCloud<T>,
@@ -78,7 +78,7 @@ impl<T: Scalar> Held<T> {
         radius: Radius,
         method: &Method,
         begin: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Result<Search<T>, Error> {
+    ) -> Result<SearchResult<T>, Error> {
         let (mut near, mut axes) = (Neighborhoods::default(), normals::Residual::default());
         match method {
             Method::Previous => return Err(Error::Orientation),
@@ -98,7 +98,7 @@ impl<T: Scalar> Held<T> {
             &mut orient::Scratch::default(),
             &mut found,
         )?;
-        Ok(Search {
+        Ok(SearchResult {
             held: Self::of(device, &near, &axes, &found)?,
             axes: None,
             method: found.method.name(),
@@ -107,7 +107,7 @@ impl<T: Scalar> Held<T> {
         })
     }
 
-    /// What the CPU found already, by its stages or by [`isograd::Orienter`].
+    /// Radii and signs of the CPU's stages or of [`isograd::Orienter`].
     ///
     /// # Errors
     /// [`crate::Error::TooLarge`].
@@ -136,7 +136,7 @@ impl<T: Scalar> Held<T> {
     /// Finds all of it on the device, from `(N, 3)` points that are there.
     ///
     /// # Errors
-    /// What neighbors or orientation say of the cloud; [`Error::Device`].
+    /// Errors of the neighbors or the orientation; [`Error::Device`].
     pub fn find_on_device<R: Runtime>(
         device: &Device<R>,
         points: &Buffer<T>,
@@ -154,7 +154,7 @@ impl<T: Scalar> Held<T> {
         radius: Radius,
         method: &crate::orient::Method<T>,
         begin: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Result<Search<T>, Error> {
+    ) -> Result<SearchResult<T>, Error> {
         let found = radius::forward(device, points, radius)?;
         let (mut axes, mut residual) = crate::normals::forward(device, &found.neighborhoods)?;
         let mut radii = found.each.clone();
@@ -179,9 +179,9 @@ impl<T: Scalar> Held<T> {
             has_moved: false,
         };
         let residual = residual.into();
-        Ok(Search {
+        Ok(SearchResult {
             held,
-            axes: Some(FoundAxes { axes, residual }),
+            axes: Some(SampleAxes { axes, residual }),
             method: method.name(),
             guarded,
             flipped,
@@ -193,7 +193,7 @@ impl<T: Scalar> Held<T> {
         device: &Device<R>,
         points: &Buffer<T>,
         radius: Radius,
-    ) -> Result<Search<T>, Error> {
+    ) -> Result<SearchResult<T>, Error> {
         let found = radius::forward(device, points, radius)?;
         let held = Self {
             radii: found.each.clone(),
@@ -204,7 +204,7 @@ impl<T: Scalar> Held<T> {
             spacing: found.spacing,
             has_moved: false,
         };
-        Ok(Search {
+        Ok(SearchResult {
             held,
             axes: None,
             method: "given",
@@ -213,7 +213,7 @@ impl<T: Scalar> Held<T> {
         })
     }
 
-    /// The same radii, with sides told by other `(N, 3)` vectors of any length, roughly outward. Axes that are more
+    /// These radii, with the signs of other `(N, 3)` vectors of any length, roughly outward. Axes that are more
     /// than 60° off follow their neighbors.
     ///
     /// # Errors
@@ -240,7 +240,7 @@ impl<T: Scalar> Held<T> {
         })
     }
 
-    /// Turns `(N, 3)` axes to the sides that are held.
+    /// Turns `(N, 3)` axes to the held signs.
     pub(super) fn turn<R: Runtime>(
         &self,
         device: &Device<R>,
@@ -269,9 +269,6 @@ impl<T: Scalar> Held<T> {
     }
 }
 
-/// Units of a group.
-const BLOCK: u32 = 256;
-
 /// `vectors` `(N, 3)`, each multiplied by the sign that turns its axis to the side of `outward`. Its own
 /// pullback.
 pub(super) fn turn<R: Runtime, T: Scalar>(
@@ -283,16 +280,9 @@ pub(super) fn turn<R: Runtime, T: Scalar>(
     check_length("the outward vectors", outward, axes.len())?;
     check_length("the vectors to turn", vectors, axes.len())?;
     let turned = device.empty(axes.len())?;
-    turn_vectors::launch::<T, R>(
-        device.client(),
-        device.groups(axes.len() / 3, BLOCK),
-        CubeDim::new_1d(BLOCK),
-        vectors.arg(),
-        axes.arg(),
-        outward.arg(),
-        turned.arg(),
-        (axes.len() / 3) as u32,
-    );
+    launch!(device, axes.len() / 3 => turn_vectors<T>(
+        vectors, axes, outward, turned, (axes.len() / 3) as u32,
+    ));
     Ok(turned)
 }
 

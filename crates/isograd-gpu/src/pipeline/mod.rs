@@ -2,7 +2,7 @@
 //!
 //! # Map
 //! points → axes, areas → outward normals → `b` → χ → iso-value → surface → φ. What the CPU chose for the
-//! cloud, radii and sides, is [`Held`]: found once, it does for the steps of a body that moves a little. After
+//! cloud, radii and sides, is [`RadiiAndSigns`]: found once, it does for the steps of a body that moves a little. After
 //! that nothing comes back to the host but a few counts, and the mean area where the smoothing follows it.
 //!
 //! [`Reconstructor::extend`] carries attributes of the samples to the surface and the cells round it.
@@ -12,7 +12,7 @@
 //! [`Reconstructor::pullback`].
 //!
 //! # Not differentiable
-//! What is held, and what the stages say of themselves.
+//! RadiiAndSigns radii and signs, and the parts that the stages name.
 
 mod extend;
 mod forward;
@@ -21,8 +21,8 @@ mod pullback;
 
 pub use forward::Observer;
 pub(crate) use forward::Start;
-pub use held::Held;
-pub(crate) use held::{FoundAxes, Search};
+pub use held::RadiiAndSigns;
+pub(crate) use held::{SampleAxes, SearchResult};
 pub use pullback::{CloudCotangent, Cotangent, ExtensionCotangent};
 
 use cubecl::prelude::Runtime;
@@ -31,12 +31,11 @@ use isograd::poisson::Smoothing;
 use isograd::{Grid, Stage};
 
 use crate::distance::{self, Band};
-use crate::iso_value::local;
-use crate::isosurface::{self, Surface};
-use crate::splat::{self, Weights};
-use crate::{Buffer, Device, Scalar, area, iso_value, neighbors, normals, poisson};
+use crate::isosurface::{self, Surface, iso_value, local_level as local};
+use crate::splat::{self, Weights, area};
+use crate::{Buffer, Device, Scalar, neighbors, normals, poisson};
 
-/// Why there is no result.
+/// Errors of the pipeline.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The device.
@@ -48,8 +47,8 @@ pub enum Error {
     /// The orientation.
     #[error(transparent)]
     Orient(#[from] isograd::orient::Error),
-    /// A way to orient that needs a step before.
-    #[error("there is no step before here: take its sides by Held::after")]
+    /// A method of orientation that needs an earlier step.
+    #[error("there is no step before here: take its sides by RadiiAndSigns::after")]
     Orientation,
     /// The smoothing makes no sense.
     #[error("the smoothing is {0:?}; it must be 0 or more cells, and finite")]
@@ -65,12 +64,12 @@ pub enum Error {
         "{count} points, the first of them number {first}, are outside the grid or within 2 cells of its walls; use more padding or larger bounds, or remove them"
     )]
     Outside {
-        /// How many.
+        /// Number of points.
         count: usize,
         /// Index of the first.
         first: usize,
     },
-    /// The observer asked to stop.
+    /// The observer stopped the work.
     #[error("stopped before the stage '{}'", .0.name())]
     Interrupted(Stage),
     /// The surface.
@@ -111,10 +110,10 @@ impl From<crate::orient::Error> for Error {
     }
 }
 
-/// What a plan does: those of [`isograd::Options`] that are for devices too.
+/// Options of a plan: those of [`isograd::Options`] that concern the stages after the orientation.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
-    /// How samples are spread.
+    /// Kernel of the splat.
     pub weights: Weights,
     /// Whether each sample counts by the area of surface that it stands for.
     pub area_weights: bool,
@@ -185,7 +184,7 @@ pub struct Reconstruction<T: Scalar> {
     pub normals: Buffer<T>,
     /// `(N,)` from 0 to 1, how sure their sides are; 1 for given normals.
     pub confidence: Buffer<T>,
-    /// `(1,)` how many axes have turned by more than 60° since the step whose sides are [`Held`], and followed their
+    /// `(1,)` how many axes have turned by more than 60° since the step whose sides are [`RadiiAndSigns`], and followed their
     /// neighbors; 0 where these sides were found in this cloud. From 3 % of the points on, find them again.
     pub turned: Buffer<u32>,
     /// `(N,)` areas, in that unit squared; 1 where samples do not count by them.
@@ -196,7 +195,7 @@ pub struct Reconstruction<T: Scalar> {
     residuals: Residuals<T>,
 }
 
-/// What the stages kept for their pullbacks.
+/// Residuals of the stages.
 struct Residuals<T: Scalar> {
     /// The points in their tree, and the radius that most neighborhoods have.
     near: neighbors::Neighborhoods<T>,

@@ -3,16 +3,13 @@
 use cubecl::prelude::*;
 
 use super::{Error, Reconstruction, Reconstructor, Source, held};
-use crate::device::check_length;
+use crate::device::{check_length, launch};
 use crate::distance::extend;
-use crate::iso_value::local;
+use crate::isosurface::{self, iso_value, local_level as local};
 use crate::primitives::fill::{add, zeros};
 use crate::primitives::flags;
-use crate::splat::{self, SampleCotangent, Samples};
-use crate::{Buffer, Scalar, area, distance, iso_value, isosurface, normals, orient, poisson};
-
-/// Units of a group.
-const BLOCK: u32 = 256;
+use crate::splat::{self, SampleCotangent, Samples, area};
+use crate::{Buffer, Scalar, distance, normals, orient, poisson};
 
 /// Cotangents of the results of a reconstruction: by how much a scalar (a loss) changes, a unit of each
 /// result. What is left out counts as zero.
@@ -39,9 +36,9 @@ pub struct Cotangent<'a, T> {
 pub struct ExtensionCotangent<'a, T> {
     /// The attribute, as it was given.
     pub attribute: extend::Attribute<'a, T>,
-    /// What came out.
+    /// The extended attribute.
     pub extension: &'a extend::Extension<T>,
-    /// What was kept for this.
+    /// Its residual.
     pub residual: &'a extend::Residual<T>,
     /// `(V, components)` of the values at the vertices.
     pub vertices: Option<&'a Buffer<T>>,
@@ -87,7 +84,7 @@ pub struct CloudCotangent<T> {
     pub guarded: Option<Buffer<u32>>,
 }
 
-/// What extensions have for others than the samples.
+/// Cotangents of the extensions.
 struct Extended<T> {
     attributes: Vec<Buffer<T>>,
     /// None where nothing was extended.
@@ -276,7 +273,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
     fn pull_smoothing(
         &self,
         result: &Reconstruction<T>,
-        local: Option<local::Found<T>>,
+        local: Option<local::Cotangents<T>>,
         chi_bar: &Buffer<T>,
         bars: &SampleCotangent<T>,
     ) -> Result<(), Error> {
@@ -286,23 +283,16 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             return Ok(());
         }
         let (device, cells) = (&self.device, width.cells);
-        // As it was solved for, and what its level has of the smoothing besides.
+        // χ before the local level, and the level's own derivative by the smoothing.
         let (chi, by_level) = match &local {
             Some(found) => (&found.chi, found.smoothing),
             None => (&result.indicator, 0.0),
         };
         let bar = poisson::smoothing::pullback(device, cells, self.grid.shape(), chi, chi_bar)?;
-        share_smoothing::launch::<T, R>(
-            device.client(),
-            device.groups(bars.areas.len(), BLOCK),
-            CubeDim::new_1d(BLOCK),
-            bar.arg(),
-            bars.areas.arg(),
-            bars.grid.arg(),
-            T::of(by_level),
-            T::of(0.5 * cells / (mean * count as f64)),
+        launch!(device, bars.areas.len() => share_smoothing<T>(
+            bar, bars.areas, bars.grid, T::of(by_level), T::of(0.5 * cells / (mean * count as f64)),
             T::of(cells / self.grid.spacing().f64()),
-        );
+        ));
         Ok(())
     }
 }

@@ -22,6 +22,7 @@
 //! As on the CPU: nothing with [`Weights::BSpline`]; with [`Weights::Paper`], `b` jumps where a sample
 //! crosses a cell face.
 
+pub mod area;
 mod cotangent;
 mod forward;
 mod order;

@@ -3,7 +3,8 @@
 use cubecl::prelude::Runtime;
 use isograd::{Real, splat};
 use isograd_element::vector;
-use isograd_gpu::{Device, Scalar, area, neighbors};
+use isograd_gpu::splat::area;
+use isograd_gpu::{Device, Scalar, neighbors};
 
 use crate::clouds::{Cloud, clouds, real, relative};
 use crate::devices::{Numbers, in_each_number, on_each_device, tolerance};

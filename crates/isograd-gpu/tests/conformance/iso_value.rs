@@ -3,7 +3,7 @@
 use cubecl::prelude::Runtime;
 use isograd::Field;
 use isograd::isosurface::iso_value as cpu;
-use isograd_gpu::iso_value::{forward, pullback};
+use isograd_gpu::isosurface::iso_value::{forward, pullback};
 use isograd_gpu::splat::{self, SampleCotangent, Weights};
 use isograd_gpu::{Device, Error, Scalar};
 

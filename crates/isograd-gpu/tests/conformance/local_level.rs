@@ -5,9 +5,10 @@ use isograd::isosurface::iso_value as mean;
 use isograd::isosurface::local_level as cpu;
 use isograd::splat::{SortedSamples, Weights};
 use isograd::{Field, Grid};
-use isograd_gpu::iso_value::local::{Options, Residual, forward, pullback};
+use isograd_gpu::isosurface::iso_value;
+use isograd_gpu::isosurface::local_level::{Options, Residual, forward, pullback};
 use isograd_gpu::splat::{self, SampleCotangent};
-use isograd_gpu::{Buffer, Device, Scalar, iso_value};
+use isograd_gpu::{Buffer, Device, Scalar};
 
 use crate::devices::{Numbers, in_both_numbers, in_each_number, on_each_device};
 use crate::samples::{Cloud, OnDevice, assert_near, distance, report, upload_cotangent};

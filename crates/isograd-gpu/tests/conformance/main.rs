@@ -4,6 +4,8 @@ mod areas;
 mod clouds;
 mod devices;
 mod distance;
+#[cfg(feature = "wgpu")]
+mod host;
 mod iso_value;
 mod isosurface;
 mod local_level;

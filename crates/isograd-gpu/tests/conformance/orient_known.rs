@@ -6,7 +6,7 @@ use isograd::orient::{self as cpu, MethodUsed, Orientation, Scratch};
 use isograd::{PointCloud, Real};
 use isograd_element::vector;
 use isograd_gpu::orient::previous::{self, Before};
-use isograd_gpu::pipeline::{Held, Reconstructor};
+use isograd_gpu::pipeline::{RadiiAndSigns, Reconstructor};
 use isograd_gpu::{Device, Scalar, neighbors};
 use isograd_shapes::Sampling;
 
@@ -110,7 +110,7 @@ fn check_turning<R: Runtime>(device: &Device<R>) {
     let start = PointCloud::new(cloud.points().to_vec()).unwrap();
     let grid = isograd::Grid::new([-1.6; 3], 0.1, [32; 3]).unwrap();
     let plan = Reconstructor::new(device.clone(), grid, Default::default()).unwrap();
-    let mut held = Held::find(device, &start, Radius::Auto, &cpu::Method::Auto).unwrap();
+    let mut held = RadiiAndSigns::find(device, &start, Radius::Auto, &cpu::Method::Auto).unwrap();
     for step in 0..8 {
         let angle = 0.5 * step as f32;
         let points = turned(angle, cloud.points());

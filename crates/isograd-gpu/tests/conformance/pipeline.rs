@@ -7,7 +7,7 @@ use isograd::orient::{Method, ParityOptions};
 use isograd::poisson::Smoothing;
 use isograd::{Grid, Options, PointCloud, Real, Reconstructor, Resolution};
 use isograd_gpu::distance::Band;
-use isograd_gpu::pipeline::{self, Error, Held};
+use isograd_gpu::pipeline::{self, Error, RadiiAndSigns};
 use isograd_gpu::splat::Weights;
 use isograd_gpu::{Device, Scalar, orient};
 use isograd_shapes::Sampling;
@@ -131,7 +131,7 @@ fn compare<R: Runtime, T: Scalar>(device: &Device<R>) {
         let expected = plan.reconstruct(&cloud).unwrap();
 
         let plan = pipeline::Reconstructor::new(device.clone(), grid, (&options).into()).unwrap();
-        let held = Held::find(device, &cloud, Radius::Auto, &Method::Auto).unwrap();
+        let held = RadiiAndSigns::find(device, &cloud, Radius::Auto, &Method::Auto).unwrap();
         let points = device.upload(cloud.points().as_flattened()).unwrap();
         let result = plan.reconstruct(&points, &held).unwrap();
         let found = device.download(&result.sdf).unwrap();
@@ -233,7 +233,7 @@ fn points_outside_the_grid_are_named() {
         let cloud = cloud::<f32>("torus", 500);
         let grid = Grid::new([0.0; 3], 0.1, [12, 12, 12]).unwrap();
         let plan = pipeline::Reconstructor::new(device.clone(), grid, Default::default()).unwrap();
-        let held = Held::find(device, &cloud, Radius::Auto, &Method::Auto).unwrap();
+        let held = RadiiAndSigns::find(device, &cloud, Radius::Auto, &Method::Auto).unwrap();
         let points = device.upload(cloud.points().as_flattened()).unwrap();
         match plan.reconstruct(&points, &held) {
             Err(Error::Outside { count, first }) => assert!(count > 100 && first < 500),
@@ -273,8 +273,8 @@ fn compare_held<R: Runtime, T: Scalar>(device: &Device<R>) {
     ];
     for (on_cpu, on_device) in methods {
         for radius in [Radius::Auto, Radius::Fixed(0.08)] {
-            let expected = Held::find(device, &cloud, radius, &on_cpu).unwrap();
-            let found = Held::find_on_device(device, &points, radius, &on_device).unwrap();
+            let expected = RadiiAndSigns::find(device, &cloud, radius, &on_cpu).unwrap();
+            let found = RadiiAndSigns::find_on_device(device, &points, radius, &on_device).unwrap();
             let common = Real::f64(found.common_radius) / Real::f64(expected.common_radius);
             assert!((common - 1.0).abs() < tight, "{common}");
             for (found, expected, most) in [
@@ -306,12 +306,12 @@ fn compare_held<R: Runtime, T: Scalar>(device: &Device<R>) {
     let none = device.upload::<T>(&[]).unwrap();
     let method = orient::Method::Parity(parity);
     assert!(matches!(
-        Held::find_on_device(device, &none, Radius::Auto, &method),
+        RadiiAndSigns::find_on_device(device, &none, Radius::Auto, &method),
         Err(Error::Neighbors(_))
     ));
     let short = orient::Method::Signs(none.clone());
     assert!(matches!(
-        Held::find_on_device(device, &points, Radius::Auto, &short),
+        RadiiAndSigns::find_on_device(device, &points, Radius::Auto, &short),
         Err(Error::Device(_))
     ));
 }

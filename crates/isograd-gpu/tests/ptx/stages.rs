@@ -6,14 +6,11 @@ use isograd::isosurface::Level;
 use isograd::neighbors::Radius;
 use isograd::splat::Weights;
 use isograd_gpu::distance::{Band, Mesh, extend, lattice};
-use isograd_gpu::iso_value::local;
+use isograd_gpu::isosurface::{self, iso_value, local_level as local};
 use isograd_gpu::orient::previous::{self, Before};
 use isograd_gpu::primitives::{reduce, scan, sort};
-use isograd_gpu::splat::{self, SampleCotangent, Samples};
-use isograd_gpu::{
-    Buffer, Device, Scalar, area, iso_value, isosurface, neighbors, normals, orient, pipeline,
-    poisson,
-};
+use isograd_gpu::splat::{self, SampleCotangent, Samples, area};
+use isograd_gpu::{Buffer, Device, Scalar, neighbors, normals, orient, pipeline, poisson};
 
 use crate::recorder::{Recorder, answer, forget_answers};
 
@@ -88,7 +85,7 @@ fn held<T: Scalar>(device: &Device<Recorder>) {
         &unit_box,
     ]);
     let parity = orient::Method::Parity(Default::default());
-    pipeline::Held::find_on_device(device, &points, Radius::Auto, &parity).unwrap();
+    pipeline::RadiiAndSigns::find_on_device(device, &points, Radius::Auto, &parity).unwrap();
     forget_answers();
     let near = neighbors::forward(device, &points, &numbers(device, SAMPLES)).unwrap();
     neighbors::radius::census(device, &near, <T as isograd::Real>::of(0.1)).unwrap();
@@ -267,7 +264,7 @@ fn extensions<T: Scalar>(device: &Device<Recorder>) {
 }
 
 fn whole<T: Scalar>(device: &Device<Recorder>) {
-    let held = pipeline::Held {
+    let held = pipeline::RadiiAndSigns {
         radii: numbers::<T>(device, SAMPLES),
         area_radii: numbers(device, SAMPLES),
         common_radius: <T as isograd::Real>::of(0.1),

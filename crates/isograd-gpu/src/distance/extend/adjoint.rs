@@ -1,13 +1,16 @@
-//! The pullback of the fits: to the vertices, and what the samples need of each.
+//! The pullback of the fits to the vertices, and the records of it that the samples gather.
 
 use cubecl::prelude::*;
 
+use super::FIT;
 use super::checks::Given;
 use super::fits::{covariance, in_frame, ridge, solve};
-use super::neighbor::{Fitted, Neighbor, Sorted, contract, neighbor, sum_moments};
-use super::{BLOCK, FIT, Samples};
+use super::neighbor::{Fitted, Neighbor, SampleArrays, Sorted, contract, neighbor, sum_moments};
+use crate::device::{Argument, launch};
 use crate::element::fit;
-use crate::neighbors::{self, Neighborhoods, end_of_leaf, first_of_leaf, next_leaf};
+use crate::neighbors::{
+    self, NeighborhoodArrays, Neighborhoods, end_of_leaf, first_of_leaf, next_leaf,
+};
 use crate::normals::{MOMENTS, fit as plane_of};
 use crate::vector::{Vector3, is_finite};
 use crate::{Buffer, Device, Error, Scalar};
@@ -27,11 +30,25 @@ pub(super) struct Adjoints<T> {
     pub guarded: Buffer<u32>,
 }
 
+/// [`Adjoints`] in kernels.
+#[derive(CubeLaunch, CubeType)]
+pub(crate) struct AdjointArrays<F: Float + CubeElement> {
+    pub records: Array<F>,
+    pub bars: Array<F>,
+}
+
+impl<R: Runtime, T: Scalar> Argument<R> for Adjoints<T> {
+    type Parameter = AdjointArraysLaunch<T, R>;
+
+    fn argument(&self, _: &Device<R>) -> Self::Parameter {
+        AdjointArraysLaunch::new(self.records.arg(), self.bars.arg())
+    }
+}
+
 /// Pulls `bars` `(V, components)` of the values at the vertices back to the vertices themselves: adds to
 /// `vertices_bar` `(V, 3)`, and bounds that. There is at least one vertex.
 pub(super) fn pullback<R: Runtime, T: Scalar>(
     device: &Device<R>,
-    samples: Samples<'_, T>,
     sorted: &Sorted<T>,
     vertices: &Buffer<T>,
     given: &Given<'_, T>,
@@ -42,16 +59,7 @@ pub(super) fn pullback<R: Runtime, T: Scalar>(
     let count = vertices.len() / 3;
     let components = bars.len() / count;
     let radii = device.empty(count)?;
-    let (groups, dim) = (device.groups(count, BLOCK), CubeDim::new_1d(BLOCK));
-    mask_radii::launch::<T, R>(
-        device.client(),
-        groups.clone(),
-        dim,
-        fits.arg(),
-        bars.arg(),
-        radii.arg(),
-        components as u32,
-    );
+    launch!(device, count => mask_radii<T>(fits, bars, radii, components as u32));
     let near = neighbors::forward(device, vertices, &radii)?;
     let found = Adjoints {
         records: device.empty(ADJOINT * count)?,
@@ -59,36 +67,13 @@ pub(super) fn pullback<R: Runtime, T: Scalar>(
         guarded: device.empty(count)?,
         near,
     };
-    pair_values::launch::<T, R>(
-        device.client(),
-        device.groups(bars.len(), BLOCK),
-        dim,
-        bars.arg(),
-        values.arg(),
-        found.near.places.arg(),
-        found.bars.arg(),
-        components as u32,
-    );
-    let of_samples = samples.neighborhoods;
-    pull_fits::launch::<T, R>(
-        device.client(),
-        groups,
-        dim,
-        of_samples.points.arg(),
-        sorted.areas.arg(),
-        sorted.values.arg(),
-        of_samples.nodes.arg(),
-        of_samples.links.arg(),
-        found.near.points.arg(),
-        found.near.radii.arg(),
-        found.near.places.arg(),
-        fits.arg(),
-        found.bars.arg(),
-        found.records.arg(),
-        vertices_bar.arg(),
-        found.guarded.arg(),
-        components as u32,
-    );
+    launch!(device, bars.len() => pair_values<T>(
+        bars, values, found.near.places, found.bars, components as u32,
+    ));
+    launch!(device, count => pull_fits<T>(
+        sorted, found.near, fits, found.bars, found.records, vertices_bar,
+        found.guarded,
+    ));
     Ok(found)
 }
 
@@ -204,7 +189,7 @@ impl<F: Float> Adjoint<F> {
         }
     }
 
-    /// What `d̄_j` has through the fit.
+    /// The part of `d̄_j` through the fit.
     fn through_fit(self, s: Seen<F>) -> Vector3<F> {
         let (m, e) = (self.mean, s.e);
         let (a, b) = (self.of_mean, self.of_offset);
@@ -233,36 +218,29 @@ impl<F: Float> Adjoint<F> {
 
 /// One unit takes one vertex, in the order of the vertices' tree: its adjoint, and `−Σ_j d̄_j` for itself.
 #[cube(launch)]
-fn pull_fits<F: Float>(
-    points: &Array<F>,
-    areas: &Array<F>,
-    values: &Array<F>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
-    vertices: &Array<F>,
-    radii: &Array<F>,
-    places: &Array<u32>,
+fn pull_fits<F: Float + CubeElement>(
+    samples: &SampleArrays<F>,
+    near: &NeighborhoodArrays<F>,
     fits: &Array<F>,
     bars: &Array<F>,
     records: &mut Array<F>,
     vertices_bar: &mut Array<F>,
     guarded: &mut Array<u32>,
-    components: u32,
 ) {
     let k = ABSOLUTE_POS;
-    if k < radii.len() {
-        let vertex = places[k] as usize;
+    if k < near.radii.len() {
+        let vertex = near.places[k] as usize;
         let through_surface = Vector3::<F>::at(vertices_bar, vertex);
         let mut sums = Array::<F>::new(3usize);
         through_surface.store(&mut sums, 0usize);
         let mut bounded = 0u32.runtime();
-        if radii[k] > F::new(0.0) {
-            let y = Vector3::<F>::at(vertices, k);
+        if near.radii[k] > F::new(0.0) {
+            let y = Vector3::<F>::at(&near.points, k);
             let of = Fitted::<F>::at(fits, vertex);
             let mut moments = Array::<F>::new(MOMENTS);
-            sum_moments::<F>(points, areas, nodes, links, y, of.radius, &mut moments);
+            sum_moments::<F>(samples, y, of.radius, &mut moments);
             let axes = plane_of::<F>(&moments, 0usize, 1usize).eigen;
-            let c = covariance::<F>(points, areas, nodes, links, y, of, axes);
+            let c = covariance::<F>(samples, y, of, axes);
             let ridge = ridge::<F>(c, of.mean);
 
             // Σ p, Σ p q, Σ p e, Σ p e q and Σ p s·e, with q = ū·(v − u).
@@ -271,15 +249,16 @@ fn pull_fits<F: Float>(
             for i in 0..9usize {
                 found[i] = F::new(0.0);
             }
-            let mut node = next_leaf::<F>(nodes, links, y, of.radius, 0usize, false);
-            while node < links.len() {
-                let first = first_of_leaf(links, node);
-                for j in first..end_of_leaf(first, areas.len()) {
-                    let d = Vector3::<F>::at(points, j).sub(y);
-                    let n = neighbor::<F>(d, of.unit, areas[j]);
+            let mut node =
+                next_leaf::<F>(&samples.nodes, &samples.links, y, of.radius, 0usize, false);
+            while node < samples.links.len() {
+                let first = first_of_leaf(&samples.links, node);
+                for j in first..end_of_leaf(first, samples.areas.len()) {
+                    let d = Vector3::<F>::at(&samples.points, j).sub(y);
+                    let n = neighbor::<F>(d, of.unit, samples.areas[j]);
                     if n.weight > F::new(0.0) {
                         let p = n.weight / of.weight;
-                        let q = p * contract::<F>(bars, k, values, j, components as usize);
+                        let q = p * contract::<F>(bars, k, samples, j);
                         let offset = n.offset.sub(of.mean);
                         let e = in_frame::<F>(axes, offset);
                         found[8] += p * of.tilt.dot(offset);
@@ -289,7 +268,14 @@ fn pull_fits<F: Float>(
                         e.scale(q).add_to(&mut found, 5usize);
                     }
                 }
-                node = next_leaf::<F>(nodes, links, y, of.radius, node + 1, false);
+                node = next_leaf::<F>(
+                    &samples.nodes,
+                    &samples.links,
+                    y,
+                    of.radius,
+                    node + 1,
+                    false,
+                );
             }
             let middle = found[1] / found[0];
             let drift = Vector3::<F>::load(&found, 2usize).scale(middle);
@@ -317,16 +303,18 @@ fn pull_fits<F: Float>(
             for i in 0..7usize {
                 shares[i] = F::new(0.0);
             }
-            let mut node = next_leaf::<F>(nodes, links, y, of.radius, 0usize, false);
-            while node < links.len() {
-                let first = first_of_leaf(links, node);
-                for j in first..end_of_leaf(first, areas.len()) {
-                    let d = Vector3::<F>::at(points, j).sub(y);
-                    let n = neighbor::<F>(d, of.unit, areas[j]);
+            let mut node =
+                next_leaf::<F>(&samples.nodes, &samples.links, y, of.radius, 0usize, false);
+            while node < samples.links.len() {
+                let first = first_of_leaf(&samples.links, node);
+                for j in first..end_of_leaf(first, samples.areas.len()) {
+                    let d = Vector3::<F>::at(&samples.points, j).sub(y);
+                    let n = neighbor::<F>(d, of.unit, samples.areas[j]);
                     if n.weight > F::new(0.0) {
-                        let q = contract::<F>(bars, k, values, j, components as usize);
+                        let q = contract::<F>(bars, k, samples, j);
                         let seen = without_mean.see(n, q);
-                        let radial = fit::radial::<F>(F::new(1.0) / of.weight, areas[j], n.rest);
+                        let radial =
+                            fit::radial::<F>(F::new(1.0) / of.weight, samples.areas[j], n.rest);
                         shares[0] += seen.p * seen.pull;
                         n.offset
                             .scale(radial * seen.pull)
@@ -334,7 +322,14 @@ fn pull_fits<F: Float>(
                         n.offset.scale(radial).add_to(&mut shares, 4usize);
                     }
                 }
-                node = next_leaf::<F>(nodes, links, y, of.radius, node + 1, false);
+                node = next_leaf::<F>(
+                    &samples.nodes,
+                    &samples.links,
+                    y,
+                    of.radius,
+                    node + 1,
+                    false,
+                );
             }
             without_mean.write(records, k, shares[0]);
             let of_mean = Vector3::<F>::load(&shares, 4usize).scale(shares[0]);

@@ -1,13 +1,14 @@
-//! The cells of the band: which they are, and what they get from the vertices.
+//! The cells of the band, and their values from those at the vertices.
 
 use cubecl::prelude::*;
 
-use super::super::NO_TRIANGLE;
-use super::super::search::center;
+use super::super::bvh::center;
 use super::super::triangle::{closest, corners};
-use super::{BLOCK, Surface};
+use super::super::{MeshArrays, NO_TRIANGLE};
+use super::Surface;
+use crate::device::launch;
+use crate::grid::{Lattice, low_corner};
 use crate::primitives::scan::exclusive_sum;
-use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Cells within a reach of the surface, by exclusive sums of flags.
@@ -25,17 +26,9 @@ pub(super) fn near<R: Runtime, T: Scalar>(
 ) -> Result<Near, Error> {
     let cells = surface.phi.len();
     let (band, astray) = (device.empty(cells)?, device.empty(cells)?);
-    flag_cells::launch::<T, R>(
-        device.client(),
-        device.groups(cells, BLOCK),
-        CubeDim::new_1d(BLOCK),
-        surface.phi.arg(),
-        surface.closest.arg(),
-        band.arg(),
-        astray.arg(),
-        reach,
-        surface.faces() as u32,
-    );
+    launch!(device, cells => flag_cells<T>(
+        surface.phi, surface.closest, band, astray, reach, surface.faces() as u32,
+    ));
     Ok(Near {
         band: exclusive_sum(device, &band)?,
         astray: exclusive_sum(device, &astray)?,
@@ -53,27 +46,10 @@ pub(super) fn blend<R: Runtime, T: Scalar>(
 ) -> Result<(Buffer<T>, Buffer<T>), Error> {
     let barycentric = device.empty(3 * cells.len())?;
     let values = device.empty(components * cells.len())?;
-    let ([x, y, z], [_, ny, nz]) = (surface.grid.lower(), surface.grid.shape());
-    blend_cells::launch::<T, R>(
-        device.client(),
-        device.groups(cells.len(), BLOCK),
-        CubeDim::new_1d(BLOCK),
-        surface.mesh.vertices.arg(),
-        surface.mesh.faces.arg(),
-        surface.closest.arg(),
-        cells.arg(),
-        at_vertices.arg(),
-        barycentric.arg(),
-        values.arg(),
-        x,
-        y,
-        z,
-        surface.grid.spacing(),
-        ny as u32,
-        nz as u32,
+    launch!(device, cells.len() => blend_cells<T>(
+        surface.mesh, surface.closest, cells, at_vertices, barycentric, values, surface.grid,
         components as u32,
-        cells.len() as u32,
-    );
+    ));
     Ok((barycentric, values))
 }
 
@@ -97,32 +73,26 @@ fn flag_cells<F: Float + CubeElement>(
 /// `Σ_k β_k u_k` as differences from one corner, so that constants are exact.
 #[cube(launch)]
 fn blend_cells<F: Float + CubeElement>(
-    vertices: &Array<F>,
-    faces: &Array<u32>,
+    mesh: &MeshArrays<F>,
     found: &Array<u32>,
     cells: &Array<u32>,
     at_vertices: &Array<F>,
     barycentric: &mut Array<F>,
     values: &mut Array<F>,
-    x: F,
-    y: F,
-    z: F,
-    spacing: F,
-    ny: u32,
-    nz: u32,
+    grid: Lattice<F>,
     components: u32,
-    count: u32,
 ) {
-    if ABSOLUTE_POS < count as usize {
+    if ABSOLUTE_POS < cells.len() {
         let cell = cells[ABSOLUTE_POS];
         let face = found[cell as usize];
-        let t = corners::<F>(vertices, faces, face, Vector3::<F> { x, y, z });
-        let weights = closest::<F>(t, center::<F>(cell, spacing, ny, nz)).weights;
+        let t = corners::<F>(mesh, face, low_corner::<F>(&grid));
+        let center = center::<F>(cell, grid.spacing, grid.ny, grid.nz);
+        let weights = closest::<F>(t, center).weights;
         weights.write(barycentric, ABSOLUTE_POS);
         let components = components as usize;
-        let a = faces[3 * face as usize] as usize * components;
-        let b = faces[3 * face as usize + 1] as usize * components;
-        let c = faces[3 * face as usize + 2] as usize * components;
+        let a = mesh.faces[3 * face as usize] as usize * components;
+        let b = mesh.faces[3 * face as usize + 1] as usize * components;
+        let c = mesh.faces[3 * face as usize + 2] as usize * components;
         for k in 0..components {
             let from = at_vertices[a + k];
             let rise = weights.y * (at_vertices[b + k] - from);

@@ -2,14 +2,17 @@
 
 use cubecl::prelude::*;
 
-use super::super::search::center;
-use super::super::shares::{Corners, by_face};
+use super::super::MeshArrays;
+use super::super::bvh::center;
+use super::super::shares::{ByFace, ByFaceArrays, Corners, by_face};
 use super::super::tangent::tangent;
 use super::super::triangle::{closest, corners};
-use super::{BLOCK, Extension, Residual, Surface, columns};
+use super::{Extension, ExtensionArrays, Residual, Surface, columns};
+use crate::device::launch;
+use crate::grid::{Lattice, low_corner};
 use crate::neighbors::gather;
 use crate::primitives::fill::zeros;
-use crate::primitives::segments::{NO_SEGMENT, Pieces, Rows, join_pieces, sum_rows};
+use crate::primitives::segments::{NO_SEGMENT, Rows, join_pieces, sum_rows};
 use crate::vector::{Vector3, is_finite};
 use crate::{Buffer, Device, Error, Scalar};
 
@@ -22,7 +25,7 @@ pub(super) struct OfCells<T> {
     pub vertices: Buffer<T>,
     /// `(4,)` of the grid.
     pub grid: Buffer<T>,
-    /// How often something was bounded.
+    /// Numbers of bounded derivatives.
     pub guarded: Vec<Buffer<u32>>,
 }
 
@@ -37,13 +40,7 @@ impl<T: Scalar> OfCells<T> {
     }
 }
 
-/// The cells by their closest faces, in pieces.
-struct Sorted {
-    order: Buffer<u32>,
-    pieces: Pieces,
-}
-
-/// Adds to `bars` `(V, components)` what the values at the vertices get from the cells.
+/// Adds to `bars` `(V, components)` the cotangents of the values at the vertices through the cells.
 pub(super) fn pullback<R: Runtime, T: Scalar>(
     device: &Device<R>,
     surface: Surface<'_, T>,
@@ -56,38 +53,23 @@ pub(super) fn pullback<R: Runtime, T: Scalar>(
         return OfCells::zeros(device, surface.vertices());
     };
     let faces = gather(device, surface.closest, &extension.cells, 1)?;
-    let (order, pieces) = by_face::<T, R>(device, surface.mesh, &faces, None)?;
-    let sorted = Sorted { order, pieces };
+    let sorted = by_face::<T, R>(device, surface.mesh, &faces, None)?;
     let corners = Corners::of(device, surface.mesh)?;
     for (first, width) in columns(extension.components) {
         let part = pull_columns(
             device, residual, extension, values_bar, &sorted, first, width,
         )?;
         let part = corners.sum(device, &part, width)?;
-        add_columns::launch::<T, R>(
-            device.client(),
-            device.groups(part.len(), BLOCK),
-            CubeDim::new_1d(BLOCK),
-            part.arg(),
-            bars.arg(),
-            width as u32,
-            first as u32,
-            extension.components as u32,
-        );
+        launch!(device, part.len() => add_columns<T>(
+            part, bars, width as u32, first as u32, extension.components as u32,
+        ));
     }
     let (of_faces, guarded) = pull_weights(device, surface, extension, values_bar, &sorted)?;
     let (grid, not_finite) = (device.empty(4)?, device.empty(1)?);
     let all = device.upload(&[0, surface.faces() as u32])?;
     let rows = Rows::dense(FACE);
     let total = sum_rows(device, &of_faces, rows, None, &all, surface.faces())?;
-    name_total::launch::<T, R>(
-        device.client(),
-        device.groups(1, 1),
-        CubeDim::new_1d(1),
-        total.arg(),
-        grid.arg(),
-        not_finite.arg(),
-    );
+    launch!(device, 1, 1 => name_total<T>(total, grid, not_finite));
     Ok(OfCells {
         vertices: corners.sum(device, &of_faces, 3)?,
         grid,
@@ -101,90 +83,57 @@ fn pull_columns<R: Runtime, T: Scalar>(
     residual: &Residual<T>,
     extension: &Extension<T>,
     values_bar: &Buffer<T>,
-    sorted: &Sorted,
+    sorted: &ByFace,
     first: usize,
     width: usize,
 ) -> Result<Buffer<T>, Error> {
     let most = sorted.pieces.most();
     let sums = device.empty(3 * width * most)?;
-    share_values::launch::<T, R>(
-        device.client(),
-        device.groups(most, BLOCK),
-        CubeDim::new_1d(BLOCK),
-        sorted.order.arg(),
-        sorted.pieces.table.arg(),
-        residual.barycentric.arg(),
-        values_bar.arg(),
-        sums.arg(),
-        extension.components as u32,
-        first as u32,
-        most as u32,
+    launch!(device, most => share_values<T>(
+        sorted, residual.barycentric, values_bar, sums, extension.components as u32, first as u32,
         width,
-    );
+    ));
     let (pieces, cells) = (sorted.pieces.clone(), extension.cells.len());
     join_pieces(device, sums, 3 * width, pieces, cells)
 }
 
-/// What each face and the grid get through `β`, `(F, 13)`, and how many cells of each piece were bounded.
+/// Cotangents of each face and of the grid through `β`, `(F, 13)`, and the number of bounded cells of each piece.
 fn pull_weights<R: Runtime, T: Scalar>(
     device: &Device<R>,
     surface: Surface<'_, T>,
     extension: &Extension<T>,
     values_bar: &Buffer<T>,
-    sorted: &Sorted,
+    sorted: &ByFace,
 ) -> Result<(Buffer<T>, Buffer<u32>), Error> {
     let most = sorted.pieces.most();
     let (sums, guarded) = (device.empty(FACE * most)?, device.empty(most)?);
-    let ([x, y, z], [_, ny, nz]) = (surface.grid.lower(), surface.grid.shape());
-    let spacing = surface.grid.spacing();
     let thinness = <T as isograd::Real>::f64(<T as Float>::EPSILON).sqrt();
-    pull_cells::launch::<T, R>(
-        device.client(),
-        device.groups(most, BLOCK),
-        CubeDim::new_1d(BLOCK),
-        surface.mesh.vertices.arg(),
-        surface.mesh.faces.arg(),
-        extension.vertices.arg(),
-        extension.cells.arg(),
-        values_bar.arg(),
-        sorted.order.arg(),
-        sorted.pieces.table.arg(),
-        sums.arg(),
-        guarded.arg(),
-        x,
-        y,
-        z,
-        spacing,
-        T::of(thinness * spacing.f64()),
-        ny as u32,
-        nz as u32,
-        extension.components as u32,
-        most as u32,
-    );
+    let thinnest = T::of(thinness * surface.grid.spacing().f64());
+    launch!(device, most => pull_cells<T>(
+        surface.mesh, extension, values_bar, sorted, sums, guarded, surface.grid, thinnest,
+    ));
     let (pieces, cells) = (sorted.pieces.clone(), extension.cells.len());
     Ok((join_pieces(device, sums, FACE, pieces, cells)?, guarded))
 }
 
 #[cube(launch)]
 fn share_values<F: Float>(
-    order: &Array<u32>,
-    table: &Array<u32>,
+    by_face: &ByFaceArrays,
     barycentric: &Array<F>,
     values_bar: &Array<F>,
     sums: &mut Array<F>,
     components: u32,
     column: u32,
-    most: u32,
     #[comptime] width: usize,
 ) {
-    if ABSOLUTE_POS < most as usize && table[3 * ABSOLUTE_POS] != NO_SEGMENT {
+    if 3 * ABSOLUTE_POS < by_face.table.len() && by_face.table[3 * ABSOLUTE_POS] != NO_SEGMENT {
         let mut sum = Array::<F>::new(comptime!(3 * width));
         #[unroll]
         for i in 0..comptime!(3 * width) {
             sum[i] = F::new(0.0);
         }
-        for element in table[3 * ABSOLUTE_POS + 1]..table[3 * ABSOLUTE_POS + 2] {
-            let b = order[element as usize] as usize;
+        for element in by_face.table[3 * ABSOLUTE_POS + 1]..by_face.table[3 * ABSOLUTE_POS + 2] {
+            let b = by_face.order[element as usize] as usize;
             let (y, z) = (barycentric[3 * b + 1], barycentric[3 * b + 2]);
             let x = F::new(1.0) - y - z;
             let row = b * components as usize + column as usize;
@@ -238,45 +187,36 @@ fn gain<F: Float>(
 
 #[cube(launch)]
 fn pull_cells<F: Float + CubeElement>(
-    vertices: &Array<F>,
-    faces: &Array<u32>,
-    values: &Array<F>,
-    cells: &Array<u32>,
+    mesh: &MeshArrays<F>,
+    extension: &ExtensionArrays<F>,
     values_bar: &Array<F>,
-    order: &Array<u32>,
-    table: &Array<u32>,
+    by_face: &ByFaceArrays,
     sums: &mut Array<F>,
     guarded: &mut Array<u32>,
-    x: F,
-    y: F,
-    z: F,
-    spacing: F,
+    grid: Lattice<F>,
     thinnest: F,
-    ny: u32,
-    nz: u32,
-    components: u32,
-    most: u32,
 ) {
-    if ABSOLUTE_POS < most as usize {
+    if ABSOLUTE_POS < guarded.len() {
         let mut bounded = 0u32.runtime();
-        let face = table[3 * ABSOLUTE_POS];
+        let face = by_face.table[3 * ABSOLUTE_POS];
         if face != NO_SEGMENT {
             let at = 3 * face as usize;
-            let (a, b, c) = (faces[at], faces[at + 1], faces[at + 2]);
-            let t = corners::<F>(vertices, faces, face, Vector3::<F> { x, y, z });
+            let (a, b, c) = (mesh.faces[at], mesh.faces[at + 1], mesh.faces[at + 2]);
+            let t = corners::<F>(mesh, face, low_corner::<F>(&grid));
             let mut sum = Array::<F>::new(FACE);
             for number in 0..FACE {
                 sum[number] = F::new(0.0);
             }
-            let components = components as usize;
-            for element in table[3 * ABSOLUTE_POS + 1]..table[3 * ABSOLUTE_POS + 2] {
-                let row = order[element as usize] as usize;
-                let place = center::<F>(cells[row], F::new(1.0), ny, nz);
-                let found = closest::<F>(t, place.scale(spacing));
+            let components = extension.components as usize;
+            for element in by_face.table[3 * ABSOLUTE_POS + 1]..by_face.table[3 * ABSOLUTE_POS + 2]
+            {
+                let row = by_face.order[element as usize] as usize;
+                let place = center::<F>(extension.cells[row], F::new(1.0), grid.ny, grid.nz);
+                let found = closest::<F>(t, place.scale(grid.spacing));
                 let gains = Vector3::<F> {
-                    x: gain::<F>(values, a, b, values_bar, row, components),
-                    y: gain::<F>(values, b, c, values_bar, row, components),
-                    z: gain::<F>(values, c, a, values_bar, row, components),
+                    x: gain::<F>(&extension.vertices, a, b, values_bar, row, components),
+                    y: gain::<F>(&extension.vertices, b, c, values_bar, row, components),
+                    z: gain::<F>(&extension.vertices, c, a, values_bar, row, components),
                 };
                 let moved = tangent::<F>(t, found, gains, thinnest);
                 let (g, w) = (moved.gamma, found.weights);

@@ -3,8 +3,8 @@
 use cubecl::prelude::*;
 
 use super::cpu::Error as Refused;
-use super::{Attribute, BLOCK, Error, Extension, FIT, Residual, Samples, Surface};
-use crate::device::check_length;
+use super::{Attribute, Error, Extension, FIT, Residual, Samples, Surface};
+use crate::device::{check_length, launch};
 use crate::grid::check_field;
 use crate::primitives::flags;
 use crate::primitives::scan::exclusive_sum;
@@ -63,15 +63,9 @@ impl<T: Scalar> Numbers<T> {
     ) -> Result<Self, Error> {
         let count = samples.areas.len();
         let bad = device.empty(2 * count)?;
-        flag_samples::launch::<T, R>(
-            device.client(),
-            device.groups(count, BLOCK),
-            CubeDim::new_1d(BLOCK),
-            attribute.values.arg(),
-            samples.areas.arg(),
-            bad.arg(),
-            attribute.components as u32,
-        );
+        launch!(device, count => flag_samples<T>(
+            attribute.values, samples.areas, bad, attribute.components as u32,
+        ));
         Ok(Self {
             areas: samples.areas.clone(),
             sums: exclusive_sum(device, &bad)?,
@@ -105,7 +99,7 @@ pub(super) fn refuse_face<R: Runtime>(
     Ok(Refused::Face { face }.into())
 }
 
-/// What the pullback is given besides.
+/// Further inputs of the pullback.
 pub(super) struct Given<'a, T> {
     pub residual: &'a Residual<T>,
     pub extension: &'a Extension<T>,
@@ -177,17 +171,10 @@ impl<T: Scalar> Given<'_, T> {
     ) -> Result<(), Error> {
         let cells = &self.extension.cells;
         let bad = device.empty(2 * cells.len())?;
-        flag_listed::launch::<R>(
-            device.client(),
-            device.groups(cells.len(), BLOCK),
-            CubeDim::new_1d(BLOCK),
-            cells.arg(),
-            surface.closest.arg(),
-            bad.arg(),
-            cells.len() as u32,
-            surface.grid.cells() as u32,
+        launch!(device, cells.len() => flag_listed(
+            cells, surface.closest, bad, cells.len() as u32, surface.grid.cells() as u32,
             surface.faces() as u32,
-        );
+        ));
         let sums = exclusive_sum(device, &bad)?;
         let [samples, listed] = flags::totals(device, [&numbers.sums, &sums])?;
         if samples > 0 {

@@ -1,13 +1,14 @@
-//! The fits at the vertices, and what they say of the attribute.
+//! The fits at the vertices, and the values of the attribute there.
 
 use cubecl::prelude::*;
 use isograd::distance::extend::rule::{ENOUGH, MARGIN, MOST, REACH, SMALLEST_AREA};
 
-use super::neighbor::{Fitted, Sorted, neighbor, sum_moments};
-use super::{BLOCK, FIT, Samples, columns};
+use super::neighbor::{Fitted, SampleArrays, Sorted, neighbor, sum_moments};
+use super::{FIT, Samples, columns};
+use crate::device::launch;
 use crate::element::eigen::{Eigen, Symmetric};
 use crate::element::fit;
-use crate::neighbors::{end_of_leaf, first_of_leaf, next_leaf, reach_squared};
+use crate::neighbors::{NeighborhoodArrays, end_of_leaf, first_of_leaf, next_leaf, reach_squared};
 use crate::normals::{MOMENTS, fit as plane_of};
 use crate::primitives::reduce;
 use crate::vector::Vector3;
@@ -20,14 +21,9 @@ pub(super) fn smallest_area<R: Runtime, T: Scalar>(
 ) -> Result<Buffer<T>, Error> {
     let sum = reduce::sum(device, areas)?;
     let smallest = device.empty(1)?;
-    share_area::launch::<T, R>(
-        device.client(),
-        device.groups(1, 1),
-        CubeDim::new_1d(1),
-        sum.arg(),
-        smallest.arg(),
-        T::of(SMALLEST_AREA / areas.len() as f64),
-    );
+    launch!(device, 1, 1 => share_area<T>(
+        sum, smallest, T::of(SMALLEST_AREA / areas.len() as f64),
+    ));
     Ok(smallest)
 }
 
@@ -41,67 +37,27 @@ pub(super) fn forward<R: Runtime, T: Scalar>(
     let near = samples.neighborhoods;
     let count = vertices.len() / 3;
     let fits = device.empty(FIT * count)?;
-    let (groups, dim) = (device.groups(count, BLOCK), CubeDim::new_1d(BLOCK));
-    find_radii::launch::<T, R>(
-        device.client(),
-        groups.clone(),
-        dim,
-        near.points.arg(),
-        near.nodes.arg(),
-        near.links.arg(),
-        vertices.arg(),
-        fits.arg(),
-        samples.common_radius,
-        T::of(REACH),
-        T::of(MARGIN),
-        count as u32,
-        ENOUGH.min(near.len()),
-        MOST.min(near.len()),
-    );
-    fit_vertices::launch::<T, R>(
-        device.client(),
-        groups,
-        dim,
-        near.points.arg(),
-        sorted.areas.arg(),
-        near.nodes.arg(),
-        near.links.arg(),
-        vertices.arg(),
-        fits.arg(),
-        count as u32,
-    );
+    launch!(device, count => find_radii<T>(
+        near, vertices, fits, samples.common_radius, T::of(REACH), T::of(MARGIN),
+        ENOUGH.min(near.len()), MOST.min(near.len()),
+    ));
+    launch!(device, count => fit_vertices<T>(sorted, vertices, fits));
     Ok(fits)
 }
 
 /// `u_v` at each vertex, `(V, components)`.
 pub(super) fn evaluate<R: Runtime, T: Scalar>(
     device: &Device<R>,
-    samples: Samples<'_, T>,
     sorted: &Sorted<T>,
     vertices: &Buffer<T>,
     fits: &Buffer<T>,
 ) -> Result<Buffer<T>, Error> {
-    let near = samples.neighborhoods;
-    let (count, components) = (vertices.len() / 3, sorted.values.len() / near.len());
+    let (count, components) = (vertices.len() / 3, sorted.components());
     let values = device.empty(count * components)?;
     for (first, width) in columns(components) {
-        evaluate_columns::launch::<T, R>(
-            device.client(),
-            device.groups(count, BLOCK),
-            CubeDim::new_1d(BLOCK),
-            near.points.arg(),
-            sorted.areas.arg(),
-            near.nodes.arg(),
-            near.links.arg(),
-            sorted.values.arg(),
-            vertices.arg(),
-            fits.arg(),
-            values.arg(),
-            count as u32,
-            components as u32,
-            first as u32,
-            width,
-        );
+        launch!(device, count => evaluate_columns<T>(
+            sorted, vertices, fits, values, first as u32, width,
+        ));
     }
     Ok(values)
 }
@@ -116,24 +72,35 @@ fn share_area<F: Float + CubeElement>(sum: &Array<F>, smallest: &mut Array<F>, s
 /// `max(R, min(1.5 r₆, 1.05 r₆₄))`. That is `R` just where six samples are well within it.
 #[cube(launch)]
 fn find_radii<F: Float + CubeElement>(
-    points: &Array<F>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
+    near: &NeighborhoodArrays<F>,
     vertices: &Array<F>,
     fits: &mut Array<F>,
     common: F,
     reach: F,
     margin: F,
-    count: u32,
     #[comptime] enough: usize,
     #[comptime] most: usize,
 ) {
-    if ABSOLUTE_POS < count as usize {
+    if 3 * ABSOLUTE_POS < vertices.len() {
         let y = Vector3::<F>::at(vertices, ABSOLUTE_POS);
-        let grown = reach * F::sqrt(reach_squared::<F>(points, nodes, links, y, enough));
+        let grown = reach
+            * F::sqrt(reach_squared::<F>(
+                &near.points,
+                &near.nodes,
+                &near.links,
+                y,
+                enough,
+            ));
         let mut radius = common;
         if grown > common {
-            let last = margin * F::sqrt(reach_squared::<F>(points, nodes, links, y, most));
+            let last = margin
+                * F::sqrt(reach_squared::<F>(
+                    &near.points,
+                    &near.nodes,
+                    &near.links,
+                    y,
+                    most,
+                ));
             radius = max(common, min(grown, last));
         }
         fits[FIT * ABSOLUTE_POS] = radius;
@@ -142,11 +109,8 @@ fn find_radii<F: Float + CubeElement>(
 
 /// `C` in the frame of the axes, of offsets from the mean that is given.
 #[cube]
-pub(super) fn covariance<F: Float>(
-    points: &Array<F>,
-    areas: &Array<F>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
+pub(super) fn covariance<F: Float + CubeElement>(
+    samples: &SampleArrays<F>,
     y: Vector3<F>,
     of: Fitted<F>,
     axes: Eigen<F>,
@@ -158,12 +122,12 @@ pub(super) fn covariance<F: Float>(
     let mut yy = zero;
     let mut yz = zero;
     let mut zz = zero;
-    let mut node = next_leaf::<F>(nodes, links, y, of.radius, 0usize, false);
-    while node < links.len() {
-        let first = first_of_leaf(links, node);
-        for j in first..end_of_leaf(first, areas.len()) {
-            let d = Vector3::<F>::at(points, j).sub(y);
-            let n = neighbor::<F>(d, of.unit, areas[j]);
+    let mut node = next_leaf::<F>(&samples.nodes, &samples.links, y, of.radius, 0usize, false);
+    while node < samples.links.len() {
+        let first = first_of_leaf(&samples.links, node);
+        for j in first..end_of_leaf(first, samples.areas.len()) {
+            let d = Vector3::<F>::at(&samples.points, j).sub(y);
+            let n = neighbor::<F>(d, of.unit, samples.areas[j]);
             let e = in_frame::<F>(axes, n.offset.sub(of.mean));
             let p = n.weight / of.weight;
             xx += p * e.x * e.x;
@@ -173,7 +137,14 @@ pub(super) fn covariance<F: Float>(
             yz += p * e.y * e.z;
             zz += p * e.z * e.z;
         }
-        node = next_leaf::<F>(nodes, links, y, of.radius, node + 1, false);
+        node = next_leaf::<F>(
+            &samples.nodes,
+            &samples.links,
+            y,
+            of.radius,
+            node + 1,
+            false,
+        );
     }
     Symmetric::<F> {
         xx,
@@ -195,7 +166,7 @@ pub(super) fn in_frame<F: Float>(axes: Eigen<F>, v: Vector3<F>) -> Vector3<F> {
     }
 }
 
-/// `C + ε I` in a frame, and what its pullback needs.
+/// `C + ε I` in a frame, with the intermediates of its pullback.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Ridge<F: Float> {
     /// Whether there is one: samples that coincide have no slope.
@@ -250,21 +221,17 @@ pub(super) fn solve<F: Float>(of: Ridge<F>, axes: Eigen<F>, b: Vector3<F>) -> Ve
 
 /// The radii are there already.
 #[cube(launch)]
-fn fit_vertices<F: Float>(
-    points: &Array<F>,
-    areas: &Array<F>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
+fn fit_vertices<F: Float + CubeElement>(
+    samples: &SampleArrays<F>,
     vertices: &Array<F>,
     fits: &mut Array<F>,
-    count: u32,
 ) {
-    if ABSOLUTE_POS < count as usize {
+    if 3 * ABSOLUTE_POS < vertices.len() {
         let at = FIT * ABSOLUTE_POS;
         let y = Vector3::<F>::at(vertices, ABSOLUTE_POS);
         let radius = fits[at];
         let mut sums = Array::<F>::new(MOMENTS);
-        sum_moments::<F>(points, areas, nodes, links, y, radius, &mut sums);
+        sum_moments::<F>(samples, y, radius, &mut sums);
         let plane = plane_of::<F>(&sums, 0usize, 1usize);
         let mean = plane.centroid;
         let of = Fitted::<F> {
@@ -275,7 +242,7 @@ fn fit_vertices<F: Float>(
             tilt: Vector3::<F>::zero(),
         };
         let axes = plane.eigen;
-        let c = covariance::<F>(points, areas, nodes, links, y, of, axes);
+        let c = covariance::<F>(samples, y, of, axes);
         let ridge = ridge::<F>(c, mean);
         let tilt = solve::<F>(ridge, axes, in_frame::<F>(axes, mean));
         fits[at + 1] = plane.weight;
@@ -287,24 +254,18 @@ fn fit_vertices<F: Float>(
 /// `Σ_j p_j t_j v_j` of some columns, as the mean and a correction to it, so that neither what is left of
 /// `Σ_j p_j e_j` nor what `Σ_j p_j` lacks to 1 counts.
 #[cube(launch)]
-fn evaluate_columns<F: Float>(
-    points: &Array<F>,
-    areas: &Array<F>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
-    values: &Array<F>,
+fn evaluate_columns<F: Float + CubeElement>(
+    samples: &SampleArrays<F>,
     vertices: &Array<F>,
     fits: &Array<F>,
     out: &mut Array<F>,
-    count: u32,
-    components: u32,
     column: u32,
     #[comptime] width: usize,
 ) {
-    if ABSOLUTE_POS < count as usize {
+    if 3 * ABSOLUTE_POS < vertices.len() {
         let y = Vector3::<F>::at(vertices, ABSOLUTE_POS);
         let of = Fitted::<F>::at(fits, ABSOLUTE_POS);
-        let (components, column) = (components as usize, column as usize);
+        let (components, column) = (samples.components as usize, column as usize);
         // Seen from one of the samples.
         let mut from = Array::<F>::new(width);
         let mut means = Array::<F>::new(width);
@@ -317,32 +278,39 @@ fn evaluate_columns<F: Float>(
         }
         let mut total = F::new(0.0);
         let mut drift = F::new(0.0);
-        let mut node = next_leaf::<F>(nodes, links, y, of.radius, 0usize, false);
-        while node < links.len() {
-            let first = first_of_leaf(links, node);
-            for j in first..end_of_leaf(first, areas.len()) {
-                let d = Vector3::<F>::at(points, j).sub(y);
-                let n = neighbor::<F>(d, of.unit, areas[j]);
+        let mut node = next_leaf::<F>(&samples.nodes, &samples.links, y, of.radius, 0usize, false);
+        while node < samples.links.len() {
+            let first = first_of_leaf(&samples.links, node);
+            for j in first..end_of_leaf(first, samples.areas.len()) {
+                let d = Vector3::<F>::at(&samples.points, j).sub(y);
+                let n = neighbor::<F>(d, of.unit, samples.areas[j]);
                 if n.weight > F::new(0.0) {
                     let p = n.weight / of.weight;
                     let slope = p * of.tilt.dot(n.offset.sub(of.mean));
                     if total == F::new(0.0) {
                         #[unroll]
                         for c in 0..width {
-                            from[c] = values[j * components + column + c];
+                            from[c] = samples.values[j * components + column + c];
                         }
                     }
                     total += p;
                     drift += slope;
                     #[unroll]
                     for c in 0..width {
-                        let value = values[j * components + column + c] - from[c];
+                        let value = samples.values[j * components + column + c] - from[c];
                         means[c] += p * value;
                         rises[c] += slope * value;
                     }
                 }
             }
-            node = next_leaf::<F>(nodes, links, y, of.radius, node + 1, false);
+            node = next_leaf::<F>(
+                &samples.nodes,
+                &samples.links,
+                y,
+                of.radius,
+                node + 1,
+                false,
+            );
         }
         #[unroll]
         for c in 0..width {

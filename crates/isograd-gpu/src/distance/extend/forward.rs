@@ -13,7 +13,7 @@ use crate::{Device, Scalar};
 /// the checks, and how many cells there are.
 ///
 /// # Errors
-/// What [`isograd::distance::extend::forward`] says of the same arrays; those of the device.
+/// Errors of [`isograd::distance::extend::forward`]; errors of the device.
 pub fn forward<R: Runtime, T: Scalar>(
     device: &Device<R>,
     samples: Samples<'_, T>,
@@ -44,7 +44,7 @@ pub fn forward<R: Runtime, T: Scalar>(
     let sorted = Sorted::new(device, samples, attribute, &smallest_area)?;
     let vertices = &surface.mesh.vertices;
     let fits = fits::forward(device, samples, &sorted, vertices)?;
-    let at_vertices = fits::evaluate(device, samples, &sorted, vertices, &fits)?;
+    let at_vertices = fits::evaluate(device, &sorted, vertices, &fits)?;
     let components = attribute.components;
     let (barycentric, values) = cells::blend(device, surface, &cells, &at_vertices, components)?;
     let extension = Extension {

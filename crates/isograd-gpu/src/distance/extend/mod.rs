@@ -36,14 +36,13 @@ mod samples;
 pub use forward::forward;
 pub use pullback::{Cotangent, pullback};
 
+use cubecl::prelude::*;
 use isograd::distance::extend as cpu;
 
 use super::Mesh;
+use crate::device::Argument;
 use crate::neighbors::Neighborhoods;
-use crate::{Buffer, Scalar};
-
-/// Units of a group.
-const BLOCK: u32 = 64;
+use crate::{Buffer, Device, Scalar};
 
 /// Components of an attribute that one kernel takes at a time.
 const WIDTH: usize = 4;
@@ -97,7 +96,24 @@ pub struct Extension<T> {
     pub values: Buffer<T>,
 }
 
-/// What the pullback needs besides the inputs and the extension: [`isograd::distance::extend::Residual`].
+/// [`Extension`] in kernels, but for the values at the cells.
+#[derive(CubeLaunch, CubeType)]
+pub(crate) struct ExtensionArrays<F: Float + CubeElement> {
+    pub vertices: Array<F>,
+    pub cells: Array<u32>,
+    pub components: u32,
+}
+
+impl<R: Runtime, T: Scalar> Argument<R> for Extension<T> {
+    type Parameter = ExtensionArraysLaunch<T, R>;
+
+    fn argument(&self, _: &Device<R>) -> Self::Parameter {
+        let components = self.components as u32;
+        ExtensionArraysLaunch::new(self.vertices.arg(), self.cells.arg(), components)
+    }
+}
+
+/// Residual of the pullback, besides the inputs and the extension: [`isograd::distance::extend::Residual`].
 #[derive(Clone, Debug)]
 pub struct Residual<T> {
     /// `(V, 8)` the fit at each vertex: `R_v`, `W`, `m` and `s`, in the units of
@@ -109,10 +125,10 @@ pub struct Residual<T> {
     pub barycentric: Buffer<T>,
 }
 
-/// Why an attribute was not extended.
+/// Errors of the extension.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// What was given can't be.
+    /// Invalid input.
     #[error(transparent)]
     Refused(#[from] cpu::Error),
     /// The device can't, or fails.

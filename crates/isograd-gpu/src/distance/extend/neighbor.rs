@@ -3,23 +3,56 @@
 use cubecl::prelude::*;
 
 use super::{Attribute, FIT, Samples};
+use crate::device::{Argument, launch};
 use crate::element::fit;
-use crate::neighbors::{end_of_leaf, first_of_leaf, gather, next_leaf};
+use crate::neighbors::{Neighborhoods, end_of_leaf, first_of_leaf, gather, next_leaf};
 use crate::normals::{MOMENTS, add_moments};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
-use super::BLOCK;
-
-/// What is known of the samples, in the order of their tree.
+/// Samples with areas and values, in the order of their tree.
 pub(super) struct Sorted<T> {
+    tree: Neighborhoods<T>,
     /// `(N,)` `a_j + a₀`.
     pub areas: Buffer<T>,
     /// `(N, components)` `v_j`.
     pub values: Buffer<T>,
 }
 
+/// [`Sorted`] in kernels.
+#[derive(CubeLaunch, CubeType)]
+pub(crate) struct SampleArrays<F: Float + CubeElement> {
+    pub points: Array<F>,
+    pub places: Array<u32>,
+    pub nodes: Array<F>,
+    pub links: Array<u32>,
+    pub areas: Array<F>,
+    pub values: Array<F>,
+    pub components: u32,
+}
+
+impl<R: Runtime, T: Scalar> Argument<R> for Sorted<T> {
+    type Parameter = SampleArraysLaunch<T, R>;
+
+    fn argument(&self, _: &Device<R>) -> Self::Parameter {
+        SampleArraysLaunch::new(
+            self.tree.points.arg(),
+            self.tree.places.arg(),
+            self.tree.nodes.arg(),
+            self.tree.links.arg(),
+            self.areas.arg(),
+            self.values.arg(),
+            self.components() as u32,
+        )
+    }
+}
+
 impl<T: Scalar> Sorted<T> {
+    /// Components of a value.
+    pub fn components(&self) -> usize {
+        self.values.len() / self.areas.len()
+    }
+
     pub fn new<R: Runtime>(
         device: &Device<R>,
         samples: Samples<'_, T>,
@@ -28,16 +61,11 @@ impl<T: Scalar> Sorted<T> {
     ) -> Result<Self, Error> {
         let places = &samples.neighborhoods.places;
         let sorted = Self {
+            tree: samples.neighborhoods.clone(),
             areas: gather(device, samples.areas, places, 1)?,
             values: gather(device, attribute.values, places, attribute.components)?,
         };
-        raise_areas::launch::<T, R>(
-            device.client(),
-            device.groups(sorted.areas.len(), BLOCK),
-            CubeDim::new_1d(BLOCK),
-            smallest_area.arg(),
-            sorted.areas.arg(),
-        );
+        launch!(device, sorted.areas.len() => raise_areas<T>(smallest_area, sorted.areas));
         Ok(sorted)
     }
 }
@@ -98,11 +126,8 @@ pub(super) fn neighbor<F: Float>(offset: Vector3<F>, unit: F, area: F) -> Neighb
 
 /// `Σ w`, `Σ w d` and `Σ w d dᵀ` of the samples round the vertex at `y`, in units of the radius.
 #[cube]
-pub(super) fn sum_moments<F: Float>(
-    points: &Array<F>,
-    areas: &Array<F>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
+pub(super) fn sum_moments<F: Float + CubeElement>(
+    samples: &SampleArrays<F>,
     y: Vector3<F>,
     radius: F,
     sums: &mut Array<F>,
@@ -112,33 +137,33 @@ pub(super) fn sum_moments<F: Float>(
     for k in 0..MOMENTS {
         sums[k] = F::new(0.0);
     }
-    let mut node = next_leaf::<F>(nodes, links, y, radius, 0usize, false);
-    while node < links.len() {
-        let first = first_of_leaf(links, node);
-        for j in first..end_of_leaf(first, areas.len()) {
-            let d = Vector3::<F>::at(points, j).sub(y);
-            let n = neighbor::<F>(d, unit, areas[j]);
+    let mut node = next_leaf::<F>(&samples.nodes, &samples.links, y, radius, 0usize, false);
+    while node < samples.links.len() {
+        let first = first_of_leaf(&samples.links, node);
+        for j in first..end_of_leaf(first, samples.areas.len()) {
+            let d = Vector3::<F>::at(&samples.points, j).sub(y);
+            let n = neighbor::<F>(d, unit, samples.areas[j]);
             add_moments::<F>(n.offset, n.weight, sums);
         }
-        node = next_leaf::<F>(nodes, links, y, radius, node + 1, false);
+        node = next_leaf::<F>(&samples.nodes, &samples.links, y, radius, node + 1, false);
     }
 }
 
 /// `ū·(v_j − u)` over all components, of sorted vertex `k` and sorted sample `j`. The row of each vertex is `ū`, then
 /// `u`, its own value: what all samples have in common would leave less of the digits of what they differ in.
 #[cube]
-pub(super) fn contract<F: Float>(
+pub(super) fn contract<F: Float + CubeElement>(
     bars: &Array<F>,
     k: usize,
-    values: &Array<F>,
+    samples: &SampleArrays<F>,
     j: usize,
-    components: usize,
 ) -> F {
+    let components = samples.components as usize;
     let row = 2 * k * components;
     let mut sum = F::new(0.0);
     for c in 0..components {
         let from = bars[row + components + c];
-        sum += bars[row + c] * (values[j * components + c] - from);
+        sum += bars[row + c] * (samples.values[j * components + c] - from);
     }
     sum
 }

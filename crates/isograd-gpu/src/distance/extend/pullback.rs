@@ -36,7 +36,7 @@ pub struct Cotangent<T> {
 /// The radii `R_v`, `a₀`, φ (which chooses the band) and the closest faces are held constant.
 ///
 /// # Errors
-/// What [`isograd::distance::extend::pullback`] says of the same arrays; those of the device.
+/// Errors of [`isograd::distance::extend::pullback`]; errors of the device.
 #[expect(clippy::too_many_arguments, reason = "inputs, outputs and cotangents")]
 pub fn pullback<R: Runtime, T: Scalar>(
     device: &Device<R>,
@@ -72,16 +72,8 @@ pub fn pullback<R: Runtime, T: Scalar>(
     let sorted = Sorted::new(device, samples, attribute, &residual.smallest_area)?;
     let vertices = &surface.mesh.vertices;
     let vertices_bar = of_cells.vertices;
-    let adjoints = adjoint::pullback(
-        device,
-        samples,
-        &sorted,
-        vertices,
-        &given,
-        &bars,
-        &vertices_bar,
-    )?;
-    let found = of_samples::gather(device, samples, &sorted, &adjoints)?;
+    let adjoints = adjoint::pullback(device, &sorted, vertices, &given, &bars, &vertices_bar)?;
+    let found = of_samples::gather(device, &sorted, &adjoints)?;
     let mut guarded: Vec<&Buffer<u32>> = of_cells.guarded.iter().collect();
     guarded.extend([&adjoints.guarded, &found.guarded]);
     Ok(Cotangent {

@@ -1,11 +1,12 @@
-//! What the samples get from the fits: each gathers over the vertices whose radius reaches it.
+//! Cotangents of the samples through the fits: each gathers over the vertices whose radius reaches it.
 
 use cubecl::prelude::*;
 
-use super::adjoint::{Adjoint, Adjoints};
-use super::neighbor::{Sorted, contract, neighbor};
-use super::{BLOCK, Samples, columns};
-use crate::neighbors::{end_of_leaf, first_of_leaf, next_leaf};
+use super::adjoint::{Adjoint, AdjointArrays, Adjoints};
+use super::columns;
+use super::neighbor::{SampleArrays, Sorted, contract, neighbor};
+use crate::device::launch;
+use crate::neighbors::{NeighborhoodArrays, end_of_leaf, first_of_leaf, next_leaf};
 use crate::vector::{Vector3, is_finite};
 use crate::{Buffer, Device, Error, Scalar};
 
@@ -23,59 +24,23 @@ pub(super) struct OfSamples<T> {
 
 pub(super) fn gather<R: Runtime, T: Scalar>(
     device: &Device<R>,
-    samples: Samples<'_, T>,
     sorted: &Sorted<T>,
     adjoints: &Adjoints<T>,
 ) -> Result<OfSamples<T>, Error> {
-    let (own, near) = (samples.neighborhoods, &adjoints.near);
-    let count = own.len();
-    let components = sorted.values.len() / count;
+    let (count, components) = (sorted.areas.len(), sorted.components());
     let out = OfSamples {
         attribute: device.empty(count * components)?,
         points: device.empty(3 * count)?,
         areas: device.empty(count)?,
         guarded: device.empty(count)?,
     };
-    let (groups, dim) = (device.groups(count, BLOCK), CubeDim::new_1d(BLOCK));
-    gather_points::launch::<T, R>(
-        device.client(),
-        groups.clone(),
-        dim,
-        own.points.arg(),
-        own.places.arg(),
-        sorted.areas.arg(),
-        sorted.values.arg(),
-        near.points.arg(),
-        near.radii.arg(),
-        near.nodes.arg(),
-        near.links.arg(),
-        adjoints.records.arg(),
-        adjoints.bars.arg(),
-        out.points.arg(),
-        out.areas.arg(),
-        out.guarded.arg(),
-        components as u32,
-    );
+    launch!(device, count => gather_points<T>(
+        sorted, adjoints.near, adjoints, out.points, out.areas, out.guarded,
+    ));
     for (first, width) in columns(components) {
-        gather_columns::launch::<T, R>(
-            device.client(),
-            groups.clone(),
-            dim,
-            own.points.arg(),
-            own.places.arg(),
-            sorted.areas.arg(),
-            near.points.arg(),
-            near.radii.arg(),
-            near.nodes.arg(),
-            near.links.arg(),
-            adjoints.records.arg(),
-            adjoints.bars.arg(),
-            out.attribute.arg(),
-            out.guarded.arg(),
-            components as u32,
-            first as u32,
-            width,
-        );
+        launch!(device, count => gather_columns<T>(
+            sorted, adjoints.near, adjoints, out.attribute, out.guarded, first as u32, width,
+        ));
     }
     Ok(out)
 }
@@ -90,42 +55,38 @@ fn write_bounded<F: Float>(out: &mut Array<F>, at: usize, number: F) -> u32 {
 
 /// `Σ_v d̄_j` and `Σ_v w̄_j K`. A vertex that counts for nothing has the radius 0.
 #[cube(launch)]
-fn gather_points<F: Float>(
-    points: &Array<F>,
-    places: &Array<u32>,
-    areas: &Array<F>,
-    values: &Array<F>,
-    vertices: &Array<F>,
-    radii: &Array<F>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
-    records: &Array<F>,
-    bars: &Array<F>,
+fn gather_points<F: Float + CubeElement>(
+    samples: &SampleArrays<F>,
+    near: &NeighborhoodArrays<F>,
+    adjoints: &AdjointArrays<F>,
     points_bar: &mut Array<F>,
     areas_bar: &mut Array<F>,
     guarded: &mut Array<u32>,
-    components: u32,
 ) {
     let j = ABSOLUTE_POS;
-    if j < areas.len() {
-        let x = Vector3::<F>::at(points, j);
+    if j < samples.areas.len() {
+        let x = Vector3::<F>::at(&samples.points, j);
         let zero = F::new(0.0);
         let mut sum_x = zero;
         let mut sum_y = zero;
         let mut sum_z = zero;
         let mut of_area = zero;
-        let mut node = next_leaf::<F>(nodes, links, x, zero, 0usize, true);
-        while node < links.len() {
-            let first = first_of_leaf(links, node);
-            for k in first..end_of_leaf(first, radii.len()) {
-                if radii[k] > zero {
-                    let unit = F::new(1.0) / radii[k];
-                    let n = neighbor::<F>(x.sub(Vector3::<F>::at(vertices, k)), unit, areas[j]);
+        let mut node = next_leaf::<F>(&near.nodes, &near.links, x, zero, 0usize, true);
+        while node < near.links.len() {
+            let first = first_of_leaf(&near.links, node);
+            for k in first..end_of_leaf(first, near.radii.len()) {
+                if near.radii[k] > zero {
+                    let unit = F::new(1.0) / near.radii[k];
+                    let n = neighbor::<F>(
+                        x.sub(Vector3::<F>::at(&near.points, k)),
+                        unit,
+                        samples.areas[j],
+                    );
                     if n.weight > zero {
-                        let q = contract::<F>(bars, k, values, j, components as usize);
-                        let adjoint = Adjoint::<F>::at(records, k);
+                        let q = contract::<F>(&adjoints.bars, k, samples, j);
+                        let adjoint = Adjoint::<F>::at(&adjoints.records, k);
                         let seen = adjoint.see(n, q);
-                        let share = adjoint.offset_bar(seen, n.rest, areas[j]);
+                        let share = adjoint.offset_bar(seen, n.rest, samples.areas[j]);
                         sum_x += share.x * unit;
                         sum_y += share.y * unit;
                         sum_z += share.z * unit;
@@ -133,9 +94,9 @@ fn gather_points<F: Float>(
                     }
                 }
             }
-            node = next_leaf::<F>(nodes, links, x, zero, node + 1, true);
+            node = next_leaf::<F>(&near.nodes, &near.links, x, zero, node + 1, true);
         }
-        let place = places[j] as usize;
+        let place = samples.places[j] as usize;
         let mut count = write_bounded::<F>(points_bar, 3 * place, sum_x);
         count += write_bounded::<F>(points_bar, 3 * place + 1, sum_y);
         count += write_bounded::<F>(points_bar, 3 * place + 2, sum_z);
@@ -146,51 +107,49 @@ fn gather_points<F: Float>(
 
 /// `Σ_v p_j t_j ū_v` of some columns.
 #[cube(launch)]
-fn gather_columns<F: Float>(
-    points: &Array<F>,
-    places: &Array<u32>,
-    areas: &Array<F>,
-    vertices: &Array<F>,
-    radii: &Array<F>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
-    records: &Array<F>,
-    bars: &Array<F>,
+fn gather_columns<F: Float + CubeElement>(
+    samples: &SampleArrays<F>,
+    near: &NeighborhoodArrays<F>,
+    adjoints: &AdjointArrays<F>,
     attribute_bar: &mut Array<F>,
     guarded: &mut Array<u32>,
-    components: u32,
     column: u32,
     #[comptime] width: usize,
 ) {
     let j = ABSOLUTE_POS;
-    if j < areas.len() {
-        let x = Vector3::<F>::at(points, j);
+    if j < samples.areas.len() {
+        let x = Vector3::<F>::at(&samples.points, j);
         let zero = F::new(0.0);
-        let (components, column) = (components as usize, column as usize);
+        let (components, column) = (samples.components as usize, column as usize);
         let mut sums = Array::<F>::new(width);
         #[unroll]
         for c in 0..width {
             sums[c] = F::new(0.0);
         }
-        let mut node = next_leaf::<F>(nodes, links, x, zero, 0usize, true);
-        while node < links.len() {
-            let first = first_of_leaf(links, node);
-            for k in first..end_of_leaf(first, radii.len()) {
-                if radii[k] > zero {
-                    let unit = F::new(1.0) / radii[k];
-                    let n = neighbor::<F>(x.sub(Vector3::<F>::at(vertices, k)), unit, areas[j]);
+        let mut node = next_leaf::<F>(&near.nodes, &near.links, x, zero, 0usize, true);
+        while node < near.links.len() {
+            let first = first_of_leaf(&near.links, node);
+            for k in first..end_of_leaf(first, near.radii.len()) {
+                if near.radii[k] > zero {
+                    let unit = F::new(1.0) / near.radii[k];
+                    let n = neighbor::<F>(
+                        x.sub(Vector3::<F>::at(&near.points, k)),
+                        unit,
+                        samples.areas[j],
+                    );
                     if n.weight > zero {
-                        let seen = Adjoint::<F>::at(records, k).see(n, zero);
+                        let seen = Adjoint::<F>::at(&adjoints.records, k).see(n, zero);
                         #[unroll]
                         for c in 0..width {
-                            sums[c] += seen.p * seen.t * bars[2 * k * components + column + c];
+                            sums[c] +=
+                                seen.p * seen.t * adjoints.bars[2 * k * components + column + c];
                         }
                     }
                 }
             }
-            node = next_leaf::<F>(nodes, links, x, zero, node + 1, true);
+            node = next_leaf::<F>(&near.nodes, &near.links, x, zero, node + 1, true);
         }
-        let row = places[j] as usize * components + column;
+        let row = samples.places[j] as usize * components + column;
         #[unroll]
         for c in 0..width {
             guarded[j] += write_bounded::<F>(attribute_bar, row + c, sums[c]);

@@ -3,16 +3,13 @@
 use cubecl::prelude::*;
 use isograd::Grid;
 
-use super::super::search::center;
-use super::super::tree::{NONE, Tree};
+use super::super::bvh::{self, NONE, Tree, center};
 use super::super::triangle::{closest, corners};
-use super::super::{Band, Error, FAR, Mesh, search};
+use super::super::{Band, Error, FAR, Mesh, MeshArrays};
 use super::Residual;
-use crate::device::check_length;
-use crate::vector::Vector3;
+use crate::device::{check_length, launch};
+use crate::grid::{Lattice, low_corner};
 use crate::{Buffer, Device, Scalar};
-
-const BLOCK: u32 = 64;
 
 /// The signed distance `φ` from every cell center of `grid` to `mesh`, in the user's unit and in memory order.
 ///
@@ -42,29 +39,12 @@ pub fn forward<T: Scalar, R: Runtime>(
         Band::Within(width) if width > 0.0 && width.is_finite() => Some(width),
         Band::Within(width) => return Err(Error::Band { width }),
     };
-    let tree = Tree::new(device, mesh, grid.lower())?;
-    let closest = search::cells(device, &tree, grid.shape(), spacing.f64(), width)?;
+    let tree = Tree::new(device, mesh, grid)?;
+    let closest = bvh::cells(device, &tree, grid.shape(), spacing.f64(), width)?;
     let phi = device.empty(grid.cells())?;
-    let ([x, y, z], [_, ny, nz]) = (grid.lower(), grid.shape());
-    measure_cells::launch::<T, R>(
-        device.client(),
-        device.groups(grid.cells(), BLOCK),
-        CubeDim::new_1d(BLOCK),
-        mesh.vertices.arg(),
-        mesh.faces.arg(),
-        chi.arg(),
-        level.arg(),
-        closest.arg(),
-        phi.arg(),
-        x,
-        y,
-        z,
-        spacing,
-        T::of(width.unwrap_or(FAR)),
-        smallest::<T>(),
-        ny as u32,
-        nz as u32,
-    );
+    launch!(device, grid.cells() => measure_cells<T>(
+        mesh, chi, level, closest, phi, grid, T::of(width.unwrap_or(FAR)), smallest::<T>(),
+    ));
     let residual = Residual {
         mesh: mesh.clone(),
         grid: *grid,
@@ -83,27 +63,21 @@ fn smallest<T: Scalar>() -> T {
 /// width.
 #[cube(launch)]
 fn measure_cells<F: Float + CubeElement>(
-    vertices: &Array<F>,
-    faces: &Array<u32>,
+    mesh: &MeshArrays<F>,
     chi: &Array<F>,
     level: &Array<F>,
     found: &mut Array<u32>,
     phi: &mut Array<F>,
-    x: F,
-    y: F,
-    z: F,
-    spacing: F,
+    grid: Lattice<F>,
     width: F,
     smallest: F,
-    ny: u32,
-    nz: u32,
 ) {
     if ABSOLUTE_POS < phi.len() {
         let face = found[ABSOLUTE_POS];
         let mut distance = width;
         if face != NONE {
-            let t = corners::<F>(vertices, faces, face, Vector3::<F> { x, y, z });
-            let q = center::<F>(ABSOLUTE_POS as u32, spacing, ny, nz);
+            let t = corners::<F>(mesh, face, low_corner::<F>(&grid));
+            let q = center::<F>(ABSOLUTE_POS as u32, grid.spacing, grid.ny, grid.nz);
             let measured = closest::<F>(t, q).offset.norm();
             if measured > width {
                 found[ABSOLUTE_POS] = NONE;

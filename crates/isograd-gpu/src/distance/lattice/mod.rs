@@ -11,7 +11,7 @@ use isograd::Grid;
 use super::Mesh;
 use crate::Buffer;
 
-/// What [`forward`] keeps for [`pullback`]. Arrays share the memory of those that went in and came out.
+/// Residual of [`forward`] for [`pullback`]. Arrays share the memory of inputs and outputs.
 #[derive(Clone, Debug)]
 pub struct Residual<T> {
     mesh: Mesh<T>,
@@ -37,7 +37,7 @@ impl<T> Residual<T> {
     }
 }
 
-/// What cotangents of the distances mean for the mesh and the grid.
+/// Cotangents of the mesh and the grid.
 #[derive(Clone, Debug)]
 pub struct Cotangents<T> {
     /// `(V, 3)`, of the vertices.

@@ -5,23 +5,21 @@
 
 use cubecl::prelude::*;
 
-use super::super::Error;
-use super::super::search::center;
-use super::super::shares::{FACE, add_share, by_face, gather_corners};
+use super::super::bvh::center;
+use super::super::shares::{ByFaceArrays, FACE, add_share, by_face, gather_corners};
 use super::super::triangle::{closest, corners};
+use super::super::{Error, MeshArrays};
 use super::{Cotangents, Residual};
-use crate::device::check_length;
+use crate::device::{check_length, launch};
+use crate::grid::{Lattice, low_corner};
 use crate::primitives::segments::{NO_SEGMENT, Rows, join_pieces, sum_rows};
-use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
-
-const BLOCK: u32 = 64;
 
 /// Pulls the cotangents `phi_bar` of the distances, in memory order, back to the vertices and the grid. Cells
 /// beyond the band count for nothing: there `φ` is constant.
 ///
 /// # Errors
-/// Those of the device.
+/// Errors of the device.
 pub fn pullback<T: Scalar, R: Runtime>(
     device: &Device<R>,
     residual: &Residual<T>,
@@ -39,35 +37,18 @@ pub fn pullback<T: Scalar, R: Runtime>(
     })
 }
 
-/// What each face gets from its cells, `(F, 10)`.
+/// Sums over the cells of each face, `(F, 10)`.
 fn pull_faces<T: Scalar, R: Runtime>(
     device: &Device<R>,
     residual: &Residual<T>,
     phi_bar: &Buffer<T>,
 ) -> Result<Buffer<T>, Error> {
     let (mesh, grid) = (&residual.mesh, &residual.grid);
-    let (cells, pieces) = by_face(device, mesh, &residual.closest, Some(phi_bar))?;
-    let sums = device.empty(pieces.most() * FACE)?;
-    let ([x, y, z], [_, ny, nz]) = (grid.lower(), grid.shape());
-    pull_cells::launch::<T, R>(
-        device.client(),
-        device.groups(pieces.most(), BLOCK),
-        CubeDim::new_1d(BLOCK),
-        mesh.vertices.arg(),
-        mesh.faces.arg(),
-        residual.phi.arg(),
-        phi_bar.arg(),
-        cells.arg(),
-        pieces.table.arg(),
-        sums.arg(),
-        x,
-        y,
-        z,
-        grid.spacing(),
-        ny as u32,
-        nz as u32,
-        pieces.most() as u32,
-    );
+    let cells = by_face(device, mesh, &residual.closest, Some(phi_bar))?;
+    let most = cells.pieces.most();
+    let sums = device.empty(most * FACE)?;
+    launch!(device, most => pull_cells<T>(mesh, residual.phi, phi_bar, cells, sums, grid));
+    let pieces = cells.pieces;
     Ok(join_pieces(device, sums, FACE, pieces, grid.cells())?)
 }
 
@@ -81,13 +62,7 @@ fn total<T: Scalar, R: Runtime>(
     let all = device.upload(&[0, faces as u32])?;
     let sum = sum_rows(device, of_faces, Rows::dense(FACE), None, &all, faces)?;
     let grid_bar = device.empty(4)?;
-    name_total::launch::<T, R>(
-        device.client(),
-        device.groups(4, BLOCK),
-        CubeDim::new_1d(BLOCK),
-        sum.arg(),
-        grid_bar.arg(),
-    );
+    launch!(device, 4 => name_total<T>(sum, grid_bar));
     Ok(grid_bar)
 }
 
@@ -105,33 +80,29 @@ fn name_total<F: Float>(sum: &Array<F>, grid_bar: &mut Array<F>) {
 /// `−Σ β_k φ̄ ∇φ` for the corners of a face, and `Σ x̂ · φ̄ ∇φ`, over a piece of its cells.
 #[cube(launch)]
 fn pull_cells<F: Float + CubeElement>(
-    vertices: &Array<F>,
-    faces: &Array<u32>,
+    mesh: &MeshArrays<F>,
     phi: &Array<F>,
     phi_bar: &Array<F>,
-    cells: &Array<u32>,
-    table: &Array<u32>,
+    by_face: &ByFaceArrays,
     sums: &mut Array<F>,
-    x: F,
-    y: F,
-    z: F,
-    spacing: F,
-    ny: u32,
-    nz: u32,
-    most: u32,
+    grid: Lattice<F>,
 ) {
-    if ABSOLUTE_POS < most as usize {
-        let face = table[ABSOLUTE_POS * 3];
+    if 3 * ABSOLUTE_POS < by_face.table.len() {
+        let face = by_face.table[ABSOLUTE_POS * 3];
         if face != NO_SEGMENT {
-            let t = corners::<F>(vertices, faces, face, Vector3::<F> { x, y, z });
+            let t = corners::<F>(mesh, face, low_corner::<F>(&grid));
             let mut sum = Array::<F>::new(FACE);
             for number in 0..FACE {
                 sum[number] = F::new(0.0);
             }
-            for element in table[ABSOLUTE_POS * 3 + 1]..table[ABSOLUTE_POS * 3 + 2] {
-                let cell = cells[element as usize];
-                let place = center::<F>(cell, F::new(1.0), ny, nz);
-                let found = closest::<F>(t, place.scale(spacing));
+            let (begin, end) = (
+                by_face.table[ABSOLUTE_POS * 3 + 1],
+                by_face.table[ABSOLUTE_POS * 3 + 2],
+            );
+            for element in begin..end {
+                let cell = by_face.order[element as usize];
+                let place = center::<F>(cell, F::new(1.0), grid.ny, grid.nz);
+                let found = closest::<F>(t, place.scale(grid.spacing));
                 let inside = phi[cell as usize] < F::new(0.0);
                 let pull = add_share::<F>(&mut sum, found, inside, phi_bar[cell as usize]);
                 sum[9] += place.dot(pull);

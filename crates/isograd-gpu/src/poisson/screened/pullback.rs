@@ -6,11 +6,12 @@ use super::gradients::System;
 use super::{Equation, Error};
 use crate::device::{check_length, launch};
 use crate::grid::{self, Lattice, check_field, place};
+use crate::isosurface::iso_value;
 use crate::primitives::fill::add;
 use crate::primitives::reduce::{BLOCK, sum_columns};
 use crate::splat::{CotangentArrays, SampleArrays, SampleCotangent, subtract_from_grid};
 use crate::spread::Before;
-use crate::{Buffer, Device, Scalar, iso_value};
+use crate::{Buffer, Device, Scalar};
 
 /// Replaces the cotangents `chi_bar`, `(nx, ny, nz)`, of the screened solution by those of the plain one, adds the
 /// cotangents of points, areas and grid to `out`, and returns the number of iterations. `level` is the residual of the

@@ -5,7 +5,7 @@ use cubecl::prelude::*;
 use super::cells::{FORM, OTHERS, TAKEN};
 use super::plate::{Usual, plate_of, pull_plate};
 use super::sample::{
-    SEEN, STATE, Sample, corner, derivatives, is_held, mean, sample, see, side, without,
+    PassArrays, SEEN, STATE, Sample, corner, derivatives, is_held, mean, sample, see, side, without,
 };
 use crate::grid::{Lattice, cell_at};
 use crate::primitives::reduce::{BLOCK, sum_of_group};
@@ -15,29 +15,24 @@ use crate::vector::Vector3;
 /// Cotangents of a sample: `r̄`, `ū`, `ω̄`, of its index coordinates, of its normal, of `â`.
 pub(super) const BARS: usize = 10;
 
-/// What the pass said at each sample; and `−(r̄ m + ū w)`, summed a group at a time, in the first places of
+/// Results of the pass at each sample; and `−(r̄ m + ū w)`, summed a group at a time, in the first places of
 /// `partial`.
 #[cube(launch)]
 pub(super) fn see_means_again<F: Float + CubeElement>(
-    keys: &Array<u32>,
-    samples: &Array<F>,
-    areas: &Array<F>,
-    sums: &Array<F>,
+    pass: &PassArrays<F>,
     state: &Array<F>,
     bars: &Array<F>,
     seen: &mut Array<F>,
     partial: &mut Array<F>,
-    count: u32,
-    shares: u32,
     grid: Lattice<F>,
 ) {
     let i = ABSOLUTE_POS;
     let zero = F::new(0.0);
     let mut product = zero;
-    if i < count as usize && is_held::<F>(keys[i], &grid) {
-        let me = sample::<F>(samples, i);
-        let corner = corner::<F>(keys[i], &grid);
-        let found = see::<F>(sums, areas, corner, &grid, me, state[i * STATE]);
+    if i < pass.keys.len() && is_held::<F>(pass.keys[i], &grid) {
+        let me = sample::<F>(&pass.samples, i);
+        let corner = corner::<F>(pass.keys[i], &grid);
+        let found = see::<F>(&pass.sums, &pass.areas, corner, &grid, me, state[i * STATE]);
         seen[i * SEEN] = found.mean;
         seen[i * SEEN + 1] = found.slope;
         seen[i * SEEN + 2] = found.forecast;
@@ -45,7 +40,7 @@ pub(super) fn see_means_again<F: Float + CubeElement>(
     }
     let mut shared = SharedMemory::<F>::new(BLOCK);
     let total = sum_of_group::<F>(product, &mut shared);
-    if UNIT_POS == 0 && CUBE_POS < shares as usize {
+    if UNIT_POS == 0 && CUBE_POS <= (pass.keys.len() - 1) / BLOCK {
         partial[CUBE_POS] = total;
     }
 }
@@ -87,25 +82,21 @@ fn add_to_bars<F: Float>(
     bars[at + 9] += area;
 }
 
-/// Cotangents of what the pass said at the samples, from there to the samples themselves; what they mean for the cells
-/// becomes forms to spread.
+/// Cotangents of the pass's results at the samples, pulled to the samples themselves; those of the cells
+/// become forms to spread.
 #[cube(launch)]
 pub(super) fn pull_seen_means<F: Float + CubeElement>(
-    keys: &Array<u32>,
-    samples: &Array<F>,
-    areas: &Array<F>,
-    sums: &Array<F>,
+    pass: &PassArrays<F>,
     seen: &Array<F>,
     state: &Array<F>,
     bars: &mut Array<F>,
     forms: &mut Array<F>,
-    count: u32,
     of: GainBars<F>,
     grid: Lattice<F>,
 ) {
     let i = ABSOLUTE_POS;
-    if i < count as usize && is_held::<F>(keys[i], &grid) {
-        let me = sample::<F>(samples, i);
+    if i < pass.keys.len() && is_held::<F>(pass.keys[i], &grid) {
+        let me = sample::<F>(&pass.samples, i);
         let (s, u) = (state[i * STATE], state[i * STATE + 1]);
         let (w, p) = (seen[i * SEEN + 1], seen[i * SEEN + 2]);
         let at = i * BARS;
@@ -121,20 +112,9 @@ pub(super) fn pull_seen_means<F: Float + CubeElement>(
             + of.forecast * p * p;
         let s_bar = me.area * (of.agreement * p + two * of.offset * s);
         write_tilt::<F>(forms, i * FORM, me, mean_bar, slope_bar);
-        let corner = corner::<F>(keys[i], &grid);
-        let found = pull_forecast::<F>(
-            sums,
-            areas,
-            corner,
-            &grid,
-            me,
-            s,
-            mean_bar,
-            forecast_bar,
-            forms,
-            i * FORM,
-        );
-        let of_means = derivatives::<F>(sums, areas, corner, &grid, me.f, true);
+        let corner = corner::<F>(pass.keys[i], &grid);
+        let found = pull_forecast::<F>(pass, i, &grid, me, s, mean_bar, forecast_bar, forms);
+        let of_means = derivatives::<F>(&pass.sums, &pass.areas, corner, &grid, me.f, true);
         let bend = of_means.bend(me.normal).scale(slope_bar);
         add_to_bars::<F>(
             bars,
@@ -173,18 +153,17 @@ struct OfSample<F: Float> {
 /// form to spread.
 #[cube]
 fn pull_forecast<F: Float + CubeElement>(
-    sums: &Array<F>,
-    areas: &Array<F>,
-    corner: u32,
+    pass: &PassArrays<F>,
+    sample: usize,
     grid: &Lattice<F>,
     me: Sample<F>,
     s: F,
     mean_bar: F,
     forecast_bar: F,
     forms: &mut Array<F>,
-    form: usize,
 ) -> OfSample<F> {
     let zero = F::new(0.0);
+    let (form, corner) = (sample * FORM, corner::<F>(pass.keys[sample], grid));
     let mut place = Vector3::<F>::zero();
     let mut area_bar = zero;
     let mut offset_bar = zero;
@@ -197,7 +176,7 @@ fn pull_forecast<F: Float + CubeElement>(
                 let at = (corner + (x.cell * grid.ny + y.cell) * grid.nz + z.cell) as usize;
                 let bump = x.bump * y.bump * z.bump;
                 let own = me.area * bump;
-                let rest = without::<F>(sums, areas, at, own, s);
+                let rest = without::<F>(&pass.sums, &pass.areas, at, own, s);
                 let part = x.tent * y.tent * z.tent * forecast_bar / rest.others;
                 let side = ((i * 2u32 + j) * 2u32 + k) as usize;
                 forms[form + OTHERS + side] = part;
@@ -205,7 +184,8 @@ fn pull_forecast<F: Float + CubeElement>(
                 offset_bar -= part * own;
                 let weight_bar = part * (rest.value - s);
                 area_bar += bump * weight_bar;
-                let value_bar = mean_bar * mean::<F>(sums, areas, at) + forecast_bar * rest.value;
+                let value_bar =
+                    mean_bar * mean::<F>(&pass.sums, &pass.areas, at) + forecast_bar * rest.value;
                 let tilt = me.area * weight_bar;
                 place.x += x.tent_slope * y.tent * z.tent * value_bar
                     + x.bump_slope * y.bump * z.bump * tilt;
@@ -327,34 +307,39 @@ pub(super) fn pull_plates<F: Float + CubeElement>(
     }
 }
 
+/// `χ` before the first pass, and the samples with their slopes.
+#[derive(CubeLaunch, CubeType)]
+pub(crate) struct Slopes<F: Float + CubeElement> {
+    chi: Array<F>,
+    keys: Array<u32>,
+    samples: Array<F>,
+    state: Array<F>,
+}
+
 /// From `ω`, `δ` and `U` to the slopes before the first pass, and from those to places, normals and, as forms to
 /// spread, cells. `share` is what `U` has for `â u`.
 #[cube(launch)]
 pub(super) fn pull_slopes<F: Float + CubeElement>(
-    chi: &Array<F>,
-    keys: &Array<u32>,
-    samples: &Array<F>,
-    state: &Array<F>,
+    of: &Slopes<F>,
     bars: &mut Array<F>,
     forms: &mut Array<F>,
-    count: u32,
     share: F,
     usual: Usual<F>,
     grid: Lattice<F>,
     #[comptime] thin: bool,
 ) {
     let s = ABSOLUTE_POS;
-    if s < count as usize && is_held::<F>(keys[s], &grid) {
-        let (me, at) = (sample::<F>(samples, s), s * BARS);
-        let slope = state[s * STATE + 1];
-        let of = plate_of::<F>(slope, &usual);
-        let bar = pull_plate::<F>(of, &usual, bars[at + 2], bars[at], thin);
+    if s < of.keys.len() && is_held::<F>(of.keys[s], &grid) {
+        let (me, at) = (sample::<F>(&of.samples, s), s * BARS);
+        let slope = of.state[s * STATE + 1];
+        let plate = plate_of::<F>(slope, &usual);
+        let bar = pull_plate::<F>(plate, &usual, bars[at + 2], bars[at], thin);
         let rising = max(slope, F::new(0.0));
         let slope_bar = bars[at + 1] + bar.slope + share * me.area * rising;
         let squares = rising * rising - usual.slope * usual.slope;
         bars[at + 9] += F::new(0.5) * share * squares;
-        let corner = corner::<F>(keys[s], &grid);
-        let found = derivatives::<F>(chi, chi, corner, &grid, me.f, false);
+        let corner = corner::<F>(of.keys[s], &grid);
+        let found = derivatives::<F>(&of.chi, &of.chi, corner, &grid, me.f, false);
         let bend = found.bend(me.normal).scale(slope_bar);
         let gradient = found.gradient().scale(slope_bar);
         bars[at + 3] += bend.x;
@@ -376,12 +361,11 @@ pub(super) fn add_bars<F: Float + CubeElement>(
     points_bar: &mut Array<F>,
     normals_bar: &mut Array<F>,
     areas_bar: &mut Array<F>,
-    count: u32,
     spacing: F,
     #[comptime] area_weights: bool,
 ) {
     let s = ABSOLUTE_POS;
-    if s < count as usize {
+    if s < places.len() {
         let i = places[s] as usize;
         let at = s * BARS;
         values_bar[i] = bars[at];
@@ -397,7 +381,7 @@ pub(super) fn add_bars<F: Float + CubeElement>(
     }
 }
 
-/// What the cotangents of a group mean for the grid, and for the iso-value: less the sum of `r̄`.
+/// Cotangents of the grid from those of a group, and of the iso-value: less the sum of `r̄`.
 #[cube(launch)]
 pub(super) fn add_bars_of_grid<F: Float + CubeElement>(
     keys: &Array<u32>,

@@ -1,4 +1,4 @@
-//! What samples have for the cells round them, and what becomes of fields cell by cell.
+//! Spread forms of the samples, and updates of fields cell by cell.
 
 use cubecl::prelude::*;
 
@@ -120,7 +120,7 @@ pub(super) fn take_means<F: Float + CubeElement>(
     }
 }
 
-/// The same, and `Σ Ē_o e_o` a group at a time, with `Ē = −χ̄`, from place `start` of `partial` on.
+/// `χ + λ e`, into `out`, and `Σ Ē_o e_o` a group at a time, with `Ē = −χ̄`, in the last places of `partial`.
 #[cube(launch)]
 pub(super) fn put_means_back<F: Float + CubeElement>(
     chi: &Array<F>,
@@ -130,7 +130,6 @@ pub(super) fn put_means_back<F: Float + CubeElement>(
     out: &mut Array<F>,
     partial: &mut Array<F>,
     gain: F,
-    start: u32,
     #[comptime] first: bool,
 ) {
     let at = ABSOLUTE_POS;
@@ -146,7 +145,7 @@ pub(super) fn put_means_back<F: Float + CubeElement>(
     }
     let mut shared = SharedMemory::<F>::new(BLOCK);
     let total = sum_of_group::<F>(product, &mut shared);
-    let own = CUBE_POS + start as usize;
+    let own = CUBE_POS + partial.len() - (out.len() - 1) / BLOCK - 1;
     if UNIT_POS == 0 && own < partial.len() {
         partial[own] = total;
     }

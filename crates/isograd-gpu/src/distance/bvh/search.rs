@@ -9,17 +9,18 @@
 
 use cubecl::prelude::*;
 
+use super::super::triangle::{distance_squared, load_frame};
+use super::super::{Error, FAR};
+use super::build::{LEAF, NONE, Tree, TreeArrays};
 use super::settle::settle;
-use super::tree::{LEAF, NONE, Tree};
-use super::triangle::{distance_squared, load_frame};
-use super::{Error, FAR};
+use crate::device::{Ready, launch};
 use crate::grid::{Cell, cell_at};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
 /// Cells along the side of a brick, and units of a group, one a cell.
 const BRICK: usize = 4;
-const UNITS: u32 = 64;
+const UNITS: usize = 64;
 
 /// The coarsest lattice has at most so many cells: they begin with nothing.
 const COARSEST: usize = 64;
@@ -39,33 +40,59 @@ pub(super) const NOTHING_YET: u32 = UNPROVEN - 2;
 pub(super) struct Level {
     pub shape: [usize; 3],
     pub spacing: f64,
+    /// Greatest squared distance of a triangle that is looked for.
+    pub bound: f64,
+}
+
+/// [`Level`] in kernels.
+#[derive(CubeLaunch, CubeType, Clone, Copy)]
+pub(crate) struct Centers<F: Float + CubeElement> {
+    pub nx: u32,
+    pub ny: u32,
+    pub nz: u32,
+    pub spacing: F,
+    pub bound: F,
+}
+
+impl Level {
+    /// The level as an argument of a kernel.
+    pub(super) fn arg<R: Runtime, T: Scalar>(&self) -> Ready<CentersLaunch<T, R>> {
+        let [nx, ny, nz] = self.shape.map(|n| n as u32);
+        let (spacing, bound) = (T::of(self.spacing), T::of(self.bound));
+        Ready::new(CentersLaunch::new(nx, ny, nz, spacing, bound))
+    }
 }
 
 /// The face closest to each cell center of a lattice whose low corner is the origin of the tree, or [`NONE`]
 /// where it is further than `width`.
-pub(super) fn cells<T: Scalar, R: Runtime>(
+pub(crate) fn cells<T: Scalar, R: Runtime>(
     device: &Device<R>,
     tree: &Tree<T>,
     shape: [usize; 3],
     spacing: f64,
     width: Option<f64>,
 ) -> Result<Buffer<u32>, Error> {
-    let mut levels = vec![Level { shape, spacing }];
-    let mut finest = Level { shape, spacing };
-    while finest.shape.iter().product::<usize>() > COARSEST {
-        finest = Level {
-            shape: finest.shape.map(|n| n.div_ceil(BRICK)),
-            spacing: finest.spacing * BRICK as f64,
-        };
-        levels.push(finest);
+    let bound =
+        |beyond: f64| width.map_or(FAR, |width: f64| (width + beyond).powi(2) * (1.0 + 1e-5));
+    let mut levels = vec![Level {
+        shape,
+        spacing,
+        bound: bound(0.0),
+    }];
+    let (mut shape, mut spacing) = (shape, spacing);
+    while shape.iter().product::<usize>() > COARSEST {
+        shape = shape.map(|n| n.div_ceil(BRICK));
+        spacing *= BRICK as f64;
+        levels.push(Level {
+            shape,
+            spacing,
+            // A brick may be as far beyond the band as its corners are from its center.
+            bound: bound(0.87 * spacing),
+        });
     }
     let mut seeds = None;
     while let Some(level) = levels.pop() {
-        let last = levels.is_empty();
-        // A brick may be as far beyond the band as its corners are from its center.
-        let beyond = if last { 0.0 } else { 0.87 * level.spacing };
-        let bound = width.map_or(FAR, |width| (width + beyond).powi(2) * (1.0 + 1e-5));
-        seeds = Some(solve_level(device, tree, level, bound, seeds, last)?);
+        seeds = Some(solve_level(device, tree, level, seeds, levels.is_empty())?);
     }
     Ok(seeds.unwrap_or(device.empty(0)?))
 }
@@ -74,33 +101,17 @@ fn solve_level<T: Scalar, R: Runtime>(
     device: &Device<R>,
     tree: &Tree<T>,
     level: Level,
-    bound: f64,
     seeds: Option<Buffer<u32>>,
     last: bool,
 ) -> Result<Buffer<u32>, Error> {
-    let [nx, ny, nz] = level.shape;
-    let found = device.empty(nx * ny * nz)?;
-    let bricks = level.shape.map(|n| n.div_ceil(BRICK));
+    let found = device.empty(level.shape.iter().product())?;
+    let bricks: usize = level.shape.iter().map(|n| n.div_ceil(BRICK)).product();
     let seeded = seeds.is_some();
-    nearest_of_cells::launch::<T, R>(
-        device.client(),
-        device.groups(bricks.iter().product::<usize>() * UNITS as usize, UNITS),
-        CubeDim::new_1d(UNITS),
-        tree.boxes.arg(),
-        tree.children.arg(),
-        tree.frames.arg(),
-        tree.faces.arg(),
-        seeds.unwrap_or(device.empty(0)?).arg(),
-        found.arg(),
-        T::of(level.spacing),
-        T::of(bound),
-        nx as u32,
-        ny as u32,
-        nz as u32,
-        seeded,
-        last,
-    );
-    settle(device, tree, level, bound, last, &found)?;
+    let seeds = seeds.unwrap_or(device.empty(0)?);
+    launch!(device, bricks * UNITS, UNITS => nearest_of_cells<T>(
+        tree, seeds, found, level.arg::<R, T>(), seeded, last,
+    ));
+    settle(device, tree, level, last, &found)?;
     Ok(found)
 }
 
@@ -113,14 +124,11 @@ pub(super) fn box_distance_squared<F: Float>(boxes: &Array<F>, at: u32, q: Vecto
 }
 
 /// The triangle closest to `q`, as its place in Morton order: not further than the root of `bound`, else
-/// [`NONE`]; [`UNPROVEN`] where the descent was given up. `seed` is a guess or [`NONE`]. Of triangles equally far the one of the lowest face, so that the
-/// seed does not matter.
+/// [`NONE`]; [`UNPROVEN`] where the descent was given up. `seed` is a guess or [`NONE`]. Of triangles equally far the
+/// one of the lowest face, so that the seed does not matter.
 #[cube]
-fn nearest<F: Float>(
-    boxes: &Array<F>,
-    children: &Array<u32>,
-    frames: &Array<F>,
-    faces: &Array<u32>,
+fn nearest<F: Float + CubeElement>(
+    tree: &TreeArrays<F>,
     q: Vector3<F>,
     bound: F,
     seed: u32,
@@ -129,11 +137,11 @@ fn nearest<F: Float>(
     let mut best_face = NONE.runtime();
     let mut least = bound;
     if seed != NONE {
-        let d = distance_squared::<F>(load_frame::<F>(frames, seed), q);
+        let d = distance_squared::<F>(load_frame::<F>(&tree.frames, seed), q);
         if d <= least {
             least = d;
             best = seed;
-            best_face = faces[seed as usize];
+            best_face = tree.faces[seed as usize];
         }
     }
     let mut waiting = Array::<u32>::new(STACK);
@@ -151,9 +159,9 @@ fn nearest<F: Float>(
                 let first = node & 0x0fff_ffffu32;
                 let count = ((node >> 28u32) & 7u32) + 1u32;
                 for place in first..first + count {
-                    let d = distance_squared::<F>(load_frame::<F>(frames, place), q);
+                    let d = distance_squared::<F>(load_frame::<F>(&tree.frames, place), q);
                     if d <= least {
-                        let face = faces[place as usize];
+                        let face = tree.faces[place as usize];
                         if d < least || face < best_face {
                             best = place;
                             best_face = face;
@@ -163,19 +171,19 @@ fn nearest<F: Float>(
                 }
             } else {
                 let at = node as usize * 4;
-                let a = box_distance_squared::<F>(boxes, node * 4u32, q);
-                let b = box_distance_squared::<F>(boxes, node * 4u32 + 2u32, q);
+                let a = box_distance_squared::<F>(&tree.boxes, node * 4u32, q);
+                let b = box_distance_squared::<F>(&tree.boxes, node * 4u32 + 2u32, q);
                 let mut wanted_a = a < least;
                 let mut wanted_b = b < least;
                 if a == least {
-                    wanted_a = children[at + 2] < best_face;
+                    wanted_a = tree.children[at + 2] < best_face;
                 }
                 if b == least {
-                    wanted_b = children[at + 3] < best_face;
+                    wanted_b = tree.children[at + 3] < best_face;
                 }
                 // The nearer one on top.
                 let b_first = b < a;
-                let (left, right) = (children[at], children[at + 1]);
+                let (left, right) = (tree.children[at], tree.children[at + 1]);
                 height = push::<F>(
                     &mut waiting,
                     &mut distances,
@@ -223,20 +231,14 @@ fn push<F: Float>(
 /// on the last one.
 #[cube(launch)]
 fn nearest_of_cells<F: Float + CubeElement>(
-    boxes: &Array<F>,
-    children: &Array<u32>,
-    frames: &Array<F>,
-    faces: &Array<u32>,
+    tree: &TreeArrays<F>,
     seeds: &Array<u32>,
     found: &mut Array<u32>,
-    spacing: F,
-    bound: F,
-    nx: u32,
-    ny: u32,
-    nz: u32,
+    level: Centers<F>,
     #[comptime] seeded: bool,
     #[comptime] last: bool,
 ) {
+    let (nx, ny, nz) = (level.nx, level.ny, level.nz);
     let across_y = (ny - 1u32) / 4u32 + 1u32;
     let across_z = (nz - 1u32) / 4u32 + 1u32;
     let brick = CUBE_POS as u32;
@@ -244,17 +246,17 @@ fn nearest_of_cells<F: Float + CubeElement>(
     let j = brick / across_z % across_y * 4u32 + UNIT_POS / 4u32 % 4u32;
     let k = brick % across_z * 4u32 + UNIT_POS % 4u32;
     if i < nx && j < ny && k < nz {
-        let q = center_of::<F>(Cell { i, j, k }, spacing);
+        let q = center_of::<F>(Cell { i, j, k }, level.spacing);
         let mut seed = NONE.runtime();
         if comptime!(seeded) {
             seed = seeds[brick as usize];
         }
         let mut result = NONE.runtime();
         if seed != NONE || !seeded {
-            result = nearest::<F>(boxes, children, frames, faces, q, bound, seed);
+            result = nearest::<F>(tree, q, level.bound, seed);
         }
         if last && result < UNPROVEN {
-            result = faces[result as usize];
+            result = tree.faces[result as usize];
         }
         found[((i * ny + j) * nz + k) as usize] = result;
     }
@@ -262,7 +264,7 @@ fn nearest_of_cells<F: Float + CubeElement>(
 
 /// The center of a cell in memory order, from the low corner of the grid.
 #[cube]
-pub(super) fn center<F: Float>(cell: u32, spacing: F, ny: u32, nz: u32) -> Vector3<F> {
+pub(crate) fn center<F: Float>(cell: u32, spacing: F, ny: u32, nz: u32) -> Vector3<F> {
     center_of::<F>(cell_at(cell, ny, nz), spacing)
 }
 

@@ -3,8 +3,8 @@
 use cubecl::prelude::*;
 
 use super::Residual;
-use crate::device::check_length;
-use crate::grid::{self, Lattice, check_field, place};
+use crate::device::{check_length, launch};
+use crate::grid::{Lattice, check_field, place};
 use crate::primitives::reduce::{BLOCK, sum_columns, sum_of_group};
 use crate::trilinear::interpolate;
 use crate::{Buffer, Device, Error, Scalar};
@@ -28,27 +28,12 @@ pub fn forward<R: Runtime, T: Scalar>(
     let count = areas.len();
     let at_samples: Buffer<T> = device.empty(4 * count)?;
     let group_sums: Buffer<T> = device.empty(2 * count.div_ceil(BLOCK))?;
-    find_at_samples::launch::<T, R>(
-        device.client(),
-        device.groups(count, BLOCK as u32),
-        CubeDim::new_1d(BLOCK as u32),
-        chi.arg(),
-        points.arg(),
-        areas.arg(),
-        at_samples.arg(),
-        group_sums.arg(),
-        count as u32,
-        grid::arg(grid),
-    );
+    launch!(device, count, BLOCK => find_at_samples<T>(
+        chi, points, areas, at_samples, group_sums, count as u32, grid,
+    ));
     let sums = sum_columns(device, &group_sums, 2)?;
     let value: Buffer<T> = device.empty(1)?;
-    divide::launch::<T, R>(
-        device.client(),
-        device.groups(1, 1),
-        CubeDim::new_1d(1),
-        sums.arg(),
-        value.arg(),
-    );
+    launch!(device, 1, 1 => divide<T>(sums, value));
     Ok((value, Residual { sums, at_samples }))
 }
 

@@ -15,7 +15,6 @@
 //! `∇χ` jumps where a sample crosses a plane through cell centers; the gradient on its side is used.
 
 mod forward;
-pub mod local;
 mod pullback;
 
 pub use forward::forward;
@@ -23,7 +22,7 @@ pub use pullback::pullback;
 
 use crate::Buffer;
 
-/// What the pullback needs besides the inputs.
+/// Residual of the pullback, besides the inputs.
 #[derive(Clone, Debug)]
 pub struct Residual<T> {
     /// `(2,)`: `Σ a_i χ(x_i)` and `Σ a_i`.

@@ -3,7 +3,8 @@
 use cubecl::prelude::*;
 
 use super::cells::{BUMP, Bump, REACH};
-use super::sample::{STATE, sample};
+use super::sample::{PassArraysLaunch, STATE, sample};
+use crate::device::{Ready, launch};
 use crate::primitives::reduce::BLOCK;
 use crate::splat::SampleOrder;
 use crate::spread::{Before, Spread, spread};
@@ -23,19 +24,23 @@ impl<R: Runtime, T: Scalar> Near<'_, R, T> {
         self.order.keys.len()
     }
 
-    /// Groups of a kernel with a unit a sample; at least one.
-    pub(super) fn groups(&self) -> CubeCount {
-        self.device.groups(self.count(), BLOCK as u32)
-    }
-
     /// Number of groups that have samples, each of which has its own sums.
     pub(super) fn shares(&self) -> usize {
         self.count().div_ceil(BLOCK).max(1)
     }
 
-    /// Groups of a kernel with a unit a cell.
-    pub(super) fn cell_groups(&self) -> CubeCount {
-        self.device.groups(self.grid.cells(), BLOCK as u32)
+    /// The samples and the fields of a pass as an argument of a kernel.
+    pub(super) fn pass(
+        &self,
+        areas: &Buffer<T>,
+        sums: &Buffer<T>,
+    ) -> Ready<PassArraysLaunch<T, R>> {
+        Ready::new(PassArraysLaunch::new(
+            self.order.keys.arg(),
+            self.samples.arg(),
+            areas.arg(),
+            sums.arg(),
+        ))
     }
 
     /// A field that holds anything.
@@ -57,16 +62,9 @@ impl<R: Runtime, T: Scalar> Near<'_, R, T> {
 
     fn bump(&self, state: &Buffer<T>, ones: bool, out: &Buffer<T>) -> Result<(), Error> {
         let bumps: Buffer<T> = self.device.empty(BUMP * self.count())?;
-        make_bumps::launch::<T, R>(
-            self.device.client(),
-            self.groups(),
-            CubeDim::new_1d(BLOCK as u32),
-            self.samples.arg(),
-            state.arg(),
-            bumps.arg(),
-            self.count() as u32,
-            ones,
-        );
+        launch!(self.device, self.count(), BLOCK => make_bumps<T>(
+            self.samples, state, bumps, self.count() as u32, ones,
+        ));
         self.spread::<Bump>(&bumps, Before::Replaced, out)
     }
 

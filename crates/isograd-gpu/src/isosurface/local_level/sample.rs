@@ -13,7 +13,7 @@ pub(super) const SAMPLE: usize = 8;
 /// Numbers of a sample as it was before a pass: `s`, `u`.
 pub(super) const STATE: usize = 2;
 
-/// What a pass says at a sample: `m`, `w`, `p`.
+/// Results of a pass at a sample: `m`, `w`, `p`.
 pub(super) const SEEN: usize = 3;
 
 /// A sample.
@@ -26,6 +26,17 @@ pub(super) struct Sample<F: Float> {
     pub area: F,
     /// `ω`.
     pub trust: F,
+}
+
+/// Samples in sorted order, and the fields of a pass.
+#[derive(CubeLaunch, CubeType)]
+pub(crate) struct PassArrays<F: Float + CubeElement> {
+    /// Cells of the samples.
+    pub keys: Array<u32>,
+    pub samples: Array<F>,
+    /// `D − ε` and `M` at every cell.
+    pub areas: Array<F>,
+    pub sums: Array<F>,
 }
 
 #[cube]
@@ -57,7 +68,7 @@ pub(super) fn mean<F: Float>(sums: &Array<F>, areas: &Array<F>, at: usize) -> F 
     sums[at] / (areas[at] + least_area::<F>())
 }
 
-/// What a cell says without a sample.
+/// Value of a cell without one of its samples.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Without<F: Float> {
     /// `v = (M − â B s)/(D − â B)`.
@@ -217,7 +228,7 @@ fn value<F: Float>(values: &Array<F>, areas: &Array<F>, at: usize, #[comptime] m
     }
 }
 
-/// What a pass says at a sample.
+/// Results of a pass at a sample.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Seen<F: Float> {
     /// `m`: `e`, trilinear.
@@ -228,7 +239,7 @@ pub(super) struct Seen<F: Float> {
     pub forecast: F,
 }
 
-/// What the cells from `corner` on say at a sample with `s = offset`.
+/// Results at a sample with `s = offset`, from the cells from `corner` on.
 #[cube]
 pub(super) fn see<F: Float + CubeElement>(
     sums: &Array<F>,

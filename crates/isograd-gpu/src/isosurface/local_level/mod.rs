@@ -34,13 +34,13 @@ mod trust;
 
 pub use forward::forward;
 pub use isograd::isosurface::local_level::{Options, PASSES};
-pub use pullback::{Found, pullback};
+pub use pullback::{Cotangents, pullback};
 
 use isograd::isosurface::local_level::{Step, Sums};
 
 use crate::Buffer;
 
-/// What the pullback needs besides the inputs.
+/// Residual of the pullback, besides the inputs.
 #[derive(Clone, Debug)]
 pub struct Residual<T> {
     area_weights: bool,

@@ -1,7 +1,5 @@
 //! The front for hosts, beside the CPU's plan.
 
-#![cfg(feature = "wgpu")]
-
 use isograd::distance::extend;
 use isograd::orient::Method;
 use isograd::{

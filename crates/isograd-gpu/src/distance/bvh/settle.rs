@@ -2,75 +2,42 @@
 
 use cubecl::prelude::*;
 
-use super::Error;
-use super::search::{Level, NOTHING_YET, UNPROVEN, box_distance_squared, center};
-use super::tree::{NONE, Tree};
-use super::triangle::{distance_squared, load_frame};
+use super::super::Error;
+use super::super::triangle::{distance_squared, load_frame};
+use super::build::{NONE, Tree, TreeArrays};
+use super::search::{Centers, Level, NOTHING_YET, UNPROVEN, box_distance_squared, center};
+use crate::device::launch;
 use crate::primitives::scan::exclusive_sum;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
-/// Units of a group that looks for what is left.
-const UNITS: u32 = 64;
-
 /// Groups that settle it, the units of each, and triangles that a unit takes at a time.
 const SETTLERS: u32 = 1024;
-const SETTLER_UNITS: u32 = 256;
+const SETTLER_UNITS: usize = 256;
 const TAKEN: usize = 64;
 
-/// What [`UNPROVEN`] marks, without the mark.
+/// Mask of the place in a result marked [`UNPROVEN`].
 const NOT_UNPROVEN: u32 = UNPROVEN - 1;
 
-/// Solves what descents to the cells of `level` have left in `found`, a group each; `bound` is squared, and faces are
-/// written where `last`.
+/// Solves what descents to the cells of `level` have left in `found`, a group each; faces are written where `last`.
 pub(super) fn settle<T: Scalar, R: Runtime>(
     device: &Device<R>,
     tree: &Tree<T>,
     level: Level,
-    bound: f64,
     last: bool,
     found: &Buffer<u32>,
 ) -> Result<(), Error> {
     let count = found.len();
-    let (groups, dim) = (device.groups(count, UNITS), CubeDim::new_1d(UNITS));
     let flags = device.empty(count)?;
-    flag_left::launch::<R>(
-        device.client(),
-        groups.clone(),
-        dim,
-        found.arg(),
-        flags.arg(),
-    );
+    launch!(device, count => flag_left(found, flags));
     let before = exclusive_sum(device, &flags)?;
     let left: Buffer<u32> = device.empty(count)?;
-    list_left::launch::<R>(
-        device.client(),
-        groups,
-        dim,
-        found.arg(),
-        before.arg(),
-        left.arg(),
-    );
+    launch!(device, count => list_left(found, before, left));
     let taken = tree.width().min(TAKEN);
-    settle_left::launch::<T, R>(
-        device.client(),
-        CubeCount::Static(SETTLERS, 1, 1),
-        CubeDim::new_1d(SETTLER_UNITS),
-        tree.pyramid.arg(),
-        tree.frames.arg(),
-        tree.faces.arg(),
-        left.arg(),
-        before.arg(),
-        found.arg(),
-        T::of(level.spacing),
-        T::of(bound),
-        level.shape[1] as u32,
-        level.shape[2] as u32,
-        (tree.width() / taken) as u32,
-        taken as u32,
+    launch!(device, [SETTLERS; SETTLER_UNITS] => settle_left<T>(
+        tree, left, before, found, level.arg::<R, T>(), (tree.width() / taken) as u32, taken as u32,
         last,
-        SETTLER_UNITS as usize,
-    );
+    ));
     Ok(())
 }
 
@@ -98,37 +65,31 @@ fn list_left(found: &Array<u32>, before: &Array<u32>, left: &mut Array<u32>) {
 /// them all is the answer.
 #[cube(launch)]
 fn settle_left<F: Float + CubeElement>(
-    pyramid: &Array<F>,
-    frames: &Array<F>,
-    faces: &Array<u32>,
+    tree: &TreeArrays<F>,
     left: &Array<u32>,
     before: &Array<u32>,
     found: &mut Array<u32>,
-    spacing: F,
-    bound: F,
-    ny: u32,
-    nz: u32,
+    cells: Centers<F>,
     level: u32,
     taken: u32,
     #[comptime] last: bool,
-    #[comptime] units: usize,
 ) {
-    let mut least_of = SharedMemory::<F>::new(units);
-    let mut face_of = SharedMemory::<u32>::new(units);
-    let mut place_of = SharedMemory::<u32>::new(units);
+    let mut least_of = SharedMemory::<F>::new(SETTLER_UNITS);
+    let mut face_of = SharedMemory::<u32>::new(SETTLER_UNITS);
+    let mut place_of = SharedMemory::<u32>::new(SETTLER_UNITS);
     let unit = UNIT_POS as usize;
     let count = before[before.len() - 1];
     let mut turn = CUBE_POS as u32;
     while turn < count {
         let query = left[turn as usize];
-        let q = center::<F>(query, spacing, ny, nz);
+        let q = center::<F>(query, cells.spacing, cells.ny, cells.nz);
         let guess = found[query as usize] & NOT_UNPROVEN;
-        let own = try_runs::<F>(pyramid, frames, faces, q, bound, guess, level, taken, units);
+        let own = try_runs::<F>(tree, q, cells.bound, guess, level, taken);
         least_of[unit] = own.least;
         face_of[unit] = own.face;
         place_of[unit] = own.place;
         sync_cube();
-        let mut half = (units / 2).runtime();
+        let mut half = (SETTLER_UNITS / 2).runtime();
         while half > 0 {
             if unit < half {
                 let (a, b) = (least_of[unit], least_of[unit + half]);
@@ -161,33 +122,30 @@ struct Known<F: Float> {
 /// Tries the triangles of every so many-th run, those of entries `level` to `2 level` of the pyramid, `guess`
 /// being the place of one or [`NOTHING_YET`].
 #[cube]
-fn try_runs<F: Float>(
-    pyramid: &Array<F>,
-    frames: &Array<F>,
-    faces: &Array<u32>,
+fn try_runs<F: Float + CubeElement>(
+    tree: &TreeArrays<F>,
     q: Vector3<F>,
     bound: F,
     guess: u32,
     level: u32,
     taken: u32,
-    #[comptime] units: usize,
 ) -> Known<F> {
     let mut least = bound;
     let mut best = NONE.runtime();
     let mut best_face = NONE.runtime();
     if guess != NOTHING_YET {
         best = guess;
-        best_face = faces[guess as usize];
-        least = distance_squared::<F>(load_frame::<F>(frames, guess), q);
+        best_face = tree.faces[guess as usize];
+        least = distance_squared::<F>(load_frame::<F>(&tree.frames, guess), q);
     }
     let mut run = UNIT_POS;
     while run < level {
-        if box_distance_squared::<F>(pyramid, (level + run) * 2u32, q) <= least {
-            let end = min((run + 1u32) * taken, faces.len() as u32);
+        if box_distance_squared::<F>(&tree.pyramid, (level + run) * 2u32, q) <= least {
+            let end = min((run + 1u32) * taken, tree.faces.len() as u32);
             for place in run * taken..end {
-                let d = distance_squared::<F>(load_frame::<F>(frames, place), q);
+                let d = distance_squared::<F>(load_frame::<F>(&tree.frames, place), q);
                 if d <= least {
-                    let face = faces[place as usize];
+                    let face = tree.faces[place as usize];
                     if d < least || face < best_face {
                         best = place;
                         best_face = face;
@@ -196,7 +154,7 @@ fn try_runs<F: Float>(
                 }
             }
         }
-        run += comptime!(units as u32);
+        run += comptime!(SETTLER_UNITS as u32);
     }
     Known::<F> {
         least,

@@ -15,14 +15,14 @@
 
 use cubecl::prelude::*;
 
-use crate::device::check_length;
+use crate::device::{check_length, launch};
 use crate::element::plane;
-use crate::neighbors::{BLOCK, Neighborhoods, end_of_leaf, first_of_leaf, is_isolated, next_leaf};
+use crate::neighbors::{Neighborhoods, end_of_leaf, first_of_leaf, is_isolated, next_leaf};
 use crate::primitives::reduce::{self, sum_of_group};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
-/// What the pullback needs of [`forward`].
+/// Residual of [`forward`] for [`pullback`].
 #[derive(Clone, Debug)]
 pub struct Residual<T> {
     neighborhoods: Neighborhoods<T>,
@@ -43,19 +43,10 @@ pub fn forward<R: Runtime, T: Scalar>(
     let n = neighborhoods.len();
     let areas = device.empty(n)?;
     if n > 0 {
-        find_areas::launch::<T, R>(
-            device.client(),
-            device.groups(n, BLOCK),
-            CubeDim::new_1d(BLOCK),
-            neighborhoods.points.arg(),
-            neighborhoods.radii.arg(),
-            neighborhoods.places.arg(),
-            neighborhoods.nodes.arg(),
-            neighborhoods.links.arg(),
-            areas.arg(),
-            common_radius,
-            T::PI(),
-        );
+        launch!(device, n => find_areas<T>(
+            neighborhoods.points, neighborhoods.radii, neighborhoods.places, neighborhoods.nodes,
+            neighborhoods.links, areas, common_radius, T::PI(),
+        ));
     }
     let residual = Residual {
         neighborhoods: neighborhoods.clone(),
@@ -64,7 +55,7 @@ pub fn forward<R: Runtime, T: Scalar>(
     Ok((areas, residual))
 }
 
-/// What the cotangents `areas_bar` `(N,)` of the areas mean for the points: `(N, 3)`. Both in input order.
+/// Cotangents `(N, 3)` of the points from those of the areas, `areas_bar` `(N,)`. Both in input order.
 ///
 /// # Errors
 /// [`Error::Length`], [`Error::TooLarge`].
@@ -81,30 +72,12 @@ pub fn pullback<R: Runtime, T: Scalar>(
         return Ok(points_bar);
     }
     let factors: Buffer<T> = device.empty(n)?;
-    let (groups, dim) = (device.groups(n, BLOCK), CubeDim::new_1d(BLOCK));
-    fill_factors::launch::<T, R>(
-        device.client(),
-        groups.clone(),
-        dim,
-        residual.areas.arg(),
-        near.radii.arg(),
-        near.places.arg(),
-        areas_bar.arg(),
-        factors.arg(),
-        T::FRAC_1_PI(),
-    );
-    gather::launch::<T, R>(
-        device.client(),
-        groups,
-        dim,
-        near.points.arg(),
-        near.radii.arg(),
-        near.places.arg(),
-        near.nodes.arg(),
-        near.links.arg(),
-        factors.arg(),
-        points_bar.arg(),
-    );
+    launch!(device, n => fill_factors<T>(
+        residual.areas, near.radii, near.places, areas_bar, factors, T::FRAC_1_PI(),
+    ));
+    launch!(device, n => gather<T>(
+        near.points, near.radii, near.places, near.nodes, near.links, factors, points_bar,
+    ));
     Ok(points_bar)
 }
 
@@ -112,20 +85,14 @@ pub fn pullback<R: Runtime, T: Scalar>(
 /// device.
 ///
 /// # Errors
-/// Those of the device.
+/// Errors of the device.
 pub fn mean<R: Runtime, T: Scalar>(
     device: &Device<R>,
     areas: &Buffer<T>,
 ) -> Result<(f64, usize), Error> {
     let n = areas.len();
     let parts: Buffer<T> = device.empty(2 * n.div_ceil(reduce::BLOCK))?;
-    sum_areas::launch::<T, R>(
-        device.client(),
-        device.groups(n, reduce::BLOCK as u32),
-        CubeDim::new_1d(reduce::BLOCK as u32),
-        areas.arg(),
-        parts.arg(),
-    );
+    launch!(device, n, reduce::BLOCK => sum_areas<T>(areas, parts));
     let sums = device.download(&reduce::sum_columns(device, &parts, 2)?)?;
     let [sum, count] = [sums[0], sums[1]].map(isograd::Real::f64);
     Ok((sum / count, count as usize))

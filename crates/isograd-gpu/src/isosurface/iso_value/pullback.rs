@@ -3,8 +3,8 @@
 use cubecl::prelude::*;
 
 use super::Residual;
-use crate::device::check_length;
-use crate::grid::{self, Lattice, cell_at, check_field, from_center, place};
+use crate::device::{Ready, check_length, launch};
+use crate::grid::{Lattice, cell_at, check_field, from_center, place};
 use crate::primitives::fill::add;
 use crate::primitives::reduce::{BLOCK, sum_columns};
 use crate::splat::{self, SampleCotangent, Samples, subtract_from_grid};
@@ -41,75 +41,62 @@ pub fn pullback<R: Runtime, T: Scalar>(
     if values_bar.is_some() {
         check_length("the cotangent of the values", given, count)?;
     }
-    let groups = device.groups(count, BLOCK as u32);
-    let dim = CubeDim::new_1d(BLOCK as u32);
     let shares: Buffer<T> = device.empty(count)?;
-    pull_samples::launch::<T, R>(
-        device.client(),
-        groups.clone(),
-        dim,
+    let mean = MeanLaunch::new(
         samples.areas.arg(),
         residual.at_samples.arg(),
         residual.sums.arg(),
         bar.arg(),
         given.arg(),
-        out.points.arg(),
-        out.areas.arg(),
-        shares.arg(),
-        count as u32,
-        grid.spacing(),
-        values_bar.is_some(),
     );
+    launch!(device, count, BLOCK => pull_samples<T>(
+        Ready::new(mean), out.points, out.areas, shares, grid.spacing(), values_bar.is_some(),
+    ));
     let sorted: Buffer<T> = device.empty(NUMBERS * count)?;
     let grid_sums: Buffer<T> = device.empty(4 * count.div_ceil(BLOCK))?;
-    sort_shares::launch::<T, R>(
-        device.client(),
-        groups,
-        dim,
-        samples.points.arg(),
-        residual.at_samples.arg(),
-        shares.arg(),
-        order.keys.arg(),
-        order.places.arg(),
-        sorted.arg(),
-        grid_sums.arg(),
-        count as u32,
-        grid::arg(grid),
-    );
+    launch!(device, count, BLOCK => sort_shares<T>(
+        samples.points, residual.at_samples, shares, order.keys, order.places, sorted, grid_sums,
+        grid,
+    ));
     add(device, &sum_columns(device, &grid_sums, 4)?, &out.grid)?;
     spread::<R, T, Trilinear>(device, &sorted, order, REACH, Before::Kept, chi_bar)
+}
+
+/// The mean, and cotangents of it and of the values at the samples.
+#[derive(CubeLaunch, CubeType)]
+struct Mean<F: Float + CubeElement> {
+    areas: Array<F>,
+    at_samples: Array<F>,
+    sums: Array<F>,
+    bar: Array<F>,
+    values_bar: Array<F>,
 }
 
 /// The cotangent of the value at each sample, and what it means for the point; and the cotangent of the area,
 /// which the mean alone depends on.
 #[cube(launch)]
 fn pull_samples<F: Float + CubeElement>(
-    areas: &Array<F>,
-    at_samples: &Array<F>,
-    sums: &Array<F>,
-    bar: &Array<F>,
-    values_bar: &Array<F>,
+    of: &Mean<F>,
     points_bar: &mut Array<F>,
     areas_bar: &mut Array<F>,
     shares: &mut Array<F>,
-    count: u32,
     spacing: F,
     #[comptime] given: bool,
 ) {
     let i = ABSOLUTE_POS;
-    if i < count as usize {
-        let share = bar[0] / sums[1];
-        let mean = sums[0] / sums[1];
-        let mut value_bar = share * areas[i];
+    if i < shares.len() {
+        let share = of.bar[0] / of.sums[1];
+        let mean = of.sums[0] / of.sums[1];
+        let mut value_bar = share * of.areas[i];
         if given {
-            value_bar += values_bar[i];
+            value_bar += of.values_bar[i];
         }
         shares[i] = value_bar;
         let slope = value_bar / spacing;
         for axis in 0..3usize {
-            points_bar[3 * i + axis] += at_samples[4 * i + 1 + axis] * slope;
+            points_bar[3 * i + axis] += of.at_samples[4 * i + 1 + axis] * slope;
         }
-        areas_bar[i] += share * (at_samples[4 * i] - mean);
+        areas_bar[i] += share * (of.at_samples[4 * i] - mean);
     }
 }
 
@@ -124,7 +111,6 @@ fn sort_shares<F: Float + CubeElement>(
     places: &Array<u32>,
     sorted: &mut Array<F>,
     grid_sums: &mut Array<F>,
-    count: u32,
     grid: Lattice<F>,
 ) {
     let s = ABSOLUTE_POS;
@@ -133,7 +119,7 @@ fn sort_shares<F: Float + CubeElement>(
     let mut bar_y = zero;
     let mut bar_z = zero;
     let mut bar_h = zero;
-    if s < count as usize {
+    if s < keys.len() {
         let i = places[s] as usize;
         let x = place::<F>(points, i, &grid);
         let cell = cell_at(keys[s], grid.ny, grid.nz);

@@ -8,22 +8,22 @@ use super::cells::{FORM, Others, Taken, Tilt, pull_means, put_means_back};
 use super::near::Near;
 use super::plate;
 use super::pull_samples::{
-    BARS, GainBarsLaunch, add_bars, add_bars_of_grid, pull_cells, pull_plates, pull_seen_means,
-    pull_slopes, see_means_again,
+    BARS, GainBarsLaunch, SlopesLaunch, add_bars, add_bars_of_grid, pull_cells, pull_plates,
+    pull_seen_means, pull_slopes, see_means_again,
 };
 use super::sample::{SAMPLE, SEEN};
 use super::{Pass, Residual};
-use crate::device::check_length;
-use crate::grid::{self, check_field};
+use crate::device::{Ready, check_length, launch};
+use crate::grid::check_field;
 use crate::primitives::fill::{add, zeros};
 use crate::primitives::reduce::{BLOCK, sum, sum_columns};
 use crate::splat::{self, SampleCotangent, Samples};
 use crate::spread::Before;
 use crate::{Buffer, Device, Error, Scalar};
 
-/// What the pullback finds besides what it adds.
+/// Cotangents that are returned, besides those that are added.
 #[derive(Clone, Debug)]
-pub struct Found<T> {
+pub struct Cotangents<T> {
     /// `(nx, ny, nz)` the indicator that went in, to rounding; the array of the one that came out, if that is the same.
     pub chi: Buffer<T>,
     /// `(N,)` cotangents of `χ(x_i)`, which the pullback of the mean takes.
@@ -36,7 +36,7 @@ pub struct Found<T> {
 
 /// Adds to `out` what the cotangents `chi_bar` `(nx, ny, nz)` of the indicator `chi` that came out mean for points,
 /// normals, areas and grid. `chi_bar` becomes that of the indicator that went in, but for what
-/// [`Found::values`] means for it. All else is as it was in [`forward`](super::forward()). Waits for the device once,
+/// [`Cotangents::values`] means for it. All else is as it was in [`forward`](super::forward()). Waits for the device once,
 /// and once a pass; not at all if there was none.
 ///
 /// # Errors
@@ -49,7 +49,7 @@ pub fn pullback<R: Runtime, T: Scalar>(
     chi: &Buffer<T>,
     chi_bar: &Buffer<T>,
     out: &SampleCotangent<T>,
-) -> Result<Found<T>, Error> {
+) -> Result<Cotangents<T>, Error> {
     let (grid, order, count) = (&splat.grid, &splat.order, samples.len());
     samples.check()?;
     check_length("the array of areas", samples.areas, order.keys.len())?;
@@ -59,7 +59,7 @@ pub fn pullback<R: Runtime, T: Scalar>(
     out.check(count)?;
     let values: Buffer<T> = zeros(device, count)?;
     let Some(first) = residual.passes.first() else {
-        return Ok(Found {
+        return Ok(Cotangents {
             chi: chi.clone(),
             values,
             level: zeros(device, 1)?,
@@ -87,7 +87,7 @@ pub fn pullback<R: Runtime, T: Scalar>(
     let smoothing = pulled.pull_trust(&near, &first.state, residual)?;
     near.spread::<Tilt>(&pulled.forms, Before::Kept, chi_bar)?;
     let level = pulled.add(&near, residual.area_weights, &values, out)?;
-    Ok(Found {
+    Ok(Cotangents {
         chi: pulled.chi,
         values,
         level,
@@ -95,7 +95,7 @@ pub fn pullback<R: Runtime, T: Scalar>(
     })
 }
 
-/// What goes from pass to pass.
+/// State carried from pass to pass.
 struct Pulled<T> {
     /// `(N, 10)` cotangents of the samples.
     bars: Buffer<T>,
@@ -126,35 +126,19 @@ impl<T: Scalar> Pulled<T> {
         let (bars, before_bar) = pass.sums.pullback(pass.flattened, gain_bar, flattened_bar);
         self.pull_seen(near, pass, &seen, bars);
         near.spread::<Tilt>(&self.forms, Before::Replaced, &self.node_bars)?;
-        pull_means::launch::<T, R>(
-            near.device.client(),
-            near.cell_groups(),
-            CubeDim::new_1d(BLOCK as u32),
-            self.areas.arg(),
-            chi_bar.arg(),
-            self.node_bars.arg(),
-            self.sums.arg(),
-            T::of(pass.gain),
-        );
+        launch!(near.device, near.grid.cells(), BLOCK => pull_means<T>(
+            self.areas, chi_bar, self.node_bars, self.sums, T::of(pass.gain),
+        ));
         near.spread::<Others>(&self.forms, Before::Kept, &self.node_bars)?;
         near.spread::<Taken>(&self.forms, Before::Kept, &self.sums)?;
-        pull_cells::launch::<T, R>(
-            near.device.client(),
-            near.groups(),
-            CubeDim::new_1d(BLOCK as u32),
-            near.order.keys.arg(),
-            near.samples.arg(),
-            self.node_bars.arg(),
-            self.sums.arg(),
-            pass.state.arg(),
-            self.bars.arg(),
-            near.count() as u32,
-            grid::arg(near.grid),
-        );
+        launch!(near.device, near.count(), BLOCK => pull_cells<T>(
+            near.order.keys, near.samples, self.node_bars, self.sums, pass.state, self.bars,
+            near.count() as u32, near.grid,
+        ));
         Ok(before_bar)
     }
 
-    /// `(N, 3)` what the pass said at the samples, and `λ̄` but for the share of the slope. `χ` becomes that before
+    /// `(N, 3)` results of the pass at the samples, and `λ̄` but for the share of the slope. `χ` becomes that before
     /// the pass.
     fn see_again<R: Runtime>(
         &mut self,
@@ -163,45 +147,20 @@ impl<T: Scalar> Pulled<T> {
         chi_bar: &Buffer<T>,
         first: bool,
     ) -> Result<(Buffer<T>, f64), Error> {
-        let (device, dim) = (near.device, CubeDim::new_1d(BLOCK as u32));
+        let device = near.device;
         let seen: Buffer<T> = device.empty(SEEN * near.count())?;
-        let shares = near.shares();
-        let partial: Buffer<T> = device.empty(shares + near.grid.cells().div_ceil(BLOCK))?;
-        see_means_again::launch::<T, R>(
-            device.client(),
-            near.groups(),
-            dim,
-            near.order.keys.arg(),
-            near.samples.arg(),
-            self.areas.arg(),
-            self.sums.arg(),
-            pass.state.arg(),
-            self.bars.arg(),
-            seen.arg(),
-            partial.arg(),
-            near.count() as u32,
-            shares as u32,
-            grid::arg(near.grid),
-        );
+        let partial: Buffer<T> = device.empty(near.shares() + near.grid.cells().div_ceil(BLOCK))?;
+        launch!(device, near.count(), BLOCK => see_means_again<T>(
+            near.pass(&self.areas, &self.sums), pass.state, self.bars, seen, partial, near.grid,
+        ));
         // No array may be bound twice if one of the two is written.
         let (from, out) = match first {
             true => (&self.chi, near.field()?),
             false => (&self.areas, self.chi.clone()),
         };
-        put_means_back::launch::<T, R>(
-            device.client(),
-            near.cell_groups(),
-            dim,
-            from.arg(),
-            self.areas.arg(),
-            self.sums.arg(),
-            chi_bar.arg(),
-            out.arg(),
-            partial.arg(),
-            T::of(pass.gain),
-            shares as u32,
-            first,
-        );
+        launch!(device, near.grid.cells(), BLOCK => put_means_back<T>(
+            from, self.areas, self.sums, chi_bar, out, partial, T::of(pass.gain), first,
+        ));
         self.chi = out;
         let gain_bar = device.download(&sum(device, &partial)?)?[0];
         Ok((seen, isograd::Real::f64(gain_bar)))
@@ -214,29 +173,18 @@ impl<T: Scalar> Pulled<T> {
         seen: &Buffer<T>,
         bars: Sums,
     ) {
-        pull_seen_means::launch::<T, R>(
-            near.device.client(),
-            near.groups(),
-            CubeDim::new_1d(BLOCK as u32),
-            near.order.keys.arg(),
-            near.samples.arg(),
-            self.areas.arg(),
-            self.sums.arg(),
-            seen.arg(),
-            pass.state.arg(),
-            self.bars.arg(),
-            self.forms.arg(),
-            near.count() as u32,
-            GainBarsLaunch::new(
-                T::of(pass.gain),
-                T::of(bars.rise),
-                T::of(bars.slope),
-                T::of(bars.agreement),
-                T::of(bars.offset),
-                T::of(bars.prediction),
-            ),
-            grid::arg(near.grid),
+        let of_gain = GainBarsLaunch::new(
+            T::of(pass.gain),
+            T::of(bars.rise),
+            T::of(bars.slope),
+            T::of(bars.agreement),
+            T::of(bars.offset),
+            T::of(bars.prediction),
         );
+        launch!(near.device, near.count(), BLOCK => pull_seen_means<T>(
+            near.pass(&self.areas, &self.sums), seen, pass.state, self.bars, self.forms,
+            Ready::new(of_gain), near.grid,
+        ));
     }
 
     /// From trust, shifts and slopes before the first pass to places, normals and areas; and to cells, as forms to
@@ -247,38 +195,24 @@ impl<T: Scalar> Pulled<T> {
         state: &Buffer<T>,
         residual: &Residual<T>,
     ) -> Result<f64, Error> {
-        let (device, dim) = (near.device, CubeDim::new_1d(BLOCK as u32));
+        let device = near.device;
         let step: Step = residual.step;
         let partial: Buffer<T> = device.empty(2 * near.shares())?;
-        pull_plates::launch::<T, R>(
-            device.client(),
-            near.groups(),
-            dim,
-            state.arg(),
-            self.bars.arg(),
-            partial.arg(),
-            near.count() as u32,
-            plate::arg(&step, STEEPEST),
-            step.thin,
-        );
+        launch!(device, near.count(), BLOCK => pull_plates<T>(
+            state, self.bars, partial, near.count() as u32, plate::arg(&step, STEEPEST), step.thin,
+        ));
         let found = device.download(&sum_columns(device, &partial, 2)?)?;
         let share = step.usual_pullback(isograd::Real::f64(found[0]), residual.area);
-        pull_slopes::launch::<T, R>(
-            device.client(),
-            near.groups(),
-            dim,
+        let slopes = SlopesLaunch::new(
             self.chi.arg(),
             near.order.keys.arg(),
             near.samples.arg(),
             state.arg(),
-            self.bars.arg(),
-            self.forms.arg(),
-            near.count() as u32,
-            T::of(share),
-            plate::arg(&step, STEEPEST),
-            grid::arg(near.grid),
-            step.thin,
         );
+        launch!(device, near.count(), BLOCK => pull_slopes<T>(
+            Ready::new(slopes), self.bars, self.forms, T::of(share), plate::arg(&step, STEEPEST),
+            near.grid, step.thin,
+        ));
         Ok(step.width_pullback(isograd::Real::f64(found[1])))
     }
 
@@ -291,36 +225,17 @@ impl<T: Scalar> Pulled<T> {
         values: &Buffer<T>,
         out: &SampleCotangent<T>,
     ) -> Result<Buffer<T>, Error> {
-        let (device, dim) = (near.device, CubeDim::new_1d(BLOCK as u32));
-        add_bars::launch::<T, R>(
-            device.client(),
-            near.groups(),
-            dim,
-            near.order.places.arg(),
-            self.bars.arg(),
-            values.arg(),
-            out.points.arg(),
-            out.normals.arg(),
-            out.areas.arg(),
-            near.count() as u32,
-            near.grid.spacing(),
-            area_weights,
-        );
+        let device = near.device;
+        launch!(device, near.count(), BLOCK => add_bars<T>(
+            near.order.places, self.bars, values, out.points, out.normals, out.areas,
+            near.grid.spacing(), area_weights,
+        ));
         let grid_sums: Buffer<T> = device.empty(4 * near.shares())?;
         let level_sums: Buffer<T> = device.empty(near.shares())?;
-        add_bars_of_grid::launch::<T, R>(
-            device.client(),
-            near.groups(),
-            dim,
-            near.order.keys.arg(),
-            near.samples.arg(),
-            self.bars.arg(),
-            grid_sums.arg(),
-            level_sums.arg(),
-            near.count() as u32,
-            grid::arg(near.grid),
-            area_weights,
-        );
+        launch!(device, near.count(), BLOCK => add_bars_of_grid<T>(
+            near.order.keys, near.samples, self.bars, grid_sums, level_sums, near.count() as u32,
+            near.grid, area_weights,
+        ));
         add(device, &sum_columns(device, &grid_sums, 4)?, &out.grid)?;
         sum(device, &level_sums)
     }

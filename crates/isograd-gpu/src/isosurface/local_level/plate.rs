@@ -1,10 +1,11 @@
-//! How far a sample is followed, and where the surface is to be seen from it: by how thick the body is there. See
+//! Weight of a sample and shift of the surface there, from the thickness of the body. See
 //! [`isograd::isosurface::local_level::Step`].
 
 use cubecl::prelude::*;
 use isograd::isosurface::local_level::{LEAST_THICKNESS, Step};
 
 use crate::Scalar;
+use crate::device::Ready;
 use crate::element::plate;
 
 /// The step of `χ` through the surface of a thick body.
@@ -25,9 +26,9 @@ pub(super) struct Usual<F: Float + CubeElement> {
 }
 
 /// A step as an argument of a kernel.
-pub(super) fn arg<R: Runtime, T: Scalar>(step: &Step, steepest: f64) -> UsualLaunch<T, R> {
+pub(super) fn arg<R: Runtime, T: Scalar>(step: &Step, steepest: f64) -> Ready<UsualLaunch<T, R>> {
     let [low, high] = step.range();
-    UsualLaunch::new(
+    Ready::new(UsualLaunch::new(
         T::of(step.usual),
         T::of(step.width),
         T::of(low),
@@ -35,10 +36,10 @@ pub(super) fn arg<R: Runtime, T: Scalar>(step: &Step, steepest: f64) -> UsualLau
         T::of(step.depth(LEAST_THICKNESS)),
         T::of(steepest),
         T::of(std::f64::consts::LN_2),
-    )
+    ))
 }
 
-/// What the slope of `χ` at a sample says of the body.
+/// Thickness of the body at a sample, from the slope of `χ`.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Plate<F: Float> {
     /// `q`: the slope over that of a thick body.
@@ -101,7 +102,7 @@ pub(super) fn shift<F: Float + CubeElement>(of: Plate<F>, usual: &Usual<F>) -> F
     usual.slope * of.thickness * plate::rise::<F>(of.depth, usual.least_depth)
 }
 
-/// Cotangents of what a plate is told by.
+/// Cotangents of the inputs of a plate.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct PlateBar<F: Float> {
     /// Of the slope at the sample.

@@ -5,11 +5,11 @@ use isograd::isosurface::local_level::{Options, PASSES, Sums};
 
 use super::cells::take_means;
 use super::near::Near;
-use super::sample::{SAMPLE, SEEN, STATE, corner, is_held, sample, see};
+use super::sample::{PassArrays, SAMPLE, SEEN, STATE, corner, is_held, sample, see};
 use super::{Pass, Residual};
-use crate::device::check_length;
-use crate::grid::{self, Lattice, check_field};
-use crate::iso_value;
+use crate::device::{check_length, launch};
+use crate::grid::{Lattice, check_field};
+use crate::isosurface::iso_value;
 use crate::primitives::reduce::{BLOCK, sum_columns, sum_of_group};
 use crate::splat::{self, Samples};
 use crate::{Buffer, Device, Error, Scalar};
@@ -95,23 +95,14 @@ impl<R: Runtime, T: Scalar> Near<'_, R, T> {
             Some(_) => self.device.empty(STATE * self.count())?,
             None => first,
         };
-        weigh_samples::launch::<T, R>(
-            self.device.client(),
-            self.groups(),
-            CubeDim::new_1d(BLOCK as u32),
-            self.samples.arg(),
-            before.unwrap_or(self.samples).arg(),
-            seen.arg(),
-            now.arg(),
-            state.arg(),
-            self.count() as u32,
-            T::of(gain),
-            before.is_none(),
-        );
+        launch!(self.device, self.count(), BLOCK => weigh_samples<T>(
+            self.samples, before.unwrap_or(self.samples), seen, now, state, self.count() as u32,
+            T::of(gain), before.is_none(),
+        ));
         Ok(state)
     }
 
-    /// `(N, 3)` what a pass says at the samples, and the sums that its gain is made of.
+    /// `(N, 3)` results of a pass at the samples, and the sums that its gain is made of.
     fn see(
         &self,
         areas: &Buffer<T>,
@@ -120,20 +111,9 @@ impl<R: Runtime, T: Scalar> Near<'_, R, T> {
     ) -> Result<(Buffer<T>, Sums), Error> {
         let seen: Buffer<T> = self.device.empty(SEEN * self.count())?;
         let partial: Buffer<T> = self.device.empty(SUMS * self.shares())?;
-        see_means::launch::<T, R>(
-            self.device.client(),
-            self.groups(),
-            CubeDim::new_1d(BLOCK as u32),
-            self.order.keys.arg(),
-            self.samples.arg(),
-            areas.arg(),
-            sums.arg(),
-            state.arg(),
-            seen.arg(),
-            partial.arg(),
-            self.count() as u32,
-            grid::arg(self.grid),
-        );
+        launch!(self.device, self.count(), BLOCK => see_means<T>(
+            self.pass(areas, sums), state, seen, partial, self.grid,
+        ));
         let found = sum_columns(self.device, &partial, SUMS)?;
         let found = self.device.download(&found)?;
         let found = std::array::from_fn(|k| isograd::Real::f64(found[k]));
@@ -154,17 +134,9 @@ impl<R: Runtime, T: Scalar> Near<'_, R, T> {
             true => (chi, self.field()?),
             false => (areas, chi.clone()),
         };
-        take_means::launch::<T, R>(
-            self.device.client(),
-            self.cell_groups(),
-            CubeDim::new_1d(BLOCK as u32),
-            from.arg(),
-            areas.arg(),
-            sums.arg(),
-            out.arg(),
-            T::of(gain),
-            first,
-        );
+        launch!(self.device, self.grid.cells(), BLOCK => take_means<T>(
+            from, areas, sums, out, T::of(gain), first,
+        ));
         Ok(out)
     }
 }
@@ -193,17 +165,13 @@ fn weigh_samples<F: Float + CubeElement>(
     }
 }
 
-/// What a pass says at each sample; `w u`, `u²`, `s p`, `s²`, `p²`, each times `â`, summed a group at a time.
+/// Results of a pass at each sample; `w u`, `u²`, `s p`, `s²`, `p²`, each times `â`, summed a group at a time.
 #[cube(launch)]
 fn see_means<F: Float + CubeElement>(
-    keys: &Array<u32>,
-    samples: &Array<F>,
-    areas: &Array<F>,
-    sums: &Array<F>,
+    pass: &PassArrays<F>,
     state: &Array<F>,
     seen: &mut Array<F>,
     partial: &mut Array<F>,
-    count: u32,
     grid: Lattice<F>,
 ) {
     let i = ABSOLUTE_POS;
@@ -213,15 +181,15 @@ fn see_means<F: Float + CubeElement>(
     let mut forecast = zero;
     let mut s = zero;
     let mut u = zero;
-    if i < count as usize {
+    if i < pass.keys.len() {
         let mut mean = zero;
-        if is_held::<F>(keys[i], &grid) {
-            let me = sample::<F>(samples, i);
+        if is_held::<F>(pass.keys[i], &grid) {
+            let me = sample::<F>(&pass.samples, i);
             area = me.area;
             s = state[i * STATE];
             u = state[i * STATE + 1];
-            let corner = corner::<F>(keys[i], &grid);
-            let found = see::<F>(sums, areas, corner, &grid, me, s);
+            let corner = corner::<F>(pass.keys[i], &grid);
+            let found = see::<F>(&pass.sums, &pass.areas, corner, &grid, me, s);
             mean = found.mean;
             slope = found.slope;
             forecast = found.forecast;

@@ -6,9 +6,10 @@ use isograd::isosurface::local_level::{Options, STEEPEST, Step};
 use super::near::Near;
 use super::plate::{self, Usual, plate_of, shift};
 use super::sample::{SAMPLE, STATE, corner, derivatives, is_held, sample};
+use crate::device::launch;
 use crate::element::plate::trust;
-use crate::grid::{self, Lattice, cell_at, from_center, place};
-use crate::iso_value;
+use crate::grid::{Lattice, cell_at, from_center, place};
+use crate::isosurface::iso_value;
 use crate::primitives::reduce::{BLOCK, sum_columns, sum_of_group};
 use crate::splat::Samples;
 use crate::vector::Vector3;
@@ -17,20 +18,10 @@ use crate::{Buffer, Error, Scalar};
 impl<R: Runtime, T: Scalar> Near<'_, R, T> {
     /// Fills the samples, but for `ω`.
     pub(super) fn pack(&self, samples: Samples<'_, T>, area_weights: bool) {
-        pack_samples::launch::<T, R>(
-            self.device.client(),
-            self.groups(),
-            CubeDim::new_1d(BLOCK as u32),
-            samples.points.arg(),
-            samples.normals.arg(),
-            samples.areas.arg(),
-            self.order.keys.arg(),
-            self.order.places.arg(),
-            self.samples.arg(),
-            self.count() as u32,
-            grid::arg(self.grid),
-            area_weights,
-        );
+        launch!(self.device, self.count(), BLOCK => pack_samples<T>(
+            samples.points, samples.normals, samples.areas, self.order.keys, self.order.places,
+            self.samples, self.grid, area_weights,
+        ));
     }
 
     /// `(N, 2)`: anything, and `u`; the step of `χ`, and `Σ â`.
@@ -41,18 +32,9 @@ impl<R: Runtime, T: Scalar> Near<'_, R, T> {
     ) -> Result<(Buffer<T>, Step, f64), Error> {
         let state: Buffer<T> = self.device.empty(STATE * self.count())?;
         let partial: Buffer<T> = self.device.empty(2 * self.shares())?;
-        find_slopes::launch::<T, R>(
-            self.device.client(),
-            self.groups(),
-            CubeDim::new_1d(BLOCK as u32),
-            chi.arg(),
-            self.order.keys.arg(),
-            self.samples.arg(),
-            state.arg(),
-            partial.arg(),
-            self.count() as u32,
-            grid::arg(self.grid),
-        );
+        launch!(self.device, self.count(), BLOCK => find_slopes<T>(
+            chi, self.order.keys, self.samples, state, partial, self.count() as u32, self.grid,
+        ));
         let found = sum_columns(self.device, &partial, 2)?;
         let found = self.device.download(&found)?;
         let (squares, area) = (isograd::Real::f64(found[0]), isograd::Real::f64(found[1]));
@@ -67,20 +49,10 @@ impl<R: Runtime, T: Scalar> Near<'_, R, T> {
         mean: &iso_value::Residual<T>,
     ) -> Result<Buffer<T>, Error> {
         let now: Buffer<T> = self.device.empty(self.count())?;
-        trust_samples::launch::<T, R>(
-            self.device.client(),
-            self.groups(),
-            CubeDim::new_1d(BLOCK as u32),
-            state.arg(),
-            self.order.places.arg(),
-            mean.at_samples.arg(),
-            mean.sums.arg(),
-            self.samples.arg(),
-            now.arg(),
-            self.count() as u32,
-            plate::arg(step, STEEPEST),
-            step.thin,
-        );
+        launch!(self.device, self.count(), BLOCK => trust_samples<T>(
+            state, self.order.places, mean.at_samples, mean.sums, self.samples, now,
+            plate::arg(step, STEEPEST), step.thin,
+        ));
         Ok(now)
     }
 }
@@ -94,12 +66,11 @@ fn pack_samples<F: Float + CubeElement>(
     keys: &Array<u32>,
     places: &Array<u32>,
     samples: &mut Array<F>,
-    count: u32,
     grid: Lattice<F>,
     #[comptime] area_weights: bool,
 ) {
     let s = ABSOLUTE_POS;
-    if s < count as usize {
+    if s < keys.len() {
         let i = places[s] as usize;
         let mut f = Vector3::<F>::zero();
         let mut normal = Vector3::<F>::zero();
@@ -178,12 +149,11 @@ fn trust_samples<F: Float + CubeElement>(
     mean_sums: &Array<F>,
     samples: &mut Array<F>,
     now: &mut Array<F>,
-    count: u32,
     usual: Usual<F>,
     #[comptime] thin: bool,
 ) {
     let s = ABSOLUTE_POS;
-    if s < count as usize {
+    if s < now.len() {
         let of = plate_of::<F>(state[s * STATE + 1], &usual);
         samples[s * SAMPLE + 7] = trust::<F>(of.followed);
         let c = mean_sums[0] / max(mean_sums[1], F::new(0.0));

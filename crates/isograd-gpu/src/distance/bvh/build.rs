@@ -7,19 +7,18 @@
 //! anything, and there are no atomics.
 
 use cubecl::prelude::*;
+use isograd::Grid;
 
+use super::super::triangle::{FRAME, corners, frame, store_frame};
+use super::super::{Error, Mesh, MeshArrays};
 use super::morton::face_order;
-use super::triangle::{FRAME, corners, frame, store_frame};
-use super::{Error, Mesh};
+use crate::device::{Argument, launch};
+use crate::grid::{Lattice, low_corner};
 use crate::primitives::ends::ends;
-use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
-/// Units of a group.
-const BLOCK: u32 = 256;
-
 /// Stands in `lowest` where there is no triangle; and for a cell without a seed or a result.
-pub(super) const NONE: u32 = u32::MAX;
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// Marks a child that is a run of triangles: above it, one less than their number, from bit 28 on; below, the
 /// first of them.
@@ -28,8 +27,8 @@ pub(super) const LEAF: u32 = 1 << 31;
 /// Triangles of a run that is not cut further.
 const RUN: u32 = 2;
 
-/// The hierarchy. Places are seen from an origin, which the maker chooses.
-pub(super) struct Tree<T> {
+/// The hierarchy. Places are seen from the low corner of a grid.
+pub(crate) struct Tree<T> {
     /// For each node the boxes of its two children: low corner, high corner. Node 0 is the root.
     pub boxes: Buffer<T>,
     /// For each node: its two children, and the lowest face below each.
@@ -42,34 +41,48 @@ pub(super) struct Tree<T> {
     pub pyramid: Buffer<T>,
 }
 
+/// [`Tree`] in kernels.
+#[derive(CubeLaunch, CubeType)]
+pub(crate) struct TreeArrays<F: Float + CubeElement> {
+    pub boxes: Array<F>,
+    pub children: Array<u32>,
+    pub frames: Array<F>,
+    pub faces: Array<u32>,
+    pub pyramid: Array<F>,
+}
+
+impl<R: Runtime, T: Scalar> Argument<R> for Tree<T> {
+    type Parameter = TreeArraysLaunch<T, R>;
+
+    fn argument(&self, _: &Device<R>) -> Self::Parameter {
+        TreeArraysLaunch::new(
+            self.boxes.arg(),
+            self.children.arg(),
+            self.frames.arg(),
+            self.faces.arg(),
+            self.pyramid.arg(),
+        )
+    }
+}
+
 impl<T: Scalar> Tree<T> {
     /// The hierarchy over the faces of a mesh.
     pub fn new<R: Runtime>(
         device: &Device<R>,
         mesh: &Mesh<T>,
-        origin: [T; 3],
+        grid: &Grid<T>,
     ) -> Result<Self, Error> {
         let triangles = mesh.check()?;
         let bounds = ends(device, &mesh.vertices, 3)?;
         let order = face_order(device, mesh, &bounds)?;
-        let placed = Placed::new(device, mesh, origin, &order.places)?;
+        let placed = Placed::new(device, mesh, grid, &order.places)?;
         let leaves = placed.faces.len();
         let boxes = device.empty((leaves - 1) * 12)?;
         let children = device.empty((leaves - 1) * 4)?;
-        make_nodes::launch::<T, R>(
-            device.client(),
-            device.groups(leaves - 1, BLOCK),
-            CubeDim::new_1d(BLOCK),
-            order.keys.arg(),
-            placed.pyramid.arg(),
-            placed.lowest.arg(),
-            boxes.arg(),
-            children.arg(),
-            leaves as u32,
-            triangles as u32,
-            (placed.lowest.len() / 2) as u32,
-            RUN,
-        );
+        launch!(device, leaves - 1 => make_nodes<T>(
+            order.keys, placed.pyramid, placed.lowest, boxes, children, leaves as u32,
+            triangles as u32, RUN,
+        ));
         Ok(Self {
             boxes,
             children,
@@ -98,7 +111,7 @@ impl<T: Scalar> Placed<T> {
     fn new<R: Runtime>(
         device: &Device<R>,
         mesh: &Mesh<T>,
-        origin: [T; 3],
+        grid: &Grid<T>,
         places: &Buffer<u32>,
     ) -> Result<Self, Error> {
         // A lone triangle stands twice, so that there is a node.
@@ -110,34 +123,12 @@ impl<T: Scalar> Placed<T> {
             pyramid: device.empty(2 * width * 6)?,
             lowest: device.empty(2 * width)?,
         };
-        let dim = CubeDim::new_1d(BLOCK);
-        place_triangles::launch::<T, R>(
-            device.client(),
-            device.groups(width, BLOCK),
-            dim,
-            mesh.vertices.arg(),
-            mesh.faces.arg(),
-            places.arg(),
-            placed.frames.arg(),
-            placed.faces.arg(),
-            placed.pyramid.arg(),
-            placed.lowest.arg(),
-            origin[0],
-            origin[1],
-            origin[2],
-            places.len() as u32,
-            width as u32,
-        );
+        launch!(device, width => place_triangles<T>(
+            mesh, places, placed.frames, placed.faces, placed.pyramid, placed.lowest, grid,
+        ));
         let mut level = width / 2;
         while level > 0 {
-            join_pairs::launch::<T, R>(
-                device.client(),
-                device.groups(level, BLOCK),
-                dim,
-                placed.pyramid.arg(),
-                placed.lowest.arg(),
-                level as u32,
-            );
+            launch!(device, level => join_pairs<T>(placed.pyramid, placed.lowest, level as u32));
             level /= 2;
         }
         Ok(placed)
@@ -147,24 +138,20 @@ impl<T: Scalar> Placed<T> {
 /// Frames and boxes of the triangles in Morton order; boxes of nothing to the width of the pyramid.
 #[cube(launch)]
 fn place_triangles<F: Float + CubeElement>(
-    vertices: &Array<F>,
-    faces: &Array<u32>,
+    mesh: &MeshArrays<F>,
     places: &Array<u32>,
     frames: &mut Array<F>,
     face_of: &mut Array<u32>,
     pyramid: &mut Array<F>,
     lowest: &mut Array<u32>,
-    x: F,
-    y: F,
-    z: F,
-    triangles: u32,
-    width: u32,
+    grid: Lattice<F>,
 ) {
-    if ABSOLUTE_POS < width as usize {
-        let at = width as usize + ABSOLUTE_POS;
+    let width = lowest.len() / 2;
+    if ABSOLUTE_POS < width {
+        let at = width + ABSOLUTE_POS;
         if ABSOLUTE_POS < face_of.len() {
-            let face = places[min(ABSOLUTE_POS as u32, triangles - 1u32) as usize];
-            let t = corners::<F>(vertices, faces, face, Vector3::<F> { x, y, z });
+            let face = places[min(ABSOLUTE_POS, places.len() - 1)];
+            let t = corners::<F>(mesh, face, low_corner::<F>(&grid));
             store_frame::<F>(frames, ABSOLUTE_POS, frame::<F>(t));
             face_of[ABSOLUTE_POS] = face;
             lowest[at] = face;
@@ -225,10 +212,10 @@ fn make_nodes<F: Float>(
     children: &mut Array<u32>,
     leaves: u32,
     triangles: u32,
-    width: u32,
     #[comptime] run: u32,
 ) {
     if ABSOLUTE_POS < leaves as usize - 1 {
+        let width = (lowest.len() / 2) as u32;
         let (n, m) = (leaves as i32, triangles as i32);
         let i = ABSOLUTE_POS as i32;
         let after = shared_bits(codes, i, i + 1i32, n, m);

@@ -2,15 +2,13 @@
 
 use cubecl::prelude::*;
 
-use super::triangle::corners;
-use super::{Error, Mesh};
+use super::super::triangle::corners;
+use super::super::{Error, Mesh, MeshArrays};
+use crate::device::launch;
 use crate::primitives::morton::spread_bits;
 use crate::primitives::sort;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
-
-/// Units of a group.
-const BLOCK: u32 = 256;
 
 /// The order of the faces by the Morton codes of their centers within `bounds`.
 pub(super) fn face_order<T: Scalar, R: Runtime>(
@@ -20,15 +18,7 @@ pub(super) fn face_order<T: Scalar, R: Runtime>(
 ) -> Result<sort::Order, Error> {
     let count = mesh.faces.len() / 3;
     let codes = device.empty(count)?;
-    code_centers::launch::<T, R>(
-        device.client(),
-        device.groups(count, BLOCK),
-        CubeDim::new_1d(BLOCK),
-        mesh.vertices.arg(),
-        mesh.faces.arg(),
-        bounds.arg(),
-        codes.arg(),
-    );
+    launch!(device, count => code_centers<T>(mesh, bounds, codes));
     Ok(sort::order(device, &codes, 1 << 30)?)
 }
 
@@ -53,14 +43,13 @@ fn morton<F: Float>(place: Vector3<F>, bounds: &Array<F>) -> u32 {
 }
 
 #[cube(launch)]
-fn code_centers<F: Float>(
-    vertices: &Array<F>,
-    faces: &Array<u32>,
+fn code_centers<F: Float + CubeElement>(
+    mesh: &MeshArrays<F>,
     bounds: &Array<F>,
     codes: &mut Array<u32>,
 ) {
     if ABSOLUTE_POS < codes.len() {
-        let t = corners::<F>(vertices, faces, ABSOLUTE_POS as u32, Vector3::<F>::zero());
+        let t = corners::<F>(mesh, ABSOLUTE_POS as u32, Vector3::<F>::zero());
         let third = F::new(1.0) / F::new(3.0);
         let center = Vector3::<F> {
             x: t.a.x * third + t.b.x * third + t.c.x * third,

@@ -1,0 +1,9 @@
+//! The hierarchy of boxes over triangles, and the closest triangle in it.
+
+mod build;
+mod morton;
+mod search;
+mod settle;
+
+pub(super) use build::{NONE, Tree};
+pub(super) use search::{cells, center};
