@@ -1,5 +1,5 @@
-//! The linear fit of samples at a vertex, and its pullback: see `isograd::distance::extend`, whose letters these are.
-//! Vectors go in and out by component.
+//! Linear fit of sample values at a vertex, and its pullback, in the notation of `isograd::distance::extend`. Vectors are
+//! passed by component.
 
 #[cfg(cube)]
 use cubecl::prelude::*;
@@ -13,8 +13,8 @@ pub fn noise<F: Element>() -> F {
     F::new(1.0) / F::new(100_000.0)
 }
 
-/// `ε₁ = 1/256`: how soon the slope fades with the distance of a vertex from its samples. Half of it is gone, in the
-/// mean direction, where `|m|² = 16 tr C · √(1/3)`.
+/// `ε₁ = 1/256`: decay of the slope with the distance of a vertex from its samples. It has halved, in the mean
+/// direction, where `|m|² = 16 tr C · √(1/3)`.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn fading<F: Element>() -> F {
@@ -40,7 +40,7 @@ pub fn kernel<F: Element>(q: F) -> F {
     rest * rest
 }
 
-/// `ε`, of `tr C` and `τ`.
+/// `ε = tr C (ε₀ + ε₁ τ²)`, the ridge of the fit.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn ridge<F: Element>(trace: F, tau: F) -> F {
@@ -54,7 +54,7 @@ pub fn ridge_of_mean<F: Element>(tau: F, along: F) -> F {
     F::new(4.0) * fading::<F>() * tau * along
 }
 
-/// `(g·s) (ε₀ − ε₁ τ²)`: factor of `e_j` in it.
+/// `(g·s) (ε₀ − ε₁ τ²)`: factor of `e_j` in the pullback of `ε`.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn ridge_of_offset<F: Element>(tau: F, along: F) -> F {
@@ -65,21 +65,21 @@ pub fn ridge_of_offset<F: Element>(tau: F, along: F) -> F {
 #[cfg_attr(cube, derive(CubeType))]
 #[derive(Clone, Copy, Debug)]
 pub struct Factors<F: Element> {
-    /// Below the diagonal of `L`.
+    /// Entry `yx` of `L`.
     pub yx: F,
-    /// The same.
+    /// Entry `zx` of `L`.
     pub zx: F,
-    /// The same.
+    /// Entry `zy` of `L`.
     pub zy: F,
-    /// Of `D`.
+    /// First entry of `D`.
     pub x: F,
-    /// Of `D`.
+    /// Second entry of `D`.
     pub y: F,
-    /// Of `D`.
+    /// Third entry of `D`.
     pub z: F,
 }
 
-/// The factors of a matrix.
+/// `L D Lᵀ` factors of a symmetric positive definite matrix.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn factors<F: Element>(xx: F, yy: F, zz: F, yz: F, xz: F, xy: F) -> Factors<F> {
@@ -106,42 +106,42 @@ pub fn solved_z<F: Element>(of: Factors<F>, a: F, b: F, c: F) -> F {
     (c - of.zx * a - of.zy * lower) / of.z
 }
 
-/// `y` of it, given `z`.
+/// `y` of that solution, given `z`.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn solved_y<F: Element>(of: Factors<F>, a: F, b: F, z: F) -> F {
     (b - of.yx * a) / of.y - of.zy * z
 }
 
-/// `x` of it, given the others.
+/// `x` of that solution, given `y` and `z`.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn solved_x<F: Element>(of: Factors<F>, a: F, y: F, z: F) -> F {
     a / of.x - of.yx * y - of.zx * z
 }
 
-/// `D_j`, of `ρ_j`, `t_j`, `|e_j|²`, `m·e_j` and the factors of the ridge.
+/// `D_j` from `ρ_j`, `t_j`, `|e_j|²`, `m·e_j` and the factors of the ridge.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn pull<F: Element>(rho: F, t: F, ee: F, me: F, of_offset: F, of_mean: F) -> F {
     rho * t + of_offset * ee + of_mean * me
 }
 
-/// What `d̄_j` has through the ridge, over `p_j`.
+/// Term of `d̄_j` through the ridge, over `p_j`.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn ridge_bar<F: Element>(m: F, of_mean: F, e: F, of_offset: F) -> F {
     m * of_mean + e * (F::new(2.0) * of_offset)
 }
 
-/// What it has through the fit, over `p_j`, that of the ridge included.
+/// Term of `d̄_j` through the fit, the ridge included, over `p_j`.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn fit_bar<F: Element>(g: F, t: F, s: F, rho: F, of_ridge: F) -> F {
     g * -t + s * -rho + of_ridge
 }
 
-/// `−4 w̄_j (a_j + a₀)(1 − q)`: factor of `d_j` in what `d̄_j` has through the weight.
+/// `−4 w̄_j (a_j + a₀)(1 − q)`: factor of `d_j` in the term of `d̄_j` through the weight.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn radial<F: Element>(weight_bar: F, area: F, rest: F) -> F {

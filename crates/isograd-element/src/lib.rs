@@ -6,34 +6,17 @@
 //!
 //! This crate belongs to the inside of `isograd`; its interface changes without notice.
 
-#[cfg(not(cube))]
-pub mod coupling;
 pub mod crossing;
-#[cfg(not(cube))]
-pub mod curvature;
-#[cfg(not(cube))]
-pub mod difference;
-#[cfg(not(cube))]
-pub mod disc;
 pub mod eigen;
-#[cfg(not(cube))]
-pub mod evidence;
 pub mod fit;
-pub mod hat;
 pub mod linear;
 pub mod plane;
 pub mod plate;
-#[cfg(not(cube))]
-pub mod sheet;
-#[cfg(not(cube))]
-pub mod sight;
-pub mod spline;
+pub mod stencil;
 pub mod turned;
 #[cfg(not(cube))]
 pub mod vector;
 pub mod vector3;
-#[cfg(not(cube))]
-pub mod winding;
 
 #[cfg(cube)]
 use cubecl::prelude::*;

@@ -1,5 +1,5 @@
-//! What one pair of samples adds to the plane, the crowd and the area of a sample: see
-//! `isograd::normals` and `isograd::splat::area`.
+//! Contribution of one neighbor to the local plane, the crowding and the area of a sample: see `isograd::normals` and
+//! `isograd::splat::area`.
 
 #[cfg(cube)]
 use cubecl::prelude::*;
@@ -13,22 +13,22 @@ pub fn weight<F: Element>(r: F, epsilon: F) -> F {
     F::new(1.0) / (r + epsilon)
 }
 
-/// `(1 − q)²`: what a sample adds to the crowd, where `q = r²/R²`.
+/// `(1 − q)²`, with `q = r²/R²`: contribution of a neighbor to the crowding of a sample.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn crowd<F: Element>(q: F) -> F {
     (F::new(1.0) - q) * (F::new(1.0) - q)
 }
 
-/// `πR²/(3 Σ (1 − q)²)`: the area that a sample stands for.
+/// `πR²/(3 Σ (1 − q)²)`: area represented by a sample.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn area<F: Element>(pi: F, radius: F, crowd: F) -> F {
     pi * radius * radius / (F::new(3.0) * crowd)
 }
 
-/// `λ₁λ/(λ − λ₁)²`: what one of the two larger eigenvalues adds to the roughness of a neighborhood; they differ
-/// from the smallest.
+/// `λ₁λ/(λ − λ₁)²`: contribution of one of the two larger eigenvalues to the roughness of a neighborhood; they
+/// differ from the smallest.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn roughness<F: Element>(first: F, value: F) -> F {

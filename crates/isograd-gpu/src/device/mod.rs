@@ -2,6 +2,7 @@
 
 mod buffer;
 mod effort;
+mod launch;
 #[cfg(feature = "cuda")]
 mod libraries;
 mod open;
@@ -9,6 +10,7 @@ mod open;
 use cubecl::prelude::*;
 
 use effort::Counts;
+pub(crate) use launch::launch;
 
 pub use buffer::Buffer;
 pub use effort::Effort;
@@ -65,16 +67,6 @@ pub enum Error {
         found: usize,
         /// The length that fits.
         expected: usize,
-    },
-    /// An axis of a grid is longer than its transform can number.
-    #[error(
-        "an axis of {cells} cells is more than the {limit} that can be transformed; use a coarser grid, or the CPU"
-    )]
-    Axis {
-        /// Cells of the axis.
-        cells: usize,
-        /// Most that it may have.
-        limit: usize,
     },
     /// The smoothing is negative or not finite.
     #[error("the smoothing is {smoothing} cells; it must be finite and 0 or more")]

@@ -1,4 +1,4 @@
-//! The points that are asked for the automatic radius: those that the CPU asks.
+//! Points that are sampled for the automatic radius: those that the CPU samples.
 //!
 //! They are a fixed stride of the order of the CPU's k-d tree, which halves the points along the longest side of
 //! their box until no more than 16 are together. So that the device asks the same ones, it halves them in the same
@@ -11,6 +11,7 @@ use isograd::neighbors::rule::AUTO_SAMPLES;
 
 use super::BLOCK;
 use super::order::{gather, ordered_bits};
+use crate::device::launch;
 use crate::primitives::scan::exclusive_sum;
 use crate::primitives::sort::{as_they_are, order};
 use crate::{Buffer, Device, Error, Scalar};
@@ -39,15 +40,16 @@ pub(super) fn choose<R: Runtime, T: Scalar>(
         lists = halve(device, points, &lists, level)?;
     }
     let chosen: Buffer<u32> = device.empty(n.div_ceil(stride))?;
-    choose_from_cells::launch::<R>(
-        device.client(),
-        device.groups(chosen.len(), BLOCK),
-        CubeDim::new_1d(BLOCK),
+    launch!(
+        device,
+        choose_from_cells,
+        chosen.len(),
+        BLOCK,
         lists.arg(),
         chosen.arg(),
         n as u32,
         levels,
-        stride as u32,
+        stride as u32
     );
     Ok(chosen)
 }
@@ -65,33 +67,26 @@ fn along_axes<R: Runtime, T: Scalar>(
         _ => (3, (-largest.log2().ceil()).exp2()),
     };
     let lists: Buffer<u32> = device.empty(3 * n)?;
-    let (groups, dim) = (device.groups(n, BLOCK), CubeDim::new_1d(BLOCK));
     for axis in 0..3 {
         let mut list = as_they_are(device, n)?;
         for word in (0..words).rev() {
             let keys = device.empty(n)?;
-            fill_words::launch::<T, R>(
-                device.client(),
-                groups.clone(),
-                dim,
+            launch!(
+                device,
+                fill_words::<T>,
+                n,
+                BLOCK,
                 points.arg(),
                 list.arg(),
                 keys.arg(),
                 <T as isograd::Real>::of(scale),
                 axis,
-                word,
+                word
             );
             let by_word = order(device, &keys, u32::MAX)?.places;
             list = gather(device, &list, &by_word, 1)?;
         }
-        put_list::launch::<R>(
-            device.client(),
-            groups.clone(),
-            dim,
-            list.arg(),
-            lists.arg(),
-            axis,
-        );
+        launch!(device, put_list, n, BLOCK, list.arg(), lists.arg(), axis);
     }
     Ok(lists)
 }
@@ -104,13 +99,12 @@ fn halve<R: Runtime, T: Scalar>(
     level: u32,
 ) -> Result<Buffer<u32>, Error> {
     let n = lists.len() / 3;
-    let (client, dim) = (device.client(), CubeDim::new_1d(BLOCK));
-    let (once, thrice) = (device.groups(n, BLOCK), device.groups(3 * n, BLOCK));
     let sides: Buffer<u32> = device.empty(n)?;
-    find_sides::launch::<T, R>(
-        client,
-        once,
-        dim,
+    launch!(
+        device,
+        find_sides::<T>,
+        n,
+        BLOCK,
         points.arg(),
         lists.arg(),
         sides.arg(),
@@ -119,10 +113,11 @@ fn halve<R: Runtime, T: Scalar>(
     let flags = gather(device, &sides, lists, 1)?;
     let before = exclusive_sum(device, &flags)?;
     let halved: Buffer<u32> = device.empty(3 * n)?;
-    move_halves::launch::<R>(
-        client,
-        thrice,
-        dim,
+    launch!(
+        device,
+        move_halves,
+        3 * n,
+        BLOCK,
         lists.arg(),
         before.arg(),
         halved.arg(),

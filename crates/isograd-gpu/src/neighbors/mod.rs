@@ -55,8 +55,31 @@ pub struct Neighborhoods<T> {
     pub(crate) radii: Buffer<T>,
     /// Low corner, high corner and largest radius of each node, each before its subtrees.
     pub(crate) nodes: Buffer<T>,
-    /// Of a leaf, its number and [`tree::IS_LEAF`]; else the node after the subtree.
+    /// For a leaf, its number and [`tree::IS_LEAF`]; for other nodes, the node after the subtree.
     pub(crate) links: Buffer<u32>,
+}
+
+/// [`Neighborhoods`] in kernels.
+#[derive(CubeLaunch, CubeType)]
+pub(crate) struct NeighborhoodArrays<F: Float + CubeElement> {
+    pub points: Array<F>,
+    pub radii: Array<F>,
+    pub places: Array<u32>,
+    pub nodes: Array<F>,
+    pub links: Array<u32>,
+}
+
+impl<T: Scalar> Neighborhoods<T> {
+    /// The neighborhoods as an argument of a kernel.
+    pub(crate) fn arg<R: Runtime>(&self) -> NeighborhoodArraysLaunch<T, R> {
+        NeighborhoodArraysLaunch::new(
+            self.points.arg(),
+            self.radii.arg(),
+            self.places.arg(),
+            self.nodes.arg(),
+            self.links.arg(),
+        )
+    }
 }
 
 impl<T> Neighborhoods<T> {
@@ -92,7 +115,7 @@ pub fn forward<R: Runtime, T: Scalar>(
     with_order(device, sorted, places, radii)
 }
 
-/// The same points with other radii `(N,)`, in input order.
+/// Neighborhoods of the same points with other radii `(N,)`, in input order.
 ///
 /// # Errors
 /// [`Error::Length`], [`Error::TooLarge`].

@@ -5,6 +5,7 @@ use cubecl::prelude::*;
 use super::tree::{IS_LEAF, NODE};
 use super::walk::{end_of_leaf, first_of_leaf};
 use super::{BLOCK, LEAF, Neighborhoods};
+use crate::device::launch;
 use crate::primitives::smallest::insert;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
@@ -23,16 +24,17 @@ pub(crate) fn reaches<R: Runtime, T: Scalar>(
 ) -> Result<Buffer<T>, Error> {
     debug_assert!(k > 0 && k <= neighborhoods.len());
     let squares = device.empty(places.len() / 3)?;
-    find_reaches::launch::<T, R>(
-        device.client(),
-        device.groups(squares.len(), BLOCK),
-        CubeDim::new_1d(BLOCK),
+    launch!(
+        device,
+        find_reaches::<T>,
+        squares.len(),
+        BLOCK,
         neighborhoods.points.arg(),
         neighborhoods.nodes.arg(),
         neighborhoods.links.arg(),
         places.arg(),
         squares.arg(),
-        k,
+        k
     );
     Ok(squares)
 }

@@ -3,6 +3,7 @@
 use cubecl::prelude::*;
 
 use super::BLOCK;
+use crate::device::launch;
 use crate::primitives::morton::spread_bits;
 use crate::primitives::sort::order;
 use crate::{Buffer, Device, Error, Scalar};
@@ -26,13 +27,14 @@ pub(super) fn along_curve<R: Runtime, T: Scalar>(
     if count == 0 {
         return Ok(low);
     }
-    fill_keys::launch::<T, R>(
-        device.client(),
-        device.groups(count, BLOCK),
-        CubeDim::new_1d(BLOCK),
+    launch!(
+        device,
+        fill_keys::<T>,
+        count,
+        BLOCK,
         points.arg(),
         high.arg(),
-        low.arg(),
+        low.arg()
     );
     let limit = 1 << (3 * BITS);
     let by_low = order(device, &low, limit)?.places;
@@ -49,14 +51,15 @@ pub(crate) fn gather<R: Runtime, E: Numeric + CubeElement>(
 ) -> Result<Buffer<E>, Error> {
     let gathered = device.empty(width * places.len())?;
     if !gathered.is_empty() {
-        gather_rows::launch::<E, R>(
-            device.client(),
-            device.groups(gathered.len(), BLOCK),
-            CubeDim::new_1d(BLOCK),
+        launch!(
+            device,
+            gather_rows::<E>,
+            gathered.len(),
+            BLOCK,
             values.arg(),
             places.arg(),
             gathered.arg(),
-            width,
+            width
         );
     }
     Ok(gathered)
@@ -70,13 +73,14 @@ pub(crate) fn scatter<R: Runtime, E: Numeric + CubeElement>(
 ) -> Result<Buffer<E>, Error> {
     let scattered = device.empty(values.len())?;
     if !values.is_empty() {
-        scatter_elements::launch::<E, R>(
-            device.client(),
-            device.groups(values.len(), BLOCK),
-            CubeDim::new_1d(BLOCK),
+        launch!(
+            device,
+            scatter_elements::<E>,
+            values.len(),
+            BLOCK,
             values.arg(),
             places.arg(),
-            scattered.arg(),
+            scattered.arg()
         );
     }
     Ok(scattered)

@@ -20,7 +20,7 @@ use super::{
     BLOCK, Neighborhoods, choice, end_of_leaf, first_of_leaf, forward as sort_points, is_isolated,
     next_leaf, with_radii,
 };
-use crate::device::check_length;
+use crate::device::{check_length, launch};
 use crate::primitives::ends::ends;
 use crate::primitives::fill::zeros;
 use crate::primitives::flags;
@@ -51,7 +51,7 @@ pub struct Radii<T> {
     pub neighborhoods: Neighborhoods<T>,
 }
 
-/// What the neighborhoods hold, in input order.
+/// Sizes of the neighborhoods, in input order.
 #[derive(Clone, Debug)]
 pub struct Census {
     /// `(N,)` number of samples within `R_i`, the point itself included.
@@ -106,10 +106,11 @@ pub fn census<R: Runtime, T: Scalar>(
         isolated: device.empty(n)?,
     };
     if n > 0 {
-        count_neighbors::launch::<T, R>(
-            device.client(),
-            device.groups(n, BLOCK),
-            CubeDim::new_1d(BLOCK),
+        launch!(
+            device,
+            count_neighbors::<T>,
+            n,
+            BLOCK,
             neighborhoods.points.arg(),
             neighborhoods.radii.arg(),
             neighborhoods.places.arg(),
@@ -117,7 +118,7 @@ pub fn census<R: Runtime, T: Scalar>(
             neighborhoods.links.arg(),
             census.count.arg(),
             census.isolated.arg(),
-            common,
+            common
         );
     }
     Ok(census)
@@ -128,12 +129,13 @@ fn check_finite<R: Runtime, T: Scalar>(
     points: &Buffer<T>,
 ) -> Result<(), Error> {
     let bad: Buffer<u32> = device.empty(points.len() / 3)?;
-    flag_not_finite::launch::<T, R>(
-        device.client(),
-        device.groups(bad.len(), BLOCK),
-        CubeDim::new_1d(BLOCK),
+    launch!(
+        device,
+        flag_not_finite::<T>,
+        bad.len(),
+        BLOCK,
         points.arg(),
-        bad.arg(),
+        bad.arg()
     );
     match flags::first(device, &bad)? {
         Some(index) => Err(Refused::NotFinite { index }.into()),
@@ -163,12 +165,13 @@ fn automatic<R: Runtime, T: Scalar>(
     let asked = gather(device, points, &chosen, 3)?;
     let squares = reaches(device, neighborhoods, &asked, AUTO_NEIGHBORS.min(n))?;
     let found: Buffer<T> = device.empty(2)?;
-    find_median::launch::<T, R>(
-        device.client(),
-        device.groups(squares.len(), BLOCK),
-        CubeDim::new_1d(BLOCK),
+    launch!(
+        device,
+        find_median::<T>,
+        squares.len(),
+        BLOCK,
         squares.arg(),
-        found.arg(),
+        found.arg()
     );
     let found = device.download(&found)?;
     let [positive, median] = [0, 1].map(|k| isograd::Real::f64(found[k]));
@@ -191,15 +194,16 @@ fn grow<R: Runtime, T: Scalar>(
         FEWEST_NEIGHBORS.min(n),
     )?;
     let radii = device.empty(n)?;
-    grow_radii::launch::<T, R>(
-        device.client(),
-        device.groups(n, BLOCK),
-        CubeDim::new_1d(BLOCK),
+    launch!(
+        device,
+        grow_radii::<T>,
+        n,
+        BLOCK,
         squares.arg(),
         neighborhoods.places.arg(),
         radii.arg(),
         common,
-        <T as isograd::Real>::of(GROWTH_MARGIN),
+        <T as isograd::Real>::of(GROWTH_MARGIN)
     );
     Ok(radii)
 }

@@ -7,6 +7,7 @@
 use cubecl::prelude::*;
 
 use super::{BLOCK, LEAF};
+use crate::device::launch;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Children of a node, and the power of two that they are.
@@ -40,11 +41,11 @@ pub(super) fn build<R: Runtime, T: Scalar>(
     if total == 0 {
         return Ok((nodes, links));
     }
-    let dim = CubeDim::new_1d(BLOCK);
-    fill_leaves::launch::<T, R>(
-        device.client(),
-        device.groups(counts[0], BLOCK),
-        dim,
+    launch!(
+        device,
+        fill_leaves::<T>,
+        counts[0],
+        BLOCK,
         points.arg(),
         radii.arg(),
         nodes.arg(),
@@ -54,10 +55,11 @@ pub(super) fn build<R: Runtime, T: Scalar>(
     );
     let mut below = 1u32;
     for level in 1..counts.len() {
-        fill_level::launch::<T, R>(
-            device.client(),
-            device.groups(counts[level], BLOCK),
-            dim,
+        launch!(
+            device,
+            fill_level::<T>,
+            counts[level],
+            BLOCK,
             nodes.arg(),
             links.arg(),
             counts[level - 1] as u32,

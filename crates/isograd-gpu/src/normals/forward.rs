@@ -3,9 +3,12 @@
 use cubecl::prelude::*;
 
 use super::{CENTROID, PLANE, Residual, TANGENT, VALUES, WEIGHT};
+use crate::device::launch;
 use crate::element::eigen::{Eigen, Symmetric, eigen};
 use crate::element::plane::weight;
-use crate::neighbors::{BLOCK, Neighborhoods, end_of_leaf, first_of_leaf, next_leaf};
+use crate::neighbors::{
+    BLOCK, NeighborhoodArrays, Neighborhoods, end_of_leaf, first_of_leaf, next_leaf,
+};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
@@ -35,27 +38,24 @@ pub fn forward<R: Runtime, T: Scalar>(
         return Ok((normals, residual));
     }
     let moments: Buffer<T> = device.empty(MOMENTS * n)?;
-    let (groups, dim) = (device.groups(n, BLOCK), CubeDim::new_1d(BLOCK));
-    sum_moments::launch::<T, R>(
-        device.client(),
-        groups.clone(),
-        dim,
-        neighborhoods.points.arg(),
-        neighborhoods.radii.arg(),
-        neighborhoods.places.arg(),
-        neighborhoods.nodes.arg(),
-        neighborhoods.links.arg(),
+    launch!(
+        device,
+        sum_moments::<T>,
+        n,
+        BLOCK,
+        neighborhoods.arg(),
         moments.arg(),
-        residual.count.arg(),
+        residual.count.arg()
     );
-    find_planes::launch::<T, R>(
-        device.client(),
-        groups,
-        dim,
+    launch!(
+        device,
+        find_planes::<T>,
+        n,
+        BLOCK,
         moments.arg(),
         neighborhoods.places.arg(),
         residual.planes.arg(),
-        normals.arg(),
+        normals.arg()
     );
     Ok((normals, residual))
 }
@@ -69,56 +69,50 @@ pub(super) fn epsilon<F: Float>() -> F {
 /// Sums and numbers of all neighborhoods. Each leaf is summed by itself, and sums of leaves are added up, so
 /// that rounding stays small where many points are close.
 #[cube(launch)]
-fn sum_moments<F: Float>(
-    points: &Array<F>,
-    radii: &Array<F>,
-    places: &Array<u32>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
+fn sum_moments<F: Float + CubeElement>(
+    near: &NeighborhoodArrays<F>,
     moments: &mut Array<F>,
     counts: &mut Array<u32>,
 ) {
-    let n = radii.len();
+    let n = near.radii.len();
     if ABSOLUTE_POS < n {
-        let center = Vector3::<F>::at(points, ABSOLUTE_POS);
+        let center = Vector3::<F>::at(&near.points, ABSOLUTE_POS);
         let mut sums = Array::<F>::new(MOMENTS);
-        let radius = radii[ABSOLUTE_POS];
-        let count = moments_within::<F>(points, nodes, links, center, radius, &mut sums);
+        let radius = near.radii[ABSOLUTE_POS];
+        let count = moments_within::<F>(near, center, radius, &mut sums);
         #[unroll]
         for k in 0..MOMENTS {
             moments[k * n + ABSOLUTE_POS] = sums[k];
         }
-        let place = places[ABSOLUTE_POS] as usize;
+        let place = near.places[ABSOLUTE_POS] as usize;
         counts[place] = count;
     }
 }
 
 /// Sums over the points within a radius, and their number.
 #[cube]
-pub(super) fn moments_within<F: Float>(
-    points: &Array<F>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
+pub(super) fn moments_within<F: Float + CubeElement>(
+    near: &NeighborhoodArrays<F>,
     center: Vector3<F>,
     radius: F,
     sums: &mut Array<F>,
 ) -> u32 {
-    let n = points.len() / 3;
+    let n = near.radii.len();
     let mut count = 0u32.runtime();
     let mut of_leaf = Array::<F>::new(MOMENTS);
     #[unroll]
     for k in 0..MOMENTS {
         sums[k] = F::new(0.0);
     }
-    let mut node = next_leaf::<F>(nodes, links, center, radius, 0usize, false);
-    while node < links.len() {
+    let mut node = next_leaf::<F>(&near.nodes, &near.links, center, radius, 0usize, false);
+    while node < near.links.len() {
         #[unroll]
         for k in 0..MOMENTS {
             of_leaf[k] = F::new(0.0);
         }
-        let first = first_of_leaf(links, node);
+        let first = first_of_leaf(&near.links, node);
         for j in first..end_of_leaf(first, n) {
-            let offset = Vector3::<F>::at(points, j).sub(center);
+            let offset = Vector3::<F>::at(&near.points, j).sub(center);
             if offset.dot(offset) <= radius * radius {
                 let d = offset.scale(F::new(1.0) / radius);
                 let w = weight::<F>(F::sqrt(d.dot(d)), epsilon::<F>());
@@ -130,7 +124,7 @@ pub(super) fn moments_within<F: Float>(
         for k in 0..MOMENTS {
             sums[k] += of_leaf[k];
         }
-        node = next_leaf::<F>(nodes, links, center, radius, node + 1, false);
+        node = next_leaf::<F>(&near.nodes, &near.links, center, radius, node + 1, false);
     }
     count
 }

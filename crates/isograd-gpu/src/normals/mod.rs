@@ -12,8 +12,8 @@
 //! cloud. `v₃ = n × v₂`. Of the pullback, `⟨B, C⟩ = 0`, and `B` is `n` and a vector `g` made of these.
 //!
 //! # Pullback
-//! As printed there. One walk over the tree gathers both what a point gets as a neighbor of others and what it
-//! hands out as a center, with the radius of each center. No atomics.
+//! That of [`isograd::normals`]. One walk over the tree gathers the cotangents of a point both as a neighbor of others and
+//! as a center, with the radius of each center. No atomics.
 //!
 //! # Not differentiable
 //! The neighborhoods, the radii, the sign. Where `λ₂ − λ₁` is at most `10⁻³ λ₃`, the pullback bounds
@@ -30,6 +30,7 @@ pub use widen::widen;
 
 use cubecl::prelude::*;
 
+use crate::device::launch;
 use crate::neighbors::{BLOCK, Neighborhoods};
 use crate::primitives::flags;
 use crate::{Buffer, Device, Error, Scalar};
@@ -45,7 +46,7 @@ const WEIGHT: usize = 12;
 /// Parts of 1000 of `λ₃` up to which the gap `λ₂ − λ₁` is too small for a normal to mean anything: as on the CPU.
 const SMALLEST_GAP: f32 = 1.0;
 
-/// What the pullback needs of [`forward`].
+/// Residual of [`forward`].
 #[derive(Clone, Debug)]
 pub struct Residual<T> {
     pub(crate) neighborhoods: Neighborhoods<T>,
@@ -68,13 +69,13 @@ impl<T: Scalar> Residual<T> {
             return Ok(0);
         }
         let guarded: Buffer<u32> = device.empty(n)?;
-        let (groups, dim) = (device.groups(n, BLOCK), CubeDim::new_1d(BLOCK));
-        flag_guarded::launch::<T, R>(
-            device.client(),
-            groups,
-            dim,
+        launch!(
+            device,
+            flag_guarded::<T>,
+            n,
+            BLOCK,
             self.planes.arg(),
-            guarded.arg(),
+            guarded.arg()
         );
         let total = flags::count(device, &guarded)?;
         Ok(device.download(&total)?[0] as usize)

@@ -7,14 +7,14 @@ use cubecl::prelude::*;
 
 use super::forward::epsilon;
 use super::{CENTROID, Residual, SMALLEST_GAP, TANGENT, VALUES, WEIGHT};
-use crate::device::check_length;
+use crate::device::{check_length, launch};
 use crate::element::plane;
-use crate::neighbors::{BLOCK, end_of_leaf, first_of_leaf, next_leaf};
+use crate::neighbors::{BLOCK, NeighborhoodArrays, end_of_leaf, first_of_leaf, next_leaf};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
-/// What the cotangents `normals_bar` `(N, 3)` of the axes (with the sign that [`forward`](super::forward) gave
-/// them; their part along the axis drops out) mean for the points: `(N, 3)`. Both in input order.
+/// Cotangents `(N, 3)` of the points for the cotangents `normals_bar` `(N, 3)` of the axes, with the sign that
+/// [`forward`](super::forward) gave them; their part along the axis drops out. Both in input order.
 ///
 /// # Errors
 /// [`Error::Length`], [`Error::TooLarge`].
@@ -31,27 +31,24 @@ pub fn pullback<R: Runtime, T: Scalar>(
         return Ok(points_bar);
     }
     let centers: Buffer<T> = device.empty(CENTER * n)?;
-    let (groups, dim) = (device.groups(n, BLOCK), CubeDim::new_1d(BLOCK));
-    fill_centers::launch::<T, R>(
-        device.client(),
-        groups.clone(),
-        dim,
+    launch!(
+        device,
+        fill_centers::<T>,
+        n,
+        BLOCK,
         residual.planes.arg(),
         near.places.arg(),
         normals_bar.arg(),
-        centers.arg(),
+        centers.arg()
     );
-    gather::launch::<T, R>(
-        device.client(),
-        groups,
-        dim,
-        near.points.arg(),
-        near.radii.arg(),
-        near.places.arg(),
-        near.nodes.arg(),
-        near.links.arg(),
+    launch!(
+        device,
+        gather::<T>,
+        n,
+        BLOCK,
+        near.arg(),
         centers.arg(),
-        points_bar.arg(),
+        points_bar.arg()
     );
     Ok(points_bar)
 }
@@ -59,7 +56,7 @@ pub fn pullback<R: Runtime, T: Scalar>(
 /// Numbers that a center hands out by: `ĝ/Ŵ`, `n` and `m̂`.
 const CENTER: usize = 9;
 
-/// The same numbers.
+/// Plane of a center, as its members need it.
 #[derive(CubeType, Clone, Copy)]
 struct Center<F: Float> {
     g: Vector3<F>,
@@ -138,31 +135,27 @@ fn slope<F: Float>(gap: F, largest: F, weight: F) -> F {
     select(extends, F::new(-1.0) / divisor, F::new(0.0))
 }
 
-/// What each point gets as a neighbor of the others, less what it hands out as a center.
+/// Cotangent of each point: the sum over the centers that it is a neighbor of, less the sum over its own neighbors.
 #[cube(launch)]
-fn gather<F: Float>(
-    points: &Array<F>,
-    radii: &Array<F>,
-    places: &Array<u32>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
+fn gather<F: Float + CubeElement>(
+    near: &NeighborhoodArrays<F>,
     centers: &Array<F>,
     points_bar: &mut Array<F>,
 ) {
-    let n = radii.len();
+    let n = near.radii.len();
     if ABSOLUTE_POS < n {
-        let point = Vector3::<F>::at(points, ABSOLUTE_POS);
-        let radius = radii[ABSOLUTE_POS];
+        let point = Vector3::<F>::at(&near.points, ABSOLUTE_POS);
+        let radius = near.radii[ABSOLUTE_POS];
         let inverse = F::new(1.0) / radius;
         let own = Center::<F>::at(centers, ABSOLUTE_POS);
         let mut x = F::new(0.0);
         let mut y = F::new(0.0);
         let mut z = F::new(0.0);
-        let mut node = next_leaf::<F>(nodes, links, point, radius, 0usize, true);
-        while node < links.len() {
-            let first = first_of_leaf(links, node);
+        let mut node = next_leaf::<F>(&near.nodes, &near.links, point, radius, 0usize, true);
+        while node < near.links.len() {
+            let first = first_of_leaf(&near.links, node);
             for j in first..end_of_leaf(first, n) {
-                let offset = Vector3::<F>::at(points, j).sub(point);
+                let offset = Vector3::<F>::at(&near.points, j).sub(point);
                 let square = offset.dot(offset);
                 if square <= radius * radius {
                     let out = own.offset_bar(offset.scale(inverse));
@@ -170,7 +163,7 @@ fn gather<F: Float>(
                     y -= out.y * inverse;
                     z -= out.z * inverse;
                 }
-                let other = radii[j];
+                let other = near.radii[j];
                 if square <= other * other {
                     let unit = F::new(1.0) / other;
                     let into = Center::<F>::at(centers, j).offset_bar(offset.scale(-unit));
@@ -179,9 +172,9 @@ fn gather<F: Float>(
                     z += into.z * unit;
                 }
             }
-            node = next_leaf::<F>(nodes, links, point, radius, node + 1, true);
+            node = next_leaf::<F>(&near.nodes, &near.links, point, radius, node + 1, true);
         }
         let sum = Vector3::<F> { x, y, z };
-        sum.write(points_bar, places[ABSOLUTE_POS] as usize);
+        sum.write(points_bar, near.places[ABSOLUTE_POS] as usize);
     }
 }

@@ -5,8 +5,9 @@ use isograd::normals::widen::{GAIN, RIM, ROUGH, STEPS};
 
 use super::forward::{MOMENTS, fit, moments_within};
 use super::{Residual, VALUES};
+use crate::device::launch;
 use crate::element::plane;
-use crate::neighbors::{BLOCK, scatter};
+use crate::neighbors::{BLOCK, NeighborhoodArrays, scatter};
 use crate::primitives::flags;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
@@ -28,48 +29,47 @@ pub fn widen<R: Runtime, T: Scalar>(
     if n == 0 {
         return Ok(widened);
     }
-    let (groups, dim) = (device.groups(n, BLOCK), CubeDim::new_1d(BLOCK));
-    begin_widening::launch::<T, R>(
-        device.client(),
-        groups.clone(),
-        dim,
+    launch!(
+        device,
+        begin_widening::<T>,
+        n,
+        BLOCK,
         residual.planes.arg(),
         near.radii.arg(),
         roughness.arg(),
-        widened.arg(),
+        widened.arg()
     );
     for step in STEPS {
         let rough: Buffer<u32> = device.empty(n)?;
-        flag_rough::launch::<T, R>(
-            device.client(),
-            groups.clone(),
-            dim,
+        launch!(
+            device,
+            flag_rough::<T>,
+            n,
+            BLOCK,
             roughness.arg(),
             rough.arg(),
-            <T as isograd::Real>::of(ROUGH),
+            <T as isograd::Real>::of(ROUGH)
         );
         let listed = flags::list(device, &rough)?;
-        try_wider::launch::<T, R>(
-            device.client(),
-            groups.clone(),
-            dim,
-            near.points.arg(),
-            near.radii.arg(),
-            near.nodes.arg(),
-            near.links.arg(),
+        launch!(
+            device,
+            try_wider::<T>,
+            n,
+            BLOCK,
+            near.arg(),
             listed.indices.arg(),
             listed.sums.arg(),
             roughness.arg(),
             widened.arg(),
             <T as isograd::Real>::of(step),
             <T as isograd::Real>::of(GAIN),
-            <T as isograd::Real>::of(RIM * RIM),
+            <T as isograd::Real>::of(RIM * RIM)
         );
     }
     scatter(device, &widened, &near.places)
 }
 
-/// Of ascending eigenvalues; as good as infinite where the smallest is no smaller than another.
+/// Roughness of a neighborhood from its ascending eigenvalues; practically infinite if the smallest equals another.
 #[cube]
 fn roughness<F: Float>(values: Vector3<F>) -> F {
     let mut found = F::new(0.0);
@@ -119,10 +119,7 @@ fn flag_rough<F: Float + CubeElement>(rough: &Array<F>, flags: &mut Array<u32>, 
 /// One unit tries one of the listed points, of which the last of `sums` says how many there are.
 #[cube(launch)]
 fn try_wider<F: Float + CubeElement>(
-    points: &Array<F>,
-    radii: &Array<F>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
+    near: &NeighborhoodArrays<F>,
     listed: &Array<u32>,
     sums: &Array<u32>,
     rough: &mut Array<F>,
@@ -134,10 +131,10 @@ fn try_wider<F: Float + CubeElement>(
     let count = sums[sums.len() - 1];
     if ABSOLUTE_POS < count as usize {
         let at = listed[ABSOLUTE_POS] as usize;
-        let center = Vector3::<F>::at(points, at);
-        let radius = step * radii[at];
+        let center = Vector3::<F>::at(&near.points, at);
+        let radius = step * near.radii[at];
         let mut sums = Array::<F>::new(MOMENTS);
-        moments_within::<F>(points, nodes, links, center, radius, &mut sums);
+        moments_within::<F>(near, center, radius, &mut sums);
         let fit = fit::<F>(&sums, 0usize, 1usize);
         let second = fit.eigen.second.dot(fit.centroid);
         let third = fit.eigen.third.dot(fit.centroid);

@@ -1,18 +1,18 @@
-//! One axis of the grid: how it is transformed, and the tables of that.
+//! One axis of the grid: how its lines are transformed, and the tables of that.
 
 use std::f64::consts::PI;
 
 use cubecl::prelude::*;
 
-use super::{lines, products};
+use super::lines;
 use crate::{Buffer, Device, Error, Scalar};
 
-/// The largest prime factor that is left to the transforms of lines: its pass takes a time that grows with
-/// it, and products with matrices waste less.
+/// The largest prime factor that has a pass of its own where the chirp transform fits: the time of a pass grows with
+/// its factor.
 const LARGEST_FACTOR: usize = 31;
 
 /// The lines of a field along one axis.
-#[derive(Clone, Copy)]
+#[derive(CubeLaunch, CubeType, Clone, Copy)]
 pub(super) struct Lines {
     /// Cells of a line.
     pub(super) n: usize,
@@ -30,104 +30,158 @@ impl Lines {
             count: shape.iter().product::<usize>() / shape[axis],
         }
     }
+
+    /// The lines as an argument of a kernel.
+    pub(super) fn arg<R: Runtime>(self) -> LinesLaunch<R> {
+        LinesLaunch::new(self.n, self.step, self.count)
+    }
 }
 
-/// Where cell `j` of a line is in the field; see [`Lines`].
+/// Where cell `j` of a line is in the field.
 #[cube]
-pub(super) fn cell_of_line(n: usize, step: usize, line: usize, j: usize) -> usize {
-    (line / step) * (n * step) + line % step + j * step
-}
-
-/// An axis of `n` cells.
-pub(super) struct Axis<T> {
-    pub(super) way: Way<T>,
+pub(super) fn cell_of_line(lines: &Lines, line: usize, j: usize) -> usize {
+    (line / lines.step) * (lines.n * lines.step) + line % lines.step + j * lines.step
 }
 
 /// How an axis is transformed.
-pub(super) enum Way<T> {
+pub(super) enum Axis<T> {
+    /// By Fourier transforms in shared memory.
     Fourier(Fourier<T>),
-    Products(Products<T>),
+    /// By the sums that define the cosine transform.
+    Sums(Sums<T>),
 }
 
-/// Tables of the Fourier transform of lines of `n` cells.
+/// Tables of the Fourier transform of lines of `n` cells, by passes over `m` numbers: `m = n`, or `m ≥ 2n − 1` for the
+/// chirp transform.
 pub(super) struct Fourier<T> {
-    /// Real and imaginary parts of `exp(−2πit/n)` for `t` in `0..n`, then of `exp(−πik/2n)`.
+    /// Real and imaginary parts of `exp(−2πit/m)` for `t` in `0..m`, then of `exp(−πik/2n)` for `k` in `0..n`.
     pub(super) roots: Buffer<T>,
-    /// The passes: their product is `n`.
+    /// The passes: their product is `m`.
     pub(super) radices: Buffer<u32>,
+    /// For the chirp transform: real and imaginary parts of `w_j = exp(−πij²/n)` for `j` in `0..n`, then of the Fourier
+    /// transform of `w̄`, over `m`.
+    pub(super) chirp: Option<Buffer<T>>,
+    /// `m`.
+    pub(super) length: usize,
 }
 
-/// Table of the cosine transform as a matrix.
-pub(super) struct Products<T> {
+/// Table of the sums that define the cosine transform.
+pub(super) struct Sums<T> {
     /// `2 cos(πt/2n)` for `t` in `0..4n`.
     pub(super) cosines: Buffer<T>,
 }
 
 impl<T: Scalar> Axis<T> {
+    /// The fastest way for an axis of `n` cells.
     pub(super) fn new<R: Runtime>(device: &Device<R>, n: usize) -> Result<Self, Error> {
-        let radices = radices(n);
-        let largest = radices.iter().max();
-        if n > lines::capacity::<R, T>(device) || largest.is_some_and(|&r| r > LARGEST_FACTOR) {
-            return Self::by_products(device, n);
+        let capacity = lines::capacity::<R, T>(device);
+        let largest = radices(n).into_iter().max().unwrap_or(1);
+        let padded = padded_length(n);
+        if largest > LARGEST_FACTOR && padded <= capacity {
+            Ok(Self::Fourier(Fourier::chirped(device, n, padded)?))
+        } else if n <= capacity {
+            Ok(Self::Fourier(Fourier::new(device, n)?))
+        } else {
+            Self::by_definition(device, n)
         }
-        let whole = |t: usize| 2.0 * PI * t as f64 / n as f64;
-        let quarter = |k: usize| PI * k as f64 / (2 * n) as f64;
-        let roots = (0..4 * n).map(|at| match (at / n, at % n) {
-            (0, t) => T::of(whole(t).cos()),
-            (1, t) => T::of(-whole(t).sin()),
-            (2, k) => T::of(quarter(k).cos()),
-            (_, k) => T::of(-quarter(k).sin()),
-        });
-        let radices: Vec<u32> = radices.iter().map(|&r| r as u32).collect();
-        let way = Way::Fourier(Fourier {
-            roots: device.upload(&roots.collect::<Vec<T>>())?,
-            radices: device.upload(&radices)?,
-        });
-        Ok(Self { way })
     }
 
-    pub(super) fn by_products<R: Runtime>(device: &Device<R>, n: usize) -> Result<Self, Error> {
-        if n > products::LONGEST {
-            return Err(Error::Axis {
-                cells: n,
-                limit: products::LONGEST,
-            });
-        }
+    /// An axis of `n` cells by sums, in `O(n²)` for a line.
+    pub(super) fn by_definition<R: Runtime>(device: &Device<R>, n: usize) -> Result<Self, Error> {
         let cosine = |t: usize| T::of(2.0 * (PI * t as f64 / (2 * n) as f64).cos());
         let cosines: Vec<T> = (0..4 * n).map(cosine).collect();
-        let way = Way::Products(Products {
-            cosines: device.upload(&cosines)?,
+        let cosines = device.upload(&cosines)?;
+        Ok(Self::Sums(Sums { cosines }))
+    }
+
+    /// Lines → `Y_k = 2 Σ_j x_j cos(πk(2j+1)/2n)`; or, if `inverse`, `Y` → lines times `2n`.
+    pub(super) fn transform<R: Runtime>(
+        &self,
+        device: &Device<R>,
+        lines: Lines,
+        from: &Buffer<T>,
+        to: &Buffer<T>,
+        inverse: bool,
+    ) {
+        match self {
+            Self::Fourier(fourier) => fourier.transform(device, lines, from, to, inverse),
+            Self::Sums(sums) => sums.transform(device, lines, from, to, inverse),
+        }
+    }
+}
+
+impl<T: Scalar> Fourier<T> {
+    /// By passes over the lines themselves.
+    fn new<R: Runtime>(device: &Device<R>, n: usize) -> Result<Self, Error> {
+        Self::with_length(device, n, n, None)
+    }
+
+    /// By the chirp transform, a cyclic convolution of `length` numbers.
+    fn chirped<R: Runtime>(device: &Device<R>, n: usize, length: usize) -> Result<Self, Error> {
+        let chirp: Vec<[f64; 2]> = (0..n)
+            .map(|j| {
+                let (sin, cos) = (PI * (j * j % (2 * n)) as f64 / n as f64).sin_cos();
+                [cos, -sin]
+            })
+            .collect();
+        let mut kernel = vec![[0.0; 2]; length];
+        for (j, &[re, im]) in chirp.iter().enumerate() {
+            kernel[j] = [re, -im];
+            kernel[(length - j) % length] = [re, -im];
+        }
+        let kernel = fourier_transform(&kernel);
+        let parts = |numbers: &[[f64; 2]], scale: f64| -> Vec<T> {
+            let part = |p: usize| numbers.iter().map(move |number| T::of(number[p] * scale));
+            part(0).chain(part(1)).collect()
+        };
+        let mut table = parts(&chirp, 1.0);
+        table.extend(parts(&kernel, 1.0 / length as f64));
+        Self::with_length(device, n, length, Some(device.upload(&table)?))
+    }
+
+    fn with_length<R: Runtime>(
+        device: &Device<R>,
+        n: usize,
+        length: usize,
+        chirp: Option<Buffer<T>>,
+    ) -> Result<Self, Error> {
+        let whole = (0..length).map(|t| 2.0 * PI * t as f64 / length as f64);
+        let quarter = (0..n).map(|k| PI * k as f64 / (2 * n) as f64);
+        let roots = (whole.clone().map(f64::cos))
+            .chain(whole.map(|angle| -angle.sin()))
+            .chain(quarter.clone().map(f64::cos))
+            .chain(quarter.map(|angle| -angle.sin()));
+        let radices: Vec<u32> = radices(length).iter().map(|&r| r as u32).collect();
+        Ok(Self {
+            roots: device.upload(&roots.map(T::of).collect::<Vec<T>>())?,
+            radices: device.upload(&radices)?,
+            chirp,
+            length,
+        })
+    }
+}
+
+/// The Fourier transform of complex numbers, by its definition.
+fn fourier_transform(numbers: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let n = numbers.len();
+    let roots: Vec<(f64, f64)> = (0..n)
+        .map(|t| (2.0 * PI * t as f64 / n as f64).sin_cos())
+        .collect();
+    let transformed = (0..n).map(|k| {
+        let terms = numbers.iter().enumerate().map(|(j, &[re, im])| {
+            let (sin, cos) = roots[j * k % n];
+            [re * cos + im * sin, im * cos - re * sin]
         });
-        Ok(Self { way })
-    }
+        terms.fold([0.0; 2], |[a, b], [re, im]| [a + re, b + im])
+    });
+    transformed.collect()
+}
 
-    /// Lines → `Y_k = 2 Σ_j x_j cos(πk(2j+1)/2n)`.
-    pub(super) fn forward<R: Runtime>(
-        &self,
-        device: &Device<R>,
-        lines: Lines,
-        from: &Buffer<T>,
-        to: &Buffer<T>,
-    ) {
-        match &self.way {
-            Way::Fourier(fourier) => fourier.transform(device, lines, from, to, false),
-            Way::Products(products) => products.forward(device, lines, from, to, None),
-        }
-    }
-
-    /// `2n` times the inverse of [`Self::forward`].
-    pub(super) fn inverse<R: Runtime>(
-        &self,
-        device: &Device<R>,
-        lines: Lines,
-        from: &Buffer<T>,
-        to: &Buffer<T>,
-    ) {
-        match &self.way {
-            Way::Fourier(fourier) => fourier.transform(device, lines, from, to, true),
-            Way::Products(products) => products.inverse(device, lines, from, to),
-        }
-    }
+/// The least length of a chirp transform of `n` numbers that has only factors 2, 3 and 5.
+fn padded_length(n: usize) -> usize {
+    (2 * n.max(1) - 1..)
+        .find(|&m| radices(m).iter().all(|&radix| radix <= 5))
+        .expect("powers of two have no end")
 }
 
 /// Factors of `n`: fours first, then primes.

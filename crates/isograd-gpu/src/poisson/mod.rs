@@ -6,11 +6,12 @@
 //! those of [`isograd::poisson::spectrum`], and the constant mode is set to 0. A value that is not finite
 //! spreads to all others.
 //!
-//! Each axis is transformed in shared memory, two lines as one complex line, in `O(n log n)`
-//! (J. Makhoul, *A fast cosine transform in one and two dimensions*, IEEE Trans. ASSP 28, 1980) where its
-//! length has no large prime factor and a line fits; otherwise by products with the matrix of cosines, in
-//! `O(n²)`. The last axis to be transformed is the first to be transformed back, and `G/λ` is applied between:
-//! in the same kernel where it has the fast way. Besides `b`, two fields are in memory.
+//! Each axis is transformed in shared memory, two lines as one complex line, in `O(n log n)` (J. Makhoul, *A fast
+//! cosine transform in one and two dimensions*, IEEE Trans. ASSP 28, 1980). A length with a large prime factor takes
+//! the chirp transform (L. Bluestein, *A linear filtering approach to the computation of discrete Fourier transform*,
+//! IEEE Trans. AU 18, 1970) or, from half the shared memory on, a pass in `O(n²)`. A line that does not fit in shared
+//! memory is transformed by plain sums. The last axis to be transformed is the first to be transformed back, and `G/λ`
+//! is applied between: in the same kernel, if a line fits. Besides `b`, two fields are in memory.
 //!
 //! # Residual
 //! `σ` and `χ`, which share the memory of the result. `b̄` needs the first, `σ̄` both.
@@ -25,23 +26,22 @@
 mod axis;
 mod gain;
 mod lines;
-mod products;
 pub mod screened;
 pub mod smoothing;
+mod sums;
 
 use cubecl::prelude::Runtime;
 use isograd::poisson::spectrum;
 
 use crate::device::check_length;
 use crate::{Buffer, Device, Error, Scalar};
-use axis::{Axis, Lines, Way};
+use axis::{Axis, Lines};
 use gain::Gains;
 
-/// What a grid's Poisson equation has that does not depend on its right-hand side: tables on the device. Made
-/// once, used for every solve.
+/// Plan of the Poisson equation of a grid: tables on the device that do not depend on the right-hand side.
 pub struct Solver<T> {
     shape: [usize; 3],
-    /// The same field with axes of one cell moved from the front to the end: the first one, where the gains
+    /// Shape of the field with axes of one cell moved from the front to the end: the first one, where the gains
     /// are applied, has more if any has.
     turned: [usize; 3],
     /// The first axis and others of more than one cell, of `turned`, in the order of the transforms back.
@@ -50,7 +50,7 @@ pub struct Solver<T> {
     spectrum: Buffer<T>,
 }
 
-/// What the pullback of a solve needs.
+/// Residual of a solve.
 pub struct Residual<T> {
     /// `σ` in cells.
     pub smoothing: f64,
@@ -58,7 +58,7 @@ pub struct Residual<T> {
     pub chi: Buffer<T>,
 }
 
-/// Cotangents of what a solve was given.
+/// Cotangents of the inputs of a solve.
 pub struct Cotangents<T> {
     /// `b̄`, one value per cell.
     pub b: Buffer<T>,
@@ -88,7 +88,7 @@ pub fn forward<R: Runtime, T: Scalar>(
 /// From `χ̄` to `b̄` and `σ̄`.
 ///
 /// # Errors
-/// As [`forward`].
+/// Like [`forward`].
 pub fn pullback<R: Runtime, T: Scalar>(
     device: &Device<R>,
     solver: &Solver<T>,
@@ -106,19 +106,18 @@ impl<T: Scalar> Solver<T> {
     /// For grids of `(nx, ny, nz)` cells, of any size, primes included.
     ///
     /// # Errors
-    /// [`Error::NoNumber`] if the device doesn't calculate in `T`, or [`Error::Axis`] for an axis of more than
-    /// 741,455 cells.
+    /// [`Error::NoNumber`] if the device doesn't calculate in `T`, or [`Error::TooLarge`] for tables that it cannot
+    /// hold.
     pub fn new<R: Runtime>(device: &Device<R>, shape: [usize; 3]) -> Result<Self, Error> {
         Self::of_axes(device, shape, Axis::new)
     }
 
-    /// As [`Self::new`], by products with matrices along every axis: `O(n⁴)` for `n³` cells, and another
-    /// way to the same numbers.
+    /// Like [`Self::new`], with the sums that define the transforms, `O(n⁴)` for `n³` cells: an oracle.
     ///
     /// # Errors
-    /// As [`Self::new`].
-    pub fn by_products<R: Runtime>(device: &Device<R>, shape: [usize; 3]) -> Result<Self, Error> {
-        Self::of_axes(device, shape, Axis::by_products)
+    /// Like [`Self::new`].
+    pub fn by_definition<R: Runtime>(device: &Device<R>, shape: [usize; 3]) -> Result<Self, Error> {
+        Self::of_axes(device, shape, Axis::by_definition)
     }
 
     fn of_axes<R: Runtime>(
@@ -162,7 +161,7 @@ impl<T: Scalar> Solver<T> {
     /// `χ` for the right-hand side `b`: [`forward`] without its residual. Its own transpose.
     ///
     /// # Errors
-    /// As [`forward`].
+    /// Like [`forward`].
     pub fn solve<R: Runtime>(
         &self,
         device: &Device<R>,
@@ -181,24 +180,30 @@ impl<T: Scalar> Solver<T> {
         let (first, others) = self.axes.split_first().expect("an axis");
         for (a, axis) in others.iter().rev() {
             let lines = Lines::new(self.turned, *a);
-            fields.step(device, |from, to| axis.forward(device, lines, from, to))?;
+            fields.step(device, |from, to| {
+                axis.transform(device, lines, from, to, false)
+            })?;
         }
         let (a, axis) = first;
         let lines = Lines::new(self.turned, *a);
-        match &axis.way {
-            Way::Fourier(fourier) => fields.step(device, |from, to| {
+        if let Axis::Fourier(fourier) = axis {
+            fields.step(device, |from, to| {
                 fourier.filter(device, lines, from, to, &gains)
-            })?,
-            Way::Products(products) => {
-                fields.step(device, |from, to| {
-                    products.forward(device, lines, from, to, Some(&gains))
-                })?;
-                fields.step(device, |from, to| products.inverse(device, lines, from, to))?;
-            }
+            })?;
+        } else {
+            fields.step(device, |from, to| {
+                axis.transform(device, lines, from, to, false)
+            })?;
+            fields.step(device, |from, to| sums::filter(device, from, to, &gains))?;
+            fields.step(device, |from, to| {
+                axis.transform(device, lines, from, to, true)
+            })?;
         }
         for (a, axis) in others {
             let lines = Lines::new(self.turned, *a);
-            fields.step(device, |from, to| axis.inverse(device, lines, from, to))?;
+            fields.step(device, |from, to| {
+                axis.transform(device, lines, from, to, true)
+            })?;
         }
         Ok(fields.last)
     }
@@ -220,10 +225,10 @@ impl<T: Scalar> Solver<T> {
     }
 }
 
-/// The fields of a solve: what the last kernel wrote, and room for the next.
+/// Fields of a solve: the output of the last kernel, and a buffer for the next.
 struct Fields<T> {
     last: Buffer<T>,
-    /// Whether `last` is what was given, not to be written.
+    /// Whether `last` is the caller's input, which is not written to.
     given: bool,
     spare: Option<Buffer<T>>,
 }

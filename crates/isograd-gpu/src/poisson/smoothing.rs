@@ -1,11 +1,11 @@
-//! What more smoothing would do: [`isograd::poisson::smoothing::pullback`] on a device.
+//! Cotangent of the smoothing: [`isograd::poisson::smoothing::pullback`] on a device.
 //!
 //! With `L` the sum of second differences along the axes, even at the walls, `χ·Lχ̄ = −Σ ∇χ·∇χ̄` over the
 //! differences of neighboring cells: fewer terms, and smaller ones.
 
 use cubecl::prelude::*;
 
-use crate::device::check_length;
+use crate::device::{check_length, launch};
 use crate::primitives::reduce::{self, BLOCK, sum_of_group};
 use crate::{Buffer, Device, Error, Scalar};
 
@@ -32,22 +32,23 @@ pub fn pullback<R: Runtime, T: Scalar>(
     }
     let [nx, ny, nz] = shape;
     let sums: Buffer<T> = device.empty(cells.div_ceil(BLOCK * OWN))?;
-    sum_products::launch::<T, R>(
-        device.client(),
-        device.groups(sums.len() * BLOCK, BLOCK as u32),
-        CubeDim::new_1d(BLOCK as u32),
+    launch!(
+        device,
+        sum_products::<T>,
+        sums.len() * BLOCK,
+        BLOCK as u32,
         chi.arg(),
         chi_bar.arg(),
         sums.arg(),
         T::of(-smoothing),
         nx,
         ny,
-        nz,
+        nz
     );
     reduce::sum(device, &sums)
 }
 
-/// Of the cells of a group, `factor` times the sum of products of differences.
+/// `factor` times the sum of products of differences, for each group of cells.
 #[cube(launch)]
 fn sum_products<F: Float + CubeElement>(
     chi: &Array<F>,

@@ -2,7 +2,7 @@
 
 use cubecl::prelude::*;
 
-use crate::device::check_length;
+use crate::device::{check_length, launch};
 use crate::{Buffer, Device, Error, Scalar};
 
 const BLOCK: u32 = 256;
@@ -13,8 +13,7 @@ const BLOCK: u32 = 256;
 /// [`Error::TooLarge`].
 pub fn zeros<R: Runtime, T: Scalar>(device: &Device<R>, len: usize) -> Result<Buffer<T>, Error> {
     let out = device.empty(len)?;
-    let (groups, dim) = (device.groups(len, BLOCK), CubeDim::new_1d(BLOCK));
-    fill_zeros::launch::<T, R>(device.client(), groups, dim, out.arg());
+    launch!(device, fill_zeros::<T>, len, BLOCK, out.arg());
     Ok(out)
 }
 
@@ -41,9 +40,15 @@ pub fn add_scaled<R: Runtime, T: Scalar>(
     out: &Buffer<T>,
 ) -> Result<(), Error> {
     check_length("the array to add", values, out.len())?;
-    let (groups, dim) = (device.groups(out.len(), BLOCK), CubeDim::new_1d(BLOCK));
-    let client = device.client();
-    add_values::launch::<T, R>(client, groups, dim, values.arg(), factor, out.arg());
+    launch!(
+        device,
+        add_values::<T>,
+        out.len(),
+        BLOCK,
+        values.arg(),
+        factor,
+        out.arg()
+    );
     Ok(())
 }
 

@@ -3,6 +3,7 @@
 use cubecl::prelude::*;
 
 use super::scan::exclusive_sum;
+use crate::device::launch;
 use crate::{Buffer, Device, Error};
 
 const BLOCK: u32 = 256;
@@ -14,12 +15,13 @@ pub(crate) fn first<R: Runtime>(
 ) -> Result<Option<usize>, Error> {
     let sums = exclusive_sum(device, flags)?;
     let found: Buffer<u32> = device.empty(2)?;
-    find_first::launch::<R>(
-        device.client(),
-        device.groups(sums.len(), BLOCK),
-        CubeDim::new_1d(BLOCK),
+    launch!(
+        device,
+        find_first,
+        sums.len(),
+        BLOCK,
         sums.arg(),
-        found.arg(),
+        found.arg()
     );
     let found = device.download(&found)?;
     Ok((found[0] > 0).then_some(found[1] as usize))
@@ -32,8 +34,7 @@ pub(crate) fn count<R: Runtime>(
 ) -> Result<Buffer<u32>, Error> {
     let sums = exclusive_sum(device, flags)?;
     let total = device.empty(1)?;
-    let (groups, dim) = (device.groups(1, 1), CubeDim::new_1d(1));
-    take_last::launch::<R>(device.client(), groups, dim, sums.arg(), total.arg(), 0);
+    launch!(device, take_last, 1, 1, sums.arg(), total.arg(), 0);
     Ok(total)
 }
 
@@ -58,13 +59,14 @@ pub(crate) fn indices<R: Runtime>(
     len: usize,
 ) -> Result<Buffer<u32>, Error> {
     let (flags, indices) = (sums.len() - 1, device.empty(len)?);
-    write_indices::launch::<R>(
-        device.client(),
-        device.groups(flags, BLOCK),
-        CubeDim::new_1d(BLOCK),
+    launch!(
+        device,
+        write_indices,
+        flags,
+        BLOCK,
         sums.arg(),
         indices.arg(),
-        flags as u32,
+        flags as u32
     );
     Ok(indices)
 }
@@ -77,14 +79,7 @@ pub(crate) fn totals<R: Runtime, const N: usize>(
 ) -> Result<[usize; N], Error> {
     let last: Buffer<u32> = device.empty(N)?;
     for (k, sums) in sums.into_iter().enumerate() {
-        take_last::launch::<R>(
-            device.client(),
-            device.groups(1, 1),
-            CubeDim::new_1d(1),
-            sums.arg(),
-            last.arg(),
-            k as u32,
-        );
+        launch!(device, take_last, 1, 1, sums.arg(), last.arg(), k as u32);
     }
     let last = device.download(&last)?;
     Ok(std::array::from_fn(|k| last[k] as usize))
@@ -97,13 +92,14 @@ pub(crate) fn sum_of_all<R: Runtime>(
 ) -> Result<Buffer<u32>, Error> {
     let ends: Buffer<u32> = device.empty(arrays.len())?;
     for (k, array) in arrays.iter().enumerate() {
-        take_last::launch::<R>(
-            device.client(),
-            device.groups(1, 1),
-            CubeDim::new_1d(1),
+        launch!(
+            device,
+            take_last,
+            1,
+            1,
             exclusive_sum(device, array)?.arg(),
             ends.arg(),
-            k as u32,
+            k as u32
         );
     }
     count(device, &ends)

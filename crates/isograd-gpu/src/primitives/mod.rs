@@ -1,4 +1,4 @@
-//! What several stages need: sums from the beginning, orders, totals, extremes, flags, medians of a few numbers.
+//! Building blocks of several stages: prefix sums, orders, totals, extremes, flags, medians of a few numbers.
 
 pub(crate) mod ends;
 pub mod fill;

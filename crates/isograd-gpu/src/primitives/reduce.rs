@@ -2,7 +2,7 @@
 
 use cubecl::prelude::*;
 
-use crate::device::check_length;
+use crate::device::{check_length, launch};
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Units of a group of a kernel that sums.
@@ -43,15 +43,16 @@ pub fn sum_columns<R: Runtime, T: Scalar>(
     check_length("the array to sum", values, rows * columns)?;
     let groups = rows.div_ceil(BLOCK * STEPS).max(1);
     let sums: Buffer<T> = device.empty(groups * columns)?;
-    sum_spans::launch::<T, R>(
-        device.client(),
-        device.groups(groups * BLOCK, BLOCK as u32),
-        CubeDim::new_1d(BLOCK as u32),
+    launch!(
+        device,
+        sum_spans::<T>,
+        groups * BLOCK,
+        BLOCK as u32,
         values.arg(),
         sums.arg(),
         rows as u32,
         groups as u32,
-        columns,
+        columns
     );
     match groups {
         1 => Ok(sums),
@@ -85,7 +86,7 @@ fn sum_spans<F: Float>(
     }
 }
 
-/// The sum of the values that the `BLOCK` units of a group have, by halves. Every unit must call it.
+/// Sum of the values of the `BLOCK` units of a group, by halves. Every unit must call it.
 #[cube]
 pub(crate) fn sum_of_group<N: Numeric>(value: N, shared: &mut SharedMemory<N>) -> N {
     let unit = UNIT_POS as usize;

@@ -2,6 +2,7 @@
 
 use cubecl::prelude::*;
 
+use crate::device::launch;
 use crate::{Buffer, Device, Error};
 
 /// Units of a group, and elements that it sums.
@@ -20,25 +21,27 @@ pub fn exclusive_sum<R: Runtime>(
     let blocks = (count + 1).div_ceil(BLOCK);
     let sums: Buffer<u32> = device.empty(count + 1)?;
     let totals: Buffer<u32> = device.empty(blocks)?;
-    sum_blocks::launch::<R>(
-        device.client(),
-        device.groups(blocks * BLOCK, BLOCK as u32),
-        CubeDim::new_1d(BLOCK as u32),
+    launch!(
+        device,
+        sum_blocks,
+        blocks * BLOCK,
+        BLOCK as u32,
         values.arg(),
         sums.arg(),
         totals.arg(),
         count as u32,
-        BLOCK,
+        BLOCK
     );
     if blocks > 1 {
         let before = exclusive_sum(device, &totals)?;
-        add_blocks::launch::<R>(
-            device.client(),
-            device.groups(count + 1, BLOCK as u32),
-            CubeDim::new_1d(BLOCK as u32),
+        launch!(
+            device,
+            add_blocks,
+            count + 1,
+            BLOCK as u32,
             before.arg(),
             sums.arg(),
-            BLOCK,
+            BLOCK
         );
     }
     Ok(sums)

@@ -8,6 +8,7 @@
 use cubecl::prelude::*;
 
 use super::scan::exclusive_sum;
+use crate::device::launch;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Units of a group.
@@ -16,10 +17,10 @@ const BLOCK: u32 = 256;
 /// Most elements of a piece.
 pub(crate) const PIECE: usize = 64;
 
-/// Stands for the segment of a piece that is not there.
+/// Segment of an unused row of the table of pieces.
 pub(crate) const NO_SEGMENT: u32 = u32::MAX;
 
-/// The pieces that segments are cut into. Clones share the memory.
+/// Pieces of segments. Clones share the memory.
 #[derive(Clone)]
 pub(crate) struct Pieces {
     /// `(P, 3)`: segment, first element, and one past the last; [`NO_SEGMENT`] in those that are too many.
@@ -28,8 +29,8 @@ pub(crate) struct Pieces {
     pub starts: Buffer<u32>,
 }
 
-/// Where the rows of a sum are.
-#[derive(Clone, Copy)]
+/// Layout of the rows of a sum in memory.
+#[derive(Clone, Copy, Debug, Hash, PartialEq, Eq)]
 pub(crate) struct Rows {
     /// Numbers of a row, each summed for itself.
     pub width: usize,
@@ -59,30 +60,31 @@ impl Pieces {
         elements: usize,
     ) -> Result<Self, Error> {
         let segments = starts.len() - 1;
-        let dim = CubeDim::new_1d(BLOCK);
         let counts = device.empty(segments)?;
-        count_pieces::launch::<R>(
-            device.client(),
-            device.groups(segments, BLOCK),
-            dim,
+        launch!(
+            device,
+            count_pieces,
+            segments,
+            BLOCK,
             starts.arg(),
             counts.arg(),
             segments as u32,
-            PIECE as u32,
+            PIECE as u32
         );
         let first = exclusive_sum(device, &counts)?;
         let most = segments + elements / PIECE;
         let table = device.empty(3 * most)?;
-        list_pieces::launch::<R>(
-            device.client(),
-            device.groups(most, BLOCK),
-            dim,
+        launch!(
+            device,
+            list_pieces,
+            most,
+            BLOCK,
             starts.arg(),
             first.arg(),
             table.arg(),
             segments as u32,
             most as u32,
-            PIECE as u32,
+            PIECE as u32
         );
         Ok(Self {
             table,
@@ -110,7 +112,7 @@ pub(crate) fn sum_rows<T: Scalar, R: Runtime>(
     sum_rows_in(device, values, rows, places, pieces, elements)
 }
 
-/// The same for segments that are cut already.
+/// Like [`sum_rows`], for segments that are cut already.
 pub(crate) fn sum_rows_in<T: Scalar, R: Runtime>(
     device: &Device<R>,
     values: &Buffer<T>,
@@ -120,19 +122,18 @@ pub(crate) fn sum_rows_in<T: Scalar, R: Runtime>(
     elements: usize,
 ) -> Result<Buffer<T>, Error> {
     let sums = device.empty(pieces.most() * rows.width)?;
-    sum_pieces::launch::<T, R>(
-        device.client(),
-        device.groups(sums.len(), BLOCK),
-        CubeDim::new_1d(BLOCK),
+    launch!(
+        device,
+        sum_pieces::<T>,
+        sums.len(),
+        BLOCK,
         values.arg(),
         places.unwrap_or(&device.empty(0)?).arg(),
         pieces.table.arg(),
         sums.arg(),
         pieces.most() as u32,
-        rows.width,
-        rows.group,
-        rows.pitch,
-        places.is_some(),
+        rows,
+        places.is_some()
     );
     join_pieces(device, sums, rows.width, pieces, elements)
 }
@@ -151,33 +152,33 @@ pub(crate) fn join_pieces<T: Scalar, R: Runtime>(
         let (rows, count) = (Rows::dense(width), pieces.most());
         let finer = Pieces::new(device, &pieces.starts, count)?;
         let joined = device.empty(finer.most() * width)?;
-        sum_pieces::launch::<T, R>(
-            device.client(),
-            device.groups(joined.len(), BLOCK),
-            CubeDim::new_1d(BLOCK),
+        launch!(
+            device,
+            sum_pieces::<T>,
+            joined.len(),
+            BLOCK,
             sums.arg(),
             device.empty::<u32>(0)?.arg(),
             finer.table.arg(),
             joined.arg(),
             finer.most() as u32,
-            rows.width,
-            rows.group,
-            rows.pitch,
-            false,
+            rows,
+            false
         );
         return join_pieces(device, joined, width, finer, most);
     }
     let segments = pieces.starts.len() - 1;
     let joined = device.empty(segments * width)?;
-    sum_segments::launch::<T, R>(
-        device.client(),
-        device.groups(joined.len(), BLOCK),
-        CubeDim::new_1d(BLOCK),
+    launch!(
+        device,
+        sum_segments::<T>,
+        joined.len(),
+        BLOCK,
         sums.arg(),
         pieces.starts.arg(),
         joined.arg(),
         segments as u32,
-        width,
+        width
     );
     Ok(joined)
 }
@@ -235,13 +236,11 @@ fn sum_pieces<F: Float>(
     table: &Array<u32>,
     sums: &mut Array<F>,
     most: u32,
-    #[comptime] width: usize,
-    #[comptime] group: usize,
-    #[comptime] pitch: usize,
+    #[comptime] rows: Rows,
     #[comptime] by_place: bool,
 ) {
-    let piece = ABSOLUTE_POS / width;
-    let column = ABSOLUTE_POS % width;
+    let piece = ABSOLUTE_POS / rows.width;
+    let column = ABSOLUTE_POS % rows.width;
     if piece < most as usize {
         let mut sum = F::new(0.0);
         for element in table[piece * 3 + 1]..table[piece * 3 + 2] {
@@ -249,7 +248,7 @@ fn sum_pieces<F: Float>(
             if comptime!(by_place) {
                 row = places[element as usize] as usize;
             }
-            sum += values[row / group * pitch + row % group * width + column];
+            sum += values[row / rows.group * rows.pitch + row % rows.group * rows.width + column];
         }
         sums[ABSOLUTE_POS] = sum;
     }

@@ -3,6 +3,7 @@
 use cubecl::prelude::*;
 
 use super::scan::exclusive_sum;
+use crate::device::launch;
 use crate::{Buffer, Device, Error};
 
 /// Bits of a key that one pass orders by.
@@ -48,11 +49,7 @@ pub(crate) fn as_they_are<R: Runtime>(
     count: usize,
 ) -> Result<Buffer<u32>, Error> {
     let places = device.empty(count)?;
-    let (groups, dim) = (
-        device.groups(count, BLOCK as u32),
-        CubeDim::new_1d(BLOCK as u32),
-    );
-    fill_places::launch::<R>(device.client(), groups, dim, places.arg());
+    launch!(device, fill_places, count, BLOCK as u32, places.arg());
     Ok(places)
 }
 
@@ -67,13 +64,14 @@ pub fn starts<R: Runtime>(
     limit: u32,
 ) -> Result<Buffer<u32>, Error> {
     let starts = device.empty(limit as usize + 1)?;
-    fill_starts::launch::<R>(
-        device.client(),
-        device.groups(starts.len(), BLOCK as u32),
-        CubeDim::new_1d(BLOCK as u32),
+    launch!(
+        device,
+        fill_starts,
+        starts.len(),
+        BLOCK as u32,
         keys.arg(),
         starts.arg(),
-        keys.len() as u32,
+        keys.len() as u32
     );
     Ok(starts)
 }
@@ -86,41 +84,58 @@ impl Order {
         let blocks = count.div_ceil(BLOCK);
         let counts: Buffer<u32> = device.empty(blocks * BLOCK)?;
         let ranks: Buffer<u32> = device.empty(count)?;
-        let dim = CubeDim::new_1d(BLOCK as u32);
-        let groups = device.groups(count, BLOCK as u32);
-        rank_digits::launch::<R>(
-            device.client(),
-            groups.clone(),
-            dim,
+        let digit = Digit {
+            count: count as u32,
+            blocks: blocks as u32,
+            shift,
+        };
+        launch!(
+            device,
+            rank_digits,
+            count,
+            BLOCK as u32,
             self.keys.arg(),
             ranks.arg(),
             counts.arg(),
-            count as u32,
-            blocks as u32,
-            shift,
-            BLOCK,
+            digit.arg(),
+            BLOCK
         );
         let before = exclusive_sum(device, &counts)?;
         let next = Self {
             keys: device.empty(count)?,
             places: device.empty(count)?,
         };
-        move_to_ranks::launch::<R>(
-            device.client(),
-            groups,
-            dim,
+        launch!(
+            device,
+            move_to_ranks,
+            count,
+            BLOCK as u32,
             self.keys.arg(),
             self.places.arg(),
             ranks.arg(),
             before.arg(),
             next.keys.arg(),
             next.places.arg(),
-            count as u32,
-            blocks as u32,
-            shift,
-            BLOCK,
+            digit.arg(),
+            BLOCK
         );
         Ok(next)
+    }
+}
+
+/// A digit of keys that are ranked in blocks.
+#[derive(CubeLaunch, CubeType, Clone, Copy)]
+struct Digit {
+    /// Number of keys.
+    count: u32,
+    blocks: u32,
+    /// Lowest bit of the digit.
+    shift: u32,
+}
+
+impl Digit {
+    fn arg<R: Runtime>(self) -> DigitLaunch<R> {
+        DigitLaunch::new(self.count, self.blocks, self.shift)
     }
 }
 
@@ -137,20 +152,18 @@ fn rank_digits(
     keys: &Array<u32>,
     ranks: &mut Array<u32>,
     counts: &mut Array<u32>,
-    count: u32,
-    blocks: u32,
-    shift: u32,
+    digit: Digit,
     #[comptime] block: usize,
 ) {
     let mut digits = SharedMemory::<u32>::new(block);
     let mut of_digit = SharedMemory::<u32>::new(block);
     let unit = UNIT_POS as usize;
     let at = CUBE_POS * block + unit;
-    let is_key = at < count as usize;
+    let is_key = at < digit.count as usize;
     // No digit, where there is no key.
     let mut own = (block as u32).runtime();
     if is_key {
-        own = digit(keys[at], shift, block);
+        own = digit_of(keys[at], digit.shift, block);
     }
     digits[unit] = own;
     of_digit[unit] = 0u32;
@@ -169,14 +182,14 @@ fn rank_digits(
         }
     }
     sync_cube();
-    if CUBE_POS < blocks as usize {
-        counts[unit * blocks as usize + CUBE_POS] = of_digit[unit];
+    if CUBE_POS < digit.blocks as usize {
+        counts[unit * digit.blocks as usize + CUBE_POS] = of_digit[unit];
     }
 }
 
 /// The digit of a key, of so many values.
 #[cube]
-fn digit(key: u32, shift: u32, #[comptime] values: usize) -> u32 {
+fn digit_of(key: u32, shift: u32, #[comptime] values: usize) -> u32 {
     (key >> shift) & (values as u32 - 1u32)
 }
 
@@ -188,14 +201,13 @@ fn move_to_ranks(
     before: &Array<u32>,
     new_keys: &mut Array<u32>,
     new_places: &mut Array<u32>,
-    count: u32,
-    blocks: u32,
-    shift: u32,
+    digit: Digit,
     #[comptime] block: usize,
 ) {
-    if ABSOLUTE_POS < count as usize {
+    if ABSOLUTE_POS < digit.count as usize {
         let key = keys[ABSOLUTE_POS];
-        let of_block = digit(key, shift, block) * blocks + (ABSOLUTE_POS / block) as u32;
+        let of_block =
+            digit_of(key, digit.shift, block) * digit.blocks + (ABSOLUTE_POS / block) as u32;
         let to = (before[of_block as usize] + ranks[ABSOLUTE_POS]) as usize;
         new_keys[to] = key;
         new_places[to] = places[ABSOLUTE_POS];

@@ -20,7 +20,20 @@ pub struct SampleCotangent<T> {
     pub grid: Buffer<T>,
 }
 
+/// [`SampleCotangent`] in kernels, but for the grid.
+#[derive(CubeLaunch, CubeType)]
+pub(crate) struct CotangentArrays<F: Float + CubeElement> {
+    pub points: Array<F>,
+    pub normals: Array<F>,
+    pub areas: Array<F>,
+}
+
 impl<T: Scalar> SampleCotangent<T> {
+    /// The cotangents of the samples as an argument of a kernel.
+    pub(crate) fn arg<R: Runtime>(&self) -> CotangentArraysLaunch<T, R> {
+        CotangentArraysLaunch::new(self.points.arg(), self.normals.arg(), self.areas.arg())
+    }
+
     /// Zeros for `count` samples.
     ///
     /// # Errors
@@ -42,8 +55,8 @@ impl<T: Scalar> SampleCotangent<T> {
     }
 }
 
-/// What the points' cotangents of a group mean for the grid, at fixed points: less their sum for the low
-/// corner, and less the sum of `spacing` for the cell size. Every unit must call it.
+/// Cotangent of the grid at fixed points, from the cotangents of the points of a group: their negative sum for the low
+/// corner, and the negative sum of `spacing` for the cell size. Every unit must call it.
 #[cube]
 pub(crate) fn subtract_from_grid<F: Float>(x: F, y: F, z: F, spacing: F, grid_sums: &mut Array<F>) {
     let mut shared = SharedMemory::<F>::new(BLOCK);

@@ -2,8 +2,10 @@
 
 use cubecl::prelude::*;
 
-use super::stencil::{BSpline, NUMBERS, Paper, REACH, hats, total};
-use super::{Residual, SampleOrder, Samples, Weights};
+use super::stencil::{BSpline, NUMBERS, Paper, REACH, total};
+use super::{Residual, SampleArrays, SampleOrder, Samples, Weights};
+use crate::device::launch;
+use crate::element::stencil::hat;
 use crate::grid::{self, Lattice, cell_at, from_center, place};
 use crate::spread::{Before, spread};
 use crate::{Buffer, Device, Error, Scalar};
@@ -52,54 +54,49 @@ pub(super) fn sorted<R: Runtime, T: Scalar>(
     normalize: bool,
 ) -> Result<Buffer<T>, Error> {
     let sorted: Buffer<T> = device.empty(NUMBERS * samples.len())?;
-    sort_samples::launch::<T, R>(
-        device.client(),
-        device.groups(samples.len(), BLOCK),
-        CubeDim::new_1d(BLOCK),
-        samples.points.arg(),
-        samples.normals.arg(),
-        samples.areas.arg(),
+    launch!(
+        device,
+        sort_samples::<T>,
+        samples.len(),
+        BLOCK,
+        samples.arg(),
         residual.order.keys.arg(),
         residual.order.places.arg(),
         sorted.arg(),
-        samples.len() as u32,
         grid::arg(&residual.grid),
-        normalize,
+        normalize
     );
     Ok(sorted)
 }
 
 #[cube(launch)]
 fn sort_samples<F: Float + CubeElement>(
-    points: &Array<F>,
-    normals: &Array<F>,
-    areas: &Array<F>,
+    samples: &SampleArrays<F>,
     keys: &Array<u32>,
     places: &Array<u32>,
     sorted: &mut Array<F>,
-    count: u32,
     grid: Lattice<F>,
     #[comptime] normalize: bool,
 ) {
     let s = ABSOLUTE_POS;
-    if s < count as usize {
+    if s < samples.count as usize {
         let i = places[s] as usize;
-        let x = place::<F>(points, i, &grid);
+        let x = place::<F>(&samples.points, i, &grid);
         let cell = cell_at(keys[s], grid.ny, grid.nz);
         let fx = from_center::<F>(x.x, cell.i);
         let fy = from_center::<F>(x.y, cell.j);
         let fz = from_center::<F>(x.z, cell.k);
         // One division after the other: h² may underflow where a/h² is fine.
-        let mut scale = areas[i] / grid.spacing / grid.spacing;
+        let mut scale = samples.areas[i] / grid.spacing / grid.spacing;
         if normalize {
-            scale /= total::<F>(hats::<F>(fx), hats::<F>(fy), hats::<F>(fz));
+            scale /= total::<F>(hat::<F>(fx), hat::<F>(fy), hat::<F>(fz));
         }
         let at = s * NUMBERS;
         sorted[at] = fx;
         sorted[at + 1] = fy;
         sorted[at + 2] = fz;
-        sorted[at + 3] = normals[3 * i] * scale;
-        sorted[at + 4] = normals[3 * i + 1] * scale;
-        sorted[at + 5] = normals[3 * i + 2] * scale;
+        sorted[at + 3] = samples.normals[3 * i] * scale;
+        sorted[at + 4] = samples.normals[3 * i + 1] * scale;
+        sorted[at + 5] = samples.normals[3 * i + 2] * scale;
     }
 }

@@ -15,9 +15,8 @@
 //! `x̂ = (x − lower)/h` and `a/h²` depend.
 //!
 //! # Bad samples
-//! The CPU refuses a cloud with a sample that is less than 2 cells inside the grid, or not finite. To know
-//! costs a wait for the device: here such samples are left out, and [`Residual::refused`] tells of them when
-//! it is asked.
+//! The CPU refuses a cloud with a sample that is less than 2 cells inside the grid, or not finite. Here
+//! such samples are left out, as a check would wait for the device; [`Residual::refused`] reports them.
 //!
 //! # Not differentiable
 //! As on the CPU: nothing with [`Weights::BSpline`]; with [`Weights::Paper`], `b` jumps where a sample
@@ -29,17 +28,18 @@ mod order;
 mod pullback;
 mod stencil;
 
+pub(crate) use crate::element::stencil::{bspline, bspline_slope};
 pub use cotangent::SampleCotangent;
-pub(crate) use cotangent::subtract_from_grid;
+pub(crate) use cotangent::{CotangentArrays, subtract_from_grid};
 pub use forward::forward;
 pub use isograd::splat::Weights;
 pub use order::{Refused, SampleOrder};
 pub use pullback::pullback;
-pub(crate) use stencil::{bspline, bspline_slope, pick};
+pub(crate) use stencil::pick;
 
 use crate::device::check_length;
 use crate::{Buffer, Device, Error, Scalar};
-use cubecl::prelude::Runtime;
+use cubecl::prelude::*;
 
 /// Oriented samples.
 #[derive(Clone, Copy, Debug)]
@@ -63,6 +63,16 @@ impl<T: Scalar> Samples<'_, T> {
         self.areas.is_empty()
     }
 
+    /// The samples as an argument of a kernel.
+    pub(crate) fn arg<R: Runtime>(&self) -> SampleArraysLaunch<T, R> {
+        SampleArraysLaunch::new(
+            self.points.arg(),
+            self.normals.arg(),
+            self.areas.arg(),
+            self.len() as u32,
+        )
+    }
+
     /// There must be a point and a normal an area.
     pub(crate) fn check(&self) -> Result<(), Error> {
         check_length("the array of points", self.points, 3 * self.len())?;
@@ -70,7 +80,16 @@ impl<T: Scalar> Samples<'_, T> {
     }
 }
 
-/// What the pullback needs besides the inputs.
+/// [`Samples`] in kernels.
+#[derive(CubeLaunch, CubeType)]
+pub(crate) struct SampleArrays<F: Float + CubeElement> {
+    pub points: Array<F>,
+    pub normals: Array<F>,
+    pub areas: Array<F>,
+    pub count: u32,
+}
+
+/// Residual of [`forward`]; the pullback takes the inputs again.
 #[derive(Clone, Debug)]
 pub struct Residual<T> {
     /// The grid of `b`.

@@ -2,7 +2,8 @@
 
 use cubecl::prelude::*;
 
-use super::Samples;
+use super::{SampleArrays, Samples};
+use crate::device::launch;
 use crate::grid::{self, Lattice, place};
 use crate::primitives::sort;
 use crate::spread::first_at_least;
@@ -43,16 +44,14 @@ impl SampleOrder {
         grid: &isograd::Grid<T>,
     ) -> Result<Self, Error> {
         let keys: Buffer<u32> = device.empty(samples.len())?;
-        find_cells::launch::<T, R>(
-            device.client(),
-            device.groups(samples.len(), BLOCK),
-            CubeDim::new_1d(BLOCK),
-            samples.points.arg(),
-            samples.normals.arg(),
-            samples.areas.arg(),
+        launch!(
+            device,
+            find_cells::<T>,
+            samples.len(),
+            BLOCK,
+            samples.arg(),
             keys.arg(),
-            samples.len() as u32,
-            grid::arg(grid),
+            grid::arg(grid)
         );
         Self::from_keys(device, &keys, grid.shape())
     }
@@ -66,14 +65,15 @@ impl SampleOrder {
         let cells = shape.iter().product::<usize>() as u32;
         let sort::Order { keys, places } = sort::order(device, keys, cells + 1)?;
         let rows: Buffer<u32> = device.empty(shape[0] * shape[1] + 1)?;
-        find_rows::launch::<R>(
-            device.client(),
-            device.groups(rows.len(), BLOCK),
-            CubeDim::new_1d(BLOCK),
+        launch!(
+            device,
+            find_rows,
+            rows.len(),
+            BLOCK,
             keys.arg(),
             rows.arg(),
             keys.len() as u32,
-            shape[2] as u32,
+            shape[2] as u32
         );
         Ok(Self {
             shape,
@@ -88,13 +88,14 @@ impl SampleOrder {
             return Ok(None);
         }
         let found: Buffer<u32> = device.empty(2)?;
-        find_refused::launch::<R>(
-            device.client(),
-            device.groups(1, 1),
-            CubeDim::new_1d(1),
+        launch!(
+            device,
+            find_refused,
+            1,
+            1,
             self.rows.arg(),
             self.places.arg(),
-            found.arg(),
+            found.arg()
         );
         let found = device.download(&found)?;
         Ok((found[0] > 0).then(|| Refused {
@@ -107,22 +108,19 @@ impl SampleOrder {
 /// The cell of each sample.
 #[cube(launch)]
 fn find_cells<F: Float + CubeElement>(
-    points: &Array<F>,
-    normals: &Array<F>,
-    areas: &Array<F>,
+    samples: &SampleArrays<F>,
     keys: &mut Array<u32>,
-    count: u32,
     grid: Lattice<F>,
 ) {
     let i = ABSOLUTE_POS;
-    if i < count as usize {
-        let x = place::<F>(points, i, &grid);
+    if i < samples.count as usize {
+        let x = place::<F>(&samples.points, i, &grid);
         let inside =
             holds::<F>(x.x, grid.nx) && holds::<F>(x.y, grid.ny) && holds::<F>(x.z, grid.nz);
-        let finite = is_finite::<F>(areas[i])
-            && is_finite::<F>(normals[3 * i])
-            && is_finite::<F>(normals[3 * i + 1])
-            && is_finite::<F>(normals[3 * i + 2]);
+        let finite = is_finite::<F>(samples.areas[i])
+            && is_finite::<F>(samples.normals[3 * i])
+            && is_finite::<F>(samples.normals[3 * i + 1])
+            && is_finite::<F>(samples.normals[3 * i + 2]);
         let mut key = grid.nx * grid.ny * grid.nz;
         if inside && finite {
             let row = central_cell::<F>(x.x, grid.nx) * grid.ny + central_cell::<F>(x.y, grid.ny);

@@ -4,20 +4,18 @@ use cubecl::prelude::*;
 
 use super::cotangent::subtract_from_grid;
 use super::forward::sorted;
-use super::stencil::{
-    NUMBERS, REACH, Triple, WIDTH, along, bspline, bspline_slope, central, extra, hat_slopes, hats,
-    sum, total,
-};
-use super::{Residual, SampleCotangent, Samples, Weights};
-use crate::device::check_length;
+use super::stencil::{NUMBERS, REACH, WIDTH, along, central, extra, sum, total};
+use super::{CotangentArrays, Residual, SampleArrays, SampleCotangent, Samples, Weights};
+use crate::device::{check_length, launch};
+use crate::element::stencil::{Triple, bspline, bspline_slope, hat, hat_slope};
 use crate::grid::{self, Lattice, cell_at, check_field};
 use crate::primitives::fill::add;
 use crate::primitives::reduce::{BLOCK, sum_columns};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
-/// Adds to `out` what the cotangents `b_bar` of the right-hand side, `(nx, ny, nz)`, mean for the samples and
-/// the grid. The samples, and `residual`, are those of [`forward`](super::forward).
+/// Adds the cotangents of the samples and the grid to `out`, given the cotangents `b_bar` of the right-hand side,
+/// `(nx, ny, nz)`, and samples and residual of [`forward`](super::forward).
 ///
 /// # Errors
 /// [`Error::Length`] where the arrays do not match, [`Error::TooLarge`].
@@ -33,44 +31,40 @@ pub fn pullback<R: Runtime, T: Scalar>(
     check_length("the array of areas", samples.areas, order.keys.len())?;
     check_field("the cotangent of the right-hand side", b_bar, grid)?;
     out.check(count)?;
-    let groups = device.groups(count, BLOCK as u32);
-    let dim = CubeDim::new_1d(BLOCK as u32);
     let blocks = count.div_ceil(BLOCK);
     let gathered = sorted(device, samples, residual, false)?;
     let grid_sums: Buffer<T> = device.empty(4 * blocks)?;
-    gather_samples::launch::<T, R>(
-        device.client(),
-        groups.clone(),
-        dim,
+    launch!(
+        device,
+        gather_samples::<T>,
+        count,
+        BLOCK as u32,
         order.keys.arg(),
         b_bar.arg(),
         gathered.arg(),
         grid_sums.arg(),
         count as u32,
         grid::arg(grid),
-        residual.weights == Weights::Paper,
+        residual.weights == Weights::Paper
     );
     add(device, &sum_columns(device, &grid_sums, 4)?, &out.grid)?;
-    add_to_samples::launch::<T, R>(
-        device.client(),
-        groups,
-        dim,
-        samples.normals.arg(),
-        samples.areas.arg(),
+    launch!(
+        device,
+        add_to_samples::<T>,
+        count,
+        BLOCK as u32,
+        samples.arg(),
         order.keys.arg(),
         order.places.arg(),
         gathered.arg(),
-        out.points.arg(),
-        out.normals.arg(),
-        out.areas.arg(),
-        count as u32,
-        grid.cells() as u32,
+        out.arg(),
+        grid.cells() as u32
     );
     Ok(())
 }
 
-/// What the cells round a sample hold for it, in index space: the cotangent of the vector that was spread,
-/// and that of the sample's index coordinates.
+/// Cotangents of a sample from the cells around it, in index space: of the vector that was spread, and of the sample's
+/// index coordinates.
 #[derive(CubeType, Clone, Copy)]
 struct Gathered<F: Float> {
     spread_x: F,
@@ -89,8 +83,8 @@ struct Weights3<F: Float> {
     z: Triple<F>,
 }
 
-/// Replaces the offset and vector of each sample by the cotangents of the vector `a n`, and of the point; and
-/// sums what they mean for the grid, a group at a time.
+/// Replaces the offset and vector of each sample by the cotangents of the vector `a n` and of the point, and
+/// sums the cotangent of the grid, a group at a time.
 #[cube(launch)]
 fn gather_samples<F: Float + CubeElement>(
     keys: &Array<u32>,
@@ -151,14 +145,14 @@ fn gather_sample<F: Float + CubeElement>(
 ) -> Gathered<F> {
     if comptime!(paper) {
         let w = Weights3::<F> {
-            x: hats::<F>(f.x),
-            y: hats::<F>(f.y),
-            z: hats::<F>(f.z),
+            x: hat::<F>(f.x),
+            y: hat::<F>(f.y),
+            z: hat::<F>(f.z),
         };
         let slopes = Weights3::<F> {
-            x: hat_slopes::<F>(f.x),
-            y: hat_slopes::<F>(f.y),
-            z: hat_slopes::<F>(f.z),
+            x: hat_slope::<F>(f.x),
+            y: hat_slope::<F>(f.y),
+            z: hat_slope::<F>(f.z),
         };
         gather_paper::<F>(b_bar, corner, grid, w, slopes, v)
     } else {
@@ -287,28 +281,24 @@ fn gather_product<F: Float + CubeElement>(
 
 /// From the sorted order to that of the input.
 #[cube(launch)]
-fn add_to_samples<F: Float>(
-    normals: &Array<F>,
-    areas: &Array<F>,
+fn add_to_samples<F: Float + CubeElement>(
+    samples: &SampleArrays<F>,
     keys: &Array<u32>,
     places: &Array<u32>,
     gathered: &Array<F>,
-    points_bar: &mut Array<F>,
-    normals_bar: &mut Array<F>,
-    areas_bar: &mut Array<F>,
-    count: u32,
+    out: &mut CotangentArrays<F>,
     cells: u32,
 ) {
     let s = ABSOLUTE_POS;
-    if s < count as usize && keys[s] < cells {
+    if s < samples.count as usize && keys[s] < cells {
         let i = places[s] as usize;
         let mut area_bar = F::new(0.0);
         for axis in 0..3usize {
             let spread = gathered[s * NUMBERS + axis];
-            normals_bar[3 * i + axis] += spread * areas[i];
-            points_bar[3 * i + axis] += gathered[s * NUMBERS + 3 + axis];
-            area_bar += spread * normals[3 * i + axis];
+            out.normals[3 * i + axis] += spread * samples.areas[i];
+            out.points[3 * i + axis] += gathered[s * NUMBERS + 3 + axis];
+            area_bar += spread * samples.normals[3 * i + axis];
         }
-        areas_bar[i] += area_bar;
+        out.areas[i] += area_bar;
     }
 }

@@ -1,8 +1,8 @@
-//! What one sample has for one cell: small pure functions.
+//! Contribution of one sample to one cell.
 
 use cubecl::prelude::*;
 
-use crate::element::{hat, spline};
+use crate::element::stencil::{Triple, bspline, hat};
 use crate::spread::Spread;
 
 /// Cells between the cell of a sample and the outermost that it reaches.
@@ -14,54 +14,6 @@ pub(super) const WIDTH: u32 = 5;
 /// Numbers of a sample in the form that is spread: offset `f` from the center of its cell, −½ to ½ cells, and
 /// the vector `a n / h²`.
 pub(super) const NUMBERS: usize = 6;
-
-/// A number for each of three cells along an axis.
-#[derive(CubeType, Clone, Copy)]
-pub(crate) struct Triple<F: Float> {
-    pub below: F,
-    pub center: F,
-    pub above: F,
-}
-
-/// Weights of the quadratic B-spline.
-#[cube]
-pub(crate) fn bspline<F: Float>(f: F) -> Triple<F> {
-    Triple::<F> {
-        below: spline::below::<F>(f),
-        center: spline::center::<F>(f),
-        above: spline::above::<F>(f),
-    }
-}
-
-/// Derivatives of [`bspline`].
-#[cube]
-pub(crate) fn bspline_slope<F: Float>(f: F) -> Triple<F> {
-    Triple::<F> {
-        below: spline::below_slope::<F>(f),
-        center: spline::center_slope::<F>(f),
-        above: spline::above_slope::<F>(f),
-    }
-}
-
-/// The paper's weights, not normalized.
-#[cube]
-pub(super) fn hats<F: Float>(f: F) -> Triple<F> {
-    Triple::<F> {
-        below: hat::weight::<F>(f + F::new(1.0)),
-        center: hat::weight::<F>(f),
-        above: hat::weight::<F>(f - F::new(1.0)),
-    }
-}
-
-/// Derivatives of [`hats`].
-#[cube]
-pub(super) fn hat_slopes<F: Float>(f: F) -> Triple<F> {
-    Triple::<F> {
-        below: hat::slope::<F>(f + F::new(1.0)),
-        center: hat::slope::<F>(f),
-        above: hat::slope::<F>(f - F::new(1.0)),
-    }
-}
 
 /// The central cell alone.
 #[cube]
@@ -137,9 +89,9 @@ impl Spread for Paper {
     fn part<F: Float>(samples: &Array<F>, s: usize, x: u32, y: u32, z: u32) -> F {
         let at = s * NUMBERS;
         let (wx, wy, wz) = (
-            hats::<F>(samples[at]),
-            hats::<F>(samples[at + 1]),
-            hats::<F>(samples[at + 2]),
+            hat::<F>(samples[at]),
+            hat::<F>(samples[at + 1]),
+            hat::<F>(samples[at + 2]),
         );
         let product = term::<F>(
             samples,
@@ -160,7 +112,7 @@ impl Spread for Paper {
     }
 }
 
-/// What the central cell has beyond the product of the paper's weights.
+/// Excess of the central cell over the product of the paper's weights.
 #[cube]
 pub(super) fn extra<F: Float>(x: Triple<F>, y: Triple<F>, z: Triple<F>) -> F {
     F::new(0.5) - x.center * y.center * z.center

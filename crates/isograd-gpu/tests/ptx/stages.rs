@@ -178,14 +178,14 @@ fn local_levels<T: Scalar>(device: &Device<Recorder>, samples: Samples<'_, T>) {
     }
 }
 
-/// Lines of factors 2, 3, 4, 5 and others, and products with matrices.
+/// Lines of factors 2, 3, 4, 5 and others, the chirp transform, and plain sums.
 fn solves<T: Scalar>(device: &Device<Recorder>) {
     for shape in [[64, 90, 77], [37, 128, 1], [625, 2, 3]] {
         let solver = poisson::Solver::<T>::new(device, shape).unwrap();
         let b = numbers(device, shape.iter().product());
         let (chi, residual) = poisson::forward(device, &solver, &b, 0.8).unwrap();
         poisson::pullback(device, &solver, &residual, &chi).unwrap();
-        let solver = poisson::Solver::<T>::by_products(device, shape).unwrap();
+        let solver = poisson::Solver::<T>::by_definition(device, shape).unwrap();
         solver.solve(device, &b, 0.0).unwrap();
     }
 }

@@ -3,10 +3,10 @@
 use pulp::Arch;
 use rayon::prelude::*;
 
+use super::mean_curvature as element;
 use super::rows::{self, Order, Rows, Stencil};
 use crate::Real;
 use crate::data::Field;
-use crate::element::curvature as element;
 
 /// How curvature is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

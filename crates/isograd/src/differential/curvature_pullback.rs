@@ -5,11 +5,11 @@ use rayon::prelude::*;
 
 use super::columns::{Column, Strided, add_across, add_along, same};
 use super::curvature::{Buffers, smooth};
+use super::mean_curvature as element;
 use super::pullback::{PullbackScratch, add_finite, check_cells};
 use super::rows::{self, Order, Rows};
 use super::{Error, Options};
 use crate::data::Field;
-use crate::element::curvature as element;
 use crate::{Real, vector};
 
 /// Adds the cotangent of `φ` for that of its [`mean_curvature`](super::mean_curvature) with the same options:

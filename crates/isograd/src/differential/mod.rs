@@ -50,7 +50,9 @@
 mod columns;
 mod curvature;
 mod curvature_pullback;
+mod difference;
 mod eikonal;
+mod mean_curvature;
 mod pullback;
 #[cfg(test)]
 mod pullback_tests;

@@ -3,9 +3,9 @@
 //! A difference is `Σ_t w_t (u_t − u)`: neighbors less the cell's own value, so that large values that
 //! differ little lose nothing.
 
+use super::difference::{first_inward, second_inward};
 use crate::Real;
 use crate::data::Field;
-use crate::element::difference::{first_inward, second_inward};
 
 /// Which derivative.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,11 +4,11 @@ use rayon::prelude::*;
 
 use super::Axes;
 use super::clusters::Clusters;
+use super::evidence::{self, of_view};
 use super::fill::Fill;
 use super::graph::Graph;
 use super::signs::{Interpretation, Place, Signs, Verdict};
 use crate::Real;
-use crate::element::evidence::{self, of_view};
 use crate::neighbors::Neighborhoods;
 use crate::vector;
 

@@ -8,10 +8,10 @@
 
 use rayon::prelude::*;
 
+use super::disc;
 use super::regions::{self, Regions};
+use super::sight::{self, RAYS, STEPS};
 use super::visibility::Visibility;
-use crate::element::disc as element;
-use crate::element::sight::{self, RAYS, STEPS};
 use crate::parallel::CHUNK;
 use crate::vector;
 
@@ -55,7 +55,7 @@ impl Lattice {
     fn place(&self, point: [f64; 3]) -> [f32; 3] {
         [0, 1, 2].map(|a| {
             let x = ((point[a] - self.lower[a]) / self.cell) as f32;
-            element::inside(x, self.shape[a] as f32)
+            disc::inside(x, self.shape[a] as f32)
         })
     }
 
@@ -248,8 +248,8 @@ impl Disc {
         Self {
             center,
             axis,
-            radius: element::radius(reach),
-            half: element::half(axis[0], axis[1], axis[2]),
+            radius: disc::radius(reach),
+            half: disc::half(axis[0], axis[1], axis[2]),
         }
     }
 
@@ -282,6 +282,6 @@ impl Disc {
     fn covers(&self, cell: [usize; 3]) -> bool {
         let d = [0, 1, 2].map(|a| cell[a] as f32 + 0.5 - self.center[a]);
         let height = vector::dot(d, self.axis);
-        element::covers(vector::norm_squared(d), height, self.half, self.radius)
+        disc::covers(vector::norm_squared(d), height, self.half, self.radius)
     }
 }

@@ -2,16 +2,16 @@
 //!
 //! # Map
 //! [`Axes`] and [`Neighborhoods`] → [`Graph`], on which the [automatic method](super::Method::Auto) spreads its
-//! evidence. Formulas of single neighbors are those of [`coupling`] and [`crate::element::sheet`].
+//! evidence. Formulas of single neighbors are those of [`coupling`] and `sheet`.
 //!
 //! # Not differentiable
 //! Nothing here has a derivative: it decides about signs.
 
 use rayon::prelude::*;
 
+pub use super::coupling::NEIGHBORS;
+use super::coupling::{self, RING, ROUNDS};
 use super::{Axes, sheet};
-pub use crate::element::coupling::NEIGHBORS;
-use crate::element::coupling::{self, RING, ROUNDS};
 use crate::neighbors::Neighborhoods;
 use crate::normals::Plane;
 use crate::parallel::CHUNK;

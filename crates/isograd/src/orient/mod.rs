@@ -53,9 +53,12 @@
 
 mod auto;
 mod clusters;
+mod coupling;
+mod disc;
 mod domains;
 pub mod doubt;
 mod error;
+mod evidence;
 mod fill;
 mod graph;
 #[cfg(test)]
@@ -74,6 +77,7 @@ mod sensors;
 #[cfg(test)]
 mod shapes;
 mod sheet;
+mod sight;
 mod signs;
 #[cfg(test)]
 mod tests;
@@ -87,7 +91,6 @@ pub(crate) use pullback::hold;
 pub use pullback::{axes_pullback, given_pullback};
 
 use crate::data::Sensors;
-use crate::element::evidence;
 use crate::neighbors::Neighborhoods;
 use crate::normals::{self, Plane};
 use crate::{PointCloud, Real, vector};

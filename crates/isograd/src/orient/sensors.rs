@@ -4,9 +4,9 @@
 //! sides apart is the cosine between axis and line of sight. A grazing view, of which a small error of the axis
 //! changes the side, only adds to the evidence of the automatic method.
 
+use super::evidence;
 use super::{Error, Known};
 use crate::data::Sensors;
-use crate::element::evidence;
 use crate::{Real, vector};
 
 /// Cosine, from −1 to 1, between each axis and the direction from its point to its sensor. Where it is not

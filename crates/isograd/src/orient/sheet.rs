@@ -10,10 +10,30 @@
 //! point clouds with sharp features" (2012), but over all pairs of near neighbors instead of random
 //! ones.
 
-use crate::element::coupling::NEIGHBORS;
+use super::coupling::NEIGHBORS;
 use crate::element::eigen::eigen;
-use crate::element::sheet::{self, QUORUM, REST, SPANNING};
 use crate::vector;
+
+/// Nearest neighbors whose pairs span the planes that are tried.
+const SPANNING: usize = 9;
+
+/// Neighbors that a plane has to fit.
+const QUORUM: usize = 6;
+
+/// Rank of the neighbor that stands for those off the plane.
+const REST: usize = (NEIGHBORS + QUORUM) / 2;
+
+/// A plane is taken for a sheet where it fits its quorum this much better than the rest. Noise does not: of
+/// all planes the best fits its quorum about 7 times better than the rest, seldom 20 times.
+const RESOLVED: f32 = 0.05;
+
+/// Neighbors within this many times the fit of the quorum lie on the sheet, and so do those within this
+/// share of the distance of the rest.
+const ON: f32 = 3.0;
+const ROUNDED: f32 = 0.02;
+
+/// The square of the sine under which two neighbors must be seen to span a plane: 0.3.
+const SLIVER: f32 = 0.3 * 0.3;
 
 /// A local sheet.
 #[derive(Clone, Copy, Debug)]
@@ -33,10 +53,10 @@ pub(super) fn find(offset: &Offsets, axis: [f32; 3]) -> Option<Sheet> {
     let (normal, fit) = best_plane(offset, axis, quantile(together, QUORUM));
     let apart = residuals(offset, normal);
     let rest = quantile(apart, REST).max(quantile(together, REST));
-    if !sheet::stands_out(fit, rest) {
+    if !stands_out(fit, rest) {
         return None;
     }
-    let limit = sheet::limit(fit, rest);
+    let limit = largest_residual(fit, rest);
     let on = offset.iter().zip(apart).filter(|&(_, r)| r <= limit);
     let (found, scatter) = plane(on.map(|(d, _)| *d));
     Some(Sheet {
@@ -45,7 +65,7 @@ pub(super) fn find(offset: &Offsets, axis: [f32; 3]) -> Option<Sheet> {
         } else {
             found
         },
-        scatter: sheet::scatter(scatter, limit),
+        scatter: bounded_scatter(scatter, limit),
     })
 }
 
@@ -57,7 +77,7 @@ fn best_plane(offset: &Offsets, axis: [f32; 3], fit: f32) -> ([f32; 3], f32) {
             let normal = vector::cross(offset[j], offset[k]);
             let square = vector::norm_squared(normal);
             let squares = vector::norm_squared(offset[j]) * vector::norm_squared(offset[k]);
-            if !sheet::spans(square, squares) {
+            if !spans(square, squares) {
                 continue;
             }
             let normal = vector::scale(normal, 1.0 / square.sqrt());
@@ -96,6 +116,33 @@ fn residuals(offset: &Offsets, normal: [f32; 3]) -> [f32; NEIGHBORS] {
 /// The value of the given rank, from 1.
 fn quantile(mut values: [f32; NEIGHBORS], rank: usize) -> f32 {
     *values.select_nth_unstable_by(rank - 1, f32::total_cmp).1
+}
+
+/// Whether two offsets span a plane, by the square of their cross product and the product of their squares.
+#[inline(always)]
+fn spans(cross: f32, squares: f32) -> bool {
+    cross > SLIVER * squares
+}
+
+/// Whether a plane that fits its quorum so well stands out from the rest.
+#[inline(always)]
+fn stands_out(fit: f32, rest: f32) -> bool {
+    rest > 0.0 && fit <= RESOLVED * rest
+}
+
+/// How far from the plane a neighbor may lie to be on the sheet.
+#[inline(always)]
+fn largest_residual(fit: f32, rest: f32) -> f32 {
+    let near = ON * fit;
+    let rounded = ROUNDED * rest;
+    if near > rounded { near } else { rounded }
+}
+
+/// How far samples lie off the sheet, whose root mean square distance is `found`; above 0.
+#[inline(always)]
+fn bounded_scatter(found: f32, limit: f32) -> f32 {
+    let least = limit / ON;
+    if found > least { found } else { least }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Number of directions in which each free cell sees out of the grid.
 
-use crate::element::sight;
+use super::sight;
 
 /// Directions of one sweep: the neighbors of a cell that come before it in C order.
 const DIRECTIONS: u32 = 13;

@@ -15,12 +15,15 @@ use rayon::prelude::*;
 
 use super::graph::Graph;
 use super::signs::{Domains, Place};
-use crate::element::winding::{share, softened};
 use crate::vector;
 
 /// Number of samples at which the winding number is computed, and the fewest in one domain.
 const PROBES: usize = 2048;
 const FEWEST_PROBES: usize = 4;
+
+/// A sample nearer than this share of the spacing counts as if it were so far: it lies on the same sheet, and
+/// only its noise would speak.
+const SOFT: f32 = 0.3;
 
 /// A sample as a piece of surface; lengths in sample spacings.
 #[derive(Clone, Copy, Debug, Default)]
@@ -159,6 +162,19 @@ fn winding_number(blocks: &[Block], at: [f32; 3]) -> f64 {
     total
 }
 
+/// The square of the distance that counts, in squares of the spacing.
+#[inline(always)]
+fn softened(square: f32) -> f32 {
+    square + SOFT * SOFT
+}
+
+/// The share of a sample whose moment (area times outward normal, over 4π) is `along` its offset from the place, by
+/// the softened square of their distance and its root.
+#[inline(always)]
+fn share(along: f32, square: f32, root: f32) -> f32 {
+    along / (square * root)
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::shapes::{Sampled, inside_out, join, sphere};
@@ -235,7 +251,7 @@ mod tests {
         let at = [3.0, -1.0, 4.0f32];
         let one = |d: &Dipole| {
             let r = vector::to_f64(vector::sub(d.position, at));
-            let square = softened(vector::norm_squared(r));
+            let square = vector::norm_squared(r) + f64::from(SOFT * SOFT);
             vector::dot(r, vector::to_f64(d.moment)) / square.powf(1.5)
         };
         let plain: f64 = ball.iter().map(one).sum();

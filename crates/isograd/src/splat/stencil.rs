@@ -5,7 +5,7 @@
 
 use super::Weights;
 use crate::Real;
-use crate::element::{hat as hats, spline};
+use crate::element::stencil::{bspline, bspline_slope, hat, hat_slope};
 use crate::vector::dot;
 
 /// Cells along each axis to which one sample contributes.
@@ -56,7 +56,7 @@ pub(super) fn for_each_term<T: Real>(
         Weights::Paper => {
             // The weights as printed are a product, but for ½ in the central cell: a product, and a
             // second one that is zero elsewhere.
-            let weights = f.map(hat);
+            let weights = hat_weights(f);
             let product = weights[0][1] * weights[1][1] * weights[2][1];
             let extra = T::of(0.5) - product;
             let total = weights
@@ -102,7 +102,7 @@ pub(super) fn gather<T: Real>(
 /// central cell.
 #[inline(always)]
 fn gather_paper<T: Real>(vector: [T; 3], f: [T; 3], block: &Block<T>) -> Gathered<T> {
-    let (weights, slopes) = (f.map(hat), f.map(hat_slope));
+    let (weights, slopes) = (hat_weights(f), hat_slopes(f));
     let sum = |w: [T; 3]| w[0] + w[1] + w[2];
     let (sums, sum_slopes) = (weights.map(sum), slopes.map(sum));
     let extra = T::of(0.5) - weights[0][1] * weights[1][1] * weights[2][1];
@@ -174,60 +174,33 @@ fn along<T: Real>(row: &[T; WIDTH], weight: &[T; WIDTH]) -> T {
     sum
 }
 
-/// Weights of the quadratic B-spline on the cell below, the central cell and the cell above.
-#[inline(always)]
-fn quadratic_bspline<T: Real>(f: T) -> [T; 3] {
-    [spline::below(f), spline::center(f), spline::above(f)]
-}
-
-/// [`quadratic_bspline`] along each axis. By name: mapped over an array, it is not inlined.
+/// Weights of the quadratic B-spline on the cells below, at and above that of a sample, along each axis. By name: mapped
+/// over an array, it is not inlined.
 #[inline(always)]
 pub(crate) fn bspline_weights<T: Real>([x, y, z]: [T; 3]) -> [[T; 3]; 3] {
-    [
-        quadratic_bspline(x),
-        quadratic_bspline(y),
-        quadratic_bspline(z),
-    ]
+    [bspline(x).into(), bspline(y).into(), bspline(z).into()]
 }
 
 /// Derivatives of [`bspline_weights`].
 #[inline(always)]
 pub(crate) fn bspline_slopes<T: Real>([x, y, z]: [T; 3]) -> [[T; 3]; 3] {
     [
-        quadratic_bspline_slope(x),
-        quadratic_bspline_slope(y),
-        quadratic_bspline_slope(z),
+        bspline_slope(x).into(),
+        bspline_slope(y).into(),
+        bspline_slope(z).into(),
     ]
 }
 
-/// Derivatives of [`quadratic_bspline`].
+/// The paper's weights on those cells, not normalized, along each axis.
 #[inline(always)]
-fn quadratic_bspline_slope<T: Real>(f: T) -> [T; 3] {
-    [
-        spline::below_slope(f),
-        spline::center_slope(f),
-        spline::above_slope(f),
-    ]
+fn hat_weights<T: Real>(f: [T; 3]) -> [[T; 3]; 3] {
+    f.map(|f| hat(f).into())
 }
 
-/// The paper's weights on the cell below, the central cell and the cell above, not normalized.
+/// Derivatives of [`hat_weights`].
 #[inline(always)]
-pub(super) fn hat<T: Real>(f: T) -> [T; 3] {
-    [
-        hats::weight(f + T::one()),
-        hats::weight(f),
-        hats::weight(f - T::one()),
-    ]
-}
-
-/// Derivatives of [`hat`]; 0 for the central cell at its center, where there is none.
-#[inline(always)]
-pub(super) fn hat_slope<T: Real>(f: T) -> [T; 3] {
-    [
-        hats::slope(f + T::one()),
-        hats::slope(f),
-        hats::slope(f - T::one()),
-    ]
+fn hat_slopes<T: Real>(f: [T; 3]) -> [[T; 3]; 3] {
+    f.map(|f| hat_slope(f).into())
 }
 
 /// `M u`, with `M = (1, 4, 1)/6`.

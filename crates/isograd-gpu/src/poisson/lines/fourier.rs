@@ -2,35 +2,114 @@
 
 use cubecl::prelude::*;
 
-use super::tile::{Tile, place};
+use super::Tables;
+use super::tile::{Shared, Tile, place};
 
-/// The Fourier transforms of what is at `from`, one half of the shared memory; returns the half they are in.
+/// The Fourier transforms of the numbers at `from`, one half of the shared memory; returns the half they are in.
 #[cube]
-pub(super) fn transform_tile<F: Float>(
-    re: &mut SharedMemory<F>,
-    im: &mut SharedMemory<F>,
-    roots: &Array<F>,
-    radices: &Array<u32>,
-    passes: usize,
+pub(super) fn transform_tile<F: Float + CubeElement>(
+    shared: &mut Shared<F>,
+    tables: &Tables<F>,
     tile: &Tile,
     from: usize,
-    #[comptime] capacity: usize,
+    #[comptime] chirped: bool,
+) -> usize {
+    if comptime!(chirped) {
+        transform_by_chirp(shared, tables, tile, from)
+    } else {
+        transform_by_passes(shared, tables, tile, from)
+    }
+}
+
+/// With `w_j = exp(−πij²/n)`, `Z_k = w_k Σ_j (x_j w_j) w̄_{k−j}`: a cyclic convolution of `length` numbers.
+#[cube]
+fn transform_by_chirp<F: Float + CubeElement>(
+    shared: &mut Shared<F>,
+    tables: &Tables<F>,
+    tile: &Tile,
+    from: usize,
+) -> usize {
+    let n = tile.lines.n;
+    let mut j = tile.begin;
+    while j < tile.length {
+        let at = from + place(tile, tile.pair, j);
+        if j < n {
+            let x = times_table(shared, tables, at, j, n);
+            shared.re[at] = x.re;
+            shared.im[at] = x.im;
+        } else {
+            shared.re[at] = F::new(0.0);
+            shared.im[at] = F::new(0.0);
+        }
+        j += tile.stride;
+    }
+    sync_cube();
+    let middle = transform_by_passes(shared, tables, tile, from);
+    // A transform of numbers whose parts are exchanged is the inverse one, its parts exchanged.
+    let mut k = tile.begin;
+    while k < tile.length {
+        let at = middle + place(tile, tile.pair, k);
+        let x = times_table(shared, tables, at, 2 * n + k, tile.length);
+        shared.re[at] = x.im;
+        shared.im[at] = x.re;
+        k += tile.stride;
+    }
+    sync_cube();
+    let end = transform_by_passes(shared, tables, tile, middle);
+    let mut k = tile.begin;
+    while k < n {
+        let at = end + place(tile, tile.pair, k);
+        let re = shared.im[at];
+        shared.im[at] = shared.re[at];
+        shared.re[at] = re;
+        let x = times_table(shared, tables, at, k, n);
+        shared.re[at] = x.re;
+        shared.im[at] = x.im;
+        k += tile.stride;
+    }
+    sync_cube();
+    end
+}
+
+/// The number at a place, times number `entry` of the table of the chirp, whose imaginary part is `pitch` further on.
+#[cube]
+fn times_table<F: Float + CubeElement>(
+    shared: &Shared<F>,
+    tables: &Tables<F>,
+    at: usize,
+    entry: usize,
+    pitch: usize,
+) -> Complex<F> {
+    let c = tables.chirp[entry];
+    let s = tables.chirp[entry + pitch];
+    Complex::<F> {
+        re: shared.re[at] * c - shared.im[at] * s,
+        im: shared.re[at] * s + shared.im[at] * c,
+    }
+}
+
+#[cube]
+fn transform_by_passes<F: Float + CubeElement>(
+    shared: &mut Shared<F>,
+    tables: &Tables<F>,
+    tile: &Tile,
+    from: usize,
 ) -> usize {
     let mut at = from;
     let mut done = 1usize.runtime();
-    for pass in 0..passes {
-        let radix = radices[pass] as usize;
-        let to = capacity - at;
+    for pass in 0..tables.passes {
+        let radix = tables.radices[pass] as usize;
+        let to = shared.half - at;
         if radix == 4 {
-            pass_of_four(re, im, roots, tile, at, to, done);
+            pass_of_four(shared, tables, tile, at, to, done);
         } else if radix == 2 {
-            pass_of_two(re, im, roots, tile, at, to, done);
+            pass_of_two(shared, tables, tile, at, to, done);
         } else if radix == 3 {
-            pass_of_few(re, im, roots, tile, at, to, done, 3usize);
+            pass_of_few(shared, tables, tile, at, to, done, 3usize);
         } else if radix == 5 {
-            pass_of_few(re, im, roots, tile, at, to, done, 5usize);
+            pass_of_few(shared, tables, tile, at, to, done, 5usize);
         } else {
-            pass_of_any(re, im, roots, tile, at, to, done, radix);
+            pass_of_any(shared, tables, tile, at, to, done, radix);
         }
         sync_cube();
         at = to;
@@ -47,115 +126,111 @@ pub(super) struct Complex<F: Float> {
 
 /// Place `j` of a unit's pair, turned by `exp(−2πit/n)`.
 #[cube]
-fn turned<F: Float>(
-    re: &SharedMemory<F>,
-    im: &SharedMemory<F>,
-    roots: &Array<F>,
+fn turned<F: Float + CubeElement>(
+    shared: &Shared<F>,
+    tables: &Tables<F>,
     tile: &Tile,
     from: usize,
     j: usize,
     t: usize,
 ) -> Complex<F> {
     let at = from + place(tile, tile.pair, j);
-    let c = roots[t];
-    let s = roots[tile.n + t];
+    let c = tables.roots[t];
+    let s = tables.roots[tile.length + t];
     Complex::<F> {
-        re: re[at] * c - im[at] * s,
-        im: re[at] * s + im[at] * c,
+        re: shared.re[at] * c - shared.im[at] * s,
+        im: shared.re[at] * s + shared.im[at] * c,
     }
 }
 
 /// One pass with radix 2, after passes whose product is `done`.
 #[cube]
-fn pass_of_two<F: Float>(
-    re: &mut SharedMemory<F>,
-    im: &mut SharedMemory<F>,
-    roots: &Array<F>,
+fn pass_of_two<F: Float + CubeElement>(
+    shared: &mut Shared<F>,
+    tables: &Tables<F>,
     tile: &Tile,
     from: usize,
     to: usize,
     done: usize,
 ) {
-    let part = tile.n / 2;
+    let part = tile.length / 2;
     let turn = part / done;
     let mut b = tile.begin;
     while b < part {
         let k = b % done;
         let v0 = from + place(tile, tile.pair, b);
-        let v1 = turned(re, im, roots, tile, from, b + part, k * turn);
+        let v1 = turned(shared, tables, tile, from, b + part, k * turn);
         let first = (b - k) * 2 + k;
         let u0 = to + place(tile, tile.pair, first);
-        re[u0] = re[v0] + v1.re;
-        im[u0] = im[v0] + v1.im;
+        shared.re[u0] = shared.re[v0] + v1.re;
+        shared.im[u0] = shared.im[v0] + v1.im;
         let u1 = to + place(tile, tile.pair, first + done);
-        re[u1] = re[v0] - v1.re;
-        im[u1] = im[v0] - v1.im;
+        shared.re[u1] = shared.re[v0] - v1.re;
+        shared.im[u1] = shared.im[v0] - v1.im;
         b += tile.stride;
     }
 }
 
 /// One pass with radix 4.
 #[cube]
-fn pass_of_four<F: Float>(
-    re: &mut SharedMemory<F>,
-    im: &mut SharedMemory<F>,
-    roots: &Array<F>,
+fn pass_of_four<F: Float + CubeElement>(
+    shared: &mut Shared<F>,
+    tables: &Tables<F>,
     tile: &Tile,
     from: usize,
     to: usize,
     done: usize,
 ) {
-    let part = tile.n / 4;
+    let part = tile.length / 4;
     let turn = part / done;
     let mut b = tile.begin;
     while b < part {
         let k = b % done;
         let t = k * turn;
         let v0 = from + place(tile, tile.pair, b);
-        let v1 = turned(re, im, roots, tile, from, b + part, t);
-        let v2 = turned(re, im, roots, tile, from, b + 2 * part, 2 * t);
-        let v3 = turned(re, im, roots, tile, from, b + 3 * part, 3 * t);
-        let (sum_re, sum_im) = (re[v0] + v2.re, im[v0] + v2.im);
-        let (gap_re, gap_im) = (re[v0] - v2.re, im[v0] - v2.im);
+        let v1 = turned(shared, tables, tile, from, b + part, t);
+        let v2 = turned(shared, tables, tile, from, b + 2 * part, 2 * t);
+        let v3 = turned(shared, tables, tile, from, b + 3 * part, 3 * t);
+        let (sum_re, sum_im) = (shared.re[v0] + v2.re, shared.im[v0] + v2.im);
+        let (gap_re, gap_im) = (shared.re[v0] - v2.re, shared.im[v0] - v2.im);
         let (odd_re, odd_im) = (v1.re + v3.re, v1.im + v3.im);
         let (odd_gap_re, odd_gap_im) = (v1.re - v3.re, v1.im - v3.im);
         let first = (b - k) * 4 + k;
         let u0 = to + place(tile, tile.pair, first);
-        re[u0] = sum_re + odd_re;
-        im[u0] = sum_im + odd_im;
+        shared.re[u0] = sum_re + odd_re;
+        shared.im[u0] = sum_im + odd_im;
         let u1 = to + place(tile, tile.pair, first + done);
-        re[u1] = gap_re + odd_gap_im;
-        im[u1] = gap_im - odd_gap_re;
+        shared.re[u1] = gap_re + odd_gap_im;
+        shared.im[u1] = gap_im - odd_gap_re;
         let u2 = to + place(tile, tile.pair, first + 2 * done);
-        re[u2] = sum_re - odd_re;
-        im[u2] = sum_im - odd_im;
+        shared.re[u2] = sum_re - odd_re;
+        shared.im[u2] = sum_im - odd_im;
         let u3 = to + place(tile, tile.pair, first + 3 * done);
-        re[u3] = gap_re - odd_gap_im;
-        im[u3] = gap_im + odd_gap_re;
+        shared.re[u3] = gap_re - odd_gap_im;
+        shared.im[u3] = gap_im + odd_gap_re;
         b += tile.stride;
     }
 }
 
 /// One pass with a small radix, as plain sums of numbers that are read once.
 #[cube]
-fn pass_of_few<F: Float>(
-    re: &mut SharedMemory<F>,
-    im: &mut SharedMemory<F>,
-    roots: &Array<F>,
+fn pass_of_few<F: Float + CubeElement>(
+    shared: &mut Shared<F>,
+    tables: &Tables<F>,
     tile: &Tile,
     from: usize,
     to: usize,
     done: usize,
     #[comptime] radix: usize,
 ) {
-    let part = tile.n / radix;
+    let part = tile.length / radix;
     let turn = part / done;
     let mut unit_re = Array::<F>::new(radix);
     let mut unit_im = Array::<F>::new(radix);
     #[unroll]
     for q in 0..radix {
-        unit_re[q] = roots[q * part];
-        unit_im[q] = roots[tile.n + q * part];
+        unit_re[q] = tables.roots[q * part];
+        unit_im[q] = tables.roots[tile.length + q * part];
     }
     let mut v_re = Array::<F>::new(radix);
     let mut v_im = Array::<F>::new(radix);
@@ -164,7 +239,7 @@ fn pass_of_few<F: Float>(
         let k = b % done;
         #[unroll]
         for q in 0..radix {
-            let v = turned(re, im, roots, tile, from, b + q * part, q * k * turn);
+            let v = turned(shared, tables, tile, from, b + q * part, q * k * turn);
             v_re[q] = v.re;
             v_im[q] = v.im;
         }
@@ -180,8 +255,8 @@ fn pass_of_few<F: Float>(
                 sum_im += v_re[q] * unit_im[w] + v_im[q] * unit_re[w];
             }
             let at = to + place(tile, tile.pair, first + s * done);
-            re[at] = sum_re;
-            im[at] = sum_im;
+            shared.re[at] = sum_re;
+            shared.im[at] = sum_im;
         }
         b += tile.stride;
     }
@@ -189,19 +264,18 @@ fn pass_of_few<F: Float>(
 
 /// One pass with any radix, as a plain sum for each of its results.
 #[cube]
-fn pass_of_any<F: Float>(
-    re: &mut SharedMemory<F>,
-    im: &mut SharedMemory<F>,
-    roots: &Array<F>,
+fn pass_of_any<F: Float + CubeElement>(
+    shared: &mut Shared<F>,
+    tables: &Tables<F>,
     tile: &Tile,
     from: usize,
     to: usize,
     done: usize,
     radix: usize,
 ) {
-    let part = tile.n / radix;
+    let part = tile.length / radix;
     let mut result = tile.begin;
-    while result < tile.n {
+    while result < tile.length {
         let k = result % done;
         let blocks = result / done;
         let b = (blocks / radix) * done + k;
@@ -211,17 +285,17 @@ fn pass_of_any<F: Float>(
         let mut sum_re = F::new(0.0);
         let mut sum_im = F::new(0.0);
         for q in 0..radix {
-            let v = turned(re, im, roots, tile, from, b + q * part, angle);
+            let v = turned(shared, tables, tile, from, b + q * part, angle);
             sum_re += v.re;
             sum_im += v.im;
             angle += turn;
-            if angle >= tile.n {
-                angle -= tile.n;
+            if angle >= tile.length {
+                angle -= tile.length;
             }
         }
         let at = to + place(tile, tile.pair, result);
-        re[at] = sum_re;
-        im[at] = sum_im;
+        shared.re[at] = sum_re;
+        shared.im[at] = sum_im;
         result += tile.stride;
     }
 }

@@ -4,7 +4,8 @@
 //! Makhoul order (even places first, then odd places backwards), `Z = FFT(v)` and `w_k = exp(−iπk/2n)`, the
 //! cosine transforms of both lines are `Y_k = w_k Z_k + w̄_k Z_{n−k}`. Backwards, `Z_k = w̄_k (Y_k − i Y_{n−k})`
 //! with `Y_n = 0`, and `x` comes out times `2n`. The passes of the Fourier transform are Stockham's, from one
-//! half of the shared memory to the other. Its inverse is itself, with real and imaginary parts exchanged.
+//! half of the shared memory to the other. Its inverse is itself, with real and imaginary parts exchanged. Lengths with
+//! large prime factors are transformed by Bluestein's chirp, a convolution of a longer line.
 
 mod fourier;
 mod tile;
@@ -12,11 +13,12 @@ mod tile;
 use cubecl::prelude::*;
 
 use super::axis::{Fourier, Lines};
-use super::gain::{Gains, gain};
+use super::gain::{Gains, Spectrum, gain};
 use crate::{Buffer, Device, Scalar};
 use fourier::{Complex, transform_tile};
 use tile::{
-    Tile, first_pair, first_place, load, next_pair, next_place, own_tile, place, store, write,
+    Shared, Tile, first_pair, first_place, load, new_shared, next_pair, next_place, own_tile,
+    place, store, write,
 };
 
 /// Units of a group.
@@ -37,33 +39,64 @@ pub(super) fn capacity<R: Runtime, T: Scalar>(device: &Device<R>) -> usize {
     1 << (numbers / 4).ilog2()
 }
 
-/// What a kernel is launched with.
-struct Launch {
-    groups: CubeCount,
-    dim: CubeDim,
-    capacity: usize,
+/// Tables of the Fourier transforms in kernels.
+#[derive(CubeLaunch, CubeType)]
+pub(super) struct Tables<F: Float + CubeElement> {
+    roots: Array<F>,
+    radices: Array<u32>,
+    chirp: Array<F>,
+    passes: usize,
+    /// Complex numbers of a Fourier transform.
+    length: usize,
+    /// Pairs of lines of a tile.
     pairs: usize,
 }
 
-impl Launch {
-    fn new<R: Runtime, T: Scalar>(device: &Device<R>, lines: Lines) -> Self {
+/// Constants of a kernel.
+#[derive(Clone, Copy, Debug, Hash, PartialEq, Eq)]
+pub(super) struct Layout {
+    /// Complex numbers of a half of the shared memory.
+    capacity: usize,
+    contiguous: bool,
+    chirped: bool,
+    inverse: bool,
+}
+
+/// Arguments of a launch.
+struct Launch<T: Scalar, R: Runtime> {
+    groups: CubeCount,
+    tables: TablesLaunch<T, R>,
+    layout: Layout,
+}
+
+impl<T: Scalar> Fourier<T> {
+    fn launch<R: Runtime>(&self, device: &Device<R>, lines: Lines, inverse: bool) -> Launch<T, R> {
         let capacity = capacity::<R, T>(device);
         // A unit stays with one pair.
-        let mut pairs = (1 << (capacity / lines.n).ilog2()).min(BLOCK as usize);
+        let mut pairs = (1 << (capacity / self.length).ilog2()).min(BLOCK as usize);
         while pairs > PAIRS && lines.count < 2 * pairs * GROUPS {
             pairs /= 2;
         }
         let tiles = lines.count.div_ceil(2 * pairs);
-        Self {
+        Launch {
             groups: device.groups(tiles * BLOCK as usize, BLOCK),
-            dim: CubeDim::new_1d(BLOCK),
-            capacity,
-            pairs,
+            tables: TablesLaunch::new(
+                self.roots.arg(),
+                self.radices.arg(),
+                self.chirp.as_ref().unwrap_or(&self.roots).arg(),
+                self.radices.len(),
+                self.length,
+                pairs,
+            ),
+            layout: Layout {
+                capacity,
+                contiguous: lines.step == 1,
+                chirped: self.chirp.is_some(),
+                inverse,
+            },
         }
     }
-}
 
-impl<T: Scalar> Fourier<T> {
     /// Lines → cosine transforms; or, if `inverse`, cosine transforms → lines times `2n`.
     pub(super) fn transform<R: Runtime>(
         &self,
@@ -73,23 +106,16 @@ impl<T: Scalar> Fourier<T> {
         to: &Buffer<T>,
         inverse: bool,
     ) {
-        let launch = Launch::new::<R, T>(device, lines);
+        let launch = self.launch(device, lines, inverse);
         transform::launch::<T, R>(
             device.client(),
             launch.groups,
-            launch.dim,
+            CubeDim::new_1d(BLOCK),
             from.arg(),
             to.arg(),
-            self.roots.arg(),
-            self.radices.arg(),
-            self.radices.len(),
-            lines.n,
-            lines.step,
-            lines.count,
-            launch.pairs,
-            launch.capacity,
-            lines.step == 1,
-            inverse,
+            lines.arg(),
+            launch.tables,
+            launch.layout,
         );
     }
 
@@ -102,81 +128,60 @@ impl<T: Scalar> Fourier<T> {
         to: &Buffer<T>,
         gains: &Gains<T>,
     ) {
-        let launch = Launch::new::<R, T>(device, lines);
-        let [_, ny, nz] = gains.shape;
+        let launch = self.launch(device, lines, false);
         filter::launch::<T, R>(
             device.client(),
             launch.groups,
-            launch.dim,
+            CubeDim::new_1d(BLOCK),
             from.arg(),
             to.arg(),
-            self.roots.arg(),
-            self.radices.arg(),
-            gains.spectrum.arg(),
-            gains.gaussian.arg(),
-            self.radices.len(),
-            lines.n,
-            lines.step,
-            lines.count,
-            launch.pairs,
-            ny,
-            nz,
-            launch.capacity,
-            lines.step == 1,
+            lines.arg(),
+            launch.tables,
+            gains.arg(),
+            launch.layout,
         );
     }
 }
 
 #[cube(launch)]
-fn transform<F: Float>(
+fn transform<F: Float + CubeElement>(
     input: &Array<F>,
     output: &mut Array<F>,
-    roots: &Array<F>,
-    radices: &Array<u32>,
-    passes: usize,
-    n: usize,
-    step: usize,
-    count: usize,
-    pairs: usize,
-    #[comptime] capacity: usize,
-    #[comptime] contiguous: bool,
-    #[comptime] inverse: bool,
+    lines: &Lines,
+    tables: &Tables<F>,
+    #[comptime] layout: Layout,
 ) {
-    let tile = own_tile(n, step, count, pairs, contiguous);
-    let mut re = SharedMemory::<F>::new(2 * capacity);
-    let mut im = SharedMemory::<F>::new(2 * capacity);
-    load(input, &mut re, &mut im, &tile, comptime!(!inverse));
+    let tile = own_tile::<F>(lines, tables, layout);
+    let mut shared = new_shared::<F>(layout);
+    load(input, &mut shared, &tile, comptime!(!layout.inverse));
     let mut from = 0usize.runtime();
-    if comptime!(inverse) {
-        to_fourier(&mut re, &mut im, roots, &tile, from, capacity);
-        from = capacity - from;
+    if comptime!(layout.inverse) {
+        to_fourier(&mut shared, tables, &tile, from);
+        from = shared.half - from;
     }
-    let at = transform_tile(
-        &mut re, &mut im, roots, radices, passes, &tile, from, capacity,
-    );
-    if comptime!(inverse) {
-        store(output, &re, &im, &tile, at);
+    let at = transform_tile(&mut shared, tables, &tile, from, layout.chirped);
+    if comptime!(layout.inverse) {
+        store(output, &shared, &tile, at);
     } else {
-        store_cosines(output, &re, &im, roots, &tile, at);
+        store_cosines(output, &shared, tables, &tile, at);
     }
 }
 
 /// Writes the cosine transforms of the Fourier transforms at `at`.
 #[cube]
-fn store_cosines<F: Float>(
+fn store_cosines<F: Float + CubeElement>(
     output: &mut Array<F>,
-    re: &SharedMemory<F>,
-    im: &SharedMemory<F>,
-    roots: &Array<F>,
+    shared: &Shared<F>,
+    tables: &Tables<F>,
     tile: &Tile,
     at: usize,
 ) {
-    let items = tile.pairs * tile.n;
+    let items = tile.pairs * tile.lines.n;
     let mut item = UNIT_POS as usize;
     let mut pair = first_pair(tile);
     let mut k = first_place(tile);
     while item < items {
-        let y = cosine(re, im, roots, tile, at, pair, k);
+        let y = cosine(shared, tables, tile, at, pair, k);
         write(output, tile, pair, k, y.re);
         write(output, tile, pair + tile.pairs, k, y.im);
         item += BLOCK as usize;
@@ -186,110 +191,88 @@ fn store_cosines<F: Float>(
 }
 
 #[cube(launch)]
-fn filter<F: Float>(
+fn filter<F: Float + CubeElement>(
     input: &Array<F>,
     output: &mut Array<F>,
-    roots: &Array<F>,
-    radices: &Array<u32>,
-    spectrum: &Array<F>,
-    gaussian: &Array<F>,
-    passes: usize,
-    n: usize,
-    step: usize,
-    count: usize,
-    pairs: usize,
-    ny: usize,
-    nz: usize,
-    #[comptime] capacity: usize,
-    #[comptime] contiguous: bool,
+    lines: &Lines,
+    tables: &Tables<F>,
+    gains: &Spectrum<F>,
+    #[comptime] layout: Layout,
 ) {
-    let tile = own_tile(n, step, count, pairs, contiguous);
-    let mut re = SharedMemory::<F>::new(2 * capacity);
-    let mut im = SharedMemory::<F>::new(2 * capacity);
-    load(input, &mut re, &mut im, &tile, true);
-    let at = transform_tile(
-        &mut re,
-        &mut im,
-        roots,
-        radices,
-        passes,
-        &tile,
-        0usize.runtime(),
-        capacity,
-    );
+    let tile = own_tile::<F>(lines, tables, layout);
+    let mut shared = new_shared::<F>(layout);
+    load(input, &mut shared, &tile, true);
+    let start = 0usize.runtime();
+    let at = transform_tile(&mut shared, tables, &tile, start, layout.chirped);
     let line = tile.first + tile.pair;
     let mut k = tile.begin;
-    while k < tile.n {
-        let y = cosine(&re, &im, roots, &tile, at, tile.pair, k);
-        let to = capacity - at + place(&tile, tile.pair, k);
+    while k < lines.n {
+        let y = cosine(&shared, tables, &tile, at, tile.pair, k);
+        let to = shared.half - at + place(&tile, tile.pair, k);
         let mut one = F::new(0.0);
         let mut other = F::new(0.0);
-        if line < tile.count {
-            one = gain(spectrum, gaussian, k, line, n, ny, nz);
+        if line < lines.count {
+            one = gain(gains, k, line);
         }
-        if line + tile.pairs < tile.count {
-            other = gain(spectrum, gaussian, k, line + tile.pairs, n, ny, nz);
+        if line + tile.pairs < lines.count {
+            other = gain(gains, k, line + tile.pairs);
         }
-        re[to] = y.re * one;
-        im[to] = y.im * other;
+        shared.re[to] = y.re * one;
+        shared.im[to] = y.im * other;
         k += tile.stride;
     }
     sync_cube();
-    to_fourier(&mut re, &mut im, roots, &tile, capacity - at, capacity);
-    let end = transform_tile(
-        &mut re, &mut im, roots, radices, passes, &tile, at, capacity,
-    );
-    store(output, &re, &im, &tile, end);
+    let other = shared.half - at;
+    to_fourier(&mut shared, tables, &tile, other);
+    let end = transform_tile(&mut shared, tables, &tile, at, layout.chirped);
+    store(output, &shared, &tile, end);
 }
 
 /// `Y_k` of the Fourier transforms at `at`.
 #[cube]
-fn cosine<F: Float>(
-    re: &SharedMemory<F>,
-    im: &SharedMemory<F>,
-    roots: &Array<F>,
+fn cosine<F: Float + CubeElement>(
+    shared: &Shared<F>,
+    tables: &Tables<F>,
     tile: &Tile,
     at: usize,
     pair: usize,
     k: usize,
 ) -> Complex<F> {
-    let partner = select(k == 0, 0, tile.n - k);
+    let partner = select(k == 0, 0, tile.lines.n - k);
     let a = at + place(tile, pair, k);
     let b = at + place(tile, pair, partner);
-    let c = roots[2 * tile.n + k];
-    let s = roots[3 * tile.n + k];
+    let c = tables.roots[2 * tile.length + k];
+    let s = tables.roots[2 * tile.length + tile.lines.n + k];
     Complex::<F> {
-        re: c * (re[a] + re[b]) - s * (im[a] - im[b]),
-        im: c * (im[a] + im[b]) + s * (re[a] - re[b]),
+        re: c * (shared.re[a] + shared.re[b]) - s * (shared.im[a] - shared.im[b]),
+        im: c * (shared.im[a] + shared.im[b]) + s * (shared.re[a] - shared.re[b]),
     }
 }
 
 /// `Z_k`, its parts exchanged, of the cosine transforms at `from`, into the other half.
 #[cube]
-fn to_fourier<F: Float>(
-    re: &mut SharedMemory<F>,
-    im: &mut SharedMemory<F>,
-    roots: &Array<F>,
+fn to_fourier<F: Float + CubeElement>(
+    shared: &mut Shared<F>,
+    tables: &Tables<F>,
     tile: &Tile,
     from: usize,
-    #[comptime] capacity: usize,
 ) {
     let mut k = tile.begin;
-    while k < tile.n {
+    while k < tile.lines.n {
         let here = place(tile, tile.pair, k);
         let a = from + here;
-        let mut x = re[a];
-        let mut y = im[a];
+        let mut x = shared.re[a];
+        let mut y = shared.im[a];
         if k > 0 {
-            let b = from + place(tile, tile.pair, tile.n - k);
-            x += im[b];
-            y -= re[b];
+            let b = from + place(tile, tile.pair, tile.lines.n - k);
+            x += shared.im[b];
+            y -= shared.re[b];
         }
-        let c = roots[2 * tile.n + k];
-        let s = roots[3 * tile.n + k];
-        let to = capacity - from + here;
-        im[to] = c * x + s * y;
-        re[to] = c * y - s * x;
+        let c = tables.roots[2 * tile.length + k];
+        let s = tables.roots[2 * tile.length + tile.lines.n + k];
+        let to = shared.half - from + here;
+        shared.im[to] = c * x + s * y;
+        shared.re[to] = c * y - s * x;
         k += tile.stride;
     }
     sync_cube();

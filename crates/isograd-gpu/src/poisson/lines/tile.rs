@@ -2,19 +2,17 @@
 
 use cubecl::prelude::*;
 
-use super::super::axis::cell_of_line;
-use super::BLOCK;
+use super::super::axis::{Lines, cell_of_line};
+use super::{BLOCK, Layout, Tables};
 
 /// The lines of a group: `pairs` of them from the first on, paired with as many behind those. In shared
 /// memory, places of a line are `pairs` apart.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Tile {
-    /// Cells of a line.
-    pub(super) n: usize,
-    /// Distance in memory between neighbors on a line.
-    pub(super) step: usize,
-    /// Lines of the field.
-    pub(super) count: usize,
+    /// The lines of the field.
+    pub(super) lines: Lines,
+    /// Complex numbers of a Fourier transform: the cells of a line, or more for the chirp transform.
+    pub(super) length: usize,
     pub(super) pairs: usize,
     pub(super) first: usize,
     /// Pair of a unit, where it stays with one: units go through its places from `begin` on by `stride`.
@@ -28,24 +26,41 @@ pub(super) struct Tile {
 }
 
 #[cube]
-pub(super) fn own_tile(
-    n: usize,
-    step: usize,
-    count: usize,
-    pairs: usize,
-    #[comptime] contiguous: bool,
+pub(super) fn own_tile<F: Float + CubeElement>(
+    lines: &Lines,
+    tables: &Tables<F>,
+    #[comptime] layout: Layout,
 ) -> Tile {
     let unit = UNIT_POS as usize;
+    let pairs = tables.pairs;
     Tile {
-        n,
-        step,
-        count,
+        lines: *lines,
+        length: tables.length,
         pairs,
         first: CUBE_POS * 2 * pairs,
         pair: unit % pairs,
         begin: unit / pairs,
         stride: BLOCK as usize / pairs,
-        contiguous,
+        contiguous: comptime!(layout.contiguous),
+    }
+}
+
+/// Complex numbers of a tile in shared memory: two halves, from one to the other of which a pass goes.
+#[derive(CubeType, Clone, Copy)]
+pub(super) struct Shared<F: Float> {
+    pub(super) re: SharedMemory<F>,
+    pub(super) im: SharedMemory<F>,
+    /// Numbers of a half.
+    #[cube(comptime)]
+    pub(super) half: usize,
+}
+
+#[cube]
+pub(super) fn new_shared<F: Float>(#[comptime] layout: Layout) -> Shared<F> {
+    Shared::<F> {
+        re: SharedMemory::<F>::new(comptime!(2 * layout.capacity)),
+        im: SharedMemory::<F>::new(comptime!(2 * layout.capacity)),
+        half: comptime!(layout.capacity),
     }
 }
 
@@ -53,9 +68,9 @@ pub(super) fn own_tile(
 #[cube]
 fn cell(tile: &Tile, line: usize, j: usize) -> usize {
     if comptime!(tile.contiguous) {
-        line * tile.n + j
+        line * tile.lines.n + j
     } else {
-        cell_of_line(tile.n, tile.step, line, j)
+        cell_of_line(&tile.lines, line, j)
     }
 }
 
@@ -69,17 +84,17 @@ pub(super) fn place(tile: &Tile, pair: usize, j: usize) -> usize {
 #[cube]
 pub(super) fn first_pair(tile: &Tile) -> usize {
     if comptime!(tile.contiguous) {
-        UNIT_POS as usize / tile.n
+        UNIT_POS as usize / tile.lines.n
     } else {
         tile.pair
     }
 }
 
-/// The place of that.
+/// The place that a unit reads or writes first.
 #[cube]
 pub(super) fn first_place(tile: &Tile) -> usize {
     if comptime!(tile.contiguous) {
-        UNIT_POS as usize % tile.n
+        UNIT_POS as usize % tile.lines.n
     } else {
         tile.begin
     }
@@ -90,19 +105,19 @@ pub(super) fn first_place(tile: &Tile) -> usize {
 pub(super) fn next_pair(tile: &Tile, pair: usize, j: usize) -> usize {
     if comptime!(tile.contiguous) {
         let block = BLOCK as usize;
-        let carry = j + block % tile.n >= tile.n;
-        pair + block / tile.n + select(carry, 1, 0)
+        let carry = j + block % tile.lines.n >= tile.lines.n;
+        pair + block / tile.lines.n + select(carry, 1, 0)
     } else {
         pair
     }
 }
 
-/// The place of that.
+/// The place that a unit reads or writes after place `j`.
 #[cube]
 pub(super) fn next_place(tile: &Tile, j: usize) -> usize {
     if comptime!(tile.contiguous) {
-        let next = j + BLOCK as usize % tile.n;
-        select(next >= tile.n, next - tile.n, next)
+        let next = j + BLOCK as usize % tile.lines.n;
+        select(next >= tile.lines.n, next - tile.lines.n, next)
     } else {
         j + tile.stride
     }
@@ -119,23 +134,22 @@ fn makhoul(j: usize, n: usize) -> usize {
 #[cube]
 pub(super) fn load<F: Float>(
     input: &Array<F>,
-    re: &mut SharedMemory<F>,
-    im: &mut SharedMemory<F>,
+    shared: &mut Shared<F>,
     tile: &Tile,
     #[comptime] reorder: bool,
 ) {
-    let items = tile.pairs * tile.n;
+    let items = tile.pairs * tile.lines.n;
     let mut item = UNIT_POS as usize;
     let mut pair = first_pair(tile);
     let mut j = first_place(tile);
     while item < items {
         let mut to = j;
         if comptime!(reorder) {
-            to = makhoul(j, tile.n);
+            to = makhoul(j, tile.lines.n);
         }
         let to = place(tile, pair, to);
-        re[to] = read(input, tile, pair, j);
-        im[to] = read(input, tile, pair + tile.pairs, j);
+        shared.re[to] = read(input, tile, pair, j);
+        shared.im[to] = read(input, tile, pair + tile.pairs, j);
         item += BLOCK as usize;
         pair = next_pair(tile, pair, j);
         j = next_place(tile, j);
@@ -145,21 +159,15 @@ pub(super) fn load<F: Float>(
 
 /// Writes the lines, whose parts are exchanged, back from Makhoul order.
 #[cube]
-pub(super) fn store<F: Float>(
-    output: &mut Array<F>,
-    re: &SharedMemory<F>,
-    im: &SharedMemory<F>,
-    tile: &Tile,
-    at: usize,
-) {
-    let items = tile.pairs * tile.n;
+pub(super) fn store<F: Float>(output: &mut Array<F>, shared: &Shared<F>, tile: &Tile, at: usize) {
+    let items = tile.pairs * tile.lines.n;
     let mut item = UNIT_POS as usize;
     let mut pair = first_pair(tile);
     let mut j = first_place(tile);
     while item < items {
-        let from = at + place(tile, pair, makhoul(j, tile.n));
-        write(output, tile, pair, j, im[from]);
-        write(output, tile, pair + tile.pairs, j, re[from]);
+        let from = at + place(tile, pair, makhoul(j, tile.lines.n));
+        write(output, tile, pair, j, shared.im[from]);
+        write(output, tile, pair + tile.pairs, j, shared.re[from]);
         item += BLOCK as usize;
         pair = next_pair(tile, pair, j);
         j = next_place(tile, j);
@@ -169,7 +177,7 @@ pub(super) fn store<F: Float>(
 #[cube]
 fn read<F: Float>(input: &Array<F>, tile: &Tile, line: usize, j: usize) -> F {
     let mut value = F::new(0.0);
-    if tile.first + line < tile.count {
+    if tile.first + line < tile.lines.count {
         value = input[cell(tile, tile.first + line, j)];
     }
     value
@@ -177,7 +185,7 @@ fn read<F: Float>(input: &Array<F>, tile: &Tile, line: usize, j: usize) -> F {
 
 #[cube]
 pub(super) fn write<F: Float>(output: &mut Array<F>, tile: &Tile, line: usize, j: usize, value: F) {
-    if tile.first + line < tile.count {
+    if tile.first + line < tile.lines.count {
         output[cell(tile, tile.first + line, j)] = value;
     }
 }

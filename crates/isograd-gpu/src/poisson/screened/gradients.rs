@@ -4,12 +4,21 @@ use cubecl::prelude::*;
 use isograd::poisson::screened::{self, MOST_ITERATIONS};
 
 use super::{Equation, Error};
+use crate::device::launch;
 use crate::grid::{self, Lattice, cell_at, from_center, place};
 use crate::primitives::fill::zeros;
 use crate::primitives::reduce::{BLOCK, sum, sum_of_group};
 use crate::spread::{Before, spread};
 use crate::trilinear::{NUMBERS, REACH, Trilinear, interpolate};
 use crate::{Buffer, Device, Scalar};
+
+/// Samples of the system in kernels.
+#[derive(CubeLaunch, CubeType)]
+struct SystemArrays<F: Float + CubeElement> {
+    points: Array<F>,
+    places: Array<u32>,
+    roots: Array<F>,
+}
 
 /// The system on a device: numbers of the samples, sorted by cell.
 pub(super) struct System<'a, R: Runtime, T: Scalar> {
@@ -32,10 +41,11 @@ impl<'a, R: Runtime, T: Scalar> System<'a, R, T> {
         let order = &equation.splat.order;
         let count = order.keys.len();
         let (roots, carriers) = (device.empty(count)?, device.empty(NUMBERS * count)?);
-        start::launch::<T, R>(
-            device.client(),
-            device.groups(count, BLOCK as u32),
-            CubeDim::new_1d(BLOCK as u32),
+        launch!(
+            device,
+            start::<T>,
+            count,
+            BLOCK as u32,
             equation.samples.points.arg(),
             equation.samples.areas.arg(),
             order.keys.arg(),
@@ -43,7 +53,7 @@ impl<'a, R: Runtime, T: Scalar> System<'a, R, T> {
             roots.arg(),
             carriers.arg(),
             equation.per_area(),
-            grid::arg(&equation.splat.grid),
+            grid::arg(&equation.splat.grid)
         );
         let total: Buffer<T> = dot(device, &roots, &roots)?;
         let area = device.download(&total)?[0];
@@ -65,19 +75,22 @@ impl<'a, R: Runtime, T: Scalar> System<'a, R, T> {
     ) -> Result<Buffer<T>, Error> {
         let (device, splat) = (self.device, self.equation.splat);
         let out = device.empty(self.roots.len())?;
-        find_at_samples::launch::<T, R>(
-            device.client(),
-            device.groups(out.len(), BLOCK as u32),
-            CubeDim::new_1d(BLOCK as u32),
+        launch!(
+            device,
+            find_at_samples::<T>,
+            out.len(),
+            BLOCK as u32,
             field.arg(),
-            self.equation.samples.points.arg(),
-            splat.order.places.arg(),
-            self.roots.arg(),
+            SystemArraysLaunch::new(
+                self.equation.samples.points.arg(),
+                splat.order.places.arg(),
+                self.roots.arg(),
+            ),
             base.unwrap_or(&self.roots).arg(),
             out.arg(),
             T::of(factor),
             grid::arg(&splat.grid),
-            base.is_some(),
+            base.is_some()
         );
         Ok(out)
     }
@@ -85,13 +98,14 @@ impl<'a, R: Runtime, T: Scalar> System<'a, R, T> {
     /// Writes `Sᵀ u` to `field`, or adds it.
     pub fn spread(&self, u: &Buffer<T>, before: Before, field: &Buffer<T>) -> Result<(), Error> {
         let device = self.device;
-        carry::launch::<T, R>(
-            device.client(),
-            device.groups(u.len(), BLOCK as u32),
-            CubeDim::new_1d(BLOCK as u32),
+        launch!(
+            device,
+            carry::<T>,
+            u.len(),
+            BLOCK as u32,
             self.roots.arg(),
             u.arg(),
-            self.carriers.arg(),
+            self.carriers.arg()
         );
         let order = &self.equation.splat.order;
         spread::<R, T, Trilinear>(device, &self.carriers, order, REACH, before, field)?;
@@ -142,14 +156,15 @@ impl<'a, R: Runtime, T: Scalar> System<'a, R, T> {
     fn project(&self, v: &Buffer<T>) -> Result<(), Error> {
         let device = self.device;
         let along = dot(device, v, &self.roots)?;
-        subtract_along::launch::<T, R>(
-            device.client(),
-            device.groups(v.len(), BLOCK as u32),
-            CubeDim::new_1d(BLOCK as u32),
+        launch!(
+            device,
+            subtract_along::<T>,
+            v.len(),
+            BLOCK as u32,
             self.roots.arg(),
             along.arg(),
             self.total.arg(),
-            v.arg(),
+            v.arg()
         );
         Ok(())
     }
@@ -163,31 +178,33 @@ impl<'a, R: Runtime, T: Scalar> System<'a, R, T> {
         solution: &Buffer<T>,
         rest: &Buffer<T>,
     ) {
-        take_step::launch::<T, R>(
-            self.device.client(),
-            self.device.groups(rest.len(), BLOCK as u32),
-            CubeDim::new_1d(BLOCK as u32),
+        launch!(
+            self.device,
+            take_step::<T>,
+            rest.len(),
+            BLOCK as u32,
             up.arg(),
             down.arg(),
             direction.arg(),
             image.arg(),
             solution.arg(),
-            rest.arg(),
+            rest.arg()
         );
     }
 
     /// The next direction: what is left, and of the last direction the quotient of the two numbers, or nothing.
     fn turn(&self, rest: &Buffer<T>, share: Option<[&Buffer<T>; 2]>, direction: &Buffer<T>) {
         let [up, down] = share.unwrap_or([&self.total; 2]);
-        turn_direction::launch::<T, R>(
-            self.device.client(),
-            self.device.groups(rest.len(), BLOCK as u32),
-            CubeDim::new_1d(BLOCK as u32),
+        launch!(
+            self.device,
+            turn_direction::<T>,
+            rest.len(),
+            BLOCK as u32,
             rest.arg(),
             up.arg(),
             down.arg(),
             direction.arg(),
-            share.is_some(),
+            share.is_some()
         );
     }
 }
@@ -199,13 +216,14 @@ fn dot<R: Runtime, T: Scalar>(
     b: &Buffer<T>,
 ) -> Result<Buffer<T>, crate::Error> {
     let sums = device.empty(a.len().div_ceil(BLOCK))?;
-    sum_products::launch::<T, R>(
-        device.client(),
-        device.groups(a.len(), BLOCK as u32),
-        CubeDim::new_1d(BLOCK as u32),
+    launch!(
+        device,
+        sum_products::<T>,
+        a.len(),
+        BLOCK as u32,
         a.arg(),
         b.arg(),
-        sums.arg(),
+        sums.arg()
     );
     sum(device, &sums)
 }
@@ -248,7 +266,7 @@ fn start<F: Float + CubeElement>(
     }
 }
 
-/// Has each sample spread `√â u`.
+/// Sets the number that each sample spreads to `√â u`.
 #[cube(launch)]
 fn carry<F: Float>(roots: &Array<F>, u: &Array<F>, carriers: &mut Array<F>) {
     let s = ABSOLUTE_POS;
@@ -260,9 +278,7 @@ fn carry<F: Float>(roots: &Array<F>, u: &Array<F>, carriers: &mut Array<F>) {
 #[cube(launch)]
 fn find_at_samples<F: Float + CubeElement>(
     field: &Array<F>,
-    points: &Array<F>,
-    places: &Array<u32>,
-    roots: &Array<F>,
+    system: &SystemArrays<F>,
     base: &Array<F>,
     out: &mut Array<F>,
     factor: F,
@@ -271,8 +287,8 @@ fn find_at_samples<F: Float + CubeElement>(
 ) {
     let s = ABSOLUTE_POS;
     if s < out.len() {
-        let x = place::<F>(points, places[s] as usize, &grid);
-        let mut value = factor * roots[s] * interpolate::<F>(field, x, &grid).value;
+        let x = place::<F>(&system.points, system.places[s] as usize, &grid);
+        let mut value = factor * system.roots[s] * interpolate::<F>(field, x, &grid).value;
         if with_base {
             value += base[s];
         }

@@ -4,20 +4,20 @@ use cubecl::prelude::*;
 
 use super::gradients::System;
 use super::{Equation, Error};
-use crate::device::check_length;
+use crate::device::{check_length, launch};
 use crate::grid::{self, Lattice, check_field, place};
 use crate::primitives::fill::add;
 use crate::primitives::reduce::{BLOCK, sum_columns};
-use crate::splat::{SampleCotangent, subtract_from_grid};
+use crate::splat::{CotangentArrays, SampleArrays, SampleCotangent, subtract_from_grid};
 use crate::spread::Before;
 use crate::{Buffer, Device, Scalar, iso_value};
 
-/// Turns the cotangents `chi_bar`, `(nx, ny, nz)`, of the screened solution into those of the plain one, adds what
-/// they mean for points, areas and grid to `out`, and returns the iterations it took. `level` is what the
-/// iso-value kept of `χ`; all else is as it was in [`forward`](super::forward). Waits for the device.
+/// Replaces the cotangents `chi_bar`, `(nx, ny, nz)`, of the screened solution by those of the plain one, adds the
+/// cotangents of points, areas and grid to `out`, and returns the number of iterations. `level` is the residual of the
+/// iso-value; all other arguments are those of [`forward`](super::forward). Waits for the device.
 ///
 /// # Errors
-/// As [`forward`](super::forward); `chi_bar` is then as it was.
+/// Like [`forward`](super::forward); `chi_bar` is then unchanged.
 pub fn pullback<R: Runtime, T: Scalar>(
     device: &Device<R>,
     equation: &Equation<'_, T>,
@@ -41,42 +41,48 @@ pub fn pullback<R: Runtime, T: Scalar>(
     // Its mean at the samples and what it is there, as that of `χ`.
     let (_, adjoint) = iso_value::forward(device, &adjoint, grid, samples.points, samples.areas)?;
     let grid_sums: Buffer<T> = device.empty(4 * samples.len().div_ceil(BLOCK))?;
-    pull_matrix::launch::<T, R>(
-        device.client(),
-        device.groups(samples.len(), BLOCK as u32),
-        CubeDim::new_1d(BLOCK as u32),
-        samples.points.arg(),
-        samples.areas.arg(),
-        level.at_samples.arg(),
-        level.sums.arg(),
-        adjoint.at_samples.arg(),
-        adjoint.sums.arg(),
-        out.points.arg(),
-        out.areas.arg(),
+    launch!(
+        device,
+        pull_matrix::<T>,
+        samples.len(),
+        BLOCK as u32,
+        samples.arg(),
+        InterpolantLaunch::new(level.at_samples.arg(), level.sums.arg()),
+        InterpolantLaunch::new(adjoint.at_samples.arg(), adjoint.sums.arg()),
+        out.arg(),
         grid_sums.arg(),
-        T::of(-equation.screening),
-        equation.per_area(),
+        FactorsLaunch::new(T::of(-equation.screening), equation.per_area()),
         grid::arg(grid),
-        equation.area_weights,
+        equation.area_weights
     );
     add(device, &sum_columns(device, &grid_sums, 4)?, &out.grid)?;
     Ok(iterations)
 }
 
-/// What the derivative of the matrix has for each point and area, and summed a group at a time for the grid.
+/// Value and gradient of a field at the samples, and the sums of its area-weighted mean.
+#[derive(CubeLaunch, CubeType)]
+struct Interpolant<F: Float + CubeElement> {
+    at_samples: Array<F>,
+    sums: Array<F>,
+}
+
+/// Factors of the screening term.
+#[derive(CubeLaunch, CubeType, Clone, Copy)]
+struct Factors<F: Float + CubeElement> {
+    screening: F,
+    per_area: F,
+}
+
+/// Adds the cotangents of points and areas through the derivative of the matrix, and sums that of the grid a group at a
+/// time.
 #[cube(launch)]
 fn pull_matrix<F: Float + CubeElement>(
-    points: &Array<F>,
-    areas: &Array<F>,
-    chi: &Array<F>,
-    chi_sums: &Array<F>,
-    adjoint: &Array<F>,
-    adjoint_sums: &Array<F>,
-    points_bar: &mut Array<F>,
-    areas_bar: &mut Array<F>,
+    samples: &SampleArrays<F>,
+    chi: &Interpolant<F>,
+    adjoint: &Interpolant<F>,
+    out: &mut CotangentArrays<F>,
     grid_sums: &mut Array<F>,
-    factor: F,
-    per_area: F,
+    factors: Factors<F>,
     grid: Lattice<F>,
     #[comptime] area_weights: bool,
 ) {
@@ -85,18 +91,19 @@ fn pull_matrix<F: Float + CubeElement>(
     for k in 0..4usize {
         of_grid[k] = F::new(0.0);
     }
-    if i < areas.len() {
-        let offset = chi[4 * i] - chi_sums[0] / chi_sums[1];
-        let value = adjoint[4 * i] - adjoint_sums[0] / adjoint_sums[1];
-        let area = areas[i] * per_area;
-        let x = place::<F>(points, i, &grid);
+    if i < samples.count as usize {
+        let offset = chi.at_samples[4 * i] - chi.sums[0] / chi.sums[1];
+        let value = adjoint.at_samples[4 * i] - adjoint.sums[0] / adjoint.sums[1];
+        let area = samples.areas[i] * factors.per_area;
+        let x = place::<F>(&samples.points, i, &grid);
         for axis in 0..3usize {
-            let both = value * chi[4 * i + 1 + axis] + offset * adjoint[4 * i + 1 + axis];
-            of_grid[axis] = factor * area / grid.spacing * both;
-            points_bar[3 * i + axis] += of_grid[axis];
+            let both = value * chi.at_samples[4 * i + 1 + axis]
+                + offset * adjoint.at_samples[4 * i + 1 + axis];
+            of_grid[axis] = factors.screening * area / grid.spacing * both;
+            out.points[3 * i + axis] += of_grid[axis];
         }
-        let area_bar = factor * value * offset;
-        areas_bar[i] += area_bar * per_area;
+        let area_bar = factors.screening * value * offset;
+        out.areas[i] += area_bar * factors.per_area;
         of_grid[3] = x.x * of_grid[0] + x.y * of_grid[1] + x.z * of_grid[2];
         if area_weights {
             of_grid[3] += F::new(2.0) * area * area_bar / grid.spacing;

@@ -1,31 +1,26 @@
-//! How the signs of two neighboring axes hang together, and what spreads along such ties: see
-//! `isograd::orient::graph`. Lengths are in sample spacings, so that single precision serves any unit.
-
-#[cfg(cube)]
-use cubecl::prelude::*;
-
-use super::Element;
+//! Coupling of the signs of two neighboring axes, and the beliefs that spread along it: see
+//! [`crate::orient::graph`]. Lengths are in sample spacings, so that single precision serves any unit.
 
 /// Neighbors of a point in the graph.
 pub const NEIGHBORS: usize = 16;
 
 /// The reach of a sample is its distance to this neighbor: the first ring round it.
-pub const RING: usize = 6;
+pub(super) const RING: usize = 6;
 
-/// Rounds in which every point takes the mean of its own evidence and what its neighbors say.
-pub const ROUNDS: usize = 60;
+/// Rounds of belief propagation, in each of which a point takes the mean of its own evidence and its neighbors' beliefs.
+pub(super) const ROUNDS: usize = 60;
 
 /// A sample reaches at most this many times as far as its neighbors do at the median: an outlier
 /// stands for no more surface than the samples that are nearest to it.
 const REACH_GROWTH: f32 = 1.5;
 
-/// Offsets shorter than this share of the reach have no direction to speak of.
+/// Share of the reach below which the direction of an offset is mostly noise.
 const BLUNT: f32 = 0.22;
 
 /// A sample lies off a sheet from this many times as far as the samples of the sheet scatter.
 const APART: f32 = 3.0;
 
-/// Stands for the gap where a sheet is not known: no length reaches it.
+/// Gap of an unknown sheet: no length reaches it.
 const UNKNOWN: f32 = f32::MAX;
 
 /// A neighbor of a coupling above this along the same direction lies on the same sheet; and the least share
@@ -37,9 +32,9 @@ const LEAST_SHARE: f32 = 1.0 / 3.0;
 const ALL: f32 = NEIGHBORS as f32 + 1.0;
 const IN_RING: f32 = RING as f32 + 0.5;
 const PI: f32 = std::f32::consts::PI;
-const HEARD: f32 = NEIGHBORS as f32;
+const SOURCES: f32 = NEIGHBORS as f32;
 
-/// What the product of the spreads of two samples adds to the blur of their reflection.
+/// Factor of the product of the spreads of two samples in the blur of their reflection.
 const NOISE: f32 = 4.0;
 
 /// How soon it is clear on which side of a plane a sample lies, by its height in spreads.
@@ -49,49 +44,45 @@ const SIDE: f32 = 2.0;
 const CERTAIN: f32 = 10.0;
 
 /// How far the patch extends that a sample stands for, from its own ring and the median of those round it.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn reach(ring: f32, median: f32) -> f32 {
+pub(super) fn reach(ring: f32, median: f32) -> f32 {
     let most = REACH_GROWTH * median;
     if most < ring { most } else { ring }
 }
 
 /// In −1..1, the side of a plane on which a sample lies; `height` in spreads.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn side(height: f32) -> f32 {
+pub(super) fn side(height: f32) -> f32 {
     let mut clear = SIDE * height;
-    let most = f32::new(CERTAIN);
+    let most = CERTAIN;
     if clear > most {
         clear = most;
     }
     if clear < -most {
         clear = -most;
     }
-    f32::tanh(clear)
+    clear.tanh()
 }
 
 /// The square of the height from which on one of two samples lies off the sheet of the other, whose sheets
 /// scatter so much; as good as infinite where a sheet is not known.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn least_gap(a: f32, b: f32) -> f32 {
-    if a > 0.0f32 && b > 0.0f32 {
+pub(super) fn least_gap(a: f32, b: f32) -> f32 {
+    if a > 0.0 && b > 0.0 {
         let mut larger = a;
         if b > a {
             larger = b;
         }
         (APART * larger) * (APART * larger)
     } else {
-        f32::new(UNKNOWN)
+        UNKNOWN
     }
 }
 
-/// What is added to the square of the distance between two samples: their `spreads` and `thicknesses` are
+/// Blur that is added to the square of the distance between two samples: their `spreads` and `thicknesses` are
 /// products of those of the two.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn blur(reach: f32, spreads: f32, thicknesses: f32, gap: f32) -> f32 {
+pub(super) fn blur(reach: f32, spreads: f32, thicknesses: f32, gap: f32) -> f32 {
     let blunt = BLUNT * reach;
     let noise = NOISE * spreads;
     let mut rough = thicknesses;
@@ -102,7 +93,7 @@ pub fn blur(reach: f32, spreads: f32, thicknesses: f32, gap: f32) -> f32 {
     blunt * blunt + rough
 }
 
-/// How the signs of two neighboring axes `a` and `b` hang together, `d` apart: `a` is reflected at the
+/// Coupling of the signs of two neighboring axes `a` and `b`, `d` apart: `a` is reflected at the
 /// plane half-way between the two samples and compared with `b`. Along a sheet that is `a·b`; round an
 /// edge it turns with the surface; and two sheets that face each other, whether matter or air is
 /// between them, have opposite outward normals. A [`blur`] takes the reflection back
@@ -115,61 +106,56 @@ pub fn blur(reach: f32, spreads: f32, thicknesses: f32, gap: f32) -> f32 {
 /// Source: the reflected transfer of H. Xie, K. McDonnell, H. Qin, "Surface reconstruction of noisy
 /// and defective data sets" (2004).
 #[allow(clippy::manual_clamp)] // a kernel has no such method
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn coupled(parallel: f32, heights: f32, square: f32, gap: f32) -> f32 {
+pub(super) fn coupled(parallel: f32, heights: f32, square: f32, gap: f32) -> f32 {
     let mut divisor = square;
-    if gap < square && heights * parallel > 0.0f32 {
+    if gap < square && heights * parallel > 0.0 {
         let second = parallel * parallel;
         let fourth = second * second;
         let share = fourth * fourth;
-        let full = share * (heights.abs() + gap) + (1.0f32 - share) * square;
+        let full = share * (heights.abs() + gap) + (1.0 - share) * square;
         if full < square {
             divisor = full;
         }
     }
     let mut tie = parallel;
-    if divisor > 0.0f32 {
-        tie = parallel - 2.0f32 * heights / divisor;
+    if divisor > 0.0 {
+        tie = parallel - 2.0 * heights / divisor;
     }
-    if tie < -1.0f32 {
-        tie = -1.0f32;
+    if tie < -1.0 {
+        tie = -1.0;
     }
-    if tie > 1.0f32 {
-        tie = 1.0f32;
+    if tie > 1.0 {
+        tie = 1.0;
     }
     tie
 }
 
 /// A coupling for a [tie](coupled), its fifth power: a half-hearted one, as between a sample of one sheet and one
 /// slantwise across on the other, is mostly wrong, and must not count for half.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn trusted(tie: f32) -> f32 {
+pub(super) fn trusted(tie: f32) -> f32 {
     let square = tie * tie;
     tie * (square * square)
 }
 
 /// The coupling of two samples in a layer that has air on both sides, as far as it has (`both`, in 0..1): they hang
 /// together as they lie, on one side of the middle or on both. `parallel` as in [`coupled`].
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn parted(coupling: f32, both: f32, parallel: f32, side: f32, other: f32) -> f32 {
+pub(super) fn parted(coupling: f32, both: f32, parallel: f32, side: f32, other: f32) -> f32 {
     coupling + both * (trusted(parallel * side * other) - coupling)
 }
 
 /// Whether a neighbor lies on the same sheet, and takes a share of its area.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn on_same_sheet(coupling: f32, parallel: f32) -> bool {
+pub(super) fn on_same_sheet(coupling: f32, parallel: f32) -> bool {
     coupling * parallel > SAME_SHEET
 }
 
 /// The area that a sample stands for with so many neighbors on the same sheet.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn area(reach: f32, same: f32) -> f32 {
-    let mut share = (1.0f32 + same) / ALL;
+pub(super) fn area(reach: f32, same: f32) -> f32 {
+    let mut share = (1.0 + same) / ALL;
     if share < LEAST_SHARE {
         share = LEAST_SHARE;
     }
@@ -178,15 +164,14 @@ pub fn area(reach: f32, same: f32) -> f32 {
 
 /// How much a neighbor lies off the sheet of a sample: above 0 where its `height`, along the axis, is. `square` is
 /// its squared distance, above 0.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn across(height: f32, square: f32, parallel: f32, gap: f32) -> f32 {
+pub(super) fn across(height: f32, square: f32, parallel: f32, gap: f32) -> f32 {
     let sine = height.abs() / f32::sqrt(square);
     let mut off = sine * sine * sine;
     if gap < UNKNOWN {
         off = height * height / (height * height + gap);
     }
-    if height < 0.0f32 {
+    if height < 0.0 {
         off = -off;
     }
     let second = parallel * parallel;
@@ -195,30 +180,23 @@ pub fn across(height: f32, square: f32, parallel: f32, gap: f32) -> f32 {
 
 /// Evidence for the sign of an axis from what lies [`across`] a second sheet close by: its sum, and that of its
 /// magnitudes. Positive where the axis points away from that sheet.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn sheet_evidence(signed: f32, total: f32) -> f32 {
-    if total > 0.0f32 {
-        -signed * signed.abs() / (total * HEARD)
+pub(super) fn sheet_evidence(signed: f32, total: f32) -> f32 {
+    if total > 0.0 {
+        -signed * signed.abs() / (total * SOURCES)
     } else {
-        f32::new(0.0)
+        0.0
     }
 }
 
-/// What a point's own evidence adds to the sum of beliefs, its strength being its weight.
-#[cfg_attr(cube, cube)]
+/// Contribution of a point's own evidence to the sum of beliefs, weighted by its strength.
 #[inline(always)]
-pub fn held(own: f32) -> f32 {
+pub(super) fn held(own: f32) -> f32 {
     own * own.abs()
 }
 
 /// The mean of evidence and beliefs; 0 where nothing has weight.
-#[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn belief(sum: f32, weight: f32) -> f32 {
-    if weight > 0.0f32 {
-        sum / weight
-    } else {
-        f32::new(0.0)
-    }
+pub(super) fn belief(sum: f32, weight: f32) -> f32 {
+    if weight > 0.0 { sum / weight } else { 0.0 }
 }
