@@ -43,15 +43,6 @@ macro_rules! launch {
     ($device:expr, $count:expr => $($kernel:tt)+) => {
         launch!($device, $count, $crate::device::BLOCK => $($kernel)+)
     };
-    // With parameters that are made already.
-    ($device:expr, $kernel:ident $(::<$($number:ty),+>)?, $count:expr, $units:expr $(, $parameter:expr)* $(,)?) => {
-        $kernel::launch::<$($($number,)+)? _>(
-            $device.client(),
-            $device.groups($count, $units),
-            ::cubecl::prelude::CubeDim::new_1d($units),
-            $($parameter),*
-        )
-    };
 }
 pub(crate) use launch;
 

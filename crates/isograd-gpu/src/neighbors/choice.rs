@@ -40,17 +40,9 @@ pub(super) fn choose<R: Runtime, T: Scalar>(
         lists = halve(device, points, &lists, level)?;
     }
     let chosen: Buffer<u32> = device.empty(n.div_ceil(stride))?;
-    launch!(
-        device,
-        choose_from_cells,
-        chosen.len(),
-        BLOCK,
-        lists.arg(),
-        chosen.arg(),
-        n as u32,
-        levels,
-        stride as u32
-    );
+    launch!(device, chosen.len(), BLOCK => choose_from_cells(
+        lists, chosen, n as u32, levels, stride as u32,
+    ));
     Ok(chosen)
 }
 
@@ -63,30 +55,21 @@ fn along_axes<R: Runtime, T: Scalar>(
 ) -> Result<Buffer<u32>, Error> {
     let n = points.len() / 3;
     let (words, scale) = match T::NAME {
-        "f32" => (1, 1.0),
+        "f32" => (1u32, 1.0),
         _ => (3, (-largest.log2().ceil()).exp2()),
     };
     let lists: Buffer<u32> = device.empty(3 * n)?;
-    for axis in 0..3 {
+    for axis in 0..3u32 {
         let mut list = as_they_are(device, n)?;
         for word in (0..words).rev() {
             let keys = device.empty(n)?;
-            launch!(
-                device,
-                fill_words::<T>,
-                n,
-                BLOCK,
-                points.arg(),
-                list.arg(),
-                keys.arg(),
-                <T as isograd::Real>::of(scale),
-                axis,
-                word
-            );
+            launch!(device, n, BLOCK => fill_words<T>(
+                points, list, keys, <T as isograd::Real>::of(scale), axis, word,
+            ));
             let by_word = order(device, &keys, u32::MAX)?.places;
             list = gather(device, &list, &by_word, 1)?;
         }
-        launch!(device, put_list, n, BLOCK, list.arg(), lists.arg(), axis);
+        launch!(device, n, BLOCK => put_list(list, lists, axis));
     }
     Ok(lists)
 }
@@ -100,29 +83,11 @@ fn halve<R: Runtime, T: Scalar>(
 ) -> Result<Buffer<u32>, Error> {
     let n = lists.len() / 3;
     let sides: Buffer<u32> = device.empty(n)?;
-    launch!(
-        device,
-        find_sides::<T>,
-        n,
-        BLOCK,
-        points.arg(),
-        lists.arg(),
-        sides.arg(),
-        level,
-    );
+    launch!(device, n, BLOCK => find_sides<T>(points, lists, sides, level));
     let flags = gather(device, &sides, lists, 1)?;
     let before = exclusive_sum(device, &flags)?;
     let halved: Buffer<u32> = device.empty(3 * n)?;
-    launch!(
-        device,
-        move_halves,
-        3 * n,
-        BLOCK,
-        lists.arg(),
-        before.arg(),
-        halved.arg(),
-        level,
-    );
+    launch!(device, 3 * n, BLOCK => move_halves(lists, before, halved, level));
     Ok(halved)
 }
 

@@ -24,18 +24,9 @@ pub(crate) fn reaches<R: Runtime, T: Scalar>(
 ) -> Result<Buffer<T>, Error> {
     debug_assert!(k > 0 && k <= neighborhoods.len());
     let squares = device.empty(places.len() / 3)?;
-    launch!(
-        device,
-        find_reaches::<T>,
-        squares.len(),
-        BLOCK,
-        neighborhoods.points.arg(),
-        neighborhoods.nodes.arg(),
-        neighborhoods.links.arg(),
-        places.arg(),
-        squares.arg(),
-        k
-    );
+    launch!(device, squares.len(), BLOCK => find_reaches<T>(
+        neighborhoods.points, neighborhoods.nodes, neighborhoods.links, places, squares, k,
+    ));
     Ok(squares)
 }
 

@@ -27,15 +27,7 @@ pub(super) fn along_curve<R: Runtime, T: Scalar>(
     if count == 0 {
         return Ok(low);
     }
-    launch!(
-        device,
-        fill_keys::<T>,
-        count,
-        BLOCK,
-        points.arg(),
-        high.arg(),
-        low.arg()
-    );
+    launch!(device, count, BLOCK => fill_keys<T>(points, high, low));
     let limit = 1 << (3 * BITS);
     let by_low = order(device, &low, limit)?.places;
     let by_both = order(device, &gather(device, &high, &by_low, 1)?, limit)?.places;
@@ -51,16 +43,7 @@ pub(crate) fn gather<R: Runtime, E: Numeric + CubeElement>(
 ) -> Result<Buffer<E>, Error> {
     let gathered = device.empty(width * places.len())?;
     if !gathered.is_empty() {
-        launch!(
-            device,
-            gather_rows::<E>,
-            gathered.len(),
-            BLOCK,
-            values.arg(),
-            places.arg(),
-            gathered.arg(),
-            width
-        );
+        launch!(device, gathered.len(), BLOCK => gather_rows<E>(values, places, gathered, width));
     }
     Ok(gathered)
 }
@@ -73,15 +56,7 @@ pub(crate) fn scatter<R: Runtime, E: Numeric + CubeElement>(
 ) -> Result<Buffer<E>, Error> {
     let scattered = device.empty(values.len())?;
     if !values.is_empty() {
-        launch!(
-            device,
-            scatter_elements::<E>,
-            values.len(),
-            BLOCK,
-            values.arg(),
-            places.arg(),
-            scattered.arg()
-        );
+        launch!(device, values.len(), BLOCK => scatter_elements<E>(values, places, scattered));
     }
     Ok(scattered)
 }

@@ -106,20 +106,10 @@ pub fn census<R: Runtime, T: Scalar>(
         isolated: device.empty(n)?,
     };
     if n > 0 {
-        launch!(
-            device,
-            count_neighbors::<T>,
-            n,
-            BLOCK,
-            neighborhoods.points.arg(),
-            neighborhoods.radii.arg(),
-            neighborhoods.places.arg(),
-            neighborhoods.nodes.arg(),
-            neighborhoods.links.arg(),
-            census.count.arg(),
-            census.isolated.arg(),
-            common
-        );
+        launch!(device, n, BLOCK => count_neighbors<T>(
+            neighborhoods.points, neighborhoods.radii, neighborhoods.places, neighborhoods.nodes,
+            neighborhoods.links, census.count, census.isolated, common,
+        ));
     }
     Ok(census)
 }
@@ -129,14 +119,7 @@ fn check_finite<R: Runtime, T: Scalar>(
     points: &Buffer<T>,
 ) -> Result<(), Error> {
     let bad: Buffer<u32> = device.empty(points.len() / 3)?;
-    launch!(
-        device,
-        flag_not_finite::<T>,
-        bad.len(),
-        BLOCK,
-        points.arg(),
-        bad.arg()
-    );
+    launch!(device, bad.len(), BLOCK => flag_not_finite<T>(points, bad));
     match flags::first(device, &bad)? {
         Some(index) => Err(Refused::NotFinite { index }.into()),
         None => Ok(()),
@@ -165,14 +148,7 @@ fn automatic<R: Runtime, T: Scalar>(
     let asked = gather(device, points, &chosen, 3)?;
     let squares = reaches(device, neighborhoods, &asked, AUTO_NEIGHBORS.min(n))?;
     let found: Buffer<T> = device.empty(2)?;
-    launch!(
-        device,
-        find_median::<T>,
-        squares.len(),
-        BLOCK,
-        squares.arg(),
-        found.arg()
-    );
+    launch!(device, squares.len(), BLOCK => find_median<T>(squares, found));
     let found = device.download(&found)?;
     let [positive, median] = [0, 1].map(|k| isograd::Real::f64(found[k]));
     // The root of a number in single precision, taken in double, rounds to the same one.
@@ -194,17 +170,9 @@ fn grow<R: Runtime, T: Scalar>(
         FEWEST_NEIGHBORS.min(n),
     )?;
     let radii = device.empty(n)?;
-    launch!(
-        device,
-        grow_radii::<T>,
-        n,
-        BLOCK,
-        squares.arg(),
-        neighborhoods.places.arg(),
-        radii.arg(),
-        common,
-        <T as isograd::Real>::of(GROWTH_MARGIN)
-    );
+    launch!(device, n, BLOCK => grow_radii<T>(
+        squares, neighborhoods.places, radii, common, <T as isograd::Real>::of(GROWTH_MARGIN),
+    ));
     Ok(radii)
 }
 

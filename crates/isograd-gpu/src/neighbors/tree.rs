@@ -41,32 +41,15 @@ pub(super) fn build<R: Runtime, T: Scalar>(
     if total == 0 {
         return Ok((nodes, links));
     }
-    launch!(
-        device,
-        fill_leaves::<T>,
-        counts[0],
-        BLOCK,
-        points.arg(),
-        radii.arg(),
-        nodes.arg(),
-        links.arg(),
-        counts[0] as u32,
-        height,
-    );
+    launch!(device, counts[0], BLOCK => fill_leaves<T>(
+        points, radii, nodes, links, counts[0] as u32, height,
+    ));
     let mut below = 1u32;
     for level in 1..counts.len() {
-        launch!(
-            device,
-            fill_level::<T>,
-            counts[level],
-            BLOCK,
-            nodes.arg(),
-            links.arg(),
-            counts[level - 1] as u32,
-            counts[level] as u32,
-            below,
+        launch!(device, counts[level], BLOCK => fill_level<T>(
+            nodes, links, counts[level - 1] as u32, counts[level] as u32, below,
             height - level as u32,
-        );
+        ));
         below = CHILDREN as u32 * below + 1;
     }
     Ok((nodes, links))

@@ -38,25 +38,10 @@ pub fn forward<R: Runtime, T: Scalar>(
         return Ok((normals, residual));
     }
     let moments: Buffer<T> = device.empty(MOMENTS * n)?;
-    launch!(
-        device,
-        sum_moments::<T>,
-        n,
-        BLOCK,
-        neighborhoods.arg(),
-        moments.arg(),
-        residual.count.arg()
-    );
-    launch!(
-        device,
-        find_planes::<T>,
-        n,
-        BLOCK,
-        moments.arg(),
-        neighborhoods.places.arg(),
-        residual.planes.arg(),
-        normals.arg()
-    );
+    launch!(device, n, BLOCK => sum_moments<T>(neighborhoods, moments, residual.count));
+    launch!(device, n, BLOCK => find_planes<T>(
+        moments, neighborhoods.places, residual.planes, normals,
+    ));
     Ok((normals, residual))
 }
 

@@ -69,14 +69,7 @@ impl<T: Scalar> Residual<T> {
             return Ok(0);
         }
         let guarded: Buffer<u32> = device.empty(n)?;
-        launch!(
-            device,
-            flag_guarded::<T>,
-            n,
-            BLOCK,
-            self.planes.arg(),
-            guarded.arg()
-        );
+        launch!(device, n, BLOCK => flag_guarded<T>(self.planes, guarded));
         let total = flags::count(device, &guarded)?;
         Ok(device.download(&total)?[0] as usize)
     }

@@ -31,25 +31,8 @@ pub fn pullback<R: Runtime, T: Scalar>(
         return Ok(points_bar);
     }
     let centers: Buffer<T> = device.empty(CENTER * n)?;
-    launch!(
-        device,
-        fill_centers::<T>,
-        n,
-        BLOCK,
-        residual.planes.arg(),
-        near.places.arg(),
-        normals_bar.arg(),
-        centers.arg()
-    );
-    launch!(
-        device,
-        gather::<T>,
-        n,
-        BLOCK,
-        near.arg(),
-        centers.arg(),
-        points_bar.arg()
-    );
+    launch!(device, n, BLOCK => fill_centers<T>(residual.planes, near.places, normals_bar, centers));
+    launch!(device, n, BLOCK => gather<T>(near, centers, points_bar));
     Ok(points_bar)
 }
 

@@ -29,42 +29,17 @@ pub fn widen<R: Runtime, T: Scalar>(
     if n == 0 {
         return Ok(widened);
     }
-    launch!(
-        device,
-        begin_widening::<T>,
-        n,
-        BLOCK,
-        residual.planes.arg(),
-        near.radii.arg(),
-        roughness.arg(),
-        widened.arg()
-    );
+    launch!(device, n, BLOCK => begin_widening<T>(residual.planes, near.radii, roughness, widened));
     for step in STEPS {
         let rough: Buffer<u32> = device.empty(n)?;
-        launch!(
-            device,
-            flag_rough::<T>,
-            n,
-            BLOCK,
-            roughness.arg(),
-            rough.arg(),
-            <T as isograd::Real>::of(ROUGH)
-        );
+        launch!(device, n, BLOCK => flag_rough<T>(
+            roughness, rough, <T as isograd::Real>::of(ROUGH),
+        ));
         let listed = flags::list(device, &rough)?;
-        launch!(
-            device,
-            try_wider::<T>,
-            n,
-            BLOCK,
-            near.arg(),
-            listed.indices.arg(),
-            listed.sums.arg(),
-            roughness.arg(),
-            widened.arg(),
-            <T as isograd::Real>::of(step),
-            <T as isograd::Real>::of(GAIN),
-            <T as isograd::Real>::of(RIM * RIM)
-        );
+        launch!(device, n, BLOCK => try_wider<T>(
+            near, listed.indices, listed.sums, roughness, widened, <T as isograd::Real>::of(step),
+            <T as isograd::Real>::of(GAIN), <T as isograd::Real>::of(RIM * RIM),
+        ));
     }
     scatter(device, &widened, &near.places)
 }

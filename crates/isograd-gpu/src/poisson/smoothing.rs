@@ -32,19 +32,9 @@ pub fn pullback<R: Runtime, T: Scalar>(
     }
     let [nx, ny, nz] = shape;
     let sums: Buffer<T> = device.empty(cells.div_ceil(BLOCK * OWN))?;
-    launch!(
-        device,
-        sum_products::<T>,
-        sums.len() * BLOCK,
-        BLOCK as u32,
-        chi.arg(),
-        chi_bar.arg(),
-        sums.arg(),
-        T::of(-smoothing),
-        nx,
-        ny,
-        nz
-    );
+    launch!(device, sums.len() * BLOCK, BLOCK => sum_products<T>(
+        chi, chi_bar, sums, T::of(-smoothing), nx, ny, nz,
+    ));
     reduce::sum(device, &sums)
 }
 

@@ -5,7 +5,7 @@ use cubecl::prelude::*;
 
 use super::axis::{Lines, Sums};
 use super::gain::{Gains, Spectrum, gain};
-use crate::device::launch;
+use crate::device::{Ready, launch};
 use crate::{Buffer, Device, Scalar};
 
 const BLOCK: u32 = 256;
@@ -20,17 +20,9 @@ impl<T: Scalar> Sums<T> {
         to: &Buffer<T>,
         inverse: bool,
     ) {
-        launch!(
-            device,
-            sum_cosines::<T>,
-            from.len(),
-            BLOCK,
-            from.arg(),
-            to.arg(),
-            self.cosines.arg(),
-            lines.arg(),
-            inverse
-        );
+        launch!(device, from.len(), BLOCK => sum_cosines<T>(
+            from, to, self.cosines, Ready::new(lines.arg()), inverse,
+        ));
     }
 }
 
@@ -41,15 +33,7 @@ pub(super) fn filter<R: Runtime, T: Scalar>(
     to: &Buffer<T>,
     gains: &Gains<T>,
 ) {
-    launch!(
-        device,
-        multiply_by_gains::<T>,
-        from.len(),
-        BLOCK,
-        from.arg(),
-        to.arg(),
-        gains.arg()
-    );
+    launch!(device, from.len(), BLOCK => multiply_by_gains<T>(from, to, Ready::new(gains.arg())));
 }
 
 /// A unit for each result.

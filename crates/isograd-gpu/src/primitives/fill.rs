@@ -13,7 +13,7 @@ const BLOCK: u32 = 256;
 /// [`Error::TooLarge`].
 pub fn zeros<R: Runtime, T: Scalar>(device: &Device<R>, len: usize) -> Result<Buffer<T>, Error> {
     let out = device.empty(len)?;
-    launch!(device, fill_zeros::<T>, len, BLOCK, out.arg());
+    launch!(device, len, BLOCK => fill_zeros<T>(out));
     Ok(out)
 }
 
@@ -40,15 +40,7 @@ pub fn add_scaled<R: Runtime, T: Scalar>(
     out: &Buffer<T>,
 ) -> Result<(), Error> {
     check_length("the array to add", values, out.len())?;
-    launch!(
-        device,
-        add_values::<T>,
-        out.len(),
-        BLOCK,
-        values.arg(),
-        factor,
-        out.arg()
-    );
+    launch!(device, out.len(), BLOCK => add_values<T>(values, factor, out));
     Ok(())
 }
 

@@ -15,14 +15,7 @@ pub(crate) fn first<R: Runtime>(
 ) -> Result<Option<usize>, Error> {
     let sums = exclusive_sum(device, flags)?;
     let found: Buffer<u32> = device.empty(2)?;
-    launch!(
-        device,
-        find_first,
-        sums.len(),
-        BLOCK,
-        sums.arg(),
-        found.arg()
-    );
+    launch!(device, sums.len(), BLOCK => find_first(sums, found));
     let found = device.download(&found)?;
     Ok((found[0] > 0).then_some(found[1] as usize))
 }
@@ -34,7 +27,7 @@ pub(crate) fn count<R: Runtime>(
 ) -> Result<Buffer<u32>, Error> {
     let sums = exclusive_sum(device, flags)?;
     let total = device.empty(1)?;
-    launch!(device, take_last, 1, 1, sums.arg(), total.arg(), 0);
+    launch!(device, 1, 1 => take_last(sums, total, 0u32));
     Ok(total)
 }
 
@@ -59,15 +52,7 @@ pub(crate) fn indices<R: Runtime>(
     len: usize,
 ) -> Result<Buffer<u32>, Error> {
     let (flags, indices) = (sums.len() - 1, device.empty(len)?);
-    launch!(
-        device,
-        write_indices,
-        flags,
-        BLOCK,
-        sums.arg(),
-        indices.arg(),
-        flags as u32
-    );
+    launch!(device, flags, BLOCK => write_indices(sums, indices, flags as u32));
     Ok(indices)
 }
 
@@ -79,7 +64,7 @@ pub(crate) fn totals<R: Runtime, const N: usize>(
 ) -> Result<[usize; N], Error> {
     let last: Buffer<u32> = device.empty(N)?;
     for (k, sums) in sums.into_iter().enumerate() {
-        launch!(device, take_last, 1, 1, sums.arg(), last.arg(), k as u32);
+        launch!(device, 1, 1 => take_last(sums, last, k as u32));
     }
     let last = device.download(&last)?;
     Ok(std::array::from_fn(|k| last[k] as usize))
@@ -92,15 +77,7 @@ pub(crate) fn sum_of_all<R: Runtime>(
 ) -> Result<Buffer<u32>, Error> {
     let ends: Buffer<u32> = device.empty(arrays.len())?;
     for (k, array) in arrays.iter().enumerate() {
-        launch!(
-            device,
-            take_last,
-            1,
-            1,
-            exclusive_sum(device, array)?.arg(),
-            ends.arg(),
-            k as u32
-        );
+        launch!(device, 1, 1 => take_last(exclusive_sum(device, array)?, ends, k as u32));
     }
     count(device, &ends)
 }

@@ -43,17 +43,9 @@ pub fn sum_columns<R: Runtime, T: Scalar>(
     check_length("the array to sum", values, rows * columns)?;
     let groups = rows.div_ceil(BLOCK * STEPS).max(1);
     let sums: Buffer<T> = device.empty(groups * columns)?;
-    launch!(
-        device,
-        sum_spans::<T>,
-        groups * BLOCK,
-        BLOCK as u32,
-        values.arg(),
-        sums.arg(),
-        rows as u32,
-        groups as u32,
-        columns
-    );
+    launch!(device, groups * BLOCK, BLOCK => sum_spans<T>(
+        values, sums, rows as u32, groups as u32, columns,
+    ));
     match groups {
         1 => Ok(sums),
         _ => sum_columns(device, &sums, columns),

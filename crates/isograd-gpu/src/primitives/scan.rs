@@ -21,28 +21,12 @@ pub fn exclusive_sum<R: Runtime>(
     let blocks = (count + 1).div_ceil(BLOCK);
     let sums: Buffer<u32> = device.empty(count + 1)?;
     let totals: Buffer<u32> = device.empty(blocks)?;
-    launch!(
-        device,
-        sum_blocks,
-        blocks * BLOCK,
-        BLOCK as u32,
-        values.arg(),
-        sums.arg(),
-        totals.arg(),
-        count as u32,
-        BLOCK
-    );
+    launch!(device, blocks * BLOCK, BLOCK => sum_blocks(
+        values, sums, totals, count as u32, BLOCK,
+    ));
     if blocks > 1 {
         let before = exclusive_sum(device, &totals)?;
-        launch!(
-            device,
-            add_blocks,
-            count + 1,
-            BLOCK as u32,
-            before.arg(),
-            sums.arg(),
-            BLOCK
-        );
+        launch!(device, count + 1, BLOCK => add_blocks(before, sums, BLOCK));
     }
     Ok(sums)
 }

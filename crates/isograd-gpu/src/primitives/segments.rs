@@ -8,7 +8,7 @@
 use cubecl::prelude::*;
 
 use super::scan::exclusive_sum;
-use crate::device::launch;
+use crate::device::{Ready, launch};
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Units of a group.
@@ -61,31 +61,15 @@ impl Pieces {
     ) -> Result<Self, Error> {
         let segments = starts.len() - 1;
         let counts = device.empty(segments)?;
-        launch!(
-            device,
-            count_pieces,
-            segments,
-            BLOCK,
-            starts.arg(),
-            counts.arg(),
-            segments as u32,
-            PIECE as u32
-        );
+        launch!(device, segments, BLOCK => count_pieces(
+            starts, counts, segments as u32, PIECE as u32,
+        ));
         let first = exclusive_sum(device, &counts)?;
         let most = segments + elements / PIECE;
         let table = device.empty(3 * most)?;
-        launch!(
-            device,
-            list_pieces,
-            most,
-            BLOCK,
-            starts.arg(),
-            first.arg(),
-            table.arg(),
-            segments as u32,
-            most as u32,
-            PIECE as u32
-        );
+        launch!(device, most, BLOCK => list_pieces(
+            starts, first, table, segments as u32, most as u32, PIECE as u32,
+        ));
         Ok(Self {
             table,
             starts: first,
@@ -122,19 +106,10 @@ pub(crate) fn sum_rows_in<T: Scalar, R: Runtime>(
     elements: usize,
 ) -> Result<Buffer<T>, Error> {
     let sums = device.empty(pieces.most() * rows.width)?;
-    launch!(
-        device,
-        sum_pieces::<T>,
-        sums.len(),
-        BLOCK,
-        values.arg(),
-        places.unwrap_or(&device.empty(0)?).arg(),
-        pieces.table.arg(),
-        sums.arg(),
-        pieces.most() as u32,
-        rows,
-        places.is_some()
-    );
+    launch!(device, sums.len(), BLOCK => sum_pieces<T>(
+        values, places.unwrap_or(&device.empty(0)?), pieces.table, sums, pieces.most() as u32,
+        Ready::new(rows), places.is_some(),
+    ));
     join_pieces(device, sums, rows.width, pieces, elements)
 }
 
@@ -152,34 +127,17 @@ pub(crate) fn join_pieces<T: Scalar, R: Runtime>(
         let (rows, count) = (Rows::dense(width), pieces.most());
         let finer = Pieces::new(device, &pieces.starts, count)?;
         let joined = device.empty(finer.most() * width)?;
-        launch!(
-            device,
-            sum_pieces::<T>,
-            joined.len(),
-            BLOCK,
-            sums.arg(),
-            device.empty::<u32>(0)?.arg(),
-            finer.table.arg(),
-            joined.arg(),
-            finer.most() as u32,
-            rows,
-            false
-        );
+        launch!(device, joined.len(), BLOCK => sum_pieces<T>(
+            sums, device.empty::<u32>(0)?, finer.table, joined, finer.most() as u32,
+            Ready::new(rows), false,
+        ));
         return join_pieces(device, joined, width, finer, most);
     }
     let segments = pieces.starts.len() - 1;
     let joined = device.empty(segments * width)?;
-    launch!(
-        device,
-        sum_segments::<T>,
-        joined.len(),
-        BLOCK,
-        sums.arg(),
-        pieces.starts.arg(),
-        joined.arg(),
-        segments as u32,
-        width
-    );
+    launch!(device, joined.len(), BLOCK => sum_segments<T>(
+        sums, pieces.starts, joined, segments as u32, width,
+    ));
     Ok(joined)
 }
 

@@ -3,7 +3,7 @@
 use cubecl::prelude::*;
 
 use super::scan::exclusive_sum;
-use crate::device::launch;
+use crate::device::{Ready, launch};
 use crate::{Buffer, Device, Error};
 
 /// Bits of a key that one pass orders by.
@@ -49,7 +49,7 @@ pub(crate) fn as_they_are<R: Runtime>(
     count: usize,
 ) -> Result<Buffer<u32>, Error> {
     let places = device.empty(count)?;
-    launch!(device, fill_places, count, BLOCK as u32, places.arg());
+    launch!(device, count, BLOCK => fill_places(places));
     Ok(places)
 }
 
@@ -64,15 +64,7 @@ pub fn starts<R: Runtime>(
     limit: u32,
 ) -> Result<Buffer<u32>, Error> {
     let starts = device.empty(limit as usize + 1)?;
-    launch!(
-        device,
-        fill_starts,
-        starts.len(),
-        BLOCK as u32,
-        keys.arg(),
-        starts.arg(),
-        keys.len() as u32
-    );
+    launch!(device, starts.len(), BLOCK => fill_starts(keys, starts, keys.len() as u32));
     Ok(starts)
 }
 
@@ -89,36 +81,18 @@ impl Order {
             blocks: blocks as u32,
             shift,
         };
-        launch!(
-            device,
-            rank_digits,
-            count,
-            BLOCK as u32,
-            self.keys.arg(),
-            ranks.arg(),
-            counts.arg(),
-            digit.arg(),
-            BLOCK
-        );
+        launch!(device, count, BLOCK => rank_digits(
+            self.keys, ranks, counts, Ready::new(digit.arg()), BLOCK,
+        ));
         let before = exclusive_sum(device, &counts)?;
         let next = Self {
             keys: device.empty(count)?,
             places: device.empty(count)?,
         };
-        launch!(
-            device,
-            move_to_ranks,
-            count,
-            BLOCK as u32,
-            self.keys.arg(),
-            self.places.arg(),
-            ranks.arg(),
-            before.arg(),
-            next.keys.arg(),
-            next.places.arg(),
-            digit.arg(),
-            BLOCK
-        );
+        launch!(device, count, BLOCK => move_to_ranks(
+            self.keys, self.places, ranks, before, next.keys, next.places, Ready::new(digit.arg()),
+            BLOCK,
+        ));
         Ok(next)
     }
 }

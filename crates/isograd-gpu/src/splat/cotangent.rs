@@ -2,7 +2,7 @@
 
 use cubecl::prelude::*;
 
-use crate::device::check_length;
+use crate::device::{Argument, check_length};
 use crate::primitives::fill::zeros;
 use crate::primitives::reduce::{BLOCK, sum_of_group};
 use crate::{Buffer, Device, Error, Scalar};
@@ -28,12 +28,15 @@ pub(crate) struct CotangentArrays<F: Float + CubeElement> {
     pub areas: Array<F>,
 }
 
-impl<T: Scalar> SampleCotangent<T> {
-    /// The cotangents of the samples as an argument of a kernel.
-    pub(crate) fn arg<R: Runtime>(&self) -> CotangentArraysLaunch<T, R> {
+impl<R: Runtime, T: Scalar> Argument<R> for SampleCotangent<T> {
+    type Parameter = CotangentArraysLaunch<T, R>;
+
+    fn argument(&self, _: &Device<R>) -> Self::Parameter {
         CotangentArraysLaunch::new(self.points.arg(), self.normals.arg(), self.areas.arg())
     }
+}
 
+impl<T: Scalar> SampleCotangent<T> {
     /// Zeros for `count` samples.
     ///
     /// # Errors

@@ -6,7 +6,7 @@ use super::stencil::{BSpline, NUMBERS, Paper, REACH, total};
 use super::{Residual, SampleArrays, SampleOrder, Samples, Weights};
 use crate::device::launch;
 use crate::element::stencil::hat;
-use crate::grid::{self, Lattice, cell_at, from_center, place};
+use crate::grid::{Lattice, cell_at, from_center, place};
 use crate::spread::{Before, spread};
 use crate::{Buffer, Device, Error, Scalar};
 
@@ -54,18 +54,9 @@ pub(super) fn sorted<R: Runtime, T: Scalar>(
     normalize: bool,
 ) -> Result<Buffer<T>, Error> {
     let sorted: Buffer<T> = device.empty(NUMBERS * samples.len())?;
-    launch!(
-        device,
-        sort_samples::<T>,
-        samples.len(),
-        BLOCK,
-        samples.arg(),
-        residual.order.keys.arg(),
-        residual.order.places.arg(),
-        sorted.arg(),
-        grid::arg(&residual.grid),
-        normalize
-    );
+    launch!(device, samples.len(), BLOCK => sort_samples<T>(
+        samples, residual.order.keys, residual.order.places, sorted, residual.grid, normalize,
+    ));
     Ok(sorted)
 }
 

@@ -38,7 +38,7 @@ pub use order::{Refused, SampleOrder};
 pub use pullback::pullback;
 pub(crate) use stencil::pick;
 
-use crate::device::check_length;
+use crate::device::{Argument, check_length};
 use crate::{Buffer, Device, Error, Scalar};
 use cubecl::prelude::*;
 
@@ -64,16 +64,6 @@ impl<T: Scalar> Samples<'_, T> {
         self.areas.is_empty()
     }
 
-    /// The samples as an argument of a kernel.
-    pub(crate) fn arg<R: Runtime>(&self) -> SampleArraysLaunch<T, R> {
-        SampleArraysLaunch::new(
-            self.points.arg(),
-            self.normals.arg(),
-            self.areas.arg(),
-            self.len() as u32,
-        )
-    }
-
     /// There must be a point and a normal an area.
     pub(crate) fn check(&self) -> Result<(), Error> {
         check_length("the array of points", self.points, 3 * self.len())?;
@@ -88,6 +78,19 @@ pub(crate) struct SampleArrays<F: Float + CubeElement> {
     pub normals: Array<F>,
     pub areas: Array<F>,
     pub count: u32,
+}
+
+impl<R: Runtime, T: Scalar> Argument<R> for Samples<'_, T> {
+    type Parameter = SampleArraysLaunch<T, R>;
+
+    fn argument(&self, _: &Device<R>) -> Self::Parameter {
+        SampleArraysLaunch::new(
+            self.points.arg(),
+            self.normals.arg(),
+            self.areas.arg(),
+            self.len() as u32,
+        )
+    }
 }
 
 /// Residual of [`forward`]; the pullback takes the inputs again.

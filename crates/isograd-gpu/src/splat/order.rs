@@ -4,7 +4,7 @@ use cubecl::prelude::*;
 
 use super::{SampleArrays, Samples};
 use crate::device::launch;
-use crate::grid::{self, Lattice, place};
+use crate::grid::{Lattice, place};
 use crate::primitives::sort;
 use crate::spread::first_at_least;
 use crate::vector::is_finite;
@@ -44,15 +44,7 @@ impl SampleOrder {
         grid: &isograd::Grid<T>,
     ) -> Result<Self, Error> {
         let keys: Buffer<u32> = device.empty(samples.len())?;
-        launch!(
-            device,
-            find_cells::<T>,
-            samples.len(),
-            BLOCK,
-            samples.arg(),
-            keys.arg(),
-            grid::arg(grid)
-        );
+        launch!(device, samples.len(), BLOCK => find_cells<T>(samples, keys, grid));
         Self::from_keys(device, &keys, grid.shape())
     }
 
@@ -65,16 +57,9 @@ impl SampleOrder {
         let cells = shape.iter().product::<usize>() as u32;
         let sort::Order { keys, places } = sort::order(device, keys, cells + 1)?;
         let rows: Buffer<u32> = device.empty(shape[0] * shape[1] + 1)?;
-        launch!(
-            device,
-            find_rows,
-            rows.len(),
-            BLOCK,
-            keys.arg(),
-            rows.arg(),
-            keys.len() as u32,
-            shape[2] as u32
-        );
+        launch!(device, rows.len(), BLOCK => find_rows(
+            keys, rows, keys.len() as u32, shape[2] as u32,
+        ));
         Ok(Self {
             shape,
             keys,
@@ -88,15 +73,7 @@ impl SampleOrder {
             return Ok(None);
         }
         let found: Buffer<u32> = device.empty(2)?;
-        launch!(
-            device,
-            find_refused,
-            1,
-            1,
-            self.rows.arg(),
-            self.places.arg(),
-            found.arg()
-        );
+        launch!(device, 1, 1 => find_refused(self.rows, self.places, found));
         let found = device.download(&found)?;
         Ok((found[0] > 0).then(|| Refused {
             count: found[0] as usize,

@@ -8,7 +8,7 @@ use super::stencil::{NUMBERS, REACH, WIDTH, along, central, extra, sum, total};
 use super::{CotangentArrays, Residual, SampleArrays, SampleCotangent, Samples, Weights};
 use crate::device::{check_length, launch};
 use crate::element::stencil::{Triple, bspline, bspline_slope, hat, hat_slope};
-use crate::grid::{self, Lattice, cell_at, check_field};
+use crate::grid::{Lattice, cell_at, check_field};
 use crate::primitives::fill::add;
 use crate::primitives::reduce::{BLOCK, sum_columns};
 use crate::vector::Vector3;
@@ -34,32 +34,14 @@ pub fn pullback<R: Runtime, T: Scalar>(
     let blocks = count.div_ceil(BLOCK);
     let gathered = sorted(device, samples, residual, false)?;
     let grid_sums: Buffer<T> = device.empty(4 * blocks)?;
-    launch!(
-        device,
-        gather_samples::<T>,
-        count,
-        BLOCK as u32,
-        order.keys.arg(),
-        b_bar.arg(),
-        gathered.arg(),
-        grid_sums.arg(),
-        count as u32,
-        grid::arg(grid),
-        residual.weights == Weights::Paper
-    );
+    launch!(device, count, BLOCK => gather_samples<T>(
+        order.keys, b_bar, gathered, grid_sums, count as u32, grid,
+        residual.weights == Weights::Paper,
+    ));
     add(device, &sum_columns(device, &grid_sums, 4)?, &out.grid)?;
-    launch!(
-        device,
-        add_to_samples::<T>,
-        count,
-        BLOCK as u32,
-        samples.arg(),
-        order.keys.arg(),
-        order.places.arg(),
-        gathered.arg(),
-        out.arg(),
-        grid.cells() as u32
-    );
+    launch!(device, count, BLOCK => add_to_samples<T>(
+        samples, order.keys, order.places, gathered, out, grid.cells() as u32,
+    ));
     Ok(())
 }
 

@@ -4,8 +4,8 @@ use cubecl::prelude::*;
 use isograd::poisson::screened::{self, MOST_ITERATIONS};
 
 use super::{Equation, Error};
-use crate::device::launch;
-use crate::grid::{self, Lattice, cell_at, from_center, place};
+use crate::device::{Ready, launch};
+use crate::grid::{Lattice, cell_at, from_center, place};
 use crate::primitives::fill::zeros;
 use crate::primitives::reduce::{BLOCK, sum, sum_of_group};
 use crate::spread::{Before, spread};
@@ -41,20 +41,10 @@ impl<'a, R: Runtime, T: Scalar> System<'a, R, T> {
         let order = &equation.splat.order;
         let count = order.keys.len();
         let (roots, carriers) = (device.empty(count)?, device.empty(NUMBERS * count)?);
-        launch!(
-            device,
-            start::<T>,
-            count,
-            BLOCK as u32,
-            equation.samples.points.arg(),
-            equation.samples.areas.arg(),
-            order.keys.arg(),
-            order.places.arg(),
-            roots.arg(),
-            carriers.arg(),
-            equation.per_area(),
-            grid::arg(&equation.splat.grid)
-        );
+        launch!(device, count, BLOCK => start<T>(
+            equation.samples.points, equation.samples.areas, order.keys, order.places, roots,
+            carriers, equation.per_area(), equation.splat.grid,
+        ));
         let total: Buffer<T> = dot(device, &roots, &roots)?;
         let area = device.download(&total)?[0];
         Ok((area > T::of(0.0)).then_some(Self {
@@ -75,38 +65,23 @@ impl<'a, R: Runtime, T: Scalar> System<'a, R, T> {
     ) -> Result<Buffer<T>, Error> {
         let (device, splat) = (self.device, self.equation.splat);
         let out = device.empty(self.roots.len())?;
-        launch!(
-            device,
-            find_at_samples::<T>,
-            out.len(),
-            BLOCK as u32,
-            field.arg(),
-            SystemArraysLaunch::new(
-                self.equation.samples.points.arg(),
-                splat.order.places.arg(),
-                self.roots.arg(),
-            ),
-            base.unwrap_or(&self.roots).arg(),
-            out.arg(),
-            T::of(factor),
-            grid::arg(&splat.grid),
-            base.is_some()
-        );
+        let samples = Ready::new(SystemArraysLaunch::new(
+            self.equation.samples.points.arg(),
+            splat.order.places.arg(),
+            self.roots.arg(),
+        ));
+        launch!(device, out.len(), BLOCK => find_at_samples<T>(
+            field,
+            samples,
+            base.unwrap_or(&self.roots), out, T::of(factor), splat.grid, base.is_some(),
+        ));
         Ok(out)
     }
 
     /// Writes `Sᵀ u` to `field`, or adds it.
     pub fn spread(&self, u: &Buffer<T>, before: Before, field: &Buffer<T>) -> Result<(), Error> {
         let device = self.device;
-        launch!(
-            device,
-            carry::<T>,
-            u.len(),
-            BLOCK as u32,
-            self.roots.arg(),
-            u.arg(),
-            self.carriers.arg()
-        );
+        launch!(device, u.len(), BLOCK => carry<T>(self.roots, u, self.carriers));
         let order = &self.equation.splat.order;
         spread::<R, T, Trilinear>(device, &self.carriers, order, REACH, before, field)?;
         Ok(())
@@ -156,16 +131,9 @@ impl<'a, R: Runtime, T: Scalar> System<'a, R, T> {
     fn project(&self, v: &Buffer<T>) -> Result<(), Error> {
         let device = self.device;
         let along = dot(device, v, &self.roots)?;
-        launch!(
-            device,
-            subtract_along::<T>,
-            v.len(),
-            BLOCK as u32,
-            self.roots.arg(),
-            along.arg(),
-            self.total.arg(),
-            v.arg()
-        );
+        launch!(device, v.len(), BLOCK => subtract_along<T>(
+            self.roots, along, self.total, v,
+        ));
         Ok(())
     }
 
@@ -178,34 +146,17 @@ impl<'a, R: Runtime, T: Scalar> System<'a, R, T> {
         solution: &Buffer<T>,
         rest: &Buffer<T>,
     ) {
-        launch!(
-            self.device,
-            take_step::<T>,
-            rest.len(),
-            BLOCK as u32,
-            up.arg(),
-            down.arg(),
-            direction.arg(),
-            image.arg(),
-            solution.arg(),
-            rest.arg()
-        );
+        launch!(self.device, rest.len(), BLOCK => take_step<T>(
+            up, down, direction, image, solution, rest,
+        ));
     }
 
     /// The next direction: what is left, and of the last direction the quotient of the two numbers, or nothing.
     fn turn(&self, rest: &Buffer<T>, share: Option<[&Buffer<T>; 2]>, direction: &Buffer<T>) {
         let [up, down] = share.unwrap_or([&self.total; 2]);
-        launch!(
-            self.device,
-            turn_direction::<T>,
-            rest.len(),
-            BLOCK as u32,
-            rest.arg(),
-            up.arg(),
-            down.arg(),
-            direction.arg(),
-            share.is_some()
-        );
+        launch!(self.device, rest.len(), BLOCK => turn_direction<T>(
+            rest, up, down, direction, share.is_some(),
+        ));
     }
 }
 
@@ -216,15 +167,7 @@ fn dot<R: Runtime, T: Scalar>(
     b: &Buffer<T>,
 ) -> Result<Buffer<T>, crate::Error> {
     let sums = device.empty(a.len().div_ceil(BLOCK))?;
-    launch!(
-        device,
-        sum_products::<T>,
-        a.len(),
-        BLOCK as u32,
-        a.arg(),
-        b.arg(),
-        sums.arg()
-    );
+    launch!(device, a.len(), BLOCK => sum_products<T>(a, b, sums));
     sum(device, &sums)
 }
 

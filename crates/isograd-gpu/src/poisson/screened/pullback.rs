@@ -4,8 +4,8 @@ use cubecl::prelude::*;
 
 use super::gradients::System;
 use super::{Equation, Error};
-use crate::device::{check_length, launch};
-use crate::grid::{self, Lattice, check_field, place};
+use crate::device::{Ready, check_length, launch};
+use crate::grid::{Lattice, check_field, place};
 use crate::isosurface::iso_value;
 use crate::primitives::fill::add;
 use crate::primitives::reduce::{BLOCK, sum_columns};
@@ -41,21 +41,22 @@ pub fn pullback<R: Runtime, T: Scalar>(
     let adjoint = equation.solver.solve(device, chi_bar, 0.0)?;
     // Its mean at the samples and what it is there, as that of `χ`.
     let (_, adjoint) = iso_value::forward(device, &adjoint, grid, samples.points, samples.areas)?;
+    let chi = Ready::new(InterpolantLaunch::new(
+        level.at_samples.arg(),
+        level.sums.arg(),
+    ));
+    let adjoint = Ready::new(InterpolantLaunch::new(
+        adjoint.at_samples.arg(),
+        adjoint.sums.arg(),
+    ));
+    let factors = Ready::new(FactorsLaunch::new(
+        T::of(-equation.screening),
+        equation.per_area(),
+    ));
     let grid_sums: Buffer<T> = device.empty(4 * samples.len().div_ceil(BLOCK))?;
-    launch!(
-        device,
-        pull_matrix::<T>,
-        samples.len(),
-        BLOCK as u32,
-        samples.arg(),
-        InterpolantLaunch::new(level.at_samples.arg(), level.sums.arg()),
-        InterpolantLaunch::new(adjoint.at_samples.arg(), adjoint.sums.arg()),
-        out.arg(),
-        grid_sums.arg(),
-        FactorsLaunch::new(T::of(-equation.screening), equation.per_area()),
-        grid::arg(grid),
-        equation.area_weights
-    );
+    launch!(device, samples.len(), BLOCK => pull_matrix<T>(
+        samples, chi, adjoint, out, grid_sums, factors, grid, equation.area_weights,
+    ));
     add(device, &sum_columns(device, &grid_sums, 4)?, &out.grid)?;
     Ok(iterations)
 }
