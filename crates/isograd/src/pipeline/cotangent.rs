@@ -27,7 +27,7 @@ pub struct Cotangent<'a, T> {
     pub extensions: &'a [ExtensionCotangent<'a, T>],
 }
 
-/// Cotangents of one attribute that was [extended](Reconstruction::extend_into).
+/// Cotangents of one attribute that was [extended](crate::Reconstruction::extend_into).
 #[derive(Clone, Copy, Debug)]
 pub struct ExtensionCotangent<'a, T> {
     /// The attribute at the samples.
