@@ -12,7 +12,7 @@ use crate::neighbors::{NeighborhoodArraysLaunch, Neighborhoods};
 /// Units of a group where a kernel does not depend on it.
 pub(crate) const BLOCK: usize = 64;
 
-/// Queues a kernel with a unit for each of `count` elements, if there are any:
+/// Queues a kernel with a unit for each of `count` elements, and one group where there are none, whose sums are then 0:
 /// `launch!(device, count => kernel<T>(points, out, 3u32))`. `launch!(device, count, units => …)` sets the units of a
 /// group, and `launch!(device, [groups; units] => …)` the number of groups too. [`Argument`] makes the parameters.
 macro_rules! launch {
@@ -30,7 +30,7 @@ macro_rules! launch {
     };
     ($device:expr, $count:expr, $units:expr =>
         $kernel:ident $(<$($number:ty),+>)? ($($argument:expr),* $(,)?)) => {
-        if $count > 0 {
+        {
             use $crate::device::Argument as _;
             $kernel::launch::<$($($number,)+)? _>(
                 $device.client(),
