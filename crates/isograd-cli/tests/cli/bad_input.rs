@@ -145,7 +145,10 @@ fn wrong_command_lines_end_with_2() {
         ("reconstruct a.ply --orient up", "parity"),
         ("reconstruct a.ply --bounds 0 0 0 1 1", "--bounds"),
         ("reconstruct a.ply --mesh m.doc", "must end in .ply"),
-        ("reconstruct a.ply --mesh out.ply --points out.ply", "twice"),
+        (
+            "reconstruct a.ply --mesh out.ply --points out.ply",
+            "name of two outputs",
+        ),
         ("reconstruct a.ply --mesh ./a.ply", "is the input"),
         ("sample cube -n 5 -o b.ply", "cube"),
         ("sample fish -n 5 -o b.ply --param size=3", "size"),
