@@ -3,6 +3,7 @@
 use std::fs;
 use std::process::Command;
 
+use crate::environment;
 use crate::process::{self, Outcome};
 use crate::workspace::Workspace;
 
@@ -15,18 +16,11 @@ pub fn run() -> Outcome<Vec<String>> {
     for name in &workspace.examples {
         println!("example {name}");
         let folder = workspace.target.join("xtask").join("examples").join(name);
-        empty(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+        environment::remove_folder(&folder)?;
+        fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
         let file = format!("{name}{}", std::env::consts::EXE_SUFFIX);
         let program = workspace.target.join("debug").join("examples").join(file);
         process::run(Command::new(program).current_dir(&folder))?;
     }
     Ok(Vec::new())
-}
-
-/// Creates the folder, or empties it.
-fn empty(folder: &std::path::Path) -> std::io::Result<()> {
-    if folder.exists() {
-        fs::remove_dir_all(folder)?;
-    }
-    fs::create_dir_all(folder)
 }

@@ -1,4 +1,5 @@
-//! What is published builds by itself: every crate from its `.crate`, the Python package from its source distribution.
+//! Tests of the published packages: every crate builds from its `.crate`, the Python package from its source
+//! distribution.
 
 use std::fs;
 use std::path::Path;

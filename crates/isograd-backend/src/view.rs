@@ -46,7 +46,7 @@ macro_rules! results {
         $(#[$doc])+
         ///
         /// # Errors
-        /// Those of the device.
+        /// Errors of the device.
         pub fn $name(self) -> Result<$kind, Error> {
             match self.0 {
                 Of::Cpu(of) => Ok(of.$name()),
@@ -100,7 +100,7 @@ impl<'a, T: Number> View<'a, T> {
     /// Numbers, times and warnings.
     ///
     /// # Errors
-    /// Those of the device.
+    /// Errors of the device.
     pub fn report(self) -> Result<&'a Report, Error> {
         match self.0 {
             Of::Cpu(of) => Ok(of.report()),

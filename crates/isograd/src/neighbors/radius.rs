@@ -201,8 +201,8 @@ pub fn forward<T: Real>(
     done
 }
 
-/// The same, and in the same walk what `sum(point, R_i, candidates)` makes of every neighborhood, in sorted
-/// order; the candidates hold all of `N_i`. To gather them takes longer than to sum over them.
+/// Like [`forward`], and returns `sum(point, R_i, candidates)` of every neighborhood in sorted order; the candidates
+/// include all of `N_i`. One walk serves both, because gathering the candidates takes longer than summing over them.
 ///
 /// # Errors
 /// As [`forward`].

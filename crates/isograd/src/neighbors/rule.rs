@@ -1,4 +1,4 @@
-//! What decides about radii: shared with those who look for neighbors elsewhere than on the CPU.
+//! Rules for the choice of radii, shared with neighbor searches on other devices.
 
 use super::radius::{Error, Radius};
 use crate::{Real, vector};

@@ -135,7 +135,7 @@ fn offset_bar<T: Real>(g: [T; 3], n: [T; 3], mean: [T; 3], d: [T; 3], r: T) -> [
     )
 }
 
-/// What a point gets as a neighbor of the others, less what it hands out as a center.
+/// Cotangent of a point as a neighbor of the others, minus its cotangents as a center.
 #[inline(always)]
 fn gather<T: Real>(
     center: [T; 3],

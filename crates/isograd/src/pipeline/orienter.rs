@@ -53,7 +53,7 @@ impl<T: Pipeline> Orienter<T> {
     /// Outward unit normals of a cloud, and the confidence in each.
     ///
     /// # Errors
-    /// Those of the neighbors and of the orientation, or [`Error::NoPlane`]; the result of the previous call is
+    /// Errors of the neighborhoods and of the orientation, or [`Error::NoPlane`]; the result of the previous call is
     /// then lost.
     pub fn orient(&mut self, cloud: &PointCloud<T>) -> Result<&Orientation<T>, Error> {
         T::orient(self, cloud)?;
