@@ -201,7 +201,7 @@ pub fn forward<T: Real>(
     done
 }
 
-/// Like [`forward`], and returns `sum(point, R_i, candidates)` of every neighborhood in sorted order; the candidates
+/// Like [`forward`], and writes `sum(point, R_i, candidates)` of every neighborhood in sorted order; the candidates
 /// include all of `N_i`. One walk serves both, because gathering the candidates takes longer than summing over them.
 ///
 /// # Errors
