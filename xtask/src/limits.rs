@@ -10,7 +10,7 @@ use crate::process::{self, Outcome};
 const PARAMETERS: usize = 8;
 const LINES: usize = 400;
 /// Folders with Rust sources.
-const FOLDERS: [&str; 4] = ["benches", "bindings", "crates", "xtask"];
+const FOLDERS: [&str; 5] = ["benches", "bindings", "crates", "fuzz", "xtask"];
 
 /// Fails if a function has too many parameters; prints files that are too long.
 pub fn run() -> Outcome<Vec<String>> {

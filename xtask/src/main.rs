@@ -5,6 +5,7 @@ mod deny;
 mod environment;
 mod examples;
 mod fit;
+mod fuzz;
 mod kit;
 mod limits;
 mod links;
@@ -32,10 +33,15 @@ Checks
   test [--all]     everything a change must pass, cheapest first: format, limits, links, clippy,
                    docs, tests, doc tests, the Python package, examples, and the commands and code
                    of the README; --all adds the GPU kernels on Vulkan and as PTX, PyTorch, the
-                   benchmarks, whether the pages match their figures, and the published packages
+                   benchmarks, a minute of fuzz, whether the pages match their figures, and the
+                   published packages
   lint             the first four of these, for the whole workspace
   python           the tests of the Python package alone
   package          the packages as they are published: crates, source distribution
+  fuzz [ARGS]      random input for the readers, the library and the command line; failing inputs
+                   are saved in target/fuzz, and a line says how to repeat each. --minutes M (1),
+                   --seed S (from the clock), --json FILE for the counts, --part
+                   readers|library|program, and --case N for one input of that part
   deny             licenses, sources and advisories of every dependency (needs cargo-deny);
                    --offline leaves the advisories out
 
@@ -94,6 +100,7 @@ fn run(command: &str, rest: &[String]) -> Option<Outcome> {
         ("lint", []) => Some(test::lint()),
         ("python", []) => Some(test::python()),
         ("package", []) => Some(packages::run()),
+        ("fuzz", _) => Some(fuzz::run(rest)),
         ("deny", []) => Some(deny::run(false)),
         ("deny", [flag]) if flag == "--offline" => Some(deny::run(true)),
         ("docs", []) => Some(pages::all()),

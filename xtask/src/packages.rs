@@ -51,7 +51,7 @@ pub fn crates() -> Outcome<Vec<String>> {
 fn copy_workspace(published: &[String], copy: &Path) -> Outcome {
     environment::remove_folder(copy)?;
     let root = process::root();
-    for folder in ["benches", "bindings", "xtask"] {
+    for folder in ["benches", "bindings", "fuzz", "xtask"] {
         environment::copy_folder(&root.join(folder), &copy.join(folder))?;
     }
     let crates = copy.join("crates");

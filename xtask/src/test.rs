@@ -3,6 +3,7 @@
 use std::process::Command;
 
 use crate::examples;
+use crate::fuzz;
 use crate::limits;
 use crate::links;
 use crate::nvrtc::Nvrtc;
@@ -13,6 +14,7 @@ use crate::python;
 use crate::readme;
 use crate::steps::Steps;
 use crate::tally::Tally;
+use crate::workspace::Workspace;
 
 /// Which packages and features a run covers.
 ///
@@ -56,10 +58,23 @@ impl Scope {
 
     /// Builds libraries, programs, examples and tests, in the dev profile.
     pub fn build(self) -> Outcome<Vec<String>> {
-        let mut build = self.cargo_built("build");
-        process::run(build.args(["--lib", "--bins", "--examples", "--tests"]))?;
+        build(&mut self.cargo_built("build"))?;
         Ok(Vec::new())
     }
+}
+
+/// Builds the default members and one more package, with the features of the former.
+pub fn build_default_and(package: &str) -> Outcome {
+    let mut command = process::cargo(["build", "--package", package]);
+    for name in Workspace::load()?.default_members {
+        command.args(["--package", &name]);
+    }
+    build(&mut command)
+}
+
+/// Runs `cargo build …` for libraries, programs, examples and tests. With other targets, features would differ.
+fn build(command: &mut Command) -> Outcome {
+    process::run(command.args(["--lib", "--bins", "--examples", "--tests"]))
 }
 
 /// All steps, a summary, and the count of tests as the last line.
@@ -103,6 +118,7 @@ fn run_steps(scope: Scope, steps: &mut Steps, tally: &mut Tally) -> Outcome {
     steps.step("examples", examples::run)?;
     steps.step("README commands", readme::run)?;
     if scope == Scope::All {
+        steps.step("fuzz", fuzz::short)?;
         steps.step("pages", pages::check)?;
         steps.step("crates", packages::crates)?;
         steps.step("source distribution", packages::source_distribution)?;

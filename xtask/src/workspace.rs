@@ -14,6 +14,8 @@ pub struct Workspace {
     pub examples: Vec<String>,
     /// Names of the packages that can be published.
     pub published: Vec<String>,
+    /// Names of the default members.
+    pub default_members: Vec<String>,
 }
 
 impl Workspace {
@@ -36,6 +38,7 @@ impl Workspace {
             target: PathBuf::from(target),
             examples: examples(&metadata),
             published: published(&metadata),
+            default_members: default_members(&metadata),
         })
     }
 
@@ -66,6 +69,14 @@ fn published(metadata: &Value) -> Vec<String> {
     names
 }
 
+fn default_members(metadata: &Value) -> Vec<String> {
+    let defaults = &metadata["workspace_default_members"];
+    each(&metadata["packages"])
+        .filter(|package| each(defaults).any(|id| *id == package["id"]))
+        .filter_map(|package| package["name"].as_str().map(str::to_owned))
+        .collect()
+}
+
 fn each(list: &Value) -> impl Iterator<Item = &Value> {
     list.as_array().into_iter().flatten()
 }
@@ -75,13 +86,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn examples_and_published_packages_are_found() {
-        let metadata = serde_json::json!({"packages": [
-            {"name": "isograd-x", "publish": [], "targets": [{"name": "b", "kind": ["example"]}, {"name": "x", "kind": ["lib"]}]},
+    fn examples_published_packages_and_default_members_are_found() {
+        let metadata = serde_json::json!({"workspace_default_members": ["x#1"], "packages": [
+            {"name": "isograd-x", "id": "x#1", "publish": [], "targets": [{"name": "b", "kind": ["example"]}, {"name": "x", "kind": ["lib"]}]},
             {"name": "isograd", "publish": null, "targets": [{"name": "a", "kind": ["example"]}]},
         ]});
         assert_eq!(examples(&metadata), ["a", "b"]);
         assert_eq!(published(&metadata), ["isograd"]);
+        assert_eq!(default_members(&metadata), ["isograd-x"]);
         assert!(examples(&Value::Null).is_empty());
     }
 }
