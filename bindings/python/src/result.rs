@@ -138,9 +138,14 @@ fn array<'py, T: Number>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let result = this.result.view();
     let (shape, count) = (result.grid().shape(), this.cloud.len());
+    let surface_shape = result.surface_grid().shape();
     match name {
         "sdf" => arrays::shaped(py, failure(result.sdf())?.values().to_vec(), shape),
-        "indicator" => arrays::shaped(py, failure(result.indicator())?.values().to_vec(), shape),
+        "indicator" => arrays::shaped(
+            py,
+            failure(result.indicator())?.values().to_vec(),
+            surface_shape,
+        ),
         "closest" => arrays::shaped(py, failure(result.closest())?.to_vec(), shape),
         "vertices" => Ok(arrays::from_vectors(py, failure(result.mesh())?.vertices())),
         "faces" => Ok(arrays::from_vectors(py, failure(result.mesh())?.faces())),

@@ -82,7 +82,7 @@ def test_every_cotangent_counts_and_they_add_up():
     extension = result.extend("a", 3 * grid.spacing)
     bars = {
         "sdf": rng.normal(size=grid.shape),
-        "indicator": rng.normal(size=grid.shape),
+        "indicator": rng.normal(size=result.surface_grid.shape),
         "vertices": rng.normal(size=result.mesh.vertices.shape),
         "normals": rng.normal(size=cloud.normals.shape),
         "areas": rng.normal(size=len(cloud.points)),
@@ -97,6 +97,20 @@ def test_every_cotangent_counts_and_they_add_up():
         whole, total = of(every), sum(of(part) for part in parts)
         assert np.abs(whole - total).max() < 1e-9 * np.abs(whole).max()
     assert every.attributes["a"].shape == cloud.points.shape
+
+
+def test_the_surface_may_be_finer_than_the_field():
+    coarse, fine = (
+        isograd.reconstruct(SPHERE, GRID, surface=surface, checks=False) for surface in ("grid", "2x")
+    )
+    assert coarse.surface_grid == GRID and fine.sdf.shape == GRID.shape
+    assert fine.surface_grid.shape == tuple(2 * n for n in GRID.shape) == fine.indicator.shape
+    assert len(fine.mesh.faces) > 3 * len(coarse.mesh.faces)
+    spacing = isograd.reconstruct(SPHERE, GRID, surface=GRID.spacing / 2, checks=False)
+    assert bits(spacing.sdf) == bits(fine.sdf)
+    exact = np.linalg.norm(GRID.centers(), axis=-1) - 1
+    off = [np.abs(result.sdf - exact).mean() for result in (coarse, fine)]
+    assert off[1] < off[0]
 
 
 def test_attributes_are_carried_to_the_surface():
@@ -201,6 +215,8 @@ def test_bad_arguments_are_refused_with_a_reason():
         (ValueError, "normals", lambda: isograd.reconstruct(SPHERE, GRID, orient="given")),
         (ValueError, "does not use", lambda: isograd.reconstruct(SPHERE, GRID, normals=SPHERE)),
         (ValueError, "smoothing", lambda: isograd.Options(smoothing=-1)),
+        (ValueError, "surface is '0.5x'", lambda: isograd.Options(surface="0.5x")),
+        (ValueError, "surface is 0", lambda: isograd.Options(surface=0)),
         (ValueError, "screening", lambda: isograd.Options(screening=float("inf"))),
         (ValueError, "'local'", lambda: isograd.Options(level="median")),
         (ValueError, "radius", lambda: isograd.Options(radius=0)),
@@ -461,7 +477,7 @@ def test_every_way_to_the_level_has_a_gradient_that_agrees_with_differences():
         {"level": "thin", "smoothing": 0.5, "area": False},
         {"radius": 0.6},
     ]:
-        options = isograd.Options(orient="given", **options)
+        options = isograd.Options(orient="given", surface="grid", **options)
         call = lambda points: isograd.reconstruct(points, grid, normals=SPHERE, options=options)  # noqa: E731
         result = call(SPHERE)
         pulled = (result.pullback(indicator=weight).points * direction).sum()

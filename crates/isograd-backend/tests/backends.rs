@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use isograd::{
     Attribute, Backend, Cotangent, ExtensionCotangent, Grid, Options, PointCloud, Reconstructor,
-    Resolution, Saved, Stage,
+    Resolution, Saved, Stage, SurfaceResolution,
 };
 use isograd_backend::{Error, Plan, View};
 
@@ -24,7 +24,11 @@ fn grid(cloud: &PointCloud<f32>) -> Grid<f32> {
 
 /// A plan, unless there is no such device.
 fn plan(backend: Backend) -> Option<Plan<f32>> {
-    match Plan::new(backend, grid(&cloud()), Options::default()) {
+    match Plan::new(
+        backend,
+        grid(&cloud()),
+        Options::default().surface(SurfaceResolution::Grid),
+    ) {
         Ok(plan) => Some(plan),
         Err(error) if error.is_of_device() => {
             println!("SKIPPED {backend}: {error}");
@@ -55,7 +59,11 @@ fn attribute(cloud: &PointCloud<f32>) -> Attribute<f32> {
 
 /// All that a view gives is what the CPU gives, as far as the tolerance goes; with 0, to the bit.
 fn check(view: View<'_, f32>, cloud: &PointCloud<f32>, tolerance: f32) {
-    let mut plan = Reconstructor::new(grid(cloud), Options::default()).unwrap();
+    let mut plan = Reconstructor::new(
+        grid(cloud),
+        Options::default().surface(SurfaceResolution::Grid),
+    )
+    .unwrap();
     let expected = plan.reconstruct(cloud).unwrap();
     let close = |what: &str, found: &[f32], wanted: &[f32]| {
         let off = off(found, wanted);
@@ -193,7 +201,11 @@ fn auto_is_a_gpu_or_says_once_why_not() {
 #[test]
 fn errors_of_devices_are_told_from_those_of_clouds() {
     let grid = grid(&cloud());
-    let missing = Plan::new(Backend::Cuda(77), grid, Options::default());
+    let missing = Plan::new(
+        Backend::Cuda(77),
+        grid,
+        Options::default().surface(SurfaceResolution::Grid),
+    );
     let missing = missing.err().expect("there are 78 CUDA devices");
     assert!(missing.is_of_device(), "{missing}");
     let far = PointCloud::new(

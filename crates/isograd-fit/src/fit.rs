@@ -32,7 +32,8 @@ pub struct Options {
     /// With L-BFGS the fit ends when the lowest loss has not fallen by a thousandth for this many epochs, and for ten
     /// sets of samples where they are redrawn; 0 for never. It does not apply to Adam, whose rate has to fall first.
     pub patience: usize,
-    /// Options of the reconstruction; its checks are left out. A shape knows its outside: with it the automatic
+    /// Options of the reconstruction; its checks are left out, and an automatic resolution of the surface is that of the
+    /// grid, since its steps would be steps of the loss. A shape knows its outside: with it the automatic
     /// orientation becomes [`orient::Method::Signs`](isograd::orient::Method::Signs). Sensors are not passed on; and
     /// with the signs of the call before the loss is no function of the variables alone.
     pub reconstruction: isograd::Options,

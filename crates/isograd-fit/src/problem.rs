@@ -1,6 +1,6 @@
 //! The chain: variables → points → φ → loss, and its gradient back.
 
-use isograd::{CloudCotangent, Cotangent};
+use isograd::{CloudCotangent, Cotangent, SurfaceResolution};
 use isograd_backend::{Plan, View};
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +42,7 @@ impl Problem {
             .clone()
             // Nobody reads the report of a reconstruction among hundreds.
             .checks(false)
+            .surface(fixed(of_plan.surface))
             .orient(degrees.orientation(of_plan.orient));
         Ok(Self {
             degrees,
@@ -144,5 +145,13 @@ impl Fingerprints {
         } else {
             None
         }
+    }
+}
+
+/// The resolution of the surface in a fit: steps of an automatic one would be steps of the loss.
+pub fn fixed(surface: SurfaceResolution) -> SurfaceResolution {
+    match surface {
+        SurfaceResolution::Auto => SurfaceResolution::Grid,
+        other => other,
     }
 }

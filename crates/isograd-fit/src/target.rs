@@ -4,6 +4,8 @@ use isograd::distance::Query;
 use isograd::isosurface::{self, measure};
 use isograd::{Field, Grid, Mesh, PointCloud, Reconstructor};
 
+use crate::problem::fixed;
+
 /// Query points per call, to bound memory.
 const BATCH: usize = 1 << 18;
 
@@ -105,7 +107,8 @@ impl Target {
         grid: Grid<f64>,
         options: &isograd::Options,
     ) -> Result<Self, TargetError> {
-        let options = options.clone().checks(false);
+        let surface = fixed(options.surface);
+        let options = options.clone().checks(false).surface(surface);
         let mut plan = Reconstructor::new(grid, options)?;
         plan.reconstruct(cloud)?;
         Self::from_sdf(plan.into_reconstruction().sdf().clone())

@@ -89,8 +89,8 @@ pub use data::{
 };
 pub use pipeline::{
     CloudCotangent, Cotangent, Error, ExtensionCotangent, Options, Orienter, ParseOptionError,
-    Pipeline, PullbackError, Reconstruction, Reconstructor, RestoreError, Saved, available_memory,
-    check_memory,
+    Pipeline, PullbackError, Reconstruction, Reconstructor, RestoreError, Saved, SurfaceResolution,
+    available_memory, check_memory,
 };
 pub use real::Real;
 pub use report::{JsonReport, Report, Seconds, Stage, Warning};

@@ -10,6 +10,7 @@ mod orienter;
 mod pullback;
 mod restore;
 mod stages;
+mod surface;
 mod text;
 
 use std::ops::ControlFlow;
@@ -28,6 +29,7 @@ pub use memory::{available_memory, check_memory};
 pub use options::{Error, Options};
 pub use orienter::Orienter;
 pub use restore::{RestoreError, Saved};
+pub use surface::SurfaceResolution;
 pub use text::ParseOptionError;
 
 /// A plan for one grid and one set of options: Fourier tables and scratch buffers, reused by every call.
@@ -57,12 +59,15 @@ impl<T: Pipeline> Reconstructor<T> {
     ///
     /// # Errors
     /// [`Error::Memory`] for a grid that needs more memory than is free, where the system tells (Linux).
-    /// [`Error::Smoothing`] and [`Error::Screening`] for what is negative or not finite. Other options are
+    /// [`Error::Smoothing`], [`Error::Screening`] and [`Error::Surface`] for what is out of range. Other options are
     /// checked by the stages that use them.
     pub fn new(grid: Grid<T>, options: Options) -> Result<Self, Error> {
         check_memory(&grid)?;
         if !options.smoothing.is_valid() {
             return Err(Error::Smoothing(options.smoothing));
+        }
+        if !options.surface.is_valid() {
+            return Err(Error::Surface(options.surface));
         }
         if !(options.screening >= 0.0) || !options.screening.is_finite() {
             return Err(Error::Screening(options.screening));
@@ -73,7 +78,7 @@ impl<T: Pipeline> Reconstructor<T> {
         })
     }
 
-    /// The grid that all results are on.
+    /// The grid of φ.
     pub fn grid(&self) -> &Grid<T> {
         self.result.sdf.grid()
     }
@@ -105,7 +110,7 @@ impl<T: Pipeline> Reconstructor<T> {
     }
 
     /// Runs all stages but the checks with the radii and the signs of the normals of `held`, a reconstruction of as many
-    /// points, and with its automatic smoothing unless that is a function of the areas. This is the map that
+    /// points, and with its resolution of the surface and its automatic smoothing unless that is a function of the areas. This is the map that
     /// [`Reconstruction::pullback`] differentiates, for comparisons with finite differences. Neighborhoods are
     /// those of the moved points: a sample that enters or leaves one still makes the normal jump.
     ///
@@ -213,6 +218,14 @@ impl<T: Real> Reconstruction<T> {
         };
     }
 
+    /// Typical distance between samples: the root of the mean area where samples have areas.
+    fn sample_spacing(&self) -> f64 {
+        match self.options.area {
+            true => splat::area::mean(&self.areas).0.sqrt(),
+            false => self.residuals.neighborhoods.spacing().f64(),
+        }
+    }
+
     fn splat_samples(&self) -> splat::Samples<'_, T> {
         splat::Samples {
             points: &self.points,
@@ -231,11 +244,16 @@ impl<T: Real> Reconstruction<T> {
         &self.sdf
     }
 
-    /// The indicator χ at every cell center: below the iso-value inside, above it outside, what the
+    /// The indicator χ at every cell center of [the surface's grid](SurfaceResolution): below the iso-value inside, above it outside, what the
     /// [local iso-value](isosurface::local_level) takes off included. It has no unit; without area weights also no
     /// scale.
     pub fn indicator(&self) -> &Field<T> {
         &self.indicator
+    }
+
+    /// The grid that the surface was found on: that of the indicator.
+    pub fn surface_grid(&self) -> &Grid<T> {
+        self.indicator.grid()
     }
 
     /// The level `c` of the surface `χ = c`.

@@ -95,7 +95,9 @@ pub struct Report {
     pub neighbors: [u32; 3],
     /// Points whose normal is not well defined (equal eigenvalues): its derivative is bounded by a guard.
     pub guarded: usize,
-    /// Width of the smoothing of the indicator, in cells.
+    /// Cell size of the grid of the surface.
+    pub surface_spacing: f64,
+    /// Width of the smoothing of the indicator, in cells of that grid.
     pub smoothing: f64,
     /// Name of the way the signs were found.
     pub orientation: &'static str,

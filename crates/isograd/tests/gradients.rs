@@ -12,7 +12,7 @@ use isograd::poisson::Smoothing;
 use isograd::splat::Weights;
 use isograd::{
     Attribute, CloudCotangent, Cotangent, ExtensionCotangent, Grid, Options, Pipeline, PointCloud,
-    Reconstruction, Reconstructor, Saved,
+    Reconstruction, Reconstructor, Saved, SurfaceResolution,
 };
 
 /// A motion of a point in cells over which nothing that has no derivative is likely to change.
@@ -105,11 +105,11 @@ impl<T: Pipeline> Extended<T> {
 
 impl<T: Pipeline> Weighted<T> {
     fn new(result: &Reconstruction<T>, extended: &Extended<T>) -> Self {
-        let cells = result.sdf().values().len();
+        let [cells, of_surface] = [result.sdf(), result.indicator()].map(|f| f.values().len());
         let (vertices, samples) = (result.mesh().vertices().len(), result.areas().len());
         Self {
             sdf: random(cells, 11),
-            indicator: random(cells, 12),
+            indicator: random(of_surface, 12),
             vertices: random_vectors(vertices, 13),
             normals: random_vectors(samples, 14),
             areas: random::<T>(samples, 15)
@@ -244,9 +244,13 @@ fn all_results_are_pulled_back_to_all_inputs() {
         .area(false)
         .splat(Weights::Paper)
         .smoothing(Smoothing::Cells(0.7))
+        .surface(SurfaceResolution::Grid)
         .level(Level::Mean);
     let signs = estimated.clone().orient(Method::Signs);
-    let screened = estimated.clone().screening(2.0);
+    let screened = estimated
+        .clone()
+        .screening(2.0)
+        .surface(SurfaceResolution::Factor(1.5));
     for options in [estimated, given, signs, plain, screened] {
         let cloud = cloud::<f64>();
         let mut plan = Reconstructor::new(grid(), options.clone()).expect("options");
@@ -255,6 +259,8 @@ fn all_results_are_pulled_back_to_all_inputs() {
         let weighted = Weighted::new(&base, &extended);
         let pulled = weighted.pull(&base, &extended);
         assert_eq!(pulled.guarded, 0);
+        let cells = base.surface_grid().shape()[0] as f64 / base.sdf().grid().shape()[0] as f64;
+        println!("a surface {cells} times as fine");
         assert_eq!(pulled.normals.is_empty(), options.orient != Method::Given);
         let direction = Direction::new(&cloud);
         let step = STEP * base.sdf().grid().spacing();

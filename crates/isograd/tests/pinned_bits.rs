@@ -14,7 +14,7 @@ use isograd::poisson::Smoothing;
 use isograd::splat::Weights;
 use isograd::{
     Attribute, Cotangent, ExtensionCotangent, Grid, Options, Pipeline, PointCloud, Reconstruction,
-    Reconstructor, Resolution,
+    Reconstructor, Resolution, SurfaceResolution,
 };
 
 /// FNV-1a, 64 bits.
@@ -184,7 +184,7 @@ fn hashes<T: Pipeline>(samples: &[([f64; 3], [f64; 3])], options: &Options) -> [
     let cloud = PointCloud::new(points).expect("finite points");
     let cloud = cloud.with_normals(normals).expect("one normal a point");
     let grid = Grid::fit(&cloud, Resolution::Cells(44), T::of(0.15)).expect("a grid");
-    let mut options = options.clone();
+    let mut options = options.clone().surface(SurfaceResolution::Grid);
     if let Band::Within(cells) = options.band {
         options.band = Band::Within(cells * grid.spacing().f64());
     }

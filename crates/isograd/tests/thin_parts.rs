@@ -1,11 +1,11 @@
-//! Parts thinner than a cell: cut off by default, kept by `Level::Thin`.
+//! Parts thinner than a cell of the surface: cut off by default, kept by `Level::Thin`.
 
 mod common;
 
 use common::Uniform;
 use isograd::isosurface::Level;
 use isograd::orient::Method;
-use isograd::{Grid, Options, PointCloud, Reconstructor, Resolution};
+use isograd::{Grid, Options, PointCloud, Reconstructor, Resolution, SurfaceResolution};
 use isograd_element::vector;
 
 /// A lens of radius 1, `thickness` in its middle, and a ball beside it, with exact normals.
@@ -42,7 +42,10 @@ fn missed(level: Level) -> f64 {
     // The longest side is some 2, and the grid 1.2 times that: cells of 0.05.
     let cloud = lens_and_ball(30_000, 0.03);
     let grid = Grid::fit(&cloud, Resolution::Cells(cells), 0.1).expect("a grid");
-    let options = Options::default().orient(Method::Given).level(level);
+    let options = Options::default()
+        .orient(Method::Given)
+        .surface(SurfaceResolution::Grid)
+        .level(level);
     let mut plan = Reconstructor::new(grid, options).expect("options");
     let result = plan.reconstruct(&cloud).expect("a surface");
     let far = cloud.points().iter().step_by(2).filter(|&&x| {

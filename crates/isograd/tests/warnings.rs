@@ -78,12 +78,12 @@ fn two_balls_are_two_pieces() {
 }
 
 #[test]
-fn a_plate_of_two_cells_is_called_thin() {
+fn a_plate_of_two_cells_of_the_surface_is_called_thin() {
     let mut random = Uniform::new(4);
     let mut points = Vec::new();
     for _ in 0..20_000 {
         let (x, y) = (2.0 * random.next() - 1.0, 2.0 * random.next() - 1.0);
-        points.push([x, y, if random.next() < 0.5 { 0.04 } else { -0.04 }]);
+        points.push([x, y, if random.next() < 0.5 { 0.02 } else { -0.02 }]);
     }
     let warnings = report(points, 64).warnings;
     let thin = warnings.iter().find_map(|w| match w {

@@ -61,10 +61,13 @@ class Options:
         orient: method that finds the side of each normal; see :class:`Orient`.
         splat: weights that spread a sample over the cells around it; see :class:`Splat`.
         area: whether a sample is weighted by the area that it stands for.
-        smoothing: width of the smoothing of the indicator, in cells; 0 for none, ``"auto"`` for 0.8 of the
+        smoothing: width of the smoothing of the indicator, in cells of the surface; 0 for none, ``"auto"`` for 0.8 of the
             typical distance between samples.
         screening: strength of the pull of the indicator to one value at the samples; 1 to 4 are usual, 0 is off.
         level: value of the indicator at the surface; see :class:`Level`.
+        surface: cells that the surface is found on: ``"auto"`` for about the distance between samples, up to twice as
+            fine as the grid of φ, ``"grid"`` for those of φ, a cell size in the unit of the points, or a factor such as
+            ``"3x"``. φ stays on its own grid.
         band: distance from the surface up to which φ is computed, in the unit of the points, or ``"full"``.
         checks: whether to measure the result and to check whether it can be trusted.
 
@@ -79,6 +82,7 @@ class Options:
     smoothing: float | Literal["auto"] = "auto"
     screening: float = 0.0
     level: LevelLike = Level.LOCAL
+    surface: float | str = "auto"
     band: float | Literal["full"] = "full"
     checks: bool = True
 
@@ -91,6 +95,7 @@ class Options:
             "smoothing": self.smoothing,
             "screening": _not_negative(self.screening, "screening", "0 or more"),
             "level": _choice(Level, self.level, "level"),
+            "surface": _surface(self.surface),
             "band": length(self.band, "band", "full"),
             "checks": bool(self.checks),
         }
@@ -150,6 +155,24 @@ def _not_negative(value: object, name: str, wanted: str) -> float:
     if not 0.0 <= found < float("inf"):
         raise ValueError(f"{name} is {value!r}; give {wanted}")
     return found
+
+
+def _surface(value: object) -> float | str:
+    text = str(value)
+    if text in ("grid", "auto"):
+        return text
+    is_factor = isinstance(value, str) and text.endswith("x")
+    try:
+        found = float(text[:-1]) if is_factor else number(value, "surface")
+    except (TypeError, ValueError):
+        found = float("nan")
+    if is_factor and 1.0 <= found <= 64.0:
+        return text
+    if not is_factor and 0.0 < found < float("inf"):
+        return found
+    raise ValueError(
+        f'surface is {value!r}; give "grid", "auto", a cell size above 0, or a factor from "1x" to "64x"'
+    )
 
 
 def length(value: object, name: str, *words: str) -> float | str:

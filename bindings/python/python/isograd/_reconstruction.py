@@ -87,7 +87,7 @@ class Reconstruction:
         self.dtype = dtype
         """float32 or float64: the type of the points."""
         self.grid = grid
-        """The grid of all fields."""
+        """The grid of φ."""
         self.options = options
         """The options of the reconstruction."""
 
@@ -101,8 +101,14 @@ class Reconstruction:
 
     @cached_property
     def indicator(self) -> np.ndarray:
-        """``(nx, ny, nz)`` indicator χ: below :attr:`iso_value` inside, above it outside."""
+        """Indicator χ, in the shape of the surface's grid: below :attr:`iso_value` inside, above it outside."""
         return self._core.array("indicator")
+
+    @cached_property
+    def surface_grid(self) -> Grid:
+        """The grid that the surface was found on: that of :attr:`indicator`."""
+        shape = self.indicator.shape
+        return Grid(self.grid.lower, self.grid.spacing * self.grid.shape[0] / shape[0], shape)
 
     @cached_property
     def iso_value(self) -> float:
@@ -184,7 +190,7 @@ class Reconstruction:
             sdf: ``(nx, ny, nz)`` derivative of a loss in φ.
             vertices: ``(V, 3)`` in the vertices of the mesh.
             normals: ``(N, 3)`` in the outward normals.
-            indicator: ``(nx, ny, nz)`` in χ.
+            indicator: in χ, in its shape.
             areas: ``(N,)`` in the areas.
             iso_value: in the level.
             extensions: triples of an :class:`Extension` and its derivatives in ``vertices`` and ``values``, or ``None``.
@@ -197,7 +203,7 @@ class Reconstruction:
         shape = self.grid.shape
         given = {
             "sdf": (sdf, shape),
-            "indicator": (indicator, shape),
+            "indicator": (indicator, shape if indicator is None else self.surface_grid.shape),
             "vertices": (vertices, (None, 3)),
             "normals": (normals, (self._count, 3)),
             "areas": (areas, (self._count,)),

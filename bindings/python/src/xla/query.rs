@@ -25,7 +25,12 @@ impl Target for Forward {
         };
         call.reconstruct(&cloud, |result| {
             let surface = Query::new(result.mesh()?.clone()).map_err(|e| e.to_string())?;
-            let hits = surface.query(queries, Some(result.sdf()?));
+            // Parts of a finer surface may lie between the cell centers of φ.
+            let signs = match result.surface_grid() == result.grid() {
+                true => Some(result.sdf()?),
+                false => None,
+            };
+            let hits = surface.query(queries, signs);
             let distances: Vec<T> = hits.iter().map(|hit| hit.distance).collect();
             copy("the distances", &distances, distance)?;
             let Some((hit_outputs, saved)) = saved else {

@@ -5,7 +5,7 @@ use isograd::distance::Band;
 use isograd::isosurface::Level;
 use isograd::poisson::Smoothing;
 use isograd::splat::Weights;
-use isograd::{Grid, GridError, Options, PointCloud, Real, Resolution};
+use isograd::{Grid, GridError, Options, PointCloud, Real, Resolution, SurfaceResolution};
 
 use super::{OrientArgs, finite, not_negative, positive};
 
@@ -42,7 +42,7 @@ pub struct MethodArgs {
     /// Whether a sample is weighted by the area that it stands for: on or off
     #[arg(long, value_name = "on|off", default_value = "on", action = ArgAction::Set, value_parser = switch)]
     pub area: bool,
-    /// Width of the smoothing of the indicator, in cells; auto: 0.8 of the distance between samples
+    /// Width of the smoothing of the indicator, in cells of the surface; auto: 0.8 of the distance between samples
     #[arg(long, value_name = "CELLS|auto", default_value = "auto")]
     pub smoothing: Smoothing,
     /// Strength of the pull of the indicator to one value at the samples; 1 to 4 are usual, 0 is off
@@ -52,6 +52,10 @@ pub struct MethodArgs {
     /// than a cell are made a cell thick; gradients oscillate there) or mean (the mean at all samples)
     #[arg(long, value_name = "LEVEL", default_value = "local")]
     pub level: Level,
+    /// Cells that the surface is found on: auto (about the distance between samples, up to twice as fine as the grid of
+    /// φ), grid (those of φ), a cell size in the cloud's unit, or a factor such as 3x; φ stays on its own grid
+    #[arg(long, value_name = "auto|grid|H|Fx", default_value = "auto")]
+    pub surface: SurfaceResolution,
     /// Distance from the surface up to which φ is computed, in the cloud's unit
     #[arg(long, value_name = "H|full", default_value = "full")]
     pub band: Band,
@@ -88,6 +92,7 @@ impl MethodArgs {
             .smoothing(self.smoothing)
             .screening(self.screening)
             .level(self.level)
+            .surface(self.surface)
             .band(self.band)
     }
 }

@@ -78,7 +78,7 @@ mod vulkan {
 
     use super::{Sandbox, sphere};
 
-    const METHOD: &str = "--resolution 32";
+    const METHOD: &str = "--resolution 32 --surface grid";
 
     /// Whether there is a device.
     fn is_here() -> bool {

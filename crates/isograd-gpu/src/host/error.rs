@@ -1,7 +1,7 @@
 //! Errors of the front for hosts.
 
 use isograd::distance::extend;
-use isograd::{Backend, PointCloudError, PullbackError, RestoreError, Stage};
+use isograd::{Backend, PointCloudError, PullbackError, RestoreError, Stage, SurfaceResolution};
 
 use crate::pipeline;
 
@@ -15,6 +15,11 @@ pub enum Error {
     /// A choice that is no device.
     #[error("{0} is no device; give cuda or vulkan")]
     NoDevice(Backend),
+    /// A surface on a grid other than that of φ.
+    #[error(
+        "the surface is {0:?}; a device finds it on the grid of φ only: give 'grid', or compute on the CPU"
+    )]
+    Surface(SurfaceResolution),
     /// The device.
     #[error(transparent)]
     Device(#[from] crate::Error),

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use isograd::orient::Method;
-use isograd::{Backend, Grid, Options, PointCloud, Report, Saved, Seconds, Stage};
+use isograd::{
+    Backend, Grid, Options, PointCloud, Report, Saved, Seconds, Stage, SurfaceResolution,
+};
 
 use super::work::{CallStart, Work};
 use super::{Error, Number, Reconstruction};
@@ -30,6 +32,10 @@ impl<T: Number> Plan<T> {
     /// # Errors
     /// An unavailable device, with the reason and the remedy; invalid options.
     pub fn new(backend: Backend, grid: Grid<T>, options: Options) -> Result<Self, Error> {
+        use SurfaceResolution::{Auto, Grid};
+        if !matches!(options.surface, Auto | Grid) {
+            return Err(Error::Surface(options.surface));
+        }
         let device = T::open(backend, grid, (&options).into())?;
         Ok(Self {
             name: format!("{backend}: {}", device.name()),

@@ -180,6 +180,7 @@ impl<T: Number> Reconstruction<T> {
     fn make_report(&self) -> Result<Report, Error> {
         let start = Instant::now();
         let mut report = self.begun.clone();
+        report.surface_spacing = isograd::Real::f64(self.grid.spacing());
         report.smoothing = self.result.smoothing();
         report.iso_value = isograd::Real::f64(self.iso_value()?);
         if self.result.surface.report.touches_wall {
@@ -243,7 +244,7 @@ impl<T: Number> Reconstruction<T> {
     /// Errors of the device; a cotangent of another length, or that is not finite; an extension of another result.
     pub fn pullback(&self, cotangent: &Cotangent<'_, T>) -> Result<CloudCotangent<T>, Error> {
         let vertices = self.result.surface.vertices.len() / 3;
-        cotangent.check(self.grid.cells(), vertices, self.points())?;
+        cotangent.check([self.grid.cells(); 2], vertices, self.points())?;
         let mut found = self.device.pullback(&self.result, cotangent)?;
         found.guarded += self.begun.guarded;
         Ok(found)

@@ -4,7 +4,7 @@ use isograd::distance::extend;
 use isograd::orient::Method;
 use isograd::{
     Attribute, Backend, Cotangent, ExtensionCotangent, Grid, Options, PointCloud, PullbackError,
-    Real, Reconstructor, Resolution, Saved, Stage,
+    Real, Reconstructor, Resolution, Saved, Stage, SurfaceResolution,
 };
 use isograd_gpu::host::{Choice, Error, Number, Plan, choose};
 use isograd_shapes::Sampling;
@@ -41,7 +41,7 @@ fn grid<T: Number>(cloud: &PointCloud<T>) -> Grid<T> {
 }
 
 fn options() -> Options {
-    Options::default()
+    Options::default().surface(SurfaceResolution::Grid)
 }
 
 /// The largest difference, of the largest number.
@@ -472,6 +472,8 @@ fn what_devices_do_not_have_is_named() {
     };
     let text = refused(options().screening(-1.0));
     assert!(text.contains("0 or more"), "{text}");
+    let text = refused(options().surface(SurfaceResolution::Factor(2.0)));
+    assert!(text.contains("on the grid of φ only"), "{text}");
     let plan = Plan::new(Backend::Cpu, grid(&cloud), options());
     assert!(matches!(plan.err(), Some(Error::NoDevice(Backend::Cpu))));
 }

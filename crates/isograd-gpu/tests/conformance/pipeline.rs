@@ -5,7 +5,7 @@ use isograd::isosurface::Level;
 use isograd::neighbors::Radius;
 use isograd::orient::{Method, ParityOptions};
 use isograd::poisson::Smoothing;
-use isograd::{Grid, Options, PointCloud, Real, Reconstructor, Resolution};
+use isograd::{Grid, Options, PointCloud, Real, Reconstructor, Resolution, SurfaceResolution};
 use isograd_gpu::distance::Band;
 use isograd_gpu::pipeline::{self, Error, RadiiAndSigns};
 use isograd_gpu::splat::Weights;
@@ -35,12 +35,17 @@ struct Case {
     options: Options,
 }
 
+/// Options with the surface where devices find it.
+fn on_grid() -> Options {
+    Options::default().surface(SurfaceResolution::Grid)
+}
+
 fn cases() -> [Case; 4] {
     let torus = Case {
         shape: "torus",
         samples: 4000,
         cells: 40,
-        options: Options::default(),
+        options: on_grid(),
     };
     let small = Case {
         samples: 2000,
@@ -53,19 +58,19 @@ fn cases() -> [Case; 4] {
             shape: "fish",
             samples: 3000,
             cells: 48,
-            options: Options::default()
+            options: on_grid()
                 .smoothing(Smoothing::Cells(1.0))
                 .level(Level::Thin),
         },
         Case {
-            options: Options::default()
+            options: on_grid()
                 .splat(Weights::Paper)
                 .area(false)
                 .band(Band::Within(0.2)),
             ..small.clone()
         },
         Case {
-            options: Options::default().screening(4.0).level(Level::Mean),
+            options: on_grid().screening(4.0).level(Level::Mean),
             ..small
         },
     ]

@@ -39,6 +39,7 @@ pub mod triangle;
 mod tests;
 
 pub use lattice::{Band, NO_TRIANGLE, Scratch};
+use query::corners_agree;
 pub use query::{Hit, Query};
 
 /// Errors of the distance stage.

@@ -119,7 +119,7 @@ impl<T: Real> Query<T> {
         let face = self.bvh.face(place);
         let found = closest_point(to_f64(point), corners(&self.mesh, face));
         let inside = signs
-            .and_then(|field| side_on_lattice(field, point))
+            .and_then(|field| corners_agree(field, T::zero(), to_f64(point)))
             .unwrap_or_else(|| self.is_inside(face, &found));
         let sign = if inside { -1.0 } else { 1.0 };
         Hit {
@@ -149,26 +149,27 @@ impl<T: Real> Query<T> {
     }
 }
 
-/// Whether a point is inside, where the eight cells round it agree.
-fn side_on_lattice<T: Real>(field: &Field<T>, point: [T; 3]) -> Option<bool> {
+/// Whether a point is below the level `c` of a field, where the eight values round it agree.
+pub(super) fn corners_agree<T: Real>(field: &Field<T>, c: T, point: [f64; 3]) -> Option<bool> {
     let grid = field.grid();
-    let x = grid.to_index(point);
+    let (lower, spacing) = (to_f64(grid.lower()), grid.spacing().f64());
     let mut cell = [0; 3];
     for a in 0..3 {
-        let from_center = x[a] - T::of(0.5);
-        if !(from_center >= T::zero()) {
+        let from_center = (point[a] - lower[a]) / spacing - 0.5;
+        if !(from_center >= 0.0) {
             return None;
         }
-        cell[a] = from_center.to_usize().filter(|i| i + 1 < grid.shape()[a])?;
+        cell[a] = from_center as usize;
+        if cell[a] + 1 >= grid.shape()[a] {
+            return None;
+        }
     }
-    let inside = |corner: usize| {
+    let below = |corner: usize| {
         let at = std::array::from_fn(|a| cell[a] + (corner >> a & 1));
-        field.at(at) < T::zero()
+        field.at(at) < c
     };
-    let first = inside(0);
-    (1..8)
-        .all(|corner| inside(corner) == first)
-        .then_some(first)
+    let first = below(0);
+    (1..8).all(|corner| below(corner) == first).then_some(first)
 }
 
 /// Infinity for NaN, since comparisons with NaN all fail and would admit it to absent boxes.

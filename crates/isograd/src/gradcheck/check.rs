@@ -138,7 +138,7 @@ impl<'a> Check<'a> {
             true => self.plan.reconstruct_held(moved, self.base)?,
             false => self.plan.reconstruct(moved)?,
         };
-        let (grid, values) = (result.sdf().grid(), result.sdf().values());
+        let (grid, chi) = (result.surface_grid(), result.indicator().values());
         let options = result.options();
         let faces = options.splat == Weights::Paper || options.level != Level::Mean;
         let between = |x: f64| match faces {
@@ -148,7 +148,7 @@ impl<'a> Check<'a> {
         let places = moved.points().iter().map(|&p| grid.to_index(p));
         Ok(Side {
             parts: self.functional.parts(result.sdf()),
-            inside: values.iter().map(|&phi| phi < 0.0).collect(),
+            inside: chi.iter().map(|&chi| chi < result.iso_value()).collect(),
             between: places.map(|x| x.map(between)).collect(),
             counts: [result.neighbor_counts(), result.axis_counts()].concat(),
             normals: result.normals().to_vec(),

@@ -24,7 +24,7 @@ mod tests;
 
 pub use motion::Motion;
 
-use crate::{Error, Grid, PointCloud, PullbackError, Reconstructor};
+use crate::{Error, Grid, PointCloud, PullbackError, Reconstructor, SurfaceResolution};
 use check::Check;
 
 /// What to compare.
@@ -168,8 +168,11 @@ pub fn gradcheck(
         what: "the cloud as it is".into(),
         source,
     };
-    let mut plan = Reconstructor::new(grid, reconstruction).map_err(failed)?;
+    let mut plan = Reconstructor::new(grid, reconstruction.clone()).map_err(failed)?;
     let base = plan.reconstruct(cloud).map_err(failed)?.clone();
+    // An automatic resolution of the surface is that of the cloud as it is.
+    let surface = SurfaceResolution::Factor(grid.spacing() / base.surface_grid().spacing());
+    let plan = Reconstructor::new(grid, reconstruction.surface(surface)).map_err(failed)?;
     let mut check = Check::new(cloud, &base, plan)?;
     let mut rows = Vec::new();
     for &motion in &options.motions {

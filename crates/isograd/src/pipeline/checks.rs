@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::data::Mesh;
+use crate::distance::Query;
 use crate::isosurface::measure;
 use crate::neighbors::Neighborhoods;
 use crate::orient::Orientation;
@@ -21,7 +22,7 @@ const THIN_DEPTH: f64 = 2.0;
 impl Report {
     /// Measures φ and the surface and adds warnings about them, for results that were not made by a
     /// [`Reconstructor`](crate::Reconstructor). `normals` are the outward ones of the points;
-    /// [`Report::sample_spacing`] must be set.
+    /// [`Report::sample_spacing`] and [`Report::surface_spacing`] must be set.
     pub fn check_field<T: Real>(
         &mut self,
         points: &[[T; 3]],
@@ -32,9 +33,9 @@ impl Report {
     ) {
         self.measure_field(sdf);
         self.surface = measure::measure(mesh, scratch);
-        let (warnings, spacing) = (&mut self.warnings, sdf.grid().spacing());
-        warnings.extend(thin_and_missed(points, normals, sdf));
-        warnings.extend(sparse(self.sample_spacing, spacing.f64()));
+        let (warnings, spacing) = (&mut self.warnings, self.surface_spacing);
+        warnings.extend(thin_and_missed(points, normals, sdf, mesh, T::of(spacing)));
+        warnings.extend(sparse(self.sample_spacing, sdf.grid().spacing().f64()));
         warnings.extend(components(self.surface.components));
         warnings.extend(rounded(points, spacing));
     }
@@ -58,23 +59,44 @@ impl Report {
     }
 }
 
-/// Samples on parts thinner than about three cells, and samples off the surface.
+/// Samples on parts thinner than about three cells of size `h`, those of the surface, and samples off the surface.
 ///
 /// At [`THIN_DEPTH`] cells below a sample on a thick part, φ still grows toward that sample. On a part
 /// thinner than about three cells the opposite side is nearer there, and the gradient has turned round.
-fn thin_and_missed<T: Real>(points: &[[T; 3]], normals: &[[T; 3]], sdf: &Field<T>) -> Vec<Warning> {
-    let h = sdf.grid().spacing();
+fn thin_and_missed<T: Real>(
+    points: &[[T; 3]],
+    normals: &[[T; 3]],
+    sdf: &Field<T>,
+    mesh: &Mesh<T>,
+    h: T,
+) -> Vec<Warning> {
     let depth = T::of(THIN_DEPTH) * h;
-    let flags: Vec<[bool; 2]> = points
-        .par_iter()
-        .zip(normals)
-        .map(|(&x, &n)| {
-            let below = vector::sub(x, vector::scale(n, depth));
-            let (_, gradient) = sdf.interpolate_with_gradient(below);
-            let thin = vector::dot(gradient, n) < T::of(-0.5);
-            [thin, !(sdf.interpolate(x).abs() <= h)]
-        })
-        .collect();
+    let below = |(&x, &n): (&[T; 3], &[T; 3])| vector::sub(x, vector::scale(n, depth));
+    let below: Vec<[T; 3]> = points.par_iter().zip(normals).map(below).collect();
+    let flag = |distance: T, gradient: [T; 3], n: [T; 3]| {
+        let thin = vector::dot(gradient, n) < T::of(-0.5);
+        [thin, !(distance.abs() <= h)]
+    };
+    let flags: Vec<[bool; 2]> = if sdf.grid().spacing() == h {
+        let samples = points.par_iter().zip(&below).zip(normals);
+        let interpolated = |((&x, &below), &n): ((&[T; 3], _), _)| {
+            flag(
+                sdf.interpolate(x),
+                sdf.interpolate_with_gradient(below).1,
+                n,
+            )
+        };
+        samples.map(interpolated).collect()
+    } else {
+        // The grid of φ is too coarse to see parts of this size.
+        let Ok(query) = Query::new(mesh.clone()) else {
+            return Vec::new();
+        };
+        let (at, below) = (query.query(points, None), query.query(&below, None));
+        let hits = at.iter().zip(&below).zip(normals);
+        hits.map(|((at, below), &n)| flag(at.distance, below.gradient, n))
+            .collect()
+    };
     let share = |which: usize| {
         flags.iter().filter(|flags| flags[which]).count() as f64 / points.len().max(1) as f64
     };
@@ -112,12 +134,12 @@ fn guarded(samples: usize, points: usize) -> Option<Warning> {
 }
 
 /// Coordinates whose rounding is visible in cells.
-fn rounded<T: Real>(points: &[[T; 3]], spacing: T) -> Option<Warning> {
+fn rounded<T: Real>(points: &[[T; 3]], spacing: f64) -> Option<Warning> {
     let largest = points
         .iter()
         .flatten()
         .fold(T::zero(), |m, c| m.max(c.abs()));
-    let cells = (largest * T::epsilon() / spacing).f64();
+    let cells = (largest * T::epsilon()).f64() / spacing;
     (cells > 1e-2).then_some(Warning::Rounded { cells })
 }
 

@@ -13,7 +13,7 @@ use crate::{Real, poisson, vector};
 pub struct Cotangent<'a, T> {
     /// `(nx, ny, nz)` of φ, in memory order.
     pub sdf: Option<&'a [T]>,
-    /// `(nx, ny, nz)` of the indicator χ.
+    /// Of the indicator χ, in the shape of [the surface's grid](crate::Reconstruction::surface_grid).
     pub indicator: Option<&'a [T]>,
     /// Of the iso-value `c`.
     pub iso_value: T,
@@ -96,19 +96,19 @@ pub enum PullbackError {
 }
 
 impl<T: Real> Cotangent<'_, T> {
-    /// Checks that every cotangent is finite and has the length of its result, given the numbers of cells of the grid,
-    /// vertices of the surface and samples of the cloud.
+    /// Checks that every cotangent is finite and has the length of its result, given the numbers of cells of the grids of
+    /// φ and of the surface, vertices of the surface and samples of the cloud.
     ///
     /// # Errors
     /// [`PullbackError::Length`], [`PullbackError::NotFinite`].
     pub fn check(
         &self,
-        cells: usize,
+        cells: [usize; 2],
         vertices: usize,
         samples: usize,
     ) -> Result<(), PullbackError> {
-        check_numbers("φ", self.sdf, cells)?;
-        check_numbers("the indicator", self.indicator, cells)?;
+        check_numbers("φ", self.sdf, cells[0])?;
+        check_numbers("the indicator", self.indicator, cells[1])?;
         check_numbers("the iso-value", Some(&[self.iso_value]), 1)?;
         check_vectors("the vertices", self.vertices, vertices)?;
         check_vectors("the normals", self.normals, samples)?;

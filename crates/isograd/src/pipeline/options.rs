@@ -1,5 +1,7 @@
 //! What to compute, and why it may fail.
 
+use super::SurfaceResolution;
+use crate::data::GridError;
 use crate::report::Stage;
 use crate::{distance, isosurface, neighbors, orient, poisson, splat};
 
@@ -45,6 +47,8 @@ options! {
     screening: f64 = 0.0,
     /// Value of the indicator at the surface.
     level: isosurface::Level = isosurface::Level::default(),
+    /// Cell size of the grid that the surface is found on.
+    surface: SurfaceResolution = SurfaceResolution::default(),
     /// Region in which φ is computed.
     band: distance::Band = distance::Band::default(),
     /// Whether to measure the result and to check whether it can be trusted.
@@ -66,6 +70,14 @@ pub enum Error {
     /// The smoothing is negative or not finite.
     #[error("the smoothing is {0:?}; it must be 0 or more cells, and finite")]
     Smoothing(poisson::Smoothing),
+    /// The resolution of the surface is out of range.
+    #[error(
+        "the surface is {0:?}; give a spacing above 0, in the cloud's unit, or a factor from 1 to 64"
+    )]
+    Surface(SurfaceResolution),
+    /// The grid of the surface has too many or too small cells.
+    #[error("the grid of the surface: {0}")]
+    Grid(#[from] GridError),
     /// The screening is negative or not finite.
     #[error("the screening is {0}; it must be 0 or more, and finite")]
     Screening(f64),

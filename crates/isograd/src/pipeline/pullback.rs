@@ -94,14 +94,18 @@ impl<T: Real> Reconstruction<T> {
         scratch: &mut PullbackScratch<T>,
         out: &mut CloudCotangent<T>,
     ) -> Result<(), PullbackError> {
-        let cells = self.sdf.values().len();
+        let cells = [&self.sdf, &self.indicator].map(|field| field.values().len());
         cotangent.check(cells, self.mesh.vertices().len(), self.areas.len())?;
         scratch.start(cotangent, self.points.len(), self.mesh.vertices().len());
         out.guarded = 0;
+        let ratio = self.indicator.grid().spacing().f64() / self.sdf.grid().spacing().f64();
         self.pull_extensions(cotangent, scratch, out)?;
         if cotangent.reaches_indicator() {
             self.pull_distance(cotangent, scratch);
+            // From the cell size of the grid of φ to that of the grid of the surface, and back at the end.
+            scratch.samples.grid.spacing /= ratio;
             self.pull_indicator(cotangent, scratch, out)?;
+            scratch.samples.grid.spacing *= ratio;
         }
         self.pull_samples(scratch, out);
         out.grid = GridCotangent {

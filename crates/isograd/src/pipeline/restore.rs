@@ -74,7 +74,7 @@ impl<T: Pipeline> Reconstructor<T> {
         orientation.confidence.clear();
         orientation.normals.extend_from_slice(saved.normals);
         self.normals(cloud, None)?;
-        self.splat()?;
+        self.splat(None)?;
         // The pullback needs residuals of the indicator before the local iso-value was subtracted.
         self.solve(None)?;
         let Reconstruction {

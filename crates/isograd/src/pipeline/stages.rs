@@ -1,12 +1,15 @@
 //! The stages of a plan, each from the results of the previous ones.
 
-use super::{Error, Reconstruction, Reconstructor, Residuals};
-use crate::data::PointCloud;
+use std::sync::Arc;
+
+use super::surface::with_shape;
+use super::{Error, Reconstruction, Reconstructor, Residuals, check_memory};
+use crate::data::{Field, PointCloud};
 use crate::isosurface::{Level, local_level};
 use crate::neighbors::{Neighborhoods, Radius};
 use crate::poisson::screened;
 use crate::report::{Report, Stage, Warning};
-use crate::{Real, distance, isosurface, neighbors, normals, orient, splat};
+use crate::{Real, distance, isosurface, neighbors, normals, orient, poisson, splat};
 
 impl<T: Real> Reconstructor<T> {
     /// One stage, compiled where it is called: see [`concrete`](super::concrete).
@@ -19,7 +22,7 @@ impl<T: Real> Reconstructor<T> {
         match stage {
             Stage::Normals => self.normals(cloud, held)?,
             Stage::Orient => self.orient(cloud, held)?,
-            Stage::Splat => self.splat()?,
+            Stage::Splat => self.splat(held)?,
             Stage::Poisson => self.solve(held)?,
             Stage::Isosurface => self.isosurface()?,
             Stage::Distance => self.distance()?,
@@ -97,7 +100,8 @@ impl<T: Real> Reconstructor<T> {
         Ok(())
     }
 
-    pub(super) fn splat(&mut self) -> Result<(), Error> {
+    pub(super) fn splat(&mut self, held: Option<&Reconstruction<T>>) -> Result<(), Error> {
+        self.choose_surface_grid(held)?;
         let Reconstruction {
             options,
             points,
@@ -114,6 +118,27 @@ impl<T: Real> Reconstructor<T> {
         };
         let (scratch, residual) = (&mut self.scratch.splat, &mut residuals.splat);
         splat::forward(samples, options.splat, scratch, residual, indicator)?;
+        Ok(())
+    }
+
+    /// Puts the indicator and the Poisson plan on the grid of the surface: as fine as that of `held` if given.
+    fn choose_surface_grid(&mut self, held: Option<&Reconstruction<T>>) -> Result<(), Error> {
+        let result = &mut self.result;
+        let grid = match held {
+            Some(held) => with_shape(result.sdf.grid(), held.indicator.grid().shape())?,
+            None => {
+                let (sdf, spacing) = (result.sdf.grid(), result.sample_spacing());
+                result.options.surface.grid(sdf, spacing)?
+            }
+        };
+        if *result.indicator.grid() != grid {
+            check_memory(&grid)?;
+            if result.indicator.grid().shape() != grid.shape() {
+                result.poisson = Arc::new(poisson::Plan::new(grid.shape()));
+            }
+            result.indicator = Field::zeros(grid);
+        }
+        result.report.surface_spacing = grid.spacing().f64();
         Ok(())
     }
 
@@ -141,12 +166,9 @@ impl<T: Real> Reconstructor<T> {
         match held.filter(|_| !result.options.smoothing_follows()) {
             Some(held) => held.residuals.smoothing,
             None => {
-                let sample_spacing = match result.options.area {
-                    true => splat::area::mean(&result.areas).0.sqrt(),
-                    false => result.residuals.neighborhoods.spacing().f64(),
-                };
                 let spacing = result.indicator.grid().spacing().f64();
-                result.options.smoothing.cells(sample_spacing / spacing)
+                let in_cells = result.sample_spacing() / spacing;
+                result.options.smoothing.cells(in_cells)
             }
         }
     }

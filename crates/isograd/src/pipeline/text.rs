@@ -7,6 +7,7 @@ use std::str::FromStr;
 
 use serde::de::{Deserialize, Deserializer, Error, Visitor};
 
+use super::SurfaceResolution;
 use crate::backend::Backend;
 use crate::distance::Band;
 use crate::isosurface::Level;
@@ -67,6 +68,27 @@ from_str!(Level, "level", "'local', 'thin' or 'mean'", {
     "thin" => Self::Thin,
     "mean" => Self::Mean,
 });
+impl FromStr for SurfaceResolution {
+    type Err = ParseOptionError;
+
+    fn from_str(text: &str) -> Result<Self, ParseOptionError> {
+        let number = |text: &str| text.trim().parse::<f64>().ok();
+        let value = match text {
+            "grid" => Some(Self::Grid),
+            "auto" => Some(Self::Auto),
+            _ => match text.strip_suffix('x') {
+                Some(factor) => number(factor).map(Self::Factor),
+                None => number(text).map(Self::Spacing),
+            },
+        };
+        value.filter(|v| v.is_valid()).ok_or(ParseOptionError {
+            option: "surface",
+            text: text.into(),
+            expected: "'grid', 'auto', a cell size above 0 in the cloud's unit, or a factor from 1x to 64x",
+        })
+    }
+}
+
 from_str!(Band, "band", "a finite length above 0, or 'full'", {
     "full" => Self::Full,
 }, |length: f64| length > 0.0 => Self::Within);
@@ -108,7 +130,16 @@ macro_rules! deserialize {
         }
     )+};
 }
-deserialize!(Radius, Method, Weights, Smoothing, Level, Band, Backend);
+deserialize!(
+    Radius,
+    Method,
+    Weights,
+    Smoothing,
+    Level,
+    SurfaceResolution,
+    Band,
+    Backend
+);
 
 #[cfg(test)]
 mod tests {
@@ -118,7 +149,7 @@ mod tests {
     #[test]
     fn options_read_from_json_with_the_names_of_the_command_line() {
         let text = r#"{"radius": 0.1, "orient": "signs", "splat": "paper", "area": false, "smoothing": 0,
-            "screening": 4, "level": "thin", "band": 0.30000000000000004, "checks": false}"#;
+            "screening": 4, "level": "thin", "surface": "1.5x", "band": 0.30000000000000004, "checks": false}"#;
         let options: Options = serde_json::from_str(text).expect("valid");
         let expected = Options::default()
             .radius(Radius::Fixed(0.1))
@@ -128,10 +159,11 @@ mod tests {
             .smoothing(Smoothing::Cells(0.0))
             .screening(4.0)
             .level(Level::Thin)
+            .surface(SurfaceResolution::Factor(1.5))
             .band(Band::Within(0.1 + 0.2))
             .checks(false);
         assert_eq!(options, expected);
-        let text = r#"{"radius": "auto", "smoothing": "auto", "band": "full"}"#;
+        let text = r#"{"radius": "auto", "smoothing": "auto", "surface": "auto", "band": "full"}"#;
         let options: Options = serde_json::from_str(text).expect("valid");
         assert_eq!(options, Options::default());
     }
@@ -149,6 +181,11 @@ mod tests {
                 "smoothing is '-1'; give 0 or more cells",
             ),
             (r#"{"band": 1e999}"#, "number out of range"),
+            (
+                r#"{"surface": "0.5x"}"#,
+                "surface is '0.5x'; give 'grid', 'auto'",
+            ),
+            (r#"{"surface": -1}"#, "surface is '-1'"),
             (r#"{"level": "global"}"#, "give 'local', 'thin' or 'mean'"),
             (r#"{"smothing": 1}"#, "unknown field `smothing`"),
         ] {

@@ -58,6 +58,7 @@ struct Confidence {
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 struct Reconstructed {
+    surface_spacing: f64,
     smoothing: f64,
     iso_value: f64,
     surface: Surface,
@@ -100,6 +101,7 @@ impl JsonReport {
     pub fn new(report: &Report) -> Self {
         Self {
             surface: Some(Reconstructed {
+                surface_spacing: report.surface_spacing,
                 smoothing: report.smoothing,
                 iso_value: report.iso_value,
                 surface: surface(&report.surface),

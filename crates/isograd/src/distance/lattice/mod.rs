@@ -9,6 +9,7 @@ mod facet;
 mod kernels;
 mod packet;
 mod pullback;
+mod sides;
 mod site_list;
 mod sites;
 mod task;
@@ -22,6 +23,7 @@ use super::bvh::Bvh;
 use crate::{Field, Grid, Mesh, Real};
 use block::{BLOCK, Block};
 pub use pullback::{PullbackScratch, pullback};
+use sides::Sides;
 use sites::Sites;
 use task::{NEAR, Output, Task};
 use workspace::Pool;
@@ -71,7 +73,7 @@ impl<T> Scratch<T> {
 /// The distance is exact: computed in double precision from [`Grid::center_f64`] to the vertices as they stand,
 /// and rounded once. The sign is that of `χ − c` at the cell: negative inside, and positive at the level
 /// itself. Inside and at distance 0 it is the smallest negative number, so that the sign holds there too.
-/// `phi` is put on the grid of `chi` where it is on another.
+/// Where `chi` is on another grid than `phi`, the sign between its values is that of the mesh.
 ///
 /// # Errors
 /// [`Error::Empty`], [`Error::Range`], and [`Error::Band`].
@@ -84,20 +86,18 @@ pub fn forward<T: Real>(
     phi: &mut Field<T>,
     closest: &mut Vec<u32>,
 ) -> Result<(), Error> {
-    let grid = chi.grid();
+    let grid = *phi.grid();
     let width = match band {
         Band::Full => f64::INFINITY,
         Band::Within(width) if width > 0.0 && width.is_finite() => width,
         Band::Within(width) => return Err(Error::Band { width }),
     };
     scratch.bvh.rebuild(mesh)?;
-    let magnitude = magnitude(grid).max(scratch.bvh.magnitude());
+    let magnitude = magnitude(&grid).max(scratch.bvh.magnitude());
     scratch
         .sites
         .rebuild(mesh, &scratch.bvh, grid.spacing().f64(), magnitude);
-    if phi.grid() != grid {
-        *phi = Field::zeros(*grid);
-    }
+    let sides = Sides::new(mesh, chi, c, &grid);
     closest.resize(grid.cells(), NO_TRIANGLE);
 
     let plane = grid.strides()[0];
@@ -106,9 +106,10 @@ pub fn forward<T: Real>(
     let waves = waves.zip(closest.chunks_mut(planes_per_wave * plane));
     for (wave, (phi, closest)) in waves.enumerate() {
         let planes = wave * planes_per_wave..wave * planes_per_wave + phi.len() / plane;
-        solve_wave(grid, mesh, planes.clone(), width, scratch);
-        let chi = &chi.values()[planes.start * plane..planes.end * plane];
-        write_wave(grid, scratch, |i| chi[i] < c, phi, closest);
+        let first = planes.start * plane;
+        solve_wave(&grid, mesh, planes, width, scratch);
+        let inside = |i: usize, face: u32| sides.is_inside(first + i, face);
+        write_wave(&grid, scratch, inside, phi, closest);
     }
     Ok(())
 }
@@ -177,7 +178,7 @@ fn magnitude<T: Real>(grid: &Grid<T>) -> f64 {
 fn write_wave<T: Real>(
     grid: &Grid<T>,
     scratch: &Scratch<T>,
-    inside: impl Fn(usize) -> bool + Sync,
+    inside: impl Fn(usize, u32) -> bool + Sync,
     phi: &mut [T],
     closest: &mut [u32],
 ) {
@@ -196,7 +197,7 @@ fn write_wave<T: Real>(
             for k in 0..phi.len().min(closest.len()) {
                 closest[k] = found[k];
                 let d = distance[k];
-                phi[k] = if inside(first + k) {
+                phi[k] = if inside(first + k, found[k]) {
                     -d.max(T::min_positive_value())
                 } else {
                     d

@@ -1,0 +1,54 @@
+//! Side of the surface at the cell centers of a grid.
+
+use crate::distance::pseudonormals::Pseudonormals;
+use crate::distance::triangle::closest_point;
+use crate::distance::{NO_TRIANGLE, corners_agree};
+use crate::vector::{dot, to_f64};
+use crate::{Field, Grid, Mesh, Real};
+
+/// Inside and outside, from the indicator `χ` whose surface `χ = c` the mesh is.
+pub(super) struct Sides<'a, T> {
+    chi: &'a Field<T>,
+    c: T,
+    mesh: &'a Mesh<T>,
+    /// Pseudonormals of the mesh and the grid of φ, where that is not the grid of `χ`.
+    between: Option<(Pseudonormals, Grid<T>)>,
+}
+
+impl<'a, T: Real> Sides<'a, T> {
+    /// Sides at the cells of `grid`.
+    pub(super) fn new(mesh: &'a Mesh<T>, chi: &'a Field<T>, c: T, grid: &Grid<T>) -> Self {
+        let between = (chi.grid() != grid).then(|| (Pseudonormals::new(mesh), *grid));
+        Self {
+            chi,
+            c,
+            mesh,
+            between,
+        }
+    }
+
+    /// Whether the center of the cell at `index` in memory, whose closest face is given, is inside: `χ < c` where `χ` has
+    /// a value there. Between values of `χ` all eight round the center decide where they agree, since the surface does
+    /// not pass between them; elsewhere the pseudonormal of the closest feature decides, or beyond the band `χ`
+    /// interpolated.
+    #[inline(always)]
+    pub(super) fn is_inside(&self, index: usize, closest: u32) -> bool {
+        match &self.between {
+            None => self.chi.values()[index] < self.c,
+            Some((pseudonormals, grid)) => {
+                let center = grid.center_f64(grid.cell(index));
+                corners_agree(self.chi, self.c, center)
+                    .unwrap_or_else(|| self.is_behind(pseudonormals, center, closest))
+            }
+        }
+    }
+
+    fn is_behind(&self, pseudonormals: &Pseudonormals, center: [f64; 3], closest: u32) -> bool {
+        if closest == NO_TRIANGLE {
+            return self.chi.interpolate(center.map(T::of)) < self.c;
+        }
+        let found = closest_point(center, self.mesh.corners(closest as usize).map(to_f64));
+        let normal = pseudonormals.of(self.mesh, closest, found.feature);
+        dot(normal, found.offset) < 0.0
+    }
+}
