@@ -8,6 +8,7 @@ from pathlib import Path
 
 PACKAGES = [
     "libigl",
+    "open3d",
     "open3d-cpu",
     "warp-lang",
     "pymeshlab",

@@ -3,7 +3,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use isograd::{Grid, Options, PointCloud, Reconstructor, Resolution};
+use isograd::{Grid, Options, PointCloud, Reconstructor, Resolution, SurfaceResolution};
 use isograd_element::vector;
 use isograd_shapes::by_name;
 use peak_alloc::PeakAlloc;
@@ -90,7 +90,9 @@ impl Problem {
         let shape = grid.shape();
         eprintln!("{}: {} points, {shape:?} cells", self.body, self.points);
         let before = PeakAlloc.current_usage();
-        let options = Options::default().checks(false);
+        let options = Options::default()
+            .surface(SurfaceResolution::Grid)
+            .checks(false);
         let mut plan = Reconstructor::new(grid, options)?;
         let passes = Passes::measure(&mut plan, &cloud, repeats)?;
         let [forward_bytes, backward_bytes] = passes.peak_bytes.map(|b| b.saturating_sub(before));

@@ -67,6 +67,8 @@ Figures and pages
   peers [ARGS]     docs/peers.md: isograd beside other libraries, measured in one
                    run (needs Python 3 and PyPI; OpenVDB is compared where Debian's
                    python3-openvdb is installed); --quick for a short run
+  surfaces [ARGS]  docs/surfaces.md: surfaces of the real shapes in ../shared/data (or --data DIR)
+                   against their true meshes, beside PoissonRecon (needs Python 3 and PyPI)
 
 Exit status: 0 done, 1 a step failed, 2 the command line is wrong.";
 
@@ -116,6 +118,7 @@ fn run(command: &str, rest: &[String]) -> Option<Outcome> {
         ("fit", []) => Some(fit::run()),
         ("bench", _) => Some(bench::run(rest)),
         ("peers", _) => Some(peers::run(rest)),
+        ("surfaces", _) => Some(peers::surfaces(rest)),
         _ => None,
     }
 }

@@ -1,5 +1,6 @@
 //! `cargo xtask peers`: comparison with other libraries, by a script in Python.
 
+use std::path::PathBuf;
 use std::process::Command;
 
 use crate::environment::{Environment, Obstacle};
@@ -7,15 +8,46 @@ use crate::pages;
 use crate::process::{self, Outcome};
 use crate::workspace::Workspace;
 
+/// Folder of the scripts.
+fn folder() -> PathBuf {
+    process::root().join("benches").join("peers")
+}
+
+/// The virtual environment with the pinned libraries.
+fn environment() -> Result<Environment, String> {
+    let target = Workspace::load()?.target;
+    let requirements = folder().join("requirements.txt");
+    match Environment::with_requirements(target.join("peers"), &requirements) {
+        Ok(environment) => Ok(environment),
+        Err(Obstacle::Absent(reason) | Obstacle::Failure(reason)) => Err(reason),
+    }
+}
+
+/// Path of a program of `package`, built for release.
+fn release(package: &str, program: &str) -> Result<PathBuf, String> {
+    let build = ["build", "--release", "--package", package, "--bin", program];
+    process::run(&mut process::cargo(build))?;
+    let name = format!("{program}{}", std::env::consts::EXE_SUFFIX);
+    Ok(Workspace::load()?.target.join("release").join(name))
+}
+
+/// Compares surfaces of real shapes with their meshes, and renders the page.
+pub fn surfaces(arguments: &[String]) -> Outcome {
+    let environment = environment()?;
+    process::run(
+        Command::new(&environment.python)
+            .arg(folder().join("surfaces.py"))
+            .arg("--program")
+            .arg(release("isograd-cli", "isograd")?)
+            .args(arguments)
+            .current_dir(process::root()),
+    )?;
+    pages::render(&["surfaces"])
+}
+
 /// Creates a virtual environment with the pinned libraries, builds the timing program, runs both, and renders the page.
 pub fn run(arguments: &[String]) -> Outcome {
-    let target = Workspace::load()?.target;
-    let folder = process::root().join("benches").join("peers");
-    let requirements = folder.join("requirements.txt");
-    let environment = match Environment::with_requirements(target.join("peers"), &requirements) {
-        Ok(environment) => environment,
-        Err(Obstacle::Absent(reason) | Obstacle::Failure(reason)) => return Err(reason),
-    };
+    let (environment, folder) = (environment()?, folder());
     // pysdf, whose build needs the headers of Eigen (in Debian below this folder).
     let eigen = ("CPLUS_INCLUDE_PATH", "/usr/include/eigen3".to_owned());
     let optional = folder.join("optional.txt");
@@ -23,20 +55,12 @@ pub fn run(arguments: &[String]) -> Outcome {
         Ok(()) => {}
         Err(Obstacle::Absent(reason) | Obstacle::Failure(reason)) => eprintln!("skipped: {reason}"),
     }
-    let build = [
-        "build",
-        "--release",
-        "--package",
-        "isograd-benches",
-        "--bin",
-    ];
-    process::run(process::cargo(build).arg("stage-times"))?;
-    let program = format!("stage-times{}", std::env::consts::EXE_SUFFIX);
+    let program = release("isograd-benches", "stage-times")?;
     process::run(
         Command::new(&environment.python)
             .arg(folder.join("compare.py"))
             .arg("--stage-times")
-            .arg(target.join("release").join(program))
+            .arg(program)
             .args(arguments)
             .current_dir(process::root()),
     )?;

@@ -3,7 +3,9 @@
 
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, criterion_group};
-use isograd::{CloudCotangent, Cotangent, Options, Pipeline, PointCloud, Reconstructor};
+use isograd::{
+    CloudCotangent, Cotangent, Options, Pipeline, PointCloud, Reconstructor, SurfaceResolution,
+};
 use isograd_benches::{CELLS, POINTS, torus};
 
 use crate::common::{for_threads, group};
@@ -65,7 +67,10 @@ fn pull<T: Pipeline>(
 fn setting<T: Pipeline>(count: usize, cells: usize) -> (PointCloud<T>, Reconstructor<T>) {
     let (points, _) = torus::samples(count);
     let cloud = PointCloud::new(points).expect("finite points");
-    let plan = Reconstructor::new(torus::grid(cells), Options::default());
+    let plan = Reconstructor::new(
+        torus::grid(cells),
+        Options::default().surface(SurfaceResolution::Grid),
+    );
     (cloud, plan.expect("default options"))
 }
 

@@ -1,7 +1,7 @@
 //! One reconstruction: body, cloud, grid and options.
 
 use isograd::poisson::Smoothing;
-use isograd::{Options, distance, isosurface, orient, splat};
+use isograd::{Options, SurfaceResolution, distance, isosurface, orient, splat};
 use serde::Serialize;
 
 use super::measure::BAND;
@@ -119,6 +119,7 @@ impl Case {
     /// Options of the pipeline for a cell size.
     pub fn options(&self, spacing: f64) -> Options {
         Options::default()
+            .surface(SurfaceResolution::Grid)
             .orient(match self.normals {
                 Normals::Exact => orient::Method::Given,
                 Normals::Estimated => orient::Method::default(),
@@ -150,7 +151,8 @@ mod tests {
     #[test]
     fn default_cases_have_the_defaults_of_the_library() {
         let (ours, theirs) = (Case::new("torus", 1, 32).options(1.0), Options::default());
-        assert_eq!(format!("{ours:?}"), format!("{:?}", theirs.checks(false)));
+        let theirs = theirs.checks(false).surface(SurfaceResolution::Grid);
+        assert_eq!(format!("{ours:?}"), format!("{theirs:?}"));
         let given = Case {
             normals: Normals::Exact,
             ..Case::new("torus", 1, 32)

@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use isograd::neighbors::Radius;
 use isograd::orient::Method;
-use isograd::{Grid, Options, PointCloud, Reconstructor, Seconds, Stage};
+use isograd::{Grid, Options, PointCloud, Reconstructor, Seconds, Stage, SurfaceResolution};
 use isograd_benches::pool;
 use isograd_benches::sampling::{Body, centered_grid};
 use isograd_benches::statistics::median;
@@ -110,7 +110,9 @@ fn steps_after(carried: &Carried, clouds: &[Vec<[f32; 3]>], grid: Grid<f32>) -> 
 }
 
 fn unchecked() -> Options {
-    Options::default().checks(false)
+    Options::default()
+        .surface(SurfaceResolution::Grid)
+        .checks(false)
 }
 
 fn show(threads: usize, first: &Call, second: &Call, later: &[Call]) {

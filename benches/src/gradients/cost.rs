@@ -1,6 +1,6 @@
 //! Seconds and bytes of the pipeline forward and backward.
 
-use isograd::{Options, Pipeline, Reconstructor};
+use isograd::{Options, Pipeline, Reconstructor, SurfaceResolution};
 use serde::Serialize;
 
 use crate::output::Outcome;
@@ -86,7 +86,9 @@ pub fn measure(
 fn passes<T: Pipeline>(sampled: &Sampled, repeats: usize) -> Result<Passes, String> {
     let passes = || {
         let cloud = points_only::<T>(sampled.cloud.points())?;
-        let options = Options::default().checks(false);
+        let options = Options::default()
+            .surface(SurfaceResolution::Grid)
+            .checks(false);
         let mut plan = Reconstructor::new(convert_grid(&sampled.grid)?, options)?;
         Passes::measure(&mut plan, &cloud, repeats)
     };

@@ -2,7 +2,9 @@
 
 use std::time::Instant;
 
-use isograd::{CloudCotangent, Cotangent, Field, Options, Reconstruction, Reconstructor};
+use isograd::{
+    CloudCotangent, Cotangent, Field, Options, Reconstruction, Reconstructor, SurfaceResolution,
+};
 use isograd_element::vector;
 use isograd_shapes::Shape;
 use serde::Serialize;
@@ -178,7 +180,9 @@ struct Pulled {
 
 impl<'a> Bench<'a> {
     fn new(sampled: &'a Sampled, names: &[&'static str]) -> Outcome<Self> {
-        let options = Options::default().checks(false);
+        let options = Options::default()
+            .surface(SurfaceResolution::Grid)
+            .checks(false);
         let mut plan = Reconstructor::new(sampled.grid, options)?;
         let points = sampled.shape.points_at::<f64>(&sampled.coordinates)?;
         let target = plan.reconstruct(&points_only(&points)?)?.sdf().clone();

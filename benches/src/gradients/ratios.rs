@@ -2,8 +2,8 @@
 
 use isograd::poisson::Smoothing;
 use isograd::{
-    Cotangent, Options, PointCloud, Reconstruction, Reconstructor, distance, isosurface, orient,
-    splat,
+    Cotangent, Options, PointCloud, Reconstruction, Reconstructor, SurfaceResolution, distance,
+    isosurface, orient, splat,
 };
 use isograd_element::vector::dot;
 use serde::Serialize;
@@ -45,6 +45,7 @@ impl Choice {
 
     fn options(self, spacing: f64) -> Options {
         Options::default()
+            .surface(SurfaceResolution::Grid)
             .orient(if self.exact_normals {
                 orient::Method::Given
             } else {

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use isograd::isosurface::measure_pullback;
-use isograd::{Cotangent, Options, Reconstructor};
+use isograd::{Cotangent, Options, Reconstructor, SurfaceResolution};
 use isograd_element::vector::dot;
 use serde::Serialize;
 
@@ -37,7 +37,9 @@ pub fn measure(cells: usize, samples: usize, draw: Draw) -> Outcome<Sphere> {
     let sampled = body.sample(draw)?;
     let radius = sampled.shape.get("radius")?;
     let cloud = points_only(sampled.cloud.points())?;
-    let options = Options::default().checks(false);
+    let options = Options::default()
+        .surface(SurfaceResolution::Grid)
+        .checks(false);
     let mut plan = Reconstructor::new(sampled.grid, options)?;
     let result = plan.reconstruct(&cloud)?;
     let grown = |cotangent: &Cotangent<'_, f64>| -> Outcome<f64> {

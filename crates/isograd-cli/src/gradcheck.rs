@@ -14,6 +14,10 @@ use crate::progress::{Progress, to_stdout};
 /// Fraction of the derivative of uniform growth below which a derivative is negligible, and its ratio is not shown.
 const NEGLIGIBLE: f64 = 0.005;
 
+/// The loss that is differentiated: see [`isograd::gradcheck`].
+const LOSS: &str = "loss: volume of the body, with an edge 2 cells soft and weights that rise from one end to the other; a motion moves \
+the fastest point by 1";
+
 /// Runs the command, in double precision.
 ///
 /// # Errors
@@ -48,7 +52,9 @@ pub fn run(args: &args::Gradcheck) -> Result<(), Error> {
             cloud.len(),
             grid.spacing()
         ));
+        to_stdout(LOSS);
         to_stdout(&table(&check, args.step));
+        to_stdout(&verdict(&check, args.step, args.tolerance));
     }
     if let Some(report) = &args.report {
         write(report, &file, &check)?;
@@ -82,6 +88,23 @@ fn table(check: &GradientCheck, step: f64) -> String {
     }
     lines.extend(notes(check));
     lines.join("\n")
+}
+
+/// The last line: whether the pullback is the derivative, and how far real steps follow it.
+fn verdict(check: &GradientCheck, step: f64, tolerance: f64) -> String {
+    let worst = check.rows.iter().map(error).fold(0.0, f64::max);
+    let word = if worst <= tolerance {
+        "passed"
+    } else {
+        "failed"
+    };
+    let relevant = check.rows.iter().filter(|row| is_relevant(row));
+    let ratios: Vec<f64> = relevant.map(Row::large_ratio).collect();
+    let within = ratios.iter().filter(|&&ratio| off(ratio) <= 0.02).count();
+    format!(
+        "{word}: the pullback is within {worst:.1e} of small steps (tolerance {tolerance:.1e}); {within} of {} motions are within 2 % over ±{step} cell",
+        ratios.len()
+    )
 }
 
 /// Notes below the table.
@@ -146,17 +169,13 @@ fn error(row: &Row) -> f64 {
     }
 }
 
-fn check_tolerance(
-    check: &GradientCheck,
-    tolerance: Option<f64>,
-    file: String,
-) -> Result<(), Error> {
+fn check_tolerance(check: &GradientCheck, tolerance: f64, file: String) -> Result<(), Error> {
     let worst = check
         .rows
         .iter()
         .max_by(|a, b| error(a).total_cmp(&error(b)));
-    match (worst, tolerance) {
-        (Some(row), Some(tolerance)) if !(error(row) <= tolerance) => Err(Error::Gradients {
+    match worst {
+        Some(row) if !(error(row) <= tolerance) => Err(Error::Gradients {
             file,
             motion: row.motion.name(),
             off: error(row),

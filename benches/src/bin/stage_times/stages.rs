@@ -2,7 +2,8 @@
 
 use isograd::distance::Band;
 use isograd::{
-    Field, Mesh, Options, Pipeline, PointCloud, Reconstructor, distance, isosurface, poisson,
+    Field, Mesh, Options, Pipeline, PointCloud, Reconstructor, SurfaceResolution, distance,
+    isosurface, poisson,
 };
 
 use isograd_benches::output::Outcome;
@@ -159,7 +160,10 @@ impl<T: Pipeline + Number> Whole<T> {
     fn open(folder: &Folder) -> Outcome<Self> {
         Ok(Self {
             cloud: PointCloud::new(folder.read_rows("points")?)?,
-            plan: Reconstructor::new(folder.grid()?, Options::default())?,
+            plan: Reconstructor::new(
+                folder.grid()?,
+                Options::default().surface(SurfaceResolution::Grid),
+            )?,
             phi: Vec::new(),
         })
     }

@@ -27,9 +27,10 @@ pub struct Gradcheck {
     #[arg(long, value_name = "CELLS", default_value = "0.5", value_parser = positive,
         allow_negative_numbers = true, help_heading = "Comparison")]
     pub step: f64,
-    /// Fail if the relative error of the pullback against the small step exceeds this
-    #[arg(long, value_name = "SHARE", value_parser = positive, help_heading = "Comparison")]
-    pub tolerance: Option<f64>,
+    /// Largest relative error of the pullback against the small step; the command fails beyond it
+    #[arg(long, value_name = "SHARE", default_value = "1e-3", value_parser = positive,
+        help_heading = "Comparison")]
+    pub tolerance: f64,
     /// Seed of the random directions
     #[arg(
         long,

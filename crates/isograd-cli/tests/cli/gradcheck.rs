@@ -10,6 +10,12 @@ fn the_pullback_of_a_torus_agrees_with_small_steps() {
         .run("gradcheck torus.ply --resolution 48 --tolerance 1e-6 --report check.json --seed 2");
     run.says(0, &[]);
     let table = run.stdout;
+    let last = table.lines().last().unwrap_or_default();
+    assert!(
+        last.starts_with("passed: the pullback is within"),
+        "{table}"
+    );
+    assert!(table.contains("loss: volume of the body"), "{table}");
     for motion in [
         "noise",
         "waves",
