@@ -1,6 +1,6 @@
 //! Random clouds: samples of shapes, degenerate sets of points, and both with outliers, duplicates and extreme scales.
 
-use isograd_shapes::{Layout, Sampling, Shape, all};
+use isograd_shapes::{Layout, Sampling, Shape};
 
 use crate::random::Random;
 
@@ -153,9 +153,4 @@ pub fn vectors(n: usize, scales: Scales, random: &mut Random) -> Rows {
         sphere(random).map(|x| x * size)
     };
     (0..n).map(&mut vector).collect()
-}
-
-/// Shapes with default parameters.
-pub fn shapes() -> Vec<Shape> {
-    all()
 }

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use isograd::data::Attribute;
 use isograd::distance::Band;
 use isograd::isosurface::Level;
 use isograd::neighbors::Radius;
@@ -17,8 +16,19 @@ use isograd_shapes::Shape;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::case::{Inputs, Outcome, catch, check_message};
-use crate::clouds::{Rows, Scales, cloud, shapes, vectors};
+use crate::clouds::{Rows, Scales, cloud, vectors};
 use crate::random::Random;
+
+/// Scales of `f32`.
+const SINGLE: Scales = Scales {
+    moderate: 8.0,
+    extreme: 37.0,
+};
+/// Scales of `f64`.
+const DOUBLE: Scales = Scales {
+    moderate: 12.0,
+    extreme: 300.0,
+};
 
 /// Shapes, and one pool of threads for each number of threads that is compared.
 pub struct Library {
@@ -47,7 +57,7 @@ impl Library {
             builder.build().map_err(|e| format!("no threads: {e}"))
         };
         Ok(Self {
-            shapes: shapes(),
+            shapes: isograd_shapes::all(),
             pools: [pool(1)?, pool(2)?],
         })
     }
@@ -73,26 +83,14 @@ impl Library {
 impl Inputs for Library {
     fn run(&mut self, mut random: Random, folder: &Path, name: &str) -> Outcome {
         let is_single = random.one_in(2);
-        let scales = match is_single {
-            true => Scales {
-                moderate: 8.0,
-                extreme: 37.0,
-            },
-            false => Scales {
-                moderate: 12.0,
-                extreme: 300.0,
-            },
-        };
+        let scales = if is_single { SINGLE } else { DOUBLE };
         let (points, history) = cloud(&self.shapes, scales, &mut random);
         let n = points.len();
-        let mut maybe_vectors = |chance| {
-            random
-                .one_in(chance)
-                .then(|| vectors(n, scales, &mut random))
-        };
+        let has = [2, 3].map(|chance| random.one_in(chance));
+        let [normals, sensors] = has.map(|has| has.then(|| vectors(n, scales, &mut random)));
         let setup = Setup {
-            normals: maybe_vectors(2),
-            sensors: maybe_vectors(3),
+            normals,
+            sensors,
             options: options(&mut random),
             points,
             scales,
@@ -102,8 +100,11 @@ impl Inputs for Library {
             true => ("f32", self.check::<f32>(&setup)),
             false => ("f64", self.check::<f64>(&setup)),
         };
-        if failure.is_some() {
-            save(&setup, &folder.join(name).with_extension("npz"));
+        if failure.is_some()
+            && let Ok(cloud) = typed_cloud::<f64>(&setup)
+        {
+            // Without sensors; the command repeats the input in any case.
+            let _ = isograd_io::write_cloud(&folder.join(name).with_extension("npz"), &cloud);
         }
         Outcome {
             row,
@@ -288,23 +289,4 @@ fn not_finite(results: &[(&'static str, Vec<u64>)]) -> Option<String> {
         let all = bits.len();
         (count > 0).then(|| format!("{name}: {count} of {all} numbers are not finite"))
     })
-}
-
-/// Saves the cloud. The command repeats the input where this fails.
-fn save(setup: &Setup, path: &Path) {
-    let cloud = PointCloud::new(setup.points.clone()).and_then(|cloud| match &setup.sensors {
-        Some(sensors) => cloud.with_attribute(Attribute {
-            name: "sensor".into(),
-            components: 3,
-            values: sensors.as_flattened().to_vec(),
-        }),
-        None => Ok(cloud),
-    });
-    let cloud = cloud.and_then(|cloud| match &setup.normals {
-        Some(normals) => cloud.with_normals(normals.clone()),
-        None => Ok(cloud),
-    });
-    if let Ok(cloud) = cloud {
-        let _ = isograd_io::write_cloud(path, &cloud);
-    }
 }

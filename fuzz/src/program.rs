@@ -1,14 +1,12 @@
 //! The command line: kills, signals, full disks, outputs that nobody reads, and input that cannot be read.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::fs;
-use std::io::Read;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitStatus, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
-
-use isograd::PointCloud;
 
 use crate::case::{Inputs, Outcome, check_message};
 use crate::files::{Seed, corpus, mutant};
@@ -36,7 +34,7 @@ const JOBS: [(&str, &[&str]); 5] = [
     ),
     ("orient cloud.ply -o normals.xyz", &["normals.xyz"]),
     (
-        "query cloud_mesh.stl --at cloud.ply -o distances.ply",
+        "query mesh.stl --at cloud.ply -o distances.ply",
         &["distances.ply"],
     ),
 ];
@@ -53,19 +51,37 @@ const SIGNALS: [(&str, i32); 4] = [("KILL", 9), ("TERM", 15), ("HUP", 1), ("INT"
 /// Contents of files by name.
 type Files = BTreeMap<String, Vec<u8>>;
 type Checked = Result<(), String>;
+/// A check in a folder with the inputs.
+type Check = fn(&Program, &Path, &mut Random) -> Checked;
 
-/// A program, and the complete outputs of its jobs.
+/// Checks by the row of the summary that counts them.
+const CHECKS: [(&str, Check); 5] = [
+    ("killed", Program::kill),
+    ("killed", Program::kill),
+    ("full disk", Program::full_disk),
+    ("standard output", Program::standard_output),
+    ("bad input", Program::bad_input),
+];
+
+/// The program, its inputs, and for each job the complete outputs and the time.
 pub struct Program {
     path: PathBuf,
-    complete: Vec<(Files, Duration)>,
     inputs: Files,
+    complete: Vec<(Files, Duration)>,
     corpus: Vec<Seed>,
 }
 
 /// End of a run.
 struct Run {
-    status: ExitStatus,
+    /// Exit status; 128 and the number of the signal that ended it.
+    status: i32,
     stderr: String,
+}
+
+impl fmt::Display for Run {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "status {}: {}", self.status, self.stderr.trim())
+    }
 }
 
 impl Program {
@@ -73,24 +89,17 @@ impl Program {
     pub fn new(path: PathBuf, folder: &Path) -> Result<Self, String> {
         let folder = folder.join("complete");
         let text = |e: std::io::Error| format!("{}: {e}", folder.display());
-        let _ = fs::remove_dir_all(&folder);
-        fs::create_dir_all(&folder).map_err(text)?;
-        let point = |i: usize| {
-            let (z, turn) = ((2 * i + 1) as f32 / 500.0 - 1.0, i as f32 * 2.399_963);
-            let r = (1.0 - z * z).sqrt();
-            [r * turn.cos(), r * turn.sin(), z]
-        };
-        let cloud = PointCloud::new((0..500).map(point).collect()).map_err(|e| e.to_string())?;
-        isograd_io::write_cloud(&folder.join("cloud.ply"), &cloud).map_err(|e| e.to_string())?;
         let mut program = Self {
             path,
-            complete: Vec::new(),
             inputs: Files::new(),
+            complete: Vec::new(),
             corpus: corpus()?,
         };
+        program.fill(&folder, false).map_err(text)?;
+        program.expect(&folder, "sample sphere -n 500 -o cloud.ply")?;
         program.expect(
             &folder,
-            "reconstruct cloud.ply --resolution 24 --mesh cloud_mesh.stl -q",
+            "reconstruct cloud.ply --resolution 24 --mesh mesh.stl -q",
         )?;
         program.inputs = files(&folder);
         for (line, names) in JOBS {
@@ -105,9 +114,31 @@ impl Program {
         Ok(program)
     }
 
-    fn command(&self, folder: &Path, line: &str) -> Command {
-        let mut command = Command::new(&self.path);
-        command.args(line.split_whitespace()).current_dir(folder);
+    /// Makes a new folder with the inputs and, if so chosen, old outputs.
+    fn fill(&self, folder: &Path, with_outputs: bool) -> std::io::Result<()> {
+        let _ = fs::remove_dir_all(folder);
+        fs::create_dir_all(folder)?;
+        for (name, content) in &self.inputs {
+            fs::write(folder.join(name), content)?;
+        }
+        if with_outputs {
+            fs::create_dir(folder.join("out"))?;
+            for name in JOBS.iter().flat_map(|job| job.1) {
+                fs::write(folder.join(name), old(name))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// `isograd LINE` in a folder, after commands of the shell.
+    fn command(&self, folder: &Path, before: &str, line: &str) -> Command {
+        let mut command = Command::new("sh");
+        let script = format!("{before}exec \"$0\" {line}");
+        command
+            .arg("-c")
+            .arg(script)
+            .arg(&self.path)
+            .current_dir(folder);
         command
             .stdin(Stdio::null())
             .stdout(Stdio::null())
@@ -117,118 +148,74 @@ impl Program {
 
     /// Runs a command line that has to succeed.
     fn expect(&self, folder: &Path, line: &str) -> Checked {
-        let run = finish(&mut self.command(folder, line), |_| Ok(()))?;
-        match run.status.success() {
-            true => Ok(()),
-            false => Err(format!(
-                "`isograd {line}`: {}: {}",
-                run.status,
-                run.stderr.trim()
-            )),
-        }
+        let run = finish(&mut self.command(folder, "", line), |_| Ok(()))?;
+        check(run.status == 0, || format!("`isograd {line}`: {run}"))
     }
 
-    /// Sends a signal at a random moment.
+    /// Sends a signal at a random moment. After SIGKILL the next run removes what was left.
     fn kill(&self, folder: &Path, random: &mut Random) -> Checked {
         let job = random.below(JOBS.len());
         let (name, number) = random.pick(&SIGNALS);
         let delay = self.complete[job].1.mul_f64(random.between(0.0, 1.2));
-        let mut command = self.command(folder, JOBS[job].0);
-        let run = finish(&mut command, |id| {
+        let run = finish(&mut self.command(folder, "", JOBS[job].0), |id| {
             std::thread::sleep(delay);
-            // A shell without a program `kill` has it built in.
-            let script = format!("kill -{name} {id}");
-            Command::new("sh")
-                .args(["-c", &script])
-                .stderr(Stdio::null())
-                .status()
-                .map(drop)
+            // `kill` is built into the shell.
+            let mut kill = Command::new("sh");
+            kill.arg("-c").arg(format!("kill -{name} {id}"));
+            kill.stderr(Stdio::null()).status().map(drop)
         })?;
         let what = format!("SIG{name} after {delay:?}");
-        let ended = run.status.success()
-            || run.status.signal() == Some(number)
-            || number != 9 && run.status.code() == Some(128 + number);
-        if !ended {
-            return Err(format!("{what}: {}: {}", run.status, run.stderr.trim()));
-        }
-        self.old_or_new(folder, job, number == 9)
+        check([0, 128 + number].contains(&run.status), || {
+            format!("{what}: {run}")
+        })?;
+        self.check_outputs(folder, job, &run, name == "KILL")
             .map_err(|e| format!("{what}: {e}"))?;
-        if number == 9 {
-            // The next run succeeds and removes what the killed one left.
-            self.expect(folder, JOBS[job].0)?;
-            self.old_or_new(folder, job, false)
-                .map_err(|e| format!("a run after {what}: {e}"))?;
+        if name == "KILL" {
+            let run = finish(&mut self.command(folder, "", JOBS[job].0), |_| Ok(()))?;
+            check(run.status == 0, || format!("a run after {what}: {run}"))?;
+            return self
+                .check_outputs(folder, job, &run, false)
+                .map_err(|e| format!("a run after {what}: {e}"));
         }
         Ok(())
     }
 
-    /// Limits the size of files, which stands in for a disk that fills up.
+    /// Limits the size of files, which stands in for a disk that fills up; the signal at the limit is ignored or not.
     fn full_disk(&self, folder: &Path, random: &mut Random) -> Checked {
         let job = random.below(JOBS.len());
-        let largest = self.complete[job]
-            .0
-            .values()
-            .map(Vec::len)
-            .max()
-            .unwrap_or(0);
-        let blocks = random.below(largest / 512 + 2);
-        let is_ignored = random.one_in(2);
-        let trap = if is_ignored { "trap '' XFSZ; " } else { "" };
-        let script = format!("{trap}ulimit -f {blocks}; exec \"$0\" {}", JOBS[job].0);
-        let mut command = Command::new("sh");
-        command
-            .arg("-c")
-            .arg(&script)
-            .arg(&self.path)
-            .current_dir(folder);
-        command
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped());
-        let run = finish(&mut command, |_| Ok(()))?;
-        let what = format!("files of at most {blocks} blocks");
-        let is_error = is_ignored && run.status.code() == Some(1);
-        // SIGXFSZ.
-        let is_killed =
-            !is_ignored && (run.status.signal() == Some(25) || run.status.code() == Some(153));
-        if !run.status.success() && !is_error && !is_killed {
-            return Err(format!("{what}: {}: {}", run.status, run.stderr.trim()));
-        }
-        if is_error && !run.stderr.contains("free some space") {
-            return Err(format!(
-                "{what}: the error does not name the disk: {}",
-                run.stderr.trim()
-            ));
-        }
-        self.old_or_new(folder, job, is_killed)
-            .map_err(|e| format!("{what}: {e}"))
+        let sizes = self.complete[job].0.values().map(Vec::len);
+        let blocks = random.below(sizes.max().unwrap_or(0) / 512 + 2);
+        let (trap, status) = random.pick(&[("", 128 + 25), ("trap '' XFSZ; ", 1)]);
+        let limit = format!("{trap}ulimit -f {blocks}; ");
+        let run = finish(&mut self.command(folder, &limit, JOBS[job].0), |_| Ok(()))?;
+        let is_clear = run.status != 1 || run.stderr.contains("free some space");
+        check([0, status].contains(&run.status) && is_clear, || {
+            format!("{limit}{run}")
+        })?;
+        self.check_outputs(folder, job, &run, status != 1)
+            .map_err(|e| format!("{limit}{e}"))
     }
 
-    /// Runs with a standard output that is full or closed.
+    /// Runs with a standard output that is full, or that nobody reads.
     fn standard_output(&self, folder: &Path, random: &mut Random) -> Checked {
-        let line = random.pick(&PRINTING);
-        let mut command = self.command(folder, line);
-        let is_full = random.one_in(2);
+        let (line, is_full) = (random.pick(&PRINTING), random.one_in(2));
+        let mut command = self.command(folder, "", line);
         if is_full {
             let full = fs::OpenOptions::new().write(true).open("/dev/full");
             command.stdout(full.map_err(|e| format!("/dev/full: {e}"))?);
         } else {
             // The end that reads is closed at once.
-            let (_, writer) = std::io::pipe().map_err(|e| e.to_string())?;
-            command.stdout(writer);
+            command.stdout(std::io::pipe().map_err(|e| e.to_string())?.1);
         }
         let run = finish(&mut command, |_| Ok(()))?;
-        match (is_full, run.status.code()) {
-            (true, Some(1)) | (false, Some(0 | 1 | 141)) => Ok(()),
-            _ => {
-                let what = if is_full { "a full" } else { "a closed" };
-                Err(format!(
-                    "`isograd {line}` with {what} output: {}: {}",
-                    run.status,
-                    run.stderr.trim()
-                ))
-            }
-        }
+        let (what, allowed): (_, &[i32]) = if is_full {
+            ("full", &[1])
+        } else {
+            ("closed", &[0, 1, 141])
+        };
+        check(allowed.contains(&run.status), || {
+            format!("{what} standard output, {line}: {run}")
+        })
     }
 
     /// Gives input that is missing, empty, no file, or mutated.
@@ -256,102 +243,75 @@ impl Program {
         let before = files(folder);
         let line = match random.below(3) {
             0 => format!("reconstruct {name} --mesh bad.stl --resolution 16"),
-            1 => format!("orient {name} -o normals.ply"),
+            1 => format!("orient {name} -o bad.ply"),
             _ => format!("info {name}"),
         };
-        let run = finish(&mut self.command(folder, &line), |_| Ok(()))?;
-        let what = format!("`isograd {line}` with a {kind} file");
-        if run.status.success() && kind == "mutated" {
+        let run = finish(&mut self.command(folder, "", &line), |_| Ok(()))?;
+        if run.status == 0 && kind == "mutated" {
             return Ok(());
         }
-        let message = run.stderr.trim();
-        if run.status.code() != Some(1) || !message.contains("error: ") {
-            return Err(format!("{what}: {}: {message}", run.status));
-        }
-        for line in message.lines() {
-            check_message(line).map_err(|e| format!("{what}: {e}"))?;
-        }
-        match files(folder) == before {
-            true => Ok(()),
-            false => Err(format!("{what}: files were written")),
-        }
+        let is_error = run.status == 1 && run.stderr.contains("error: ") && files(folder) == before;
+        check(is_error, || format!("{kind} input, {line}: {run}"))?;
+        run.stderr.lines().try_for_each(check_message)
     }
 
-    /// Checks that every output of a job has its old or its complete new content, and that nothing else was written. With
-    /// `temporary`, hidden files may be there.
-    fn old_or_new(&self, folder: &Path, job: usize, temporary: bool) -> Checked {
-        let complete = &self.complete[job].0;
-        for (name, content) in files(folder) {
+    /// Checks that every output of a job has its old or its complete new content, the latter if the run succeeded, and that
+    /// nothing else was written. With `temporary`, hidden files may be there.
+    fn check_outputs(&self, folder: &Path, job: usize, run: &Run, temporary: bool) -> Checked {
+        let (found, complete) = (files(folder), &self.complete[job].0);
+        for (name, content) in &found {
             let is_hidden = name.rsplit('/').next().unwrap_or_default().starts_with('.');
-            let expected = match complete.get(&name) {
+            let is_old = run.status != 0 && *content == old(name);
+            let is_right = match complete.get(name) {
                 // Times differ between runs.
                 Some(_) if name.ends_with(".json") => {
-                    serde_json::from_slice::<serde_json::Value>(&content).is_ok()
+                    is_old || content.starts_with(b"{") && content.ends_with(b"}\n")
                 }
-                Some(new) => content == *new || content == old(&name),
+                Some(new) => is_old || content == new,
                 None if is_hidden => temporary,
-                None => self.inputs.get(&name) == Some(&content) || content == old(&name),
+                None => self.inputs.get(name) == Some(content) || *content == old(name),
             };
-            if !expected {
-                return Err(format!(
-                    "{name} has {} bytes and is neither old nor new",
+            check(is_right, || {
+                format!(
+                    "{name} has {} bytes, neither old nor new; {run}",
                     content.len()
-                ));
-            }
+                )
+            })?;
         }
-        Ok(())
+        let missing = complete
+            .keys()
+            .find(|name| run.status == 0 && !found.contains_key(*name));
+        missing.map_or(Ok(()), |name| Err(format!("{name} is missing")))
     }
 }
 
 impl Inputs for Program {
     fn run(&mut self, mut random: Random, folder: &Path, name: &str) -> Outcome {
-        type Check = fn(&Program, &Path, &mut Random) -> Checked;
-        let checks: [(&str, Check); 5] = [
-            ("killed", Self::kill),
-            ("killed", Self::kill),
-            ("full disk", Self::full_disk),
-            ("standard output", Self::standard_output),
-            ("bad input", Self::bad_input),
-        ];
-        let (row, check) = random.pick(&checks);
+        let (row, check) = random.pick(&CHECKS);
         let folder = folder.join(name);
-        let failure = self
-            .fill(&folder, &mut random)
-            .map_err(|e| format!("{}: {e}", folder.display()))
-            .and_then(|()| check(self, &folder, &mut random));
-        if failure.is_ok() {
+        let filled = self
+            .fill(&folder, random.one_in(2))
+            .map_err(|e| e.to_string());
+        let result = filled.and_then(|()| check(self, &folder, &mut random));
+        if result.is_ok() {
             let _ = fs::remove_dir_all(&folder);
         }
         Outcome {
             row,
-            accepted: failure.is_ok(),
-            failure: failure.err(),
+            accepted: result.is_ok(),
+            failure: result.err(),
             ..Outcome::default()
         }
     }
 }
 
-impl Program {
-    /// A new folder with the inputs and, in half of the cases, old outputs.
-    fn fill(&self, folder: &Path, random: &mut Random) -> std::io::Result<()> {
-        let _ = fs::remove_dir_all(folder);
-        fs::create_dir_all(folder)?;
-        for (name, content) in &self.inputs {
-            fs::write(folder.join(name), content)?;
-        }
-        if random.one_in(2) {
-            fs::create_dir(folder.join("out"))?;
-            for name in JOBS.iter().flat_map(|job| job.1) {
-                fs::write(folder.join(name), old(name))?;
-            }
-        }
-        Ok(())
-    }
+fn check(is_right: bool, problem: impl FnOnce() -> String) -> Checked {
+    if is_right { Ok(()) } else { Err(problem()) }
 }
 
 /// Content of an output before the run.
 fn old(name: &str) -> Vec<u8> {
-    format!("\"old {name}\"").into_bytes()
+    format!("old {name}").into_bytes()
 }
 
 /// Starts a command, calls `meanwhile` with its process id, and waits. A panic of the program is an error.
@@ -360,32 +320,28 @@ fn finish(
     meanwhile: impl FnOnce(u32) -> std::io::Result<()>,
 ) -> Result<Run, String> {
     let run = || {
-        let mut child = command.spawn()?;
-        let done = meanwhile(child.id());
-        let mut stderr = Vec::new();
-        if let Some(mut pipe) = child.stderr.take() {
-            pipe.read_to_end(&mut stderr)?;
-        }
-        let status = child.wait()?;
-        done.map(|()| (status, String::from_utf8_lossy(&stderr).into_owned()))
+        let child = command.spawn()?;
+        meanwhile(child.id())?;
+        child.wait_with_output()
     };
-    let (status, stderr) = run().map_err(|e: std::io::Error| format!("{command:?}: {e}"))?;
-    match stderr.contains("panicked") || status.code() == Some(101) {
-        true => Err(format!("the program panicked: {stderr}")),
-        false => Ok(Run { status, stderr }),
-    }
+    let output = run().map_err(|e| format!("{command:?}: {e}"))?;
+    let signal = output.status.signal().map(|number| 128 + number);
+    let run = Run {
+        status: output.status.code().or(signal).unwrap_or(-1),
+        stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
+    };
+    let is_panic = run.status == 101 || run.stderr.contains("panicked");
+    check(!is_panic, || format!("the program panicked: {run}")).map(|()| run)
 }
 
 /// Contents of all files in a folder and its subfolders; those that cannot be read are empty.
 fn files(folder: &Path) -> Files {
     let mut files = Files::new();
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    for path in entries.map(|entry| entry.path()) {
-        let name = path
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let (path, name) = (
+            entry.path(),
+            entry.file_name().to_string_lossy().into_owned(),
+        );
         if path.is_dir() {
             let inner = self::files(&path).into_iter();
             files.extend(inner.map(|(file, content)| (format!("{name}/{file}"), content)));
