@@ -12,6 +12,7 @@ use isograd_io::Format;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
+use crate::bombs::bomb;
 use crate::mutate::mutate;
 use crate::random::Random;
 
@@ -30,6 +31,8 @@ pub struct Seed {
 
 /// Mutant of a file.
 pub struct Mutant {
+    /// Format of the file.
+    pub format: Format,
     /// Mutated content.
     pub bytes: Vec<u8>,
     /// File it was made from, and what was done to it.
@@ -62,6 +65,20 @@ pub fn corpus() -> Result<Vec<Seed>, String> {
     }
 }
 
+/// A mutant of a file of the corpus, or now and then a file that unpacks to much more than its size.
+pub fn any(corpus: &[Seed], random: &mut Random) -> Mutant {
+    if random.one_in(500) {
+        let (format, bytes) = bomb(random);
+        let history = "bomb".into();
+        return Mutant {
+            format,
+            bytes,
+            history,
+        };
+    }
+    mutant(&corpus[random.below(corpus.len())], corpus, random)
+}
+
 /// Mutates a file, with parts of another file of its format.
 pub fn mutant(seed: &Seed, corpus: &[Seed], random: &mut Random) -> Mutant {
     let donors: Vec<&Seed> = corpus.iter().filter(|s| s.format == seed.format).collect();
@@ -76,8 +93,11 @@ pub fn mutant(seed: &Seed, corpus: &[Seed], random: &mut Random) -> Mutant {
     if names.len() == 1 || random.one_in(4) {
         names.extend(mutate(&mut bytes, &donor.bytes, random));
     }
-    let history = names.join(", ");
-    Mutant { bytes, history }
+    Mutant {
+        format: seed.format,
+        bytes,
+        history: names.join(", "),
+    }
 }
 
 /// Mutates an array before it is compressed; `None` for files that nothing is packed in.
@@ -166,7 +186,7 @@ fn mutate_members(
 }
 
 /// An archive of these members, compressed or not; `None` if names collide.
-fn archive(members: &Members, random: &mut Random) -> Option<Vec<u8>> {
+pub fn archive(members: &Members, random: &mut Random) -> Option<Vec<u8>> {
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     let method = random.pick(&[CompressionMethod::Deflated, CompressionMethod::Stored]);
     let options = SimpleFileOptions::default().compression_method(method);
@@ -216,25 +236,25 @@ fn unpack(text: &str, range: Range<usize>) -> Option<Vec<u8>> {
 
 /// Packs an array for a VTK file, in blocks of a random size where it is compressed.
 fn pack(text: &str, bytes: &[u8], random: &mut Random) -> Option<String> {
-    let words = |words: &[usize]| -> Vec<u8> {
-        words
-            .iter()
-            .flat_map(|&word| (word as u32).to_le_bytes())
-            .collect()
-    };
-    if !is_compressed(text) {
-        return Some(STANDARD.encode([&words(&[bytes.len()]), bytes].concat()));
+    match is_compressed(text) {
+        true => blocks(bytes, random.pick(&[64, 1 << 15, 1 << 20])),
+        false => Some(STANDARD.encode([&(bytes.len() as u32).to_le_bytes(), bytes].concat())),
     }
-    let size = random.pick(&[64, 1 << 15, 1 << 20]);
-    let mut header = vec![bytes.len().div_ceil(size), size, bytes.len() % size];
+}
+
+/// Compressed blocks of this size, after their sizes, as VTK writes them.
+pub fn blocks(bytes: &[u8], size: usize) -> Option<String> {
+    let mut words = vec![bytes.len().div_ceil(size), size, bytes.len() % size];
     let mut packed = Vec::new();
     for block in bytes.chunks(size) {
         let before = packed.len();
-        let mut encoder = ZlibEncoder::new(block, Compression::default());
-        encoder.read_to_end(&mut packed).ok()?;
-        header.push(packed.len() - before);
+        ZlibEncoder::new(block, Compression::default())
+            .read_to_end(&mut packed)
+            .ok()?;
+        words.push(packed.len() - before);
     }
-    Some(STANDARD.encode(words(&header)) + &STANDARD.encode(packed))
+    let words = words.iter().flat_map(|&word| (word as u32).to_le_bytes());
+    Some(STANDARD.encode(words.collect::<Vec<u8>>()) + &STANDARD.encode(packed))
 }
 
 #[cfg(test)]
@@ -296,11 +316,7 @@ mod tests {
         let corpus = corpus().expect("corpus");
         let mut within = 0;
         for number in 0..200 {
-            let mutant = || {
-                let random = &mut Random::new(7, 1, number);
-                let seed = &corpus[random.below(corpus.len())];
-                super::mutant(seed, &corpus, random)
-            };
+            let mutant = || any(&corpus, &mut Random::new(7, 1, number));
             let (a, b) = (mutant(), mutant());
             assert_eq!((&a.bytes, &a.history), (&b.bytes, &b.history));
             within += usize::from(a.history.contains("within"));

@@ -10,7 +10,7 @@ use isograd::poisson::Smoothing;
 use isograd::splat::Weights;
 use isograd::{
     Cotangent, Grid, Options, Pipeline, PointCloud, Reconstruction, Reconstructor, Resolution,
-    Sensors,
+    Sensors, SurfaceResolution,
 };
 use isograd_shapes::Shape;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -143,6 +143,14 @@ fn options(random: &mut Random) -> Options {
     if random.one_in(4) {
         options.screening = random.pick(&[1e-30, 0.1, 4.0, 1e3, 1e30]);
     }
+    if random.one_in(3) {
+        options.surface = random.pick(&[
+            SurfaceResolution::Grid,
+            SurfaceResolution::Factor(1.5),
+            SurfaceResolution::Factor(3.0),
+            SurfaceResolution::Spacing(1e300),
+        ]);
+    }
     if random.one_in(4) {
         options.band = Band::Within(random.power(-4.0, 2.0));
     }
@@ -191,7 +199,7 @@ fn grid<T: Pipeline>(cloud: &PointCloud<T>, random: &mut Random) -> Result<Grid<
         let lower = shape.map(|n| T::of(-0.5 * spacing * n as f64));
         Grid::new(lower, T::of(spacing), shape)
     } else {
-        let cells = 10 + random.below(18);
+        let cells = 10 + random.below(12);
         Grid::fit(
             cloud,
             Resolution::Cells(cells),

@@ -2,6 +2,7 @@
 //!
 //! Every input follows from a seed and its number. The parts run in turn; the summary counts inputs and failures.
 
+mod bombs;
 mod case;
 mod clouds;
 mod files;

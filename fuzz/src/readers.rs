@@ -12,7 +12,7 @@ use isograd_io::{
 
 use crate::MEMORY;
 use crate::case::{Inputs, Outcome, catch};
-use crate::files::{Seed, corpus, mutant};
+use crate::files::{Seed, any, corpus};
 use crate::random::Random;
 
 /// Live memory per byte of a file.
@@ -23,8 +23,8 @@ const LEAST_MEMORY: usize = 64 << 20;
 const CONSTANT_MEMORY: usize = 1 << 20;
 /// Time that a file of at most 1 MiB may take.
 const LONGEST: Duration = Duration::from_secs(10);
-/// Smaller files are left out of the ratios: they would show constants.
-const LEAST_BYTES: usize = 1024;
+/// Smaller files are left out of the ratios: they would show constants, and what other processes do meanwhile.
+const LEAST_BYTES: usize = 1 << 14;
 
 /// Readers and their corpus.
 pub struct Readers {
@@ -100,12 +100,11 @@ impl Readers {
 
 impl Inputs for Readers {
     fn run(&mut self, mut random: Random, folder: &Path, name: &str) -> Outcome {
-        let seed = &self.corpus[random.below(self.corpus.len())];
-        let mutant = mutant(seed, &self.corpus, &mut random);
-        let (format, bytes) = (seed.format, mutant.bytes.len());
+        let mutant = any(&self.corpus, &mut random);
+        let (format, bytes) = (mutant.format, mutant.bytes.len());
         let as_field = format == Format::Vti || format == Format::Npz && random.one_in(2);
         let source = Source {
-            name: seed.name.clone(),
+            name: format.name().into(),
             bytes: mutant.bytes,
         };
         let mut reading = measure(&source, format, as_field);
@@ -121,9 +120,9 @@ impl Inputs for Readers {
         }
         let failure = self.judge(&reading, bytes, &mut random);
         if failure.is_some() {
-            let extension = Path::new(&seed.name).extension().unwrap_or_default();
+            let file = format!("{name}.{}", format.name().to_lowercase());
             // The command repeats the input where this fails.
-            let _ = std::fs::write(folder.join(name).with_extension(extension), &source.bytes);
+            let _ = std::fs::write(folder.join(file), &source.bytes);
         }
         let row = match as_field && format == Format::Npz {
             true => "NPZ field",
