@@ -1,11 +1,11 @@
-//! Small files of every format, written by hand or by the writers.
+//! Small files of every format: the corpus, written by hand or by other programs, and results of the writers.
 
 use std::io::Write;
 use std::path::Path;
 
 use isograd::data::Attribute;
 use isograd::{Field, Grid, Mesh, PointCloud, Real};
-use isograd_io::{Error, Format, Source, parse_field, parse_geometry, write_cloud, write_field};
+use isograd_io::{Error, Format, Source, parse_field, parse_geometry};
 
 /// Parses a file as a field (VTI) or as points and faces, and checks the memory that it takes.
 pub fn parse_in_bounds(source: &Source, format: Format) -> Result<(), Error> {
@@ -119,122 +119,31 @@ pub fn npz(members: &[(&str, Vec<u8>)], compressed: bool) -> Vec<u8> {
     archive.finish().expect("ends").into_inner()
 }
 
-pub const ASCII_PLY: &str = "ply
-format ascii 1.0
-comment by hand
-element vertex 4
-property float x
-property double y
-property float z
-property list uchar int skipped
-property uchar red
-element face 2
-property list uchar int vertex_indices
-property float quality
-end_header
-0 0 0 2 7 8 255
-1 0 0 0 0
-1 1 0 1 9 12
-0 1.5 0 0 3
-4 0 1 2 3 0.5
-3 0 2 3 0.25
-";
-
-pub const ASCII_STL: &str = "solid two triangles
-facet normal 0 0 1
- outer loop
-  vertex 0 0 0
-  vertex 1 0 0
-  vertex 0 1 0
- endloop
-endfacet
-facet normal 0 0 1
- outer loop
-  vertex 1 0 0
-  vertex 1 1 0
-  vertex 0 1 -0.0
- endloop
-endfacet
-endsolid
-";
-
-pub const OBJ: &str = "# comment
-o thing
-v 0 0 0 1 0 0
-v 1 0 0 1 0 0
-v 1 1 0 1 0 0
-v 0 1 0 1 0 0
-vn 0 0 1
-vn 0 0 1
-vn 0 0 1
-vn 0 0 1
-f 1//1 2//2 3//3 4//4
-f -4 -3 \\
-  -2
-";
-
-pub const CSV: &str =
-    "# made by hand\nx,y,z,nx,ny,nz,temperature\n0,0,0,0,0,1,20\n1,0,0,0,0,1,21\n0,1,0,0,0,1,22\n";
-
-pub const ASCII_VTP: &str = r#"<?xml version="1.0"?>
-<VTKFile type="PolyData" version="0.1" byte_order="LittleEndian">
-<PolyData><Piece NumberOfPoints="4" NumberOfPolys="1" NumberOfStrips="1">
-<PointData Normals="N"><DataArray type="Float32" Name="N" NumberOfComponents="3" format="ascii">
-0 0 1 0 0 1 0 0 1 0 0 1</DataArray>
-<DataArray type="Float32" Name="heat" format="ascii">1 2 3 4</DataArray></PointData>
-<Points><DataArray type="Float64" NumberOfComponents="3" format="ascii">
-0 0 0 1 0 0 0 1 0 1 1 0</DataArray></Points>
-<Polys><DataArray type="Int32" Name="connectivity" format="ascii">0 1 2</DataArray>
-<DataArray type="Int32" Name="offsets" format="ascii">3</DataArray></Polys>
-<Strips><DataArray type="Int32" Name="connectivity" format="ascii">0 1 2 3</DataArray>
-<DataArray type="Int32" Name="offsets" format="ascii">4</DataArray></Strips>
-</Piece></PolyData></VTKFile>
-"#;
-
+pub const ASCII_PLY: &str = include_str!("../corpus/mesh_ascii.ply");
+pub const ASCII_STL: &str = include_str!("../corpus/mesh_ascii.stl");
+pub const OBJ: &str = include_str!("../corpus/mesh.obj");
+pub const CSV: &str = include_str!("../corpus/cloud.csv");
+pub const ASCII_VTP: &str = include_str!("../corpus/mesh_ascii.vtp");
 /// Written by VTK 9 (`SetDataModeToBinary`), with zlib and without.
-pub const BINARY_VTP: &str = include_str!("triangle_base64.vtp");
-pub const ZLIB_VTP: &str = include_str!("triangle_zlib.vtp");
+pub const BINARY_VTP: &str = include_str!("../corpus/mesh_base64.vtp");
+pub const ZLIB_VTP: &str = include_str!("../corpus/mesh_zlib.vtp");
+pub const BIG_ENDIAN_PLY: &[u8] = include_bytes!("../corpus/mesh_big_endian.ply");
+pub const VTI: &[u8] = include_bytes!("../corpus/sdf.vti");
 
-/// One valid file of every readable kind, as `(name, format, bytes)`.
-pub fn valid_files() -> Vec<(&'static str, Format, Vec<u8>)> {
-    let points: Vec<u8> = (0..12).flat_map(|i| (i as f32).to_be_bytes()).collect();
-    let array = npy(">f4", true, "(4, 3)", &points);
-    let packed = npz(&[("points.npy", array.clone())], true);
-    let cloud_ply = written("c.ply", |path| write_cloud(path, &cloud::<f64>()));
-    let cloud_npz = written("c.npz", |path| write_cloud(path, &cloud::<f32>()));
-    let sdf_npz = written("f.npz", |path| write_field(path, &field::<f32>()));
-    let sdf_vti = written("f.vti", |path| write_field(path, &field::<f64>()));
-    vec![
-        ("ascii.ply", Format::Ply, ASCII_PLY.into()),
-        ("mesh.ply", Format::Ply, mesh_file::<f32>("m.ply")),
-        ("cloud.ply", Format::Ply, cloud_ply),
-        ("big.ply", Format::Ply, big_endian_ply()),
-        ("points.csv", Format::Text, CSV.into()),
-        (
-            "points.xyz",
-            Format::Text,
-            "3\n0 0 0\n1 2 3\n4 5 6\n".into(),
-        ),
-        ("mesh.obj", Format::Obj, OBJ.into()),
-        ("ascii.stl", Format::Stl, ASCII_STL.into()),
-        ("mesh.stl", Format::Stl, mesh_file::<f32>("m.stl")),
-        ("points.npy", Format::Npy, array),
-        ("cloud.npz", Format::Npz, cloud_npz),
-        ("packed.npz", Format::Npz, packed),
-        ("sdf.npz", Format::Npz, sdf_npz),
-        ("ascii.vtp", Format::Vtp, ASCII_VTP.into()),
-        ("base64.vtp", Format::Vtp, BINARY_VTP.into()),
-        ("zlib.vtp", Format::Vtp, ZLIB_VTP.into()),
-        ("mesh.vtp", Format::Vtp, mesh_file::<f64>("m.vtp")),
-        ("sdf.vti", Format::Vti, sdf_vti),
-    ]
-}
-
-/// A quad with vertices of `double`, big-endian.
-pub fn big_endian_ply() -> Vec<u8> {
-    let mut bytes = b"ply\r\nformat binary_big_endian 1.0\r\nelement vertex 4\r\nproperty double x\r\nproperty double y\r\nproperty double z\r\nelement face 1\r\nproperty list int uint vertex_index\r\nend_header\r\n".to_vec();
-    bytes.extend(SQUARE.iter().flatten().flat_map(|x| x.to_be_bytes()));
-    bytes.extend(4i32.to_be_bytes());
-    bytes.extend([0u32, 1, 2, 3].iter().flat_map(|i| i.to_be_bytes()));
-    bytes
+/// Files of the corpus, one of every readable kind, as `(name, format, bytes)` in the order of their names. Those
+/// whose names begin with `sdf` hold a field, the others points or a mesh.
+pub fn valid_files() -> Vec<(String, Format, Vec<u8>)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus");
+    let entries = std::fs::read_dir(folder).expect("the corpus");
+    let mut files: Vec<_> = entries
+        .map(|entry| {
+            let path = entry.expect("an entry").path();
+            let name = path.file_name().and_then(|name| name.to_str());
+            let format = Format::from_path(&path).expect("a known extension");
+            let bytes = std::fs::read(&path).expect("is readable");
+            (name.expect("plain").to_string(), format, bytes)
+        })
+        .collect();
+    files.sort_by(|a, b| a.0.cmp(&b.0));
+    files
 }

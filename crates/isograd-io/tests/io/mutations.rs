@@ -49,7 +49,7 @@ fn no_mutant_causes_a_panic_or_unbounded_memory() {
         for case in 0..CASES {
             let mut bytes = valid.clone();
             mutate(&mut bytes, &mut random);
-            let source = source(name, bytes);
+            let source = source(&name, bytes);
             let outcome = std::panic::catch_unwind(|| {
                 drop(parse_in_bounds(&source, format));
                 drop(parse_field(&source, format));
