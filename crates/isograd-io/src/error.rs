@@ -114,6 +114,7 @@ fn write_remedy(source: &io::Error) -> &'static str {
             "free some space or choose another disk"
         }
         io::ErrorKind::IsADirectory => "name a file, not a folder",
+        io::ErrorKind::InvalidInput => "choose another format",
         io::ErrorKind::Interrupted => "run it again",
         _ => "check the folder and the disk",
     }

@@ -4,6 +4,7 @@ use isograd::data::Attribute;
 use isograd::{Mesh, MeshError, PointCloud, PointCloudError, Real, Sensors};
 
 use crate::format::Format;
+use crate::limits::Memory;
 use crate::number::Dtype;
 
 /// The content of a file of points or of a mesh, in double precision: every coordinate and normal is
@@ -65,18 +66,12 @@ impl Geometry {
     fn sensors(&self) -> Option<Vec<[f64; 3]>> {
         let find = |name: &str, components: usize| {
             let mut attributes = self.attributes.iter();
-            attributes.find(|a| a.name == name && a.components == components)
+            attributes.find(|a| a.components == components && a.name.eq_ignore_ascii_case(name))
         };
-        if let Some(whole) = find("sensor", 3) {
+        if let Some(whole) = find(SENSOR, 3) {
             return Some(whole.values.as_chunks().0.to_vec());
         }
-        // The second form is how the writers split an attribute of three components.
-        [
-            ["sensor_x", "sensor_y", "sensor_z"],
-            ["sensor_0", "sensor_1", "sensor_2"],
-        ]
-        .into_iter()
-        .find_map(|[x, y, z]| {
+        SENSOR_AXES.into_iter().find_map(|[x, y, z]| {
             let (x, y, z) = (find(x, 1)?, find(y, 1)?, find(z, 1)?);
             let rows = x.values.iter().zip(&y.values).zip(&z.values);
             Some(rows.map(|((&x, &y), &z)| [x, y, z]).collect())
@@ -92,15 +87,36 @@ impl Geometry {
     }
 }
 
+/// Attribute of three components with the sensor positions.
+const SENSOR: &str = "sensor";
+
+/// Attributes of one component with the sensor positions. The second form is how the writers split [`SENSOR`].
+const SENSOR_AXES: [[&str; 3]; 2] = [
+    ["sensor_x", "sensor_y", "sensor_z"],
+    ["sensor_0", "sensor_1", "sensor_2"],
+];
+
+/// Whether an attribute may hold sensor positions.
+pub(crate) fn is_sensor(name: &str) -> bool {
+    let mut names = SENSOR_AXES.as_flattened().iter().chain([&SENSOR]);
+    names.any(|known| name.eq_ignore_ascii_case(known))
+}
+
 fn convert<T: Real>(points: &[[f64; 3]]) -> Vec<[T; 3]> {
     points.iter().map(|p| p.map(T::of)).collect()
 }
 
 /// Appends the triangles of a polygon: a fan around its first corner, with the polygon's winding.
-pub(crate) fn triangulate(corners: &[u32], faces: &mut Vec<[u32; 3]>) {
+pub(crate) fn triangulate(
+    memory: &Memory,
+    corners: &[u32],
+    faces: &mut Vec<[u32; 3]>,
+) -> Result<(), String> {
     if let Some((&first, rest)) = corners.split_first() {
+        memory.make_room(faces, rest.len())?;
         faces.extend(rest.windows(2).map(|pair| [first, pair[0], pair[1]]));
     }
+    Ok(())
 }
 
 /// Refuses a point or normal (`what`) that is not finite.

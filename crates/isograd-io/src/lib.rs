@@ -19,11 +19,14 @@
 //! | VTP | points, mesh | mesh |
 //! | VTI | field | field |
 //!
+//! The columns of a text file are found by the names in its header: `x`, `X`, `x [m]`, `Points:0`, `Points_0`,
+//! `easting`, `nx`, `Normals:0` and the like. A header without coordinates is an error, and [`Columns`] choose.
 //! Columns or properties `sensor_x`, `sensor_y` and `sensor_z`, or an array `sensor` of three components, hold the
 //! sensor position of each point.
 //!
 //! Guarantees:
-//! - No input causes a panic, and memory is bounded by the size of the file, not by the counts in its header.
+//! - No input causes a panic. Memory is bounded by the size of the file, not by the counts in its header or by the size
+//!   to which it unpacks ([`Limits`]), and so is the number of steps.
 //! - Every error names the file, the location (line, byte, element or row), the problem, and the remedy.
 //! - Writing is atomic: a file is complete or absent ([`atomic`]).
 //! - Numbers are read in double precision, exactly, and written in their own type; numbers that are
@@ -35,11 +38,16 @@ mod bytes;
 mod columns;
 mod error;
 mod field;
+mod fields;
 mod format;
 mod geometry;
+mod limits;
+mod lines;
+mod names;
 mod number;
 mod numpy;
 mod obj;
+mod options;
 mod ply;
 mod read;
 mod source;
@@ -52,7 +60,9 @@ pub use error::{Error, Location};
 pub use field::FieldFile;
 pub use format::Format;
 pub use geometry::Geometry;
+pub use limits::{Limits, parse_size};
 pub use number::Dtype;
+pub use options::{Attributes, Columns, ReadOptions};
 pub use read::{Content, parse_field, parse_geometry, read, read_field, read_geometry, read_mesh};
 pub use source::Source;
 pub use write::{

@@ -122,11 +122,10 @@ impl Number {
     }
 
     /// All the numbers in `bytes`, in order.
-    pub fn read_all(self, bytes: &[u8], endian: Endian) -> Vec<f64> {
+    pub fn read_all(self, bytes: &[u8], endian: Endian) -> impl Iterator<Item = f64> {
         bytes
             .chunks_exact(self.size())
-            .filter_map(|chunk| self.read(chunk, endian))
-            .collect()
+            .filter_map(move |chunk| self.read(chunk, endian))
     }
 }
 

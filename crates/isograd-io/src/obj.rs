@@ -8,33 +8,41 @@ use isograd::{Mesh, Real};
 
 use crate::error::{Error, Location};
 use crate::format::Format;
-use crate::geometry::{Geometry, check_finite, triangulate};
+use crate::geometry::{Geometry, triangulate};
+use crate::limits::Memory;
+use crate::lines::{Lines, coordinates, quoted, words};
 use crate::number::Dtype;
-use crate::source::{Lines, Source, quoted, three_numbers, words};
+use crate::source::Input;
 
 /// Reads an OBJ file. Normals are kept if there is one per vertex and every face pairs them by index.
-pub(crate) fn read(source: &Source) -> Result<Geometry, Error> {
+pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
+    let memory = &input.memory;
     let mut reader = Reader::default();
-    let mut lines = Lines::new(&source.bytes);
+    let mut lines = Lines::new(input.bytes);
     let mut joined = Vec::new();
     while let Some((line_number, line)) = lines.next() {
+        let bad = |problem: String| input.error(Location::Line(line_number), problem);
         let mut line = line;
         // A backslash at the end continues the line on the next one.
         if line.ends_with(b"\\") {
             joined.clear();
             while let Some(part) = line.strip_suffix(b"\\") {
-                joined.extend_from_slice(part);
-                joined.push(b' ');
+                append(memory, &mut joined, part).map_err(bad)?;
+                append(memory, &mut joined, b" ").map_err(bad)?;
                 line = lines.next().map_or(b"", |(_, next)| next);
             }
-            joined.extend_from_slice(line);
+            append(memory, &mut joined, line).map_err(bad)?;
             line = &joined;
         }
-        reader
-            .line(line, line_number)
-            .map_err(|problem| source.error(Location::Line(line_number), problem))?;
+        reader.line(memory, line, line_number).map_err(bad)?;
     }
-    reader.finish(source)
+    reader.finish(input)
+}
+
+fn append(memory: &Memory, text: &mut Vec<u8>, part: &[u8]) -> Result<(), String> {
+    memory.make_room(text, part.len())?;
+    text.extend_from_slice(part);
+    Ok(())
 }
 
 #[derive(Default)]
@@ -50,20 +58,18 @@ struct Reader {
 }
 
 impl Reader {
-    fn line(&mut self, line: &[u8], line_number: usize) -> Result<(), String> {
+    fn line(&mut self, memory: &Memory, line: &[u8], line_number: usize) -> Result<(), String> {
         let mut fields = words(line);
         match fields.next() {
             Some(b"v") => {
-                let point = three_numbers(fields)?;
-                check_finite("vertex", point)?;
-                self.points.push(point);
+                memory.make_room(&mut self.points, 1)?;
+                self.points.push(coordinates("vertex", fields)?);
             }
             Some(b"vn") => {
-                let normal = three_numbers(fields)?;
-                check_finite("normal", normal)?;
-                self.normals.push(normal);
+                memory.make_room(&mut self.normals, 1)?;
+                self.normals.push(coordinates("normal", fields)?);
             }
-            Some(b"f") => self.face(fields, line_number)?,
+            Some(b"f") => self.face(memory, fields, line_number)?,
             _ => {}
         }
         Ok(())
@@ -71,6 +77,7 @@ impl Reader {
 
     fn face<'a>(
         &mut self,
+        memory: &Memory,
         fields: impl Iterator<Item = &'a [u8]>,
         line_number: usize,
     ) -> Result<(), String> {
@@ -85,20 +92,20 @@ impl Reader {
             if self.highest.is_none_or(|(highest, _)| vertex > highest) {
                 self.highest = Some((vertex, line_number));
             }
+            memory.make_room(&mut self.corners, 1)?;
             self.corners.push(vertex);
         }
         let count = self.corners.len();
         if count < 3 {
             return Err(format!("the face has {count} corners; remove it"));
         }
-        triangulate(&self.corners, &mut self.faces);
-        Ok(())
+        triangulate(memory, &self.corners, &mut self.faces)
     }
 
-    fn finish(self, source: &Source) -> Result<Geometry, Error> {
+    fn finish(self, input: &Input) -> Result<Geometry, Error> {
         if self.points.is_empty() {
             let problem = "no line begins with 'v'; check that it is an OBJ file with vertices";
-            return Err(source.error(Location::Whole, problem));
+            return Err(input.error(Location::Whole, problem));
         }
         if let Some((highest, line)) = self.highest
             && highest as usize >= self.points.len()
@@ -108,7 +115,7 @@ impl Reader {
                 u64::from(highest) + 1,
                 self.points.len()
             );
-            return Err(source.error(Location::Line(line), problem));
+            return Err(input.error(Location::Line(line), problem));
         }
         let per_vertex = self.normals.len() == self.points.len() && !self.normals_differ;
         Ok(Geometry {

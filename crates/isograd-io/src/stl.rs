@@ -12,48 +12,59 @@ use isograd_element::vector;
 use crate::error::{Error, Location};
 use crate::format::Format;
 use crate::geometry::{Geometry, check_finite};
+use crate::limits::Memory;
+use crate::lines::{Lines, coordinates, quoted, words};
 use crate::number::{Dtype, Endian, Number};
-use crate::source::{Lines, Source, quoted, three_numbers, words};
+use crate::source::Input;
 
 const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
 
 /// Reads an STL file.
-pub(crate) fn read(source: &Source) -> Result<Geometry, Error> {
-    let bytes = &source.bytes;
+pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
+    let bytes = input.bytes;
     let count = bytes.get(80..HEADER).and_then(|b| b.first_chunk::<4>());
     let count = count.map(|b| u32::from_le_bytes(*b) as usize);
     let needed = count.and_then(|n| n.checked_mul(TRIANGLE)?.checked_add(HEADER));
     let is_exact = needed == Some(bytes.len());
     let has_facets = memchr::memmem::find(&bytes[..bytes.len().min(4096)], b"facet").is_some();
     if !is_exact && bytes.trim_ascii_start().starts_with(b"solid") && has_facets {
-        return read_ascii(source);
+        return read_ascii(input);
     }
     match (count, needed) {
-        (Some(count), Some(needed)) if needed <= bytes.len() => read_binary(source, count),
-        (Some(count), _) => Err(source.error(
+        (Some(count), Some(needed)) if needed <= bytes.len() => read_binary(input, count),
+        (Some(count), _) => Err(input.error(
             Location::Byte(80),
             format!(
                 "the header declares {count} triangles of {TRIANGLE} bytes, but the file has {} bytes; it is cut short or not an STL file",
                 bytes.len()
             ),
         )),
-        (None, _) => Err(source.error(
+        (None, _) => Err(input.error(
             Location::Whole,
             "neither ascii STL (it would begin with 'solid' and have facets) nor binary STL (it is shorter than the header)",
         )),
     }
 }
 
-/// Triangles whose equal corners are merger.
-#[derive(Default)]
-struct Merger {
+/// Triangles whose equal corners are merged.
+struct Merger<'a> {
+    memory: &'a Memory,
     points: Vec<[f64; 3]>,
     index: HashMap<[u64; 3], u32>,
     faces: Vec<[u32; 3]>,
 }
 
-impl Merger {
+impl<'a> Merger<'a> {
+    fn new(memory: &'a Memory) -> Self {
+        Self {
+            memory,
+            points: Vec::new(),
+            index: HashMap::new(),
+            faces: Vec::new(),
+        }
+    }
+
     fn vertex(&mut self, point: [f64; 3]) -> Result<u32, String> {
         check_finite("vertex", point)?;
         // Adding 0 turns −0 into 0, so that the two are equal.
@@ -62,11 +73,39 @@ impl Merger {
         if next == u32::MAX {
             return Err("more vertices than 32-bit indices can address; simplify the mesh".into());
         }
+        self.grow_index()?;
         let index = *self.index.entry(key).or_insert(next);
         if index == next {
+            self.memory.make_room(&mut self.points, 1)?;
             self.points.push(point);
         }
         Ok(index)
+    }
+
+    /// Ensures that the index has room for one more vertex.
+    fn grow_index(&mut self) -> Result<(), String> {
+        // An entry, a byte of metadata, and an eighth of the places free, in a power of two of places.
+        let bytes = |entries: usize| {
+            let places = (entries + entries / 7).next_power_of_two();
+            places * (size_of::<([u64; 3], u32)>() + 1)
+        };
+        let old = self.index.capacity();
+        if self.index.len() < old {
+            return Ok(());
+        }
+        let new = (2 * old).max(56);
+        self.memory.reserve(bytes(new))?;
+        self.index
+            .try_reserve(new - old)
+            .map_err(|e| format!("{e}; free some memory or reduce the file"))?;
+        self.memory.release(bytes(old));
+        Ok(())
+    }
+
+    fn face(&mut self, face: [u32; 3]) -> Result<(), String> {
+        self.memory.make_room(&mut self.faces, 1)?;
+        self.faces.push(face);
+        Ok(())
     }
 
     fn finish(self, dtype: Dtype) -> Geometry {
@@ -77,49 +116,55 @@ impl Merger {
     }
 }
 
-fn read_binary(source: &Source, count: usize) -> Result<Geometry, Error> {
-    let mut merger = Merger::default();
-    let triangles = source.bytes[HEADER..].chunks_exact(TRIANGLE).take(count);
+fn read_binary(input: &Input, count: usize) -> Result<Geometry, Error> {
+    let mut merger = Merger::new(&input.memory);
+    let triangles = input.bytes[HEADER..].chunks_exact(TRIANGLE).take(count);
     for (index, triangle) in triangles.enumerate() {
-        // The normal comes first and is skipped: it follows from the corners.
-        let numbers = Number::F32.read_all(&triangle[12..48], Endian::Little);
-        let mut face = [0; 3];
-        for (corner, xyz) in face.iter_mut().zip(numbers.chunks_exact(3)) {
-            *corner = merger.vertex([xyz[0], xyz[1], xyz[2]]).map_err(|problem| {
-                let location = Location::Element {
-                    name: "triangle".into(),
-                    index,
-                    byte: HEADER + index * TRIANGLE,
-                };
-                source.error(location, problem)
-            })?;
-        }
-        merger.faces.push(face);
+        add_triangle(&mut merger, triangle).map_err(|problem| {
+            let location = Location::Element {
+                name: "triangle".into(),
+                index,
+                byte: HEADER + index * TRIANGLE,
+            };
+            input.error(location, problem)
+        })?;
     }
     Ok(merger.finish(Dtype::F32))
 }
 
-fn read_ascii(source: &Source) -> Result<Geometry, Error> {
-    let mut merger = Merger::default();
+fn add_triangle(merger: &mut Merger, triangle: &[u8]) -> Result<(), String> {
+    let mut corners = [[0.0; 3]; 3];
+    // The normal comes first and is skipped: it follows from the corners.
+    let numbers = Number::F32.read_all(&triangle[12..48], Endian::Little);
+    for (corner, number) in corners.as_flattened_mut().iter_mut().zip(numbers) {
+        *corner = number;
+    }
+    let mut face = [0; 3];
+    for (index, corner) in face.iter_mut().zip(corners) {
+        *index = merger.vertex(corner)?;
+    }
+    merger.face(face)
+}
+
+fn read_ascii(input: &Input) -> Result<Geometry, Error> {
+    let mut merger = Merger::new(&input.memory);
     let mut corners: Vec<u32> = Vec::new();
     let mut open = false;
-    let mut lines = Lines::new(&source.bytes);
+    let mut lines = Lines::new(input.bytes);
     while let Some((line_number, line)) = lines.next_filled() {
-        let bad = |problem: String| source.error(Location::Line(line_number), problem);
+        let bad = |problem: String| input.error(Location::Line(line_number), problem);
         let mut fields = words(line);
         match fields.next().map(<[u8]>::to_ascii_lowercase).as_deref() {
             Some(b"facet") => open = true,
             Some(b"vertex") => {
-                let vertex = three_numbers(fields).and_then(|point| merger.vertex(point));
+                let vertex = coordinates("vertex", fields).and_then(|point| merger.vertex(point));
+                input.memory.make_room(&mut corners, 1).map_err(bad)?;
                 corners.push(vertex.map_err(bad)?);
             }
             Some(b"endfacet") => {
-                let face = <[u32; 3]>::try_from(corners.as_slice());
-                merger.faces.push(
-                    face.map_err(|_| {
-                        bad(format!("the facet has {} corners, not 3", corners.len()))
-                    })?,
-                );
+                let face = <[u32; 3]>::try_from(corners.as_slice())
+                    .map_err(|_| format!("the facet has {} corners, not 3", corners.len()));
+                face.and_then(|face| merger.face(face)).map_err(bad)?;
                 corners.clear();
                 open = false;
             }
@@ -134,7 +179,7 @@ fn read_ascii(source: &Source) -> Result<Geometry, Error> {
     }
     if open {
         let problem = "the file ends inside a facet; it is cut short";
-        return Err(source.error(Location::Line(lines.number), problem));
+        return Err(input.error(Location::Line(lines.number), problem));
     }
     Ok(merger.finish(Dtype::Text))
 }
@@ -144,7 +189,7 @@ pub(crate) fn write_mesh<T: Real>(out: &mut impl Write, mesh: &Mesh<T>) -> io::R
     let count = u32::try_from(mesh.faces().len()).map_err(|_| {
         io::Error::new(
             io::ErrorKind::InvalidInput,
-            "STL cannot hold more than 2^32 - 1 triangles; write PLY",
+            "STL cannot hold more than 2^32 - 1 triangles",
         )
     })?;
     let mut header = [0; 80];

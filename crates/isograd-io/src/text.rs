@@ -1,147 +1,135 @@
 //! Columns of numbers as text: `.xyz`, `.csv`, `.txt`.
 //!
-//! The delimiter is `;`, `,` or white space, as in the first row. A line that begins with `#` or `//` is
-//! a comment. Column names come from a first line that is not all numbers, or from a comment just before
-//! the first row if it names `x`, `y` and `z`. Without names, 3 columns are points, 6 are points and
-//! normals (or colors, if all of them are whole numbers from 0 to 255), and any others are attributes. A
-//! first line with a single number is the number of rows.
+//! The delimiter is `;`, `,` or white space, as in the first row; fields may be quoted. A line that begins with `#` or
+//! `//` is a comment. Column names come from a first line that is not all numbers, or from a comment just before the first
+//! row. A header must name the coordinates ([`names::find`]), or the user chooses columns. Without a header, 3 columns are
+//! points, 6 are points and normals (or colors, if all of them are whole numbers from 0 to 255), and any others are
+//! attributes. A first line with a single number is the number of rows.
 
 use std::io::{self, Write};
 
 use isograd::{PointCloud, Real};
 
-use crate::columns::{PointTable, column_names, find_columns, row};
+use crate::columns::{PointTable, column_names, row};
 use crate::error::{Error, Location};
+use crate::fields::Delimiter;
 use crate::format::Format;
 use crate::geometry::Geometry;
+use crate::limits::Memory;
+use crate::lines::Lines;
+use crate::names::{self, Quantity};
 use crate::number::Dtype;
-use crate::source::{Lines, Source, number};
+use crate::source::Input;
 
 /// Reads a table of numbers as a point cloud.
-pub(crate) fn read(source: &Source) -> Result<Geometry, Error> {
-    let bytes = source.bytes.as_slice();
+pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
     let byte_order_mark = b"\xef\xbb\xbf";
-    let bytes = bytes.strip_prefix(byte_order_mark).unwrap_or(bytes);
-    let mut reader = Reader::default();
+    let bytes = input.bytes.strip_prefix(byte_order_mark);
+    let bytes = bytes.unwrap_or(input.bytes);
+    let mut reader = Reader {
+        input,
+        comment: (0, b""),
+        declared: None,
+        table: None,
+        row: Vec::new(),
+    };
     let mut lines = Lines::new(bytes);
     while let Some((number, line)) = lines.next_filled() {
         reader
             .line(line, number)
-            .map_err(|problem| source.error(Location::Line(number), problem))?;
+            .map_err(|(number, problem)| input.error(Location::Line(number), problem))?;
     }
-    reader.finish(source)
-}
-
-/// Separator of the fields of a row.
-#[derive(Clone, Copy, PartialEq)]
-enum Delimiter {
-    Space,
-    Byte(u8),
-}
-
-impl Delimiter {
-    fn detect(line: &[u8]) -> Self {
-        match [b';', b','].iter().find(|d| line.contains(d)) {
-            Some(&d) => Self::Byte(d),
-            None => Self::Space,
-        }
-    }
-
-    fn fields(self, line: &[u8]) -> impl Iterator<Item = &[u8]> {
-        let line = match self {
-            // Some programs write a delimiter after the last field.
-            Self::Byte(d) => line.strip_suffix(&[d]).unwrap_or(line),
-            Self::Space => line,
-        };
-        line.split(move |b| match self {
-            Self::Space => b.is_ascii_whitespace(),
-            Self::Byte(d) => *b == d,
-        })
-        .map(<[u8]>::trim_ascii)
-        .filter(move |field| self != Self::Space || !field.is_empty())
-    }
-
-    /// Parses the fields into `row`; fails at the first that is not a number.
-    fn numbers(self, line: &[u8], row: &mut Vec<f64>) -> Result<(), String> {
-        row.clear();
-        for field in self.fields(line) {
-            row.push(number(field).map_err(|problem| {
-                format!("{problem}; a row must hold numbers only, with a decimal point")
-            })?);
-        }
-        Ok(())
-    }
-
-    fn names(self, line: &[u8]) -> Vec<String> {
-        let name = |field: &[u8]| {
-            let text = String::from_utf8_lossy(field);
-            text.trim_matches(['"', '\'']).trim().to_ascii_lowercase()
-        };
-        self.fields(line).map(name).collect()
-    }
-
-    /// Whether a line that is not all numbers can be a header: at least three fields, each with a
-    /// letter and none a number.
-    fn is_header(self, line: &[u8]) -> bool {
-        let is_word =
-            |field: &[u8]| number(field).is_err() && field.iter().any(u8::is_ascii_alphabetic);
-        self.fields(line).all(is_word) && self.fields(line).count() >= 3
-    }
+    reader.finish()
 }
 
 /// State of the reader.
-#[derive(Default)]
 struct Reader<'a> {
-    /// The last comment.
-    comment: &'a [u8],
+    input: &'a Input<'a>,
+    /// The last comment and its line.
+    comment: (usize, &'a [u8]),
     /// The number that stands alone in the first line, and the number of that line.
     declared: Option<(f64, usize)>,
-    /// Lower-case names of the columns, if a line of its own gives them.
-    names: Option<Vec<String>>,
-    /// Known from the first row on.
+    /// Known from the header or the first row on.
     table: Option<Table>,
     row: Vec<f64>,
 }
 
 impl<'a> Reader<'a> {
-    fn line(&mut self, line: &'a [u8], line_number: usize) -> Result<(), String> {
+    /// Reads a line; an error is a problem and its line.
+    fn line(&mut self, line: &'a [u8], number: usize) -> Result<(), (usize, String)> {
+        let here = |problem| (number, problem);
         if let Some(comment) = line.strip_prefix(b"#").or_else(|| line.strip_prefix(b"//")) {
-            self.comment = comment;
+            self.comment = (number, comment.trim_ascii());
             return Ok(());
         }
+        let memory = &self.input.memory;
         if let Some(table) = &mut self.table {
-            table.delimiter.numbers(line, &mut self.row)?;
-            return table.push(&self.row);
+            let delimiter = *table.delimiter.get_or_insert(Delimiter::detect(line));
+            let row = delimiter.numbers(line, &mut self.row);
+            row.and_then(|()| table.push(memory, &self.row))
+                .map_err(here)?;
+            return Ok(());
         }
         let delimiter = Delimiter::detect(line);
         let parsed = delimiter.numbers(line, &mut self.row);
-        if self.names.is_none() && self.declared.is_none() {
-            if parsed.is_err() && delimiter.is_header(line) {
-                self.names = Some(delimiter.names(line));
-                return Ok(());
-            }
-            if parsed.is_ok() && self.row.len() == 1 {
-                self.declared = Some((self.row[0], line_number));
-                return Ok(());
-            }
+        if parsed.is_err()
+            && self.declared.is_none()
+            && self.is_header(delimiter, line).map_err(here)?
+        {
+            self.table = Some(self.with_header(delimiter, line).map_err(here)?);
+            return Ok(());
         }
-        parsed?;
-        let names = self.names.take().or_else(|| self.names_in_comment());
-        let mut table = Table::new(delimiter, names, self.row.len());
-        table.push(&self.row)?;
+        parsed.map_err(here)?;
+        if self.declared.is_none() && self.row.len() == 1 {
+            self.declared = Some((self.row[0], number));
+            return Ok(());
+        }
+        let mut table = match self.header_in_comment(delimiter) {
+            Some(by) => self
+                .with_header(by, self.comment.1)
+                .map_err(|problem| (self.comment.0, problem))?,
+            None => Table::new(self.input, None, self.row.len()).map_err(here)?,
+        };
+        table.delimiter = Some(delimiter);
+        table.push(memory, &self.row).map_err(here)?;
         self.table = Some(table);
         Ok(())
     }
 
-    /// Column names in the comment before the first row.
-    fn names_in_comment(&self) -> Option<Vec<String>> {
-        let names = Delimiter::detect(self.comment).names(self.comment);
-        let has = |name: &str| names.iter().any(|n| n == name);
-        let named = names.len() == self.row.len() && has("x") && has("y") && has("z");
-        named.then_some(names)
+    /// Whether a line that is not all numbers has the names of the columns.
+    fn is_header(&self, delimiter: Delimiter, line: &[u8]) -> Result<bool, String> {
+        Ok(delimiter.is_header(line) || self.names_points(&delimiter.names(line)?))
     }
 
-    fn finish(self, source: &Source) -> Result<Geometry, Error> {
+    /// Whether the columns of the coordinates are clear from these names.
+    fn names_points(&self, all: &[String]) -> bool {
+        match &self.input.options.columns.points {
+            Some(wanted) => wanted.iter().all(|name| all.contains(name)),
+            None => names::find(all, Quantity::Points).is_some(),
+        }
+    }
+
+    /// The delimiter of the header in the comment before the first row, if it is one: as many names as the row has
+    /// numbers, and coordinates among them. Prose has no commas where the row has them.
+    fn header_in_comment(&self, of_row: Delimiter) -> Option<Delimiter> {
+        let comment = self.comment.1;
+        let delimiter = Delimiter::detect(comment);
+        let names = delimiter.names(comment).ok()?;
+        let is_table =
+            delimiter == of_row && of_row != Delimiter::Space && delimiter.is_header(comment);
+        let is_header = names.len() == self.row.len() && (is_table || self.names_points(&names));
+        is_header.then_some(delimiter)
+    }
+
+    fn with_header(&self, delimiter: Delimiter, line: &[u8]) -> Result<Table, String> {
+        // Names, also in lower case and in the attributes; up to three bytes for one that is not UTF-8.
+        self.input.memory.reserve(9 * line.len())?;
+        let names = delimiter.names(line)?;
+        let width = names.len();
+        Table::new(self.input, Some(names), width)
+    }
+
+    fn finish(self) -> Result<Geometry, Error> {
         let rows = self.table.as_ref().map_or(0, |table| table.rows.len());
         if let Some((count, line)) = self.declared
             && count != rows as f64
@@ -149,61 +137,98 @@ impl<'a> Reader<'a> {
             let problem = format!(
                 "the first line declares {count} rows, but there are {rows}; the file is cut short or the count is wrong"
             );
-            return Err(source.error(Location::Line(line), problem));
+            return Err(self.input.error(Location::Line(line), problem));
         }
-        let table = self.table.map(Table::into_geometry);
-        Ok(table.unwrap_or_else(|| Geometry::from_points(Vec::new(), Dtype::Text, Format::Text)))
+        let comment = Delimiter::detect(self.comment.1);
+        let names = comment.names(self.comment.1);
+        let table = match self.table {
+            Some(table) => Some(table),
+            // A header without rows.
+            None if names.is_ok_and(|names| self.names_points(&names)) => {
+                let table = self.with_header(comment, self.comment.1);
+                let line = Location::Line(self.comment.0);
+                Some(table.map_err(|problem| self.input.error(line, problem))?)
+            }
+            None => None,
+        };
+        let Some(table) = table else {
+            return Ok(Geometry::from_points(Vec::new(), Dtype::Text, Format::Text));
+        };
+        table
+            .into_geometry(self.input)
+            .map_err(|problem| self.input.error(Location::Whole, problem))
     }
 }
 
 /// Rows of equal length.
 struct Table {
-    delimiter: Delimiter,
+    /// Known from the first row on.
+    delimiter: Option<Delimiter>,
     width: usize,
-    has_names: bool,
+    /// Whether the normals may be colors.
+    may_be_colors: bool,
     rows: PointTable,
 }
 
 impl Table {
-    /// `width` is the number of columns where they have no names.
-    fn new(delimiter: Delimiter, names: Option<Vec<String>>, width: usize) -> Self {
-        let has_names = names.is_some();
+    /// A table of `width` columns, with their names if there is a header.
+    fn new(input: &Input, names: Option<Vec<String>>, width: usize) -> Result<Self, String> {
+        let wanted = &input.options.columns;
+        let xyz = match (&wanted.points, &names) {
+            (Some(wanted), names) => names::choose(wanted, names.as_deref(), width)?,
+            (None, Some(names)) => {
+                names::find(names, Quantity::Points).ok_or_else(|| names::unrecognized(names))?
+            }
+            (None, None) => [0, 1, 2],
+        };
+        let plain_six = width == 6 && names.is_none() && wanted.points.is_none();
+        let normal = match (&wanted.normals, &names) {
+            (Some(wanted), names) => Some(names::choose(wanted, names.as_deref(), width)?),
+            (None, Some(names)) => names::find(names, Quantity::Normals),
+            (None, None) => plain_six.then_some([3, 4, 5]),
+        };
+        let may_be_colors = plain_six && wanted.normals.is_none();
         let names = names.unwrap_or_else(|| {
             (1..=width)
                 .map(|column| format!("column_{column}"))
                 .collect()
         });
-        let names: Vec<Option<&str>> = names.iter().map(|name| Some(name.as_str())).collect();
-        let normal = find_columns(&names, ["nx", "ny", "nz"])
-            .or_else(|| find_columns(&names, ["normal_x", "normal_y", "normal_z"]))
-            .or((!has_names && width == 6).then_some([3, 4, 5]));
-        let xyz = find_columns(&names, ["x", "y", "z"]).unwrap_or([0, 1, 2]);
-        Self {
-            delimiter,
-            width: names.len(),
-            has_names,
-            rows: PointTable::new(&names, xyz, normal, 0),
-        }
+        // A column without a name is the index that some programs write.
+        let names: Vec<Option<&str>> = names
+            .iter()
+            .map(|name| Some(name.as_str()).filter(|name| !name.is_empty()))
+            .collect();
+        Ok(Self {
+            delimiter: None,
+            width,
+            may_be_colors,
+            rows: PointTable::new(input, &names, xyz, normal, 0)?,
+        })
     }
 
-    fn push(&mut self, row: &[f64]) -> Result<(), String> {
+    fn push(&mut self, memory: &Memory, row: &[f64]) -> Result<(), String> {
         let (n, width) = (row.len(), self.width);
         if n < 3 {
             return Err(format!("the row has {n} numbers; x, y and z are required"));
         }
         if n != width {
+            let may_be_decimal = self.delimiter == Some(Delimiter::Byte(b',')) && n == 2 * width;
+            let hint = match may_be_decimal {
+                true => "; decimal commas must be decimal points",
+                false => "",
+            };
             return Err(format!(
-                "the row has {n} numbers, but the lines before it have {width} columns"
+                "the row has {n} numbers, but the lines before it have {width} columns{hint}"
             ));
         }
-        self.rows.push(row)
+        self.rows.push(memory, row)
     }
 
-    fn into_geometry(mut self) -> Geometry {
-        if !self.has_names && self.width == 6 {
-            self.rows.reinterpret_normals_as_colors();
+    fn into_geometry(mut self, input: &Input) -> Result<Geometry, String> {
+        if self.may_be_colors {
+            self.rows.reinterpret_normals_as_colors(&input.memory)?;
         }
-        self.rows.into_geometry(Dtype::Text, Format::Text)
+        Ok(self.rows.into_geometry(Dtype::Text, Format::Text))
     }
 }
 
@@ -215,7 +240,7 @@ pub(crate) fn write_cloud<T: Real>(
     delimiter: &str,
 ) -> io::Result<()> {
     let comment = if delimiter == "," { "" } else { "# " };
-    let names = column_names(cloud, char::is_ascii_alphanumeric);
+    let names = column_names(cloud, char::is_ascii_alphanumeric)?;
     writeln!(out, "{comment}{}", names.join(delimiter))?;
     for i in 0..cloud.len() {
         let row: Vec<String> = row(cloud, i).map(|value| format!("{value:?}")).collect();

@@ -7,4 +7,4 @@
 mod array;
 mod npz;
 
-pub(crate) use npz::{read_field, read_npy, read_npz, write_cloud, write_field};
+pub(crate) use npz::{holds_field, read_field, read_npy, read_npz, write_cloud, write_field};

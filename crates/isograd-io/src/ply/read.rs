@@ -5,8 +5,10 @@ use crate::columns::{PointTable, find_columns};
 use crate::error::{Error, Location};
 use crate::format::Format;
 use crate::geometry::{Geometry, triangulate};
+use crate::limits::Memory;
+use crate::lines::{Lines, number, quoted, words};
 use crate::number::{Dtype, Endian, Number, as_index};
-use crate::source::{Lines, Source, number, quoted, words};
+use crate::source::Input;
 
 /// Position of the reader in the data.
 enum Cursor<'a> {
@@ -97,37 +99,42 @@ impl Cursor<'_> {
 }
 
 /// Reads a PLY file. Elements other than `vertex` and `face` are read as well, to detect damage.
-pub(crate) fn read(source: &Source) -> Result<Geometry, Error> {
-    let header = Header::parse(source)?;
+pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
+    let header = Header::parse(input)?;
     let mut cursor = match header.encoding {
         Encoding::Ascii => Cursor::Ascii {
-            lines: Lines::from(&source.bytes, header.body, header.lines),
+            lines: Lines::from(input.bytes, header.body, header.lines),
             rest: &[],
             line: header.lines,
         },
         Encoding::Binary(endian) => Cursor::Binary {
-            bytes: &source.bytes,
+            bytes: input.bytes,
             at: header.body,
             endian,
         },
     };
     let vertex = header.elements.iter().find(|e| e.name == "vertex");
     let Some(vertex) = vertex else {
-        return Err(source.error(Location::Whole, "the header has no element 'vertex'"));
+        return Err(input.error(Location::Whole, "the header has no element 'vertex'"));
     };
-    let (mut vertices, mut dtype) = point_table(source, vertex)?;
+    let memory = &input.memory;
+    let (mut vertices, mut dtype) = point_table(input, vertex)?;
     if header.encoding == Encoding::Ascii {
         dtype = Dtype::Text;
     }
     let mut faces = Faces::new(vertex.count);
     for element in &header.elements {
         match element.name.as_str() {
-            "vertex" => read_rows(source, &mut cursor, element, |row, _| vertices.push(row))?,
+            "vertex" => read_rows(input, &mut cursor, element, |row, _| {
+                vertices.push(memory, row)
+            })?,
             "face" => {
                 faces.list = face_list(element);
-                read_rows(source, &mut cursor, element, |_, list| faces.push(list))?;
+                read_rows(input, &mut cursor, element, |_, list| {
+                    faces.push(memory, list)
+                })?;
             }
-            _ => skip(source, &mut cursor, element)?,
+            _ => skip(input, &mut cursor, element)?,
         }
     }
     Ok(Geometry {
@@ -139,7 +146,7 @@ pub(crate) fn read(source: &Source) -> Result<Geometry, Error> {
 /// Reads all rows of an element. `take` receives the numbers of a row (0 in place of a list) and the
 /// items of the list `vertex_indices`.
 fn read_rows(
-    source: &Source,
+    input: &Input,
     cursor: &mut Cursor,
     element: &Element,
     mut take: impl FnMut(&[f64], &[f64]) -> Result<(), String>,
@@ -149,22 +156,29 @@ fn read_rows(
     let mut list = Vec::new();
     for index in 0..element.count {
         if !cursor.begin_row() {
-            return Err(cut_short(source, cursor, element, index));
+            return Err(cut_short(input, cursor, element, index));
         }
         let began = cursor.byte();
-        read_row(cursor, element, wanted, &mut row, &mut list)
-            .and_then(|()| take(&row, &list))
-            .map_err(|problem| source.error(cursor.location(element, index, began), problem))?;
+        read_row(
+            &input.memory,
+            cursor,
+            element,
+            wanted,
+            (&mut row, &mut list),
+        )
+        .and_then(|()| take(&row, &list))
+        .map_err(|problem| input.error(cursor.location(element, index, began), problem))?;
     }
     Ok(())
 }
 
+/// Reads the numbers of an element into the row, and the items of the list `wanted`.
 fn read_row(
+    memory: &Memory,
     cursor: &mut Cursor,
     element: &Element,
     wanted: Option<usize>,
-    row: &mut [f64],
-    list: &mut Vec<f64>,
+    (row, list): (&mut [f64], &mut Vec<f64>),
 ) -> Result<(), String> {
     list.clear();
     for (p, property) in element.properties.iter().enumerate() {
@@ -182,6 +196,7 @@ fn read_row(
                 for _ in 0..length {
                     let value = cursor.value(item)?;
                     if wanted == Some(p) {
+                        memory.make_room(list, 1)?;
                         list.push(value);
                     }
                 }
@@ -192,25 +207,25 @@ fn read_row(
 }
 
 /// Skips an element.
-fn skip(source: &Source, cursor: &mut Cursor, element: &Element) -> Result<(), Error> {
+fn skip(input: &Input, cursor: &mut Cursor, element: &Element) -> Result<(), Error> {
     if let (Cursor::Binary { at, .. }, Some(size)) = (&mut *cursor, element.fixed_bytes()) {
         // The header's counts were checked against the size of the file.
         let end = at.saturating_add(size.saturating_mul(element.count));
-        if end > source.bytes.len() {
-            return Err(cut_short(source, cursor, element, 0));
+        if end > input.bytes.len() {
+            return Err(cut_short(input, cursor, element, 0));
         }
         *at = end;
         return Ok(());
     }
-    read_rows(source, cursor, element, |_, _| Ok(()))
+    read_rows(input, cursor, element, |_, _| Ok(()))
 }
 
-fn cut_short(source: &Source, cursor: &Cursor, element: &Element, index: usize) -> Error {
+fn cut_short(input: &Input, cursor: &Cursor, element: &Element, index: usize) -> Error {
     let problem = format!(
         "the file ends after {index} of {} of element '{}'; it is cut short",
         element.count, element.name
     );
-    source.error(cursor.location(element, index, cursor.byte()), problem)
+    input.error(cursor.location(element, index, cursor.byte()), problem)
 }
 
 fn face_list(element: &Element) -> Option<usize> {
@@ -219,7 +234,7 @@ fn face_list(element: &Element) -> Option<usize> {
 }
 
 /// The table for element `vertex`, and the number type of `x`.
-fn point_table(source: &Source, element: &Element) -> Result<(PointTable, Dtype), Error> {
+fn point_table(input: &Input, element: &Element) -> Result<(PointTable, Dtype), Error> {
     let scalar = |p: &Property| match p.kind {
         Kind::Scalar(number) => Some(number),
         Kind::List { .. } => None,
@@ -230,11 +245,12 @@ fn point_table(source: &Source, element: &Element) -> Result<(PointTable, Dtype)
         .collect();
     let Some(xyz) = find_columns(&names, ["x", "y", "z"]) else {
         let problem = "element 'vertex' lacks one of the properties x, y, z";
-        return Err(source.error(Location::Whole, problem));
+        return Err(input.error(Location::Whole, problem));
     };
     let normal = find_columns(&names, ["nx", "ny", "nz"]);
     let dtype = scalar(&element.properties[xyz[0]]).map_or(Dtype::Integer, Number::dtype);
-    let table = PointTable::new(&names, xyz, normal, element.count);
+    let table = PointTable::new(input, &names, xyz, normal, element.count);
+    let table = table.map_err(|problem| input.error(Location::Whole, problem))?;
     Ok((table, dtype))
 }
 
@@ -256,7 +272,7 @@ impl Faces {
         }
     }
 
-    fn push(&mut self, list: &[f64]) -> Result<(), String> {
+    fn push(&mut self, memory: &Memory, list: &[f64]) -> Result<(), String> {
         if self.list.is_none() {
             return Ok(());
         }
@@ -272,9 +288,9 @@ impl Faces {
                         self.vertices as i64 - 1
                     )
                 })?;
+            memory.make_room(&mut self.corners, 1)?;
             self.corners.push(vertex as u32);
         }
-        triangulate(&self.corners, &mut self.triangles);
-        Ok(())
+        triangulate(memory, &self.corners, &mut self.triangles)
     }
 }

@@ -1,41 +1,48 @@
 //! Arrays of a VTK file: ascii, inline base64, appended raw or base64; compressed by zlib or not.
 
 use std::borrow::Cow;
-use std::io::Read;
 
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
-use flate2::read::ZlibDecoder;
-
+use super::stream::{Encoding, Stream};
 use super::xml::{Appended, Node, parse};
 use crate::error::{Error, Location};
-use crate::number::{Dtype, Endian, Number, as_index};
-use crate::source::{Source, number, words};
+use crate::lines::{number, words};
+use crate::number::{Dtype, Endian, Number};
+use crate::source::Input;
 
 /// A VTK file: its XML tree and the storage format of its arrays.
 pub(super) struct VtkFile<'a> {
-    source: &'a Source,
+    pub input: &'a Input<'a>,
     root: Node,
     appended: Option<Appended>,
-    endian: Endian,
-    header: Number,
-    compressed: bool,
+    encoding: Encoding,
 }
 
-/// Content of a `DataArray`.
+/// A `DataArray` whose values are not read yet.
 #[derive(Debug)]
-pub(super) struct DataArray {
+pub(super) struct DataArray<'a> {
     pub name: String,
     pub components: usize,
-    pub values: Vec<f64>,
+    /// Number of values of all components.
+    pub count: usize,
     pub dtype: Dtype,
+    numbers: Numbers<'a>,
+}
+
+/// Numbers of an array in their own type.
+#[derive(Debug)]
+enum Numbers<'a> {
+    Text(&'a [u8]),
+    Binary {
+        bytes: Cow<'a, [u8]>,
+        number: Number,
+    },
 }
 
 impl<'a> VtkFile<'a> {
     /// Parses the XML of a data set of type `kind` (`PolyData` or `ImageData`).
-    pub fn open(source: &'a Source, kind: &str) -> Result<Self, Error> {
-        let (root, appended) = parse(source)?;
-        let refuse = |problem: String| Err(source.error(Location::Whole, problem));
+    pub fn open(input: &'a Input<'a>, kind: &str) -> Result<Self, Error> {
+        let (root, appended) = parse(input)?;
+        let refuse = |problem: String| Err(input.error(Location::Whole, problem));
         let Some(file) = root.child("VTKFile") else {
             return refuse("no element <VTKFile>; the file is not VTK XML".into());
         };
@@ -51,7 +58,7 @@ impl<'a> VtkFile<'a> {
                 ));
             }
         };
-        Ok(Self {
+        let encoding = Encoding {
             endian: match file.attribute("byte_order") {
                 Some("BigEndian") => Endian::Big,
                 _ => Endian::Little,
@@ -61,9 +68,13 @@ impl<'a> VtkFile<'a> {
                 _ => Number::U32,
             },
             compressed,
-            source,
+            file_size: input.bytes.len(),
+        };
+        Ok(Self {
+            input,
             root,
             appended,
+            encoding,
         })
     }
 
@@ -71,7 +82,7 @@ impl<'a> VtkFile<'a> {
     pub fn data_set(&self, kind: &str) -> Result<&Node, Error> {
         let node = self.root.child("VTKFile").and_then(|file| file.child(kind));
         node.ok_or_else(|| {
-            self.source
+            self.input
                 .error(Location::Whole, format!("no element <{kind}>"))
         })
     }
@@ -79,7 +90,7 @@ impl<'a> VtkFile<'a> {
     /// Refuses rows of an array that are not finite.
     pub fn check_rows(&self, node: &Node, what: &str, rows: &[[f64; 3]]) -> Result<(), Error> {
         let name = node.attribute("Name").unwrap_or(&node.name);
-        self.source.check_rows(name, what, rows)
+        self.input.check_rows(name, what, rows)
     }
 
     /// An error at an element.
@@ -91,8 +102,8 @@ impl<'a> VtkFile<'a> {
             byte: node.byte,
         };
         match node.name.as_str() {
-            "DataArray" => self.source.error(Location::Array(name.into()), problem),
-            _ => self.source.error(location, problem),
+            "DataArray" => self.input.error(Location::Array(name.into()), problem),
+            _ => self.input.error(location, problem),
         }
     }
 
@@ -126,52 +137,87 @@ impl<'a> VtkFile<'a> {
             .ok_or_else(|| self.error(node, format!("{name}=\"{text}\" is not {N} numbers")))
     }
 
-    /// Reads an array.
-    pub fn array(&self, node: &Node) -> Result<DataArray, Error> {
-        let (values, dtype) = self
-            .values(node)
-            .map_err(|problem| self.error(node, problem))?;
+    /// Finds the data of an array. Nothing is allocated for its values.
+    pub fn array(&self, node: &Node) -> Result<DataArray<'a>, Error> {
+        let bad = |problem: String| self.error(node, problem);
+        let (numbers, dtype) = self.numbers_of(node).map_err(bad)?;
+        let count = match &numbers {
+            Numbers::Text(text) => words(text).count(),
+            Numbers::Binary { bytes, number } => bytes.len() / number.size(),
+        };
         let components = match node.attribute("NumberOfComponents") {
             Some(text) => text.trim().parse().ok().filter(|&n| n > 0),
             None => Some(1),
         };
         let components = components
-            .filter(|&n| values.len() % n == 0)
-            .ok_or_else(|| {
-                self.error(node, "NumberOfComponents does not fit the number of values")
-            })?;
+            .filter(|&n| count % n == 0)
+            .ok_or_else(|| bad("NumberOfComponents does not fit the number of values".into()))?;
         Ok(DataArray {
             name: node.attribute("Name").unwrap_or_default().into(),
             components,
-            values,
+            count,
             dtype,
+            numbers,
         })
     }
 
-    fn values(&self, node: &Node) -> Result<(Vec<f64>, Dtype), String> {
-        let kind = node.attribute("type").unwrap_or_default();
-        let number_type =
-            Number::from_vtk(kind).ok_or_else(|| format!("the type '{kind}' is not supported"))?;
-        let text = self.source.bytes.get(node.text.clone()).unwrap_or_default();
-        let stream = match node.attribute("format").unwrap_or("ascii") {
-            "ascii" => {
-                let values: Result<_, _> = words(text).map(number).collect();
-                return Ok((values?, Dtype::Text));
+    /// Values of an array.
+    pub fn values(&self, node: &Node, array: &DataArray) -> Result<Vec<f64>, Error> {
+        let values = self.input.memory.filled(array.count);
+        let mut values: Vec<f64> = values.map_err(|problem| self.error(node, problem))?;
+        self.read(node, array, |at, value| values[at] = value)?;
+        Ok(values)
+    }
+
+    /// Rows of an array of three components.
+    pub fn rows(&self, node: &Node, array: &DataArray) -> Result<Vec<[f64; 3]>, Error> {
+        let rows = self.input.memory.filled(array.count / 3);
+        let mut rows: Vec<[f64; 3]> = rows.map_err(|problem| self.error(node, problem))?;
+        let values = rows.as_flattened_mut();
+        self.read(node, array, |at, value| values[at] = value)?;
+        Ok(rows)
+    }
+
+    /// Calls `put` with the index and the value of every number of an array.
+    pub fn read(
+        &self,
+        node: &Node,
+        array: &DataArray,
+        mut put: impl FnMut(usize, f64),
+    ) -> Result<(), Error> {
+        match &array.numbers {
+            Numbers::Text(text) => {
+                for (at, word) in words(text).enumerate() {
+                    put(
+                        at,
+                        number(word).map_err(|problem| self.error(node, problem))?,
+                    );
+                }
             }
-            "binary" => Stream::base64(text),
+            Numbers::Binary { bytes, number } => {
+                let values = number.read_all(bytes, self.encoding.endian);
+                values.enumerate().for_each(|(at, value)| put(at, value));
+            }
+        }
+        Ok(())
+    }
+
+    fn numbers_of(&self, node: &Node) -> Result<(Numbers<'a>, Dtype), String> {
+        let kind = node.attribute("type").unwrap_or_default();
+        let number =
+            Number::from_vtk(kind).ok_or_else(|| format!("the type '{kind}' is not supported"))?;
+        let text = self.input.bytes.get(node.text.clone()).unwrap_or_default();
+        let stream = match node.attribute("format").unwrap_or("ascii") {
+            "ascii" => return Ok((Numbers::Text(text), Dtype::Text)),
+            "binary" => Stream::Base64(text),
             "appended" => self.appended_stream(node)?,
             other => return Err(format!("the format '{other}' is not supported")),
         };
-        let bytes = if self.compressed {
-            self.compressed_bytes(stream)?
-        } else {
-            self.plain_bytes(stream)?
-        };
-        if bytes.len() % number_type.size() != 0 {
+        let bytes = self.encoding.read(stream, &self.input.memory)?;
+        if bytes.len() % number.size() != 0 {
             return Err("the bytes are not a whole number of values; the file is damaged".into());
         }
-        let values = number_type.read_all(&bytes, self.endian);
-        Ok((values, number_type.dtype()))
+        Ok((Numbers::Binary { bytes, number }, number.dtype()))
     }
 
     fn appended_stream(&self, node: &Node) -> Result<Stream<'a>, String> {
@@ -179,128 +225,15 @@ impl<'a> VtkFile<'a> {
             .appended
             .as_ref()
             .ok_or("there is no <AppendedData>; the file is cut short")?;
-        let bytes = node
-            .attribute("offset")
+        let offset = node.attribute("offset");
+        let bytes = offset
             .and_then(|text| text.trim().parse::<usize>().ok())
-            .and_then(|offset| appended.start.checked_add(offset))
-            .and_then(|start| self.source.bytes.get(start..))
+            .and_then(|offset| appended.range.start.checked_add(offset))
+            .and_then(|start| self.input.bytes.get(start..appended.range.end))
             .ok_or("its offset lies beyond the end of the file; the file is cut short")?;
-        if !appended.base64 {
-            return Ok(Stream::Raw(bytes));
-        }
-        let end = memchr::memchr(b'<', bytes).unwrap_or(bytes.len());
-        Ok(Stream::base64(&bytes[..end]))
+        Ok(match appended.base64 {
+            true => Stream::Base64(bytes),
+            false => Stream::Raw(bytes),
+        })
     }
-
-    /// Reads `length, data`.
-    fn plain_bytes(&self, mut stream: Stream) -> Result<Vec<u8>, String> {
-        let header = self.header.size();
-        let length = self.word(&stream.peek(header)?)?;
-        let total = length.checked_add(header).ok_or(CUT)?;
-        if stream.is_padded_after(header) {
-            stream.take(header)?;
-            return Ok(stream.take(length)?.into_owned());
-        }
-        Ok(stream.take(total)?[header..].to_vec())
-    }
-
-    /// Reads `blocks, block size, last block size, compressed sizes…`, then the blocks.
-    fn compressed_bytes(&self, mut stream: Stream) -> Result<Vec<u8>, String> {
-        let word = self.header.size();
-        let blocks = self.word(&stream.peek(word)?)?;
-        let header = blocks
-            .checked_add(3)
-            .and_then(|n| n.checked_mul(word))
-            .ok_or(CUT)?;
-        let sizes = stream.take(header)?;
-        let sizes = sizes[3 * word..]
-            .chunks_exact(word)
-            .map(|bytes| self.word(bytes))
-            .collect::<Result<Vec<usize>, _>>()?;
-        let total = sizes.iter().try_fold(0usize, |sum, &n| sum.checked_add(n));
-        let packed = stream.take(total.ok_or(CUT)?)?;
-        let mut rest = &packed[..];
-        let mut bytes = Vec::new();
-        for size in sizes {
-            let (block, after) = rest.split_at(size);
-            ZlibDecoder::new(block)
-                .read_to_end(&mut bytes)
-                .map_err(|e| format!("a compressed block is damaged: {e}"))?;
-            rest = after;
-        }
-        Ok(bytes)
-    }
-
-    /// Parses a word of a binary header: a count that does not exceed the size of the file.
-    fn word(&self, bytes: &[u8]) -> Result<usize, String> {
-        let value = self.header.read(bytes, self.endian).ok_or(CUT)?;
-        as_index(value, self.source.bytes.len())
-            .ok_or_else(|| format!("a length of {value} bytes exceeds the file; it is damaged"))
-    }
-}
-
-/// Error of truncated data.
-const CUT: &str = "the data are cut short";
-
-/// Encoded bytes: raw, or base64 without white space.
-enum Stream<'a> {
-    Raw(&'a [u8]),
-    Base64 { text: Cow<'a, [u8]>, at: usize },
-}
-
-impl<'a> Stream<'a> {
-    fn base64(text: &'a [u8]) -> Self {
-        let text = text.trim_ascii();
-        let text = if text.iter().any(u8::is_ascii_whitespace) {
-            Cow::Owned(
-                text.iter()
-                    .copied()
-                    .filter(|b| !b.is_ascii_whitespace())
-                    .collect(),
-            )
-        } else {
-            Cow::Borrowed(text)
-        };
-        Self::Base64 { text, at: 0 }
-    }
-
-    /// Reads the next `n` bytes, which are encoded on their own.
-    fn take(&mut self, n: usize) -> Result<Cow<'a, [u8]>, String> {
-        let bytes = self.peek(n)?;
-        match self {
-            Self::Raw(rest) => *rest = &rest[n..],
-            Self::Base64 { at, .. } => *at += encoded_length(n),
-        }
-        Ok(bytes)
-    }
-
-    fn peek(&self, n: usize) -> Result<Cow<'a, [u8]>, String> {
-        match self {
-            Self::Raw(rest) => Ok(Cow::Borrowed(rest.get(..n).ok_or(CUT)?)),
-            Self::Base64 { text, at } => {
-                let end = at.checked_add(encoded_length(n)).ok_or(CUT)?;
-                let mut bytes = STANDARD
-                    .decode(text.get(*at..end).ok_or(CUT)?)
-                    .map_err(|e| format!("broken base64: {e}"))?;
-                if bytes.len() < n {
-                    return Err(CUT.into());
-                }
-                bytes.truncate(n);
-                Ok(Cow::Owned(bytes))
-            }
-        }
-    }
-
-    /// Whether the next `n` bytes of base64 end in padding, so that a new stream follows them.
-    fn is_padded_after(&self, n: usize) -> bool {
-        match self {
-            Self::Raw(_) => false,
-            Self::Base64 { text, at } => text.get(at + encoded_length(n) - 1) == Some(&b'='),
-        }
-    }
-}
-
-/// Letters of base64 for `n` bytes, padding included.
-fn encoded_length(n: usize) -> usize {
-    n.div_ceil(3).saturating_mul(4)
 }

@@ -13,12 +13,12 @@ use crate::bytes::{push_real, scalar_name, size};
 use crate::error::Error;
 use crate::field::{FieldFile, field_file};
 use crate::format::Format;
-use crate::source::Source;
+use crate::source::Input;
 
 /// Reads a field: the scalar array `sdf`, or the only one, of the point data or, if there are none, of
 /// the cell data (values at the cell centers). Cells must be cubes aligned with the axes.
-pub(crate) fn read(source: &Source) -> Result<FieldFile, Error> {
-    let file = VtkFile::open(source, "ImageData")?;
+pub(crate) fn read(input: &Input) -> Result<FieldFile, Error> {
+    let file = VtkFile::open(input, "ImageData")?;
     let image = file.data_set("ImageData")?;
     let bad = |problem: String| file.error(image, problem);
     let extent: [f64; 6] = file.numbers(image, "WholeExtent", None)?;
@@ -55,14 +55,20 @@ pub(crate) fn read(source: &Source) -> Result<FieldFile, Error> {
     let shape = points.map(|n| n - usize::from(is_cells));
     let origin = std::array::from_fn(|a| origin[a] + h * (extent[2 * a] + half));
     let count = shape.iter().try_fold(1usize, |n, &s| n.checked_mul(s));
-    if count != Some(array.values.len()) {
+    if count != Some(array.count) {
         let problem = format!(
             "{} values for {shape:?} samples; the file is cut short or its extent is wrong",
-            array.values.len()
+            array.count
         );
         return Err(file.error(node, problem));
     }
-    let values = last_axis_fastest(&array.values, shape);
+    let mut values = input
+        .memory
+        .filled(array.count)
+        .map_err(|problem| file.error(node, problem))?;
+    file.read(node, &array, |at, value| {
+        values[last_axis_fastest(at, shape)] = value;
+    })?;
     field_file(origin, h, shape, values, array.dtype, Format::Vti)
         .map_err(|problem| file.error(node, problem))
 }
@@ -81,7 +87,10 @@ fn shape(extent: [f64; 6]) -> Option<[usize; 3]> {
 }
 
 /// Selects the array to read; the flag says whether it is cell data.
-fn scalar_array<'a>(file: &VtkFile, piece: &'a Node) -> Result<(DataArray, &'a Node, bool), Error> {
+fn scalar_array<'a, 'n>(
+    file: &VtkFile<'a>,
+    piece: &'n Node,
+) -> Result<(DataArray<'a>, &'n Node, bool), Error> {
     for (section, is_cells) in [("PointData", false), ("CellData", true)] {
         let Some(data) = piece.child(section) else {
             continue;
@@ -109,13 +118,10 @@ fn scalar_array<'a>(file: &VtkFile, piece: &'a Node) -> Result<(DataArray, &'a N
     ))
 }
 
-fn last_axis_fastest(values: &[f64], [nx, ny, nz]: [usize; 3]) -> Vec<f64> {
-    let mut ordered = vec![0.0; values.len()];
-    for (index, &value) in values.iter().enumerate() {
-        let (i, j, k) = (index % nx, index / nx % ny, index / nx / ny);
-        ordered[(i * ny + j) * nz + k] = value;
-    }
-    ordered
+/// Index with the last axis fastest of the value `at` with the first axis fastest.
+fn last_axis_fastest(at: usize, [nx, ny, nz]: [usize; 3]) -> usize {
+    let (i, j, k) = (at % nx, at / nx % ny, at / nx / ny);
+    (i * ny + j) * nz + k
 }
 
 /// Writes a field as point data `sdf`, a raw appended array of type `T`.

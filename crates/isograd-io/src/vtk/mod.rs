@@ -6,6 +6,7 @@
 mod data;
 mod image;
 mod poly;
+mod stream;
 mod xml;
 
 pub(crate) use image::{read as read_field, write as write_field};

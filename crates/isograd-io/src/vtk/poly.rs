@@ -1,5 +1,6 @@
 //! PolyData: points with their data, polygons and strips.
 
+use std::collections::HashMap;
 use std::io::{self, Write};
 
 use isograd::data::Attribute;
@@ -12,12 +13,12 @@ use crate::error::Error;
 use crate::format::Format;
 use crate::geometry::{Geometry, triangulate};
 use crate::number::{Dtype, as_index};
-use crate::source::Source;
+use crate::source::Input;
 
 /// Reads all pieces as one. Point data are kept if every piece has them; normals are the active normals
 /// of the point data, or the array `Normals`.
-pub(crate) fn read(source: &Source) -> Result<Geometry, Error> {
-    let file = VtkFile::open(source, "PolyData")?;
+pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
+    let file = VtkFile::open(input, "PolyData")?;
     let mut geometry = Geometry::from_points(Vec::new(), Dtype::Text, Format::Vtp);
     let pieces = file.data_set("PolyData")?.children_named("Piece");
     for (index, piece) in pieces.enumerate() {
@@ -48,8 +49,19 @@ fn read_points(file: &VtkFile, piece: &Node, geometry: &mut Geometry) -> Result<
     let array = file.array(node)?;
     let points = rows_of_three(file, node, &array, count)?;
     file.check_rows(node, "point", &points)?;
-    geometry.points.extend(points);
     geometry.dtype = array.dtype;
+    append(file, piece, &mut geometry.points, points)
+}
+
+/// Appends the data of a further piece.
+fn append<T>(file: &VtkFile, piece: &Node, all: &mut Vec<T>, new: Vec<T>) -> Result<(), Error> {
+    if all.is_empty() {
+        *all = new;
+        return Ok(());
+    }
+    let room = file.input.memory.make_room(all, new.len());
+    room.map_err(|problem| file.error(piece, problem))?;
+    all.extend(new);
     Ok(())
 }
 
@@ -59,14 +71,21 @@ fn rows_of_three(
     array: &DataArray,
     count: usize,
 ) -> Result<Vec<[f64; 3]>, Error> {
-    if array.components != 3 && count > 0 || Some(array.values.len()) != count.checked_mul(3) {
+    if array.components != 3 && count > 0 || Some(array.count) != count.checked_mul(3) {
         let problem = format!(
             "{} values for {count} points of 3 coordinates; the file is cut short or its counts are wrong",
-            array.values.len()
+            array.count
         );
         return Err(file.error(node, problem));
     }
-    Ok(array.values.as_chunks().0.to_vec())
+    file.rows(node, array)
+}
+
+/// Normals and attributes of a piece.
+#[derive(Default)]
+struct PointData {
+    normals: Option<Vec<[f64; 3]>>,
+    attributes: Vec<Attribute<f64>>,
 }
 
 fn read_point_data(
@@ -77,45 +96,63 @@ fn read_point_data(
     geometry: &mut Geometry,
 ) -> Result<(), Error> {
     let count = geometry.points.len() - offset;
-    let mut normals = None;
-    let mut attributes: Vec<Attribute<f64>> = Vec::new();
-    if let Some(data) = piece.child("PointData") {
-        let active = data.attribute("Normals").unwrap_or("Normals");
-        for node in data.children_named("DataArray") {
-            let array = file.array(node)?;
-            if Some(array.values.len()) != count.checked_mul(array.components) {
-                let problem = format!("{} values for {count} points", array.values.len());
-                return Err(file.error(node, problem));
-            }
-            if array.name == active && array.components == 3 {
-                let rows = rows_of_three(file, node, &array, count)?;
-                file.check_rows(node, "normal", &rows)?;
-                normals = Some(rows);
-            } else {
-                attributes.push(Attribute {
-                    name: array.name,
-                    components: array.components,
-                    values: array.values,
-                });
-            }
-        }
-    }
+    let new = match piece.child("PointData") {
+        Some(data) => point_data(file, data, count)?,
+        None => PointData::default(),
+    };
     if is_first {
-        geometry.normals = normals;
-        geometry.attributes = attributes;
+        geometry.normals = new.normals;
+        geometry.attributes = new.attributes;
         return Ok(());
     }
-    geometry.normals = geometry.normals.take().zip(normals).map(|(mut all, new)| {
-        all.extend(new);
-        all
-    });
-    geometry.attributes.retain_mut(|old| {
-        let mut new = attributes.iter();
-        let new = new.find(|a| a.name == old.name && a.components == old.components);
-        old.values.extend(new.iter().flat_map(|new| &new.values));
-        new.is_some()
-    });
+    if let Some((all, new)) = geometry.normals.as_mut().zip(new.normals) {
+        append(file, piece, all, new)?;
+    } else {
+        geometry.normals = None;
+    }
+    let new = new.attributes.into_iter();
+    let mut new: HashMap<(String, usize), Vec<f64>> =
+        new.map(|a| ((a.name, a.components), a.values)).collect();
+    for mut old in std::mem::take(&mut geometry.attributes) {
+        let key = (old.name, old.components);
+        if let Some(values) = new.remove(&key) {
+            append(file, piece, &mut old.values, values)?;
+            old.name = key.0;
+            geometry.attributes.push(old);
+        }
+    }
     Ok(())
+}
+
+fn point_data(file: &VtkFile, data: &Node, count: usize) -> Result<PointData, Error> {
+    let mut found = PointData::default();
+    let active = data.attribute("Normals").unwrap_or("Normals");
+    for node in data.children_named("DataArray") {
+        let name = node.attribute("Name").unwrap_or_default();
+        if name != active && !file.input.options.keeps(name) {
+            continue;
+        }
+        let array = file.array(node)?;
+        if Some(array.count) != count.checked_mul(array.components) {
+            let problem = format!("{} values for {count} points", array.count);
+            return Err(file.error(node, problem));
+        }
+        if array.name == active && array.components == 3 {
+            let rows = rows_of_three(file, node, &array, count)?;
+            file.check_rows(node, "normal", &rows)?;
+            found.normals = Some(rows);
+        } else {
+            let attribute = Attribute {
+                values: file.values(node, &array)?,
+                name: array.name,
+                components: array.components,
+            };
+            let room = file.input.memory.make_room(&mut found.attributes, 1);
+            room.map_err(|problem| file.error(node, problem))?;
+            found.attributes.push(attribute);
+        }
+    }
+    Ok(found)
 }
 
 /// Reads polygons, or strips, in which every second triangle has the opposite winding.
@@ -134,13 +171,15 @@ fn read_cells(
     let (Some(connectivity), Some(offsets)) = (array("connectivity"), array("offsets")) else {
         return Ok(());
     };
-    let (indices, ends) = (file.array(connectivity)?, file.array(offsets)?);
+    let values = |node| file.values(node, &file.array(node)?);
+    let (indices, ends) = (values(connectivity)?, values(offsets)?);
+    let memory = &file.input.memory;
     let mut begin = 0;
     let mut corners = Vec::new();
-    for (cell, &end) in ends.values.iter().enumerate() {
+    for (cell, &end) in ends.iter().enumerate() {
         let cell_error =
             |problem: String| file.error(connectivity, format!("cell {cell}: {problem}"));
-        let end = as_index(end, indices.values.len() + 1)
+        let end = as_index(end, indices.len() + 1)
             .filter(|&end| end >= begin + 3)
             .ok_or_else(|| {
                 cell_error(format!(
@@ -148,19 +187,21 @@ fn read_cells(
                 ))
             })?;
         corners.clear();
-        for &value in &indices.values[begin..end] {
+        for &value in &indices[begin..end] {
             let index = as_index(value, points).and_then(|i| u32::try_from(first_point + i).ok());
+            memory.make_room(&mut corners, 1).map_err(cell_error)?;
             corners.push(index.ok_or_else(|| {
                 cell_error(format!("it names point {value}, but there are {points}"))
             })?);
         }
         if is_strip {
+            memory.make_room(faces, corners.len()).map_err(cell_error)?;
             faces.extend(corners.windows(3).enumerate().map(|(i, t)| match i % 2 {
                 0 => [t[0], t[1], t[2]],
                 _ => [t[1], t[0], t[2]],
             }));
         } else {
-            triangulate(&corners, faces);
+            triangulate(memory, &corners, faces).map_err(cell_error)?;
         }
         begin = end;
     }

@@ -2,7 +2,11 @@
 
 mod files;
 mod formats;
+mod headers;
+mod hostile;
 mod mutations;
+mod names;
+mod options;
 mod round_trips;
 mod stopping;
 mod traps;

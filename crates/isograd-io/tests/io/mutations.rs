@@ -8,10 +8,10 @@ use crate::files::{self, parse_in_bounds, source};
 const CASES: usize = 4000;
 
 /// xorshift64*: the same numbers on every machine.
-struct Random(u64);
+pub struct Random(pub u64);
 
 impl Random {
-    fn below(&mut self, n: usize) -> usize {
+    pub fn below(&mut self, n: usize) -> usize {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
         self.0 ^= self.0 >> 27;

@@ -242,7 +242,12 @@ fn damaged_archives() {
     refused(Format::Npz, &good[..good.len() - 30], &["damaged"]);
     let mut flipped = good.clone();
     flipped[60] ^= 0xff;
-    refused(Format::Npz, flipped, &["damaged"]);
+    refused(Format::Npz, flipped, &["array 'points'"]);
+    // A byte of the values.
+    let mut flipped = good.clone();
+    let values = memchr::memmem::rfind(&good, &[0; 24]).expect("the values");
+    flipped[values] ^= 1;
+    refused(Format::Npz, flipped, &["array 'points'", "damaged"]);
     let two = npz(&[("a.npy", member.clone()), ("b.npy", member)], true);
     refused(Format::Npz, two, &["'points'", "[\"a\", \"b\"]"]);
 }

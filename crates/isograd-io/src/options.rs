@@ -1,0 +1,75 @@
+//! Options of the readers.
+
+use crate::error::Error;
+use crate::format::Format;
+use crate::geometry::is_sensor;
+use crate::limits::Limits;
+
+/// Options of the readers; see [`crate::read_geometry`] and its siblings for the defaults.
+///
+/// ```no_run
+/// use isograd_io::{Columns, Limits, ReadOptions};
+///
+/// let options = ReadOptions {
+///     limits: Limits { memory: Some(4 << 30) },
+///     columns: Columns { points: Some(["east", "north", "up"].map(String::from)), normals: None },
+///     ..ReadOptions::default()
+/// };
+/// let file = options.read_geometry("survey.csv".as_ref())?;
+/// # Ok::<(), isograd_io::Error>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// Limits on memory.
+    pub limits: Limits,
+    /// Columns of text files; other formats have fixed names.
+    pub columns: Columns,
+    /// Attributes to keep.
+    pub attributes: Attributes,
+}
+
+/// Columns of a text file, each by its name in the header or by its number from 1. `None`: recognized by name.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Columns {
+    /// Columns of x, y and z.
+    pub points: Option<[String; 3]>,
+    /// Columns of the components of the normals.
+    pub normals: Option<[String; 3]>,
+}
+
+/// Attributes that a reader keeps. Others take no memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Attributes {
+    /// All.
+    #[default]
+    All,
+    /// Sensor positions only; see [`crate::Geometry::cloud`].
+    Sensors,
+}
+
+impl Columns {
+    fn is_default(&self) -> bool {
+        self.points.is_none() && self.normals.is_none()
+    }
+}
+
+impl ReadOptions {
+    /// Whether the attribute `name` is kept.
+    pub(crate) fn keeps(&self, name: &str) -> bool {
+        self.attributes == Attributes::All || is_sensor(name)
+    }
+
+    /// Refuses a choice of columns in a format without columns.
+    pub(crate) fn check_columns(&self, name: &str, format: Format) -> Result<(), Error> {
+        if format == Format::Text || self.columns.is_default() {
+            return Ok(());
+        }
+        Err(Error::Format {
+            file: name.into(),
+            problem: format!(
+                "columns can be chosen in text files (.csv, .xyz, .txt), and this is {}; leave the columns out",
+                format.name()
+            ),
+        })
+    }
+}
