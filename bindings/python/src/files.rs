@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use isograd::{Field, Grid};
-use isograd_io::Dtype as Stored;
+use isograd_io::{Attributes, Columns, Dtype as Stored, Limits, ReadOptions, parse_size};
 use pyo3::prelude::*;
 
 use crate::arrays::{self, Dtype, Number};
@@ -18,10 +18,45 @@ type Geometry<'py> = (
     Bound<'py, PyAny>,
 );
 
+/// A size in bytes, or text such as `"4G"`.
+#[derive(FromPyObject)]
+pub enum Size {
+    Bytes(u64),
+    Text(String),
+}
+
+fn limits(max_memory: Option<Size>) -> PyResult<Limits> {
+    let memory = match max_memory {
+        None => None,
+        Some(Size::Bytes(bytes)) => Some(bytes),
+        Some(Size::Text(text)) => Some(parse_size(&text).map_err(value)?),
+    };
+    Ok(Limits { memory })
+}
+
 /// Reads points or a mesh, in the number type of the file.
 #[pyfunction]
-pub fn read_geometry(py: Python<'_>, path: PathBuf) -> PyResult<Geometry<'_>> {
-    let geometry = py.detach(|| isograd_io::read_geometry(&path));
+#[pyo3(signature = (path, columns=None, normal_columns=None, max_memory=None, attributes=true))]
+pub fn read_geometry(
+    py: Python<'_>,
+    path: PathBuf,
+    columns: Option<[String; 3]>,
+    normal_columns: Option<[String; 3]>,
+    max_memory: Option<Size>,
+    attributes: bool,
+) -> PyResult<Geometry<'_>> {
+    let options = ReadOptions {
+        limits: limits(max_memory)?,
+        columns: Columns {
+            points: columns,
+            normals: normal_columns,
+        },
+        attributes: match attributes {
+            true => Attributes::All,
+            false => Attributes::Sensors,
+        },
+    };
+    let geometry = py.detach(|| options.read_geometry(&path));
     let geometry = geometry.map_err(file)?;
     match geometry.dtype {
         Stored::F32 => geometry_arrays::<f32>(py, &geometry),
@@ -53,8 +88,17 @@ type FieldParts<'py> = ([f64; 3], f64, [usize; 3], Bound<'py, PyAny>);
 
 /// Reads a field, in the number type of the file.
 #[pyfunction]
-pub fn read_field(py: Python<'_>, path: PathBuf) -> PyResult<FieldParts<'_>> {
-    let read = py.detach(|| isograd_io::read_field(&path)).map_err(file)?;
+#[pyo3(signature = (path, max_memory=None))]
+pub fn read_field(
+    py: Python<'_>,
+    path: PathBuf,
+    max_memory: Option<Size>,
+) -> PyResult<FieldParts<'_>> {
+    let options = ReadOptions {
+        limits: limits(max_memory)?,
+        ..ReadOptions::default()
+    };
+    let read = py.detach(|| options.read_field(&path)).map_err(file)?;
     let (grid, values) = (*read.field.grid(), read.field.into_values());
     let array = match read.dtype {
         Stored::F32 => {

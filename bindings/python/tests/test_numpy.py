@@ -485,3 +485,21 @@ def test_every_way_to_the_level_has_a_gradient_that_agrees_with_differences():
         values = [(call(SPHERE + s * direction).indicator * weight).sum() for s in (step, -step)]
         difference = (values[0] - values[1]) / (2 * step)
         assert abs(pulled - difference) < 1e-4 * abs(difference), (options, pulled, difference)
+
+
+def test_columns_and_memory_of_files_are_chosen(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("t,lon,lat,depth\n9,1,2,3\n9,4,5,6\n")
+    with pytest.raises(ValueError, match=r"2 'lon'.*columns in Python"):
+        isograd.read_points(path)
+    for columns in [("lon", "lat", "depth"), (2, 3, 4)]:
+        cloud = isograd.read_points(path, columns=columns)
+        assert np.array_equal(cloud.points, [[1, 2, 3], [4, 5, 6]]) and set(cloud.attributes) == {"t"}
+    cloud = isograd.read_points(path, columns=(2, 3, 4), normal_columns=["t", "lon", "lat"])
+    assert np.array_equal(cloud.normals[0], [9, 1, 2])
+    for memory in [64, "64"]:
+        with pytest.raises(ValueError, match="the limit is 64 bytes.*max_memory"):
+            isograd.read_points(path, columns=(2, 3, 4), max_memory=memory)
+    assert len(isograd.read_points(path, columns=(2, 3, 4), max_memory="1M").points) == 2
+    with pytest.raises(ValueError, match="'many' is not a size"):
+        isograd.read_sdf(path, max_memory="many")

@@ -10,11 +10,13 @@ mod fit;
 mod gradcheck;
 mod orient;
 mod pipeline;
+mod reading;
 
 pub use fit::{Decay, Fit, Method, TargetKind};
 pub use gradcheck::Gradcheck;
 pub use orient::{OrientArgs, OrientCloud};
 pub use pipeline::{GridArgs, MethodArgs};
+pub use reading::ReadingArgs;
 
 /// Point cloud in, exact signed distance field out.
 #[derive(Debug, Parser)]
@@ -89,6 +91,9 @@ pub struct Reconstruct {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=50_000_000),
         help_heading = "Method")]
     pub sample: Option<u32>,
+    /// Arguments of the input.
+    #[command(flatten)]
+    pub reading: ReadingArgs,
 
     /// Number type of the computation and of the outputs
     #[arg(long, default_value = "f32", help_heading = "Running")]
@@ -153,6 +158,9 @@ pub struct Query {
     /// Output, the points with the results: .ply, .npz, .xyz, .csv or .txt
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
+    /// Arguments of the input; columns are those of the points.
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// Arguments of the run.
     #[command(flatten)]
     pub running: Running,
@@ -164,6 +172,9 @@ pub struct Query {
 pub struct Info {
     /// The file; `-` is standard input
     pub file: PathBuf,
+    /// Arguments of the input.
+    #[command(flatten)]
+    pub reading: ReadingArgs,
 }
 
 /// Arguments of the run, which have no influence on the results.
@@ -327,6 +338,10 @@ mod tests {
             "isograd orient a.ply -o b.ply --parity-gamma 0",
             "isograd query a.ply -o b.ply",
             "isograd gradcheck a.ply --step 0",
+            "isograd info a.csv --columns x,y",
+            "isograd info a.csv --columns x,,z",
+            "isograd info a.csv --max-memory many",
+            "isograd info a.csv --max-memory 0",
         ] {
             assert!(Cli::try_parse_from(line.split(' ')).is_err(), "{line}");
         }

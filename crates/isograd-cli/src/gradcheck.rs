@@ -4,6 +4,7 @@ use std::path::Path;
 
 use isograd::PointCloud;
 use isograd::gradcheck::{Difference, GradientCheck, Motion, Options, Row, gradcheck};
+use isograd_io::Attributes;
 use serde::Serialize;
 
 use crate::args;
@@ -28,7 +29,8 @@ pub fn run(args: &args::Gradcheck) -> Result<(), Error> {
         check_extension(report, &["json"])?;
         isograd_io::check_output(report, &["json"])?;
     }
-    let geometry = isograd_io::read_geometry(&args.cloud)?;
+    let options = args.reading.options(Attributes::Sensors);
+    let geometry = options.read_geometry(&args.cloud)?;
     args.method.normals.check()?;
     let cloud = geometry.cloud();
     let cloud = cloud.and_then(|cloud| args.method.normals.with_sensors(cloud));

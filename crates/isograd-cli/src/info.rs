@@ -2,7 +2,7 @@
 
 use isograd::differential::{EikonalOptions, Spread, eikonal};
 use isograd::isosurface::measure;
-use isograd_io::{Content, FieldFile, Geometry};
+use isograd_io::{Attributes, Content, FieldFile, Geometry};
 
 use crate::args;
 use crate::error::Error;
@@ -13,7 +13,7 @@ use crate::progress::to_stdout;
 /// # Errors
 /// See [`Error`].
 pub fn run(args: &args::Info) -> Result<(), Error> {
-    match isograd_io::read(&args.file)? {
+    match args.reading.options(Attributes::All).read(&args.file)? {
         Content::Geometry(geometry) => describe_geometry(args, &geometry),
         Content::Field(field) => {
             describe_field(&field);

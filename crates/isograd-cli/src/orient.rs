@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use isograd::orient::doubt::Doubt;
 use isograd::{Attribute, JsonReport, Orienter, Pipeline, PointCloud, PointCloudError, Real};
-use isograd_io::{CLOUD_EXTENSIONS, Dtype, Geometry};
+use isograd_io::{Attributes, CLOUD_EXTENSIONS, Dtype, Geometry};
 
 use crate::args;
 use crate::error::Error;
@@ -21,7 +21,8 @@ pub fn run(args: &args::OrientCloud) -> Result<(), Error> {
     check(args)?;
     let mut progress = Progress::new(3, args.running);
     progress.step("read");
-    let geometry = isograd_io::read_geometry(&args.cloud)?;
+    let options = args.reading.options(Attributes::All);
+    let geometry = options.read_geometry(&args.cloud)?;
     progress.detail(&format!(
         "{} points, stored as {}",
         geometry.points.len(),

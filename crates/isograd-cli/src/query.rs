@@ -3,7 +3,7 @@
 use isograd::distance::Query;
 use isograd::isosurface::measure;
 use isograd::{Attribute, PointCloud};
-use isograd_io::{CLOUD_EXTENSIONS, Content, FieldFile, Geometry};
+use isograd_io::{Attributes, CLOUD_EXTENSIONS, Content, FieldFile, Geometry};
 
 use crate::args;
 use crate::error::Error;
@@ -17,8 +17,9 @@ use crate::progress::{to_stderr, to_stdout};
 pub fn run(args: &args::Query) -> Result<(), Error> {
     check_extension(&args.output, CLOUD_EXTENSIONS)?;
     isograd_io::check_output(&args.output, CLOUD_EXTENSIONS)?;
-    let source = isograd_io::read(&args.source)?;
-    let points = isograd_io::read_geometry(&args.at)?.points;
+    let source = args.reading.memory.options().read(&args.source)?;
+    let options = args.reading.options(Attributes::Sensors);
+    let points = options.read_geometry(&args.at)?.points;
     let attributes = match source {
         Content::Field(field) => query_field(&field, &points),
         Content::Geometry(geometry) => query_mesh(args, &geometry, &points)?,

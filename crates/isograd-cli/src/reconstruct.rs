@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use isograd::{Field, Grid, JsonReport, Mesh, PointCloud, Real, Stage};
 use isograd_backend::{Number, Plan, View};
-use isograd_io::Geometry;
+use isograd_io::{Attributes, Geometry};
 
 use crate::args::{self, Precision};
 use crate::backend;
@@ -31,7 +31,7 @@ pub fn run(args: &args::Reconstruct) -> Result<(), Error> {
     // Reading, the stages, writing.
     let mut progress = Progress::new(2 + Stage::ALL.len(), args.running);
     progress.step("read");
-    let geometry = read(args)?;
+    let geometry = read(args, &outputs)?;
     progress.detail(&format!(
         "{} points, stored as {}",
         geometry.points.len(),
@@ -54,11 +54,17 @@ pub fn run(args: &args::Reconstruct) -> Result<(), Error> {
     }
 }
 
-fn read(args: &args::Reconstruct) -> Result<Geometry, Error> {
-    let Some(n) = args.sample else {
-        return Ok(isograd_io::read_geometry(&args.cloud)?);
+fn read(args: &args::Reconstruct, outputs: &Outputs) -> Result<Geometry, Error> {
+    // Only the file of the points has attributes.
+    let attributes = match outputs.points {
+        Some(_) => Attributes::All,
+        None => Attributes::Sensors,
     };
-    let mesh = isograd_io::read_mesh(&args.cloud)?;
+    let options = args.reading.options(attributes);
+    let Some(n) = args.sample else {
+        return Ok(options.read_geometry(&args.cloud)?);
+    };
+    let mesh = options.read_mesh(&args.cloud)?;
     resample::resample(&mesh, n as usize).ok_or_else(|| {
         Error::File(isograd_io::Error::Format {
             file: args.cloud.display().to_string(),

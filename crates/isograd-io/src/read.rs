@@ -105,6 +105,7 @@ impl ReadOptions {
     /// # Errors
     /// See [`Error`].
     pub fn parse_field(&self, source: &Source, format: Format) -> Result<FieldFile, Error> {
+        self.check_columns(&source.name, format)?;
         let input = &Input::new(source, self);
         match format {
             Format::Npz => numpy::read_field(input),

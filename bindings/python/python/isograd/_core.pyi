@@ -208,10 +208,16 @@ def run_command(arguments: Sequence[str]) -> int:
 
 def read_geometry(
     path: _Path,
+    columns: Sequence[str] | None = None,
+    normal_columns: Sequence[str] | None = None,
+    max_memory: int | str | None = None,
+    attributes: bool = True,
 ) -> tuple[_Floats, _Floats | None, list[tuple[str, _Floats]], _Indices]:
     """Points, normals, attributes by name, and faces of a file, in its number type."""
 
-def read_field(path: _Path) -> tuple[_Vector, float, _Cells, _Floats]:
+def read_field(
+    path: _Path, max_memory: int | str | None = None
+) -> tuple[_Vector, float, _Cells, _Floats]:
     """Lower corner, spacing, shape and values of a field, in its number type."""
 
 def write_points(

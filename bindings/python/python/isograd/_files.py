@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -31,28 +31,47 @@ class Cloud(NamedTuple):
     """``(N, components)`` by name."""
 
 
-def read_points(path: Path) -> Cloud:
+def _names(columns: Sequence[str | int] | None) -> list[str] | None:
+    return None if columns is None else [str(column) for column in columns]
+
+
+def read_points(
+    path: Path,
+    *,
+    columns: Sequence[str | int] | None = None,
+    normal_columns: Sequence[str | int] | None = None,
+    max_memory: int | str | None = None,
+) -> Cloud:
     """Reads the points of a file, or the vertices of a mesh.
+
+    Args:
+        columns: The columns of x, y and z in a text file, by name or by number from 1. By default they are recognized
+            by the names in the header.
+        normal_columns: Likewise the columns of the normals.
+        max_memory: Memory that reading may take, in bytes or as text such as ``"4G"``. By default 64 times the size of
+            the file, at least 64 MiB.
 
     Raises:
         FileNotFoundError, OSError: an error of the operating system.
-        ValueError: invalid content, with its line or byte.
+        ValueError: invalid content, with its line or byte; columns that are not clear; more than ``max_memory``.
     """
-    points, normals, attributes, _ = _core.read_geometry(os.fspath(path))
+    points, normals, attributes, _ = _core.read_geometry(
+        os.fspath(path), _names(columns), _names(normal_columns), max_memory
+    )
     return Cloud(points, normals, dict(attributes))
 
 
-def read_mesh(path: Path) -> Mesh:
-    """Reads a triangle mesh; errors as :func:`read_points`, and ValueError for a file without faces."""
-    points, _, _, faces = _core.read_geometry(os.fspath(path))
+def read_mesh(path: Path, *, max_memory: int | str | None = None) -> Mesh:
+    """Reads a triangle mesh; errors and ``max_memory`` as :func:`read_points`, and ValueError for a file without faces."""
+    points, _, _, faces = _core.read_geometry(os.fspath(path), max_memory=max_memory, attributes=False)
     if len(faces) == 0:
         raise ValueError(f"{os.fspath(path)} has points and no faces; read it with read_points")
     return Mesh(points, faces)
 
 
-def read_sdf(path: Path) -> tuple[Grid, np.ndarray]:
-    """Reads grid and values of a field (VTI or NPZ); errors as :func:`read_points`."""
-    lower, spacing, shape, values = _core.read_field(os.fspath(path))
+def read_sdf(path: Path, *, max_memory: int | str | None = None) -> tuple[Grid, np.ndarray]:
+    """Reads grid and values of a field (VTI or NPZ); errors and ``max_memory`` as :func:`read_points`."""
+    lower, spacing, shape, values = _core.read_field(os.fspath(path), max_memory)
     return Grid(lower, spacing, shape), values
 
 

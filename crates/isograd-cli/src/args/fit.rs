@@ -6,7 +6,9 @@ use clap::{Args, ValueEnum};
 use isograd::Backend;
 use isograd_fit::Band;
 
-use super::{GridArgs, Running, STATUS, finite, name_and_value, not_negative, positive};
+use super::{
+    GridArgs, ReadingArgs, Running, STATUS, finite, name_and_value, not_negative, positive,
+};
 
 /// Arguments of `fit`.
 #[derive(Debug, Args)]
@@ -68,6 +70,10 @@ pub struct Fit {
     /// Arguments of the grid, in the target's unit; a field as target has its own.
     #[command(flatten)]
     pub grid: GridArgs,
+
+    /// Arguments of the inputs; columns are those of --points if it is there, otherwise of --target.
+    #[command(flatten)]
+    pub reading: ReadingArgs,
 
     /// Compare the fields up to this distance from the surface of the target, in the target's unit; auto: 8 cells
     #[arg(

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{GridArgs, MethodArgs, Running, STATUS, positive};
+use super::{GridArgs, MethodArgs, ReadingArgs, Running, STATUS, positive};
 
 /// Arguments of `gradcheck`.
 #[derive(Debug, Args)]
@@ -22,6 +22,9 @@ pub struct Gradcheck {
     /// Arguments of the method.
     #[command(flatten)]
     pub method: MethodArgs,
+    /// Arguments of the input.
+    #[command(flatten)]
+    pub reading: ReadingArgs,
 
     /// Displacement of the large step in both directions, in cells
     #[arg(long, value_name = "CELLS", default_value = "0.5", value_parser = positive,

@@ -7,7 +7,7 @@ use isograd::neighbors::Radius;
 use isograd::orient::{Method, ParityOptions};
 use isograd::{PointCloud, PointCloudError, Real, Sensors};
 
-use super::{Running, STATUS, finite, positive};
+use super::{ReadingArgs, Running, STATUS, finite, positive};
 use crate::error::Error;
 
 /// Arguments of the normals.
@@ -99,6 +99,9 @@ pub struct OrientCloud {
     /// The normals.
     #[command(flatten)]
     pub normals: OrientArgs,
+    /// Arguments of the input.
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// How to run.
     #[command(flatten)]
     pub running: Running,

@@ -2,7 +2,7 @@
 
 use isograd::{Grid, PointCloud};
 use isograd_fit::{Decay, Optimizer, Options, Points, ShapeParameters, Start, Target, Variables};
-use isograd_io::{Content, Geometry};
+use isograd_io::{Attributes, Content, Geometry};
 use isograd_shapes::{Sampling, Shape};
 
 use crate::args::{self, Method, TargetKind};
@@ -58,7 +58,8 @@ fn options(args: &args::Fit) -> Options {
 
 fn variables(args: &args::Fit) -> Result<Variables, Error> {
     if let Some(path) = &args.points {
-        let geometry = isograd_io::read_geometry(path)?;
+        let options = args.reading.options(Attributes::Sensors);
+        let geometry = options.read_geometry(path)?;
         let cloud = PointCloud::new(geometry.points).map_err(Error::input(path))?;
         let mut points = Points::new(cloud);
         if let Some(weight) = args.smoothness {
@@ -119,11 +120,15 @@ fn check_memory(args: &args::Fit, grid: &Grid<f64>) -> Result<(), Error> {
 
 fn target(args: &args::Fit, variables: &Variables) -> Result<Target, Error> {
     let path = &args.target;
+    let options = match args.points {
+        Some(_) => args.reading.memory.options(),
+        None => args.reading.options(Attributes::Sensors),
+    };
     let content = match args.target_kind {
-        TargetKind::Sdf => Content::Field(isograd_io::read_field(&args.target)?),
-        TargetKind::Mesh => Content::Geometry(isograd_io::read_mesh(&args.target)?),
-        TargetKind::Cloud => Content::Geometry(isograd_io::read_geometry(&args.target)?),
-        TargetKind::Auto => isograd_io::read(&args.target)?,
+        TargetKind::Sdf => Content::Field(options.read_field(path)?),
+        TargetKind::Mesh => Content::Geometry(options.read_mesh(path)?),
+        TargetKind::Cloud => Content::Geometry(options.read_geometry(path)?),
+        TargetKind::Auto => options.read(path)?,
     };
     let geometry = match content {
         Content::Field(field) if has_grid(args) => {

@@ -5,6 +5,7 @@ mod bad_input;
 mod fit;
 mod gradcheck;
 mod orient;
+mod reading;
 mod real_clouds;
 mod real_gradients;
 mod reconstruct;
