@@ -44,7 +44,7 @@ pub enum Command {
     /// Optimize a shape, or points, until their field matches a target
     Fit(Box<Fit>),
     /// Compare the gradients of a cloud's field with finite differences
-    Gradcheck(Gradcheck),
+    Gradcheck(Box<Gradcheck>),
     /// Describe the content of a file
     Info(Info),
 }
