@@ -21,7 +21,7 @@
 //! None. Those of the stages gather: a node is visited where the radius at hand or the largest one below the
 //! node reaches the other, so that one walk meets both `N_k` and all centers of `k`.
 
-mod choice;
+mod median;
 mod nearest;
 mod order;
 pub mod radius;

@@ -2,8 +2,7 @@
 //!
 //! # Map
 //! Points `(N, 3)` and a [`Radius`] → `R_i`: a radius common to all points, given or automatic, which grows where
-//! fewer than 8 samples are within it. The automatic one asks the same points as the CPU, and is the same but for
-//! the rounding of distances.
+//! fewer than 8 samples are within it. The automatic one is that of the CPU but for the rounding of distances.
 //!
 //! # Pullback
 //! None: every pullback holds the radii constant.
@@ -13,11 +12,11 @@ use isograd::neighbors::rule::{
     self, AUTO_NEIGHBORS, FEWEST_NEIGHBORS, FEWEST_POINTS, GROWTH_MARGIN,
 };
 use isograd::neighbors::{Error as Refused, Radius};
+use isograd_element::vector;
 
 use super::nearest::reaches;
-use super::order::gather;
 use super::{
-    BLOCK, Neighborhoods, choice, end_of_leaf, first_of_leaf, forward as sort_points, is_isolated,
+    BLOCK, Neighborhoods, end_of_leaf, first_of_leaf, forward as sort_points, is_isolated, median,
     next_leaf, with_radii,
 };
 use crate::device::{check_length, launch};
@@ -61,7 +60,7 @@ pub struct Census {
 }
 
 /// The radii of `(N, 3)` points. Waits for the device: the checks of the points, their box and the automatic radius
-/// come to the host, eleven numbers in all.
+/// come to the host, ten numbers in all.
 ///
 /// # Errors
 /// What [`isograd::neighbors::forward`] says of the same points; [`crate::Error::Length`] where they are not whole;
@@ -80,7 +79,7 @@ pub fn forward<R: Runtime, T: Scalar>(
     let bounds = bounds(device, points)?;
     rule::check_extent(n, bounds)?;
     let sorted = sort_points(device, points, &zeros(device, n)?)?;
-    let automatic = automatic(device, points, &sorted, bounds)?;
+    let automatic = automatic(device, &sorted, bounds)?;
     let common = rule::common(radius, automatic)?;
     let each = grow(device, &sorted, common)?;
     Ok(Radii {
@@ -137,22 +136,17 @@ pub(crate) fn bounds<R: Runtime, T: Scalar>(
 
 fn automatic<R: Runtime, T: Scalar>(
     device: &Device<R>,
-    points: &Buffer<T>,
     neighborhoods: &Neighborhoods<T>,
     bounds: [[T; 3]; 2],
 ) -> Result<T, crate::Error> {
     let n = neighborhoods.len();
-    let coordinates = bounds.as_flattened().iter();
-    let largest = coordinates.fold(0.0, |most: f64, &x| most.max(isograd::Real::f64(x).abs()));
-    let chosen = choice::choose(device, points, largest)?;
-    let asked = gather(device, points, &chosen, 3)?;
-    let squares = reaches(device, neighborhoods, &asked, AUTO_NEIGHBORS.min(n))?;
-    let found: Buffer<T> = device.empty(2)?;
-    launch!(device, squares.len(), BLOCK => find_median<T>(squares, found));
-    let found = device.download(&found)?;
-    let [positive, median] = [0, 1].map(|k| isograd::Real::f64(found[k]));
+    let points = &neighborhoods.points;
+    let squares = reaches(device, neighborhoods, points, AUTO_NEIGHBORS.min(n))?;
+    let [low, high] = bounds.map(vector::to_f64);
+    let largest = vector::norm_squared(vector::sub(high, low));
+    let square = isograd::Real::f64(median::of_positive(device, &squares, largest)?);
     // The root of a number in single precision, taken in double, rounds to the same one.
-    let median = (positive > 0.0).then(|| <T as isograd::Real>::of(median.sqrt()));
+    let median = (square > 0.0).then(|| <T as isograd::Real>::of(square.sqrt()));
     Ok(rule::automatic(median, n, bounds))
 }
 
@@ -181,31 +175,6 @@ fn flag_not_finite<F: Float>(points: &Array<F>, bad: &mut Array<u32>) {
     if ABSOLUTE_POS < bad.len() {
         let finite = Vector3::<F>::at(points, ABSOLUTE_POS).is_finite();
         bad[ABSOLUTE_POS] = select(finite, 0u32, 1u32);
-    }
-}
-
-/// How many of a few numbers are positive, and the median of those: the upper one of two.
-#[cube(launch)]
-fn find_median<F: Float>(numbers: &Array<F>, found: &mut Array<F>) {
-    if ABSOLUTE_POS < numbers.len() {
-        let own = numbers[ABSOLUTE_POS];
-        let mut positive = 0u32.runtime();
-        let mut rank = 0u32.runtime();
-        for i in 0..numbers.len() {
-            let other = numbers[i];
-            if other > F::new(0.0) {
-                positive += 1u32;
-                if other < own || (other == own && i < ABSOLUTE_POS) {
-                    rank += 1u32;
-                }
-            }
-        }
-        if own > F::new(0.0) && rank == positive / 2u32 {
-            found[1] = own;
-        }
-        if ABSOLUTE_POS == 0 {
-            found[0] = F::cast_from(positive);
-        }
     }
 }
 

@@ -37,7 +37,7 @@ fn radii_are_those_of_the_cpu() {
     in_each_number!(check_radii);
 }
 
-/// More than 1024 points, of which the automatic radius asks some, and fewer.
+/// Even and uneven clouds, and heaps of equal points.
 fn check_radii<R: Runtime, T: Scalar>(device: &Device<R>) {
     let mut all: Vec<(&str, Vec<[T; 3]>)> = clouds::<T>()
         .into_iter()

@@ -1,6 +1,6 @@
 //! Points sorted into small cells: radius and nearest queries.
 
-use std::cmp::Ordering::Equal;
+use std::cmp::Ordering;
 use std::ops::Range;
 
 use crate::Real;
@@ -44,7 +44,7 @@ struct Entry<T> {
 /// The box round the points of a subtree, and the least input index among them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node<T> {
-    low: [T; 3],
+    pub(super) low: [T; 3],
     high: [T; 3],
     pub(super) least: u32,
 }
@@ -190,6 +190,17 @@ impl<T: Real> CellIndex<T> {
         }
     }
 
+    /// The sorted positions in an order that does not depend on that of the input, except for equal points: cell by cell,
+    /// and by coordinates within each.
+    pub(crate) fn positions_by_place(&self, out: &mut Vec<u32>) {
+        out.clear();
+        out.extend(0..self.len() as u32);
+        self.walk(&mut |_| true, &mut |cell| {
+            let point = |position: &u32| self.point(*position as usize);
+            out[cell].sort_by(|a, b| compare_points(point(a), point(b)));
+        });
+    }
+
     /// Number of points.
     pub fn len(&self) -> usize {
         self.order.len()
@@ -287,6 +298,12 @@ impl<T: Real> CellIndex<T> {
     }
 }
 
+/// Order of two finite points by their first coordinate, then the second, then the third.
+#[inline(always)]
+pub(super) fn compare_points<T: Real>(a: [T; 3], b: [T; 3]) -> Ordering {
+    a.partial_cmp(&b).unwrap_or(Ordering::Equal)
+}
+
 /// Sorts `entries` into the order of the cells, and writes the nodes of their subtree.
 fn sort_into_cells<T: Real>(entries: &mut [Entry<T>], nodes: &mut [Node<T>], levels: u32) {
     let Some((node, below)) = nodes.split_first_mut() else {
@@ -299,10 +316,11 @@ fn sort_into_cells<T: Real>(entries: &mut [Entry<T>], nodes: &mut [Node<T>], lev
     }
     let axis = node.longest_axis();
     let middle = entries.len() / 2;
-    // Equal coordinates are told apart by index: the two halves are sets that no algorithm can change.
+    // Equal coordinates are told apart by the others, and equal points by index: the two halves are sets that neither
+    // the order of the points nor the algorithm can change.
+    let key = |entry: &Entry<T>| [0, 1, 2].map(|a| entry.point[(axis + a) % 3]);
     entries.select_nth_unstable_by(middle, |a, b| {
-        let along = a.point[axis].partial_cmp(&b.point[axis]);
-        along.unwrap_or(Equal).then(a.index.cmp(&b.index))
+        compare_points(key(a), key(b)).then(a.index.cmp(&b.index))
     });
     let parallel = entries.len() > TASK;
     let (left, right) = entries.split_at_mut(middle);

@@ -16,7 +16,8 @@
 //! those pullbacks share, sums over all centers that have a point as a neighbor, is in `gather.rs`.
 //!
 //! # Not differentiable
-//! A sample that enters or leaves a neighborhood, and the choice of the radius. `j ∈ N_i` and
+//! A sample that enters or leaves a neighborhood, and the choice of the radius (the automatic one is continuous in the
+//! points; no pullback follows it). `j ∈ N_i` and
 //! `i ∈ N_j` are the same where both radii are the common one, not where one has grown.
 
 mod candidates;
@@ -25,6 +26,8 @@ mod cells;
 mod census;
 mod gather;
 mod nearest;
+#[cfg(test)]
+mod order_tests;
 mod radius;
 pub mod rule;
 #[cfg(test)]

@@ -1,28 +1,32 @@
 //! The nearest points of a place.
 
-use std::cmp::Ordering::Equal;
+use std::cmp::Ordering;
 
-use super::cell_index::{CellIndex, Place, distance_squared};
+use super::cell_index::{CellIndex, Node, Place, compare_points, distance_squared};
 use crate::Real;
 
 impl<T: Real> CellIndex<T> {
-    /// The `k` points nearest to `query` as `(input index, distance²)`, nearest first, and the lower
-    /// index first among equals; all points where there are fewer than `k`. Includes the point itself
-    /// where `query` is one of the points. Exact. Takes `O(log N)` for a query near the points, in a
-    /// cluster or far outside; only where nearly all points are equally far (the center of a sphere) does
-    /// it have to look at most of them.
+    /// The `k` points nearest to `query` as `(input index, distance²)`, nearest first; of equally distant ones that with
+    /// the lower coordinates first (x, then y, then z), of equal ones that with the lower index; all points where
+    /// there are fewer than `k`. Includes the point itself where `query` is one of the points. Exact. Takes `O(log N)` for
+    /// a query near the points, in a cluster or far outside; only where nearly all points are equally far (the center of
+    /// a sphere) does it have to look at most of them.
     pub fn nearest(&self, query: [T; 3], k: usize, out: &mut Vec<(u32, T)>) {
         out.clear();
         if k > 0 && !self.is_empty() {
             self.nearest_below(self.root(), query, k, out);
         }
+        let order = self.order();
+        out.iter_mut()
+            .for_each(|(found, _)| *found = order[*found as usize]);
     }
 
+    /// Like [`Self::nearest`], with sorted positions in the place of input indices.
     fn nearest_below(&self, at: Place, query: [T; 3], k: usize, out: &mut Vec<(u32, T)>) {
         if at.levels == 0 {
             for position in at.start..at.end {
                 let d2 = distance_squared(self.point(position), query);
-                insert_nearest((self.order()[position], d2), k, out);
+                self.insert_nearest((position as u32, d2), k, out);
             }
             return;
         }
@@ -34,9 +38,50 @@ impl<T: Real> CellIndex<T> {
             order.swap(0, 1);
         }
         for (child, d2) in order {
-            if may_enter((self.nodes[child.node].least, d2), k, out) {
+            // No point of the box comes before its low corner.
+            let Node { low, least, .. } = self.nodes[child.node];
+            if self.may_enter(
+                Near {
+                    d2,
+                    point: low,
+                    index: least,
+                },
+                k,
+                out,
+            ) {
                 self.nearest_below(child, query, k, out);
             }
+        }
+    }
+
+    /// Whether something comes before the last of the `k` nearest found so far.
+    #[inline(always)]
+    fn may_enter(&self, near: Near<T>, k: usize, nearest: &[(u32, T)]) -> bool {
+        match nearest.last() {
+            Some(&last) if nearest.len() >= k => near.comes_before(|| self.near(last), last.1),
+            _ => true,
+        }
+    }
+
+    /// Puts `found`, a sorted position and its squared distance, where it belongs among the `k` nearest so far.
+    #[inline(always)]
+    fn insert_nearest(&self, found: (u32, T), k: usize, nearest: &mut Vec<(u32, T)>) {
+        let near = self.near(found);
+        if self.may_enter(near, k, nearest) {
+            nearest.truncate(k - 1);
+            let is_before = |&other: &(u32, T)| self.near(other).comes_before(|| near, near.d2);
+            let place = nearest.partition_point(is_before);
+            nearest.insert(place, found);
+        }
+    }
+
+    #[inline(always)]
+    fn near(&self, (position, d2): (u32, T)) -> Near<T> {
+        let position = position as usize;
+        Near {
+            d2,
+            point: self.point(position),
+            index: self.order()[position],
         }
     }
 
@@ -81,30 +126,27 @@ impl<T: Real> CellIndex<T> {
 
 /// The `k`-th smallest of the numbers (at least `k` of them, none NaN).
 fn smallest<T: Real>(numbers: &mut [T], k: usize) -> T {
-    let order = |a: &T, b: &T| a.partial_cmp(b).unwrap_or(Equal);
+    let order = |a: &T, b: &T| a.partial_cmp(b).unwrap_or(Ordering::Equal);
     *numbers.select_nth_unstable_by(k - 1, order).1
 }
 
-/// Whether `(index, distance²)` comes before the last of the `k` nearest found so far.
-#[inline(always)]
-fn may_enter<T: Real>((index, d2): (u32, T), k: usize, nearest: &[(u32, T)]) -> bool {
-    match nearest.last() {
-        Some(&last) if nearest.len() >= k => comes_before((index, d2), last),
-        _ => true,
-    }
+/// A point, and its squared distance from the query.
+#[derive(Clone, Copy)]
+struct Near<T> {
+    d2: T,
+    point: [T; 3],
+    index: u32,
 }
 
-#[inline(always)]
-fn comes_before<T: Real>(a: (u32, T), b: (u32, T)) -> bool {
-    a.1 < b.1 || (a.1 == b.1 && a.0 < b.0)
-}
-
-/// Puts `found` where it belongs among the `k` nearest found so far.
-#[inline(always)]
-fn insert_nearest<T: Real>(found: (u32, T), k: usize, nearest: &mut Vec<(u32, T)>) {
-    if may_enter(found, k, nearest) {
-        nearest.truncate(k - 1);
-        let place = nearest.partition_point(|&other| comes_before(other, found));
-        nearest.insert(place, found);
+impl<T: Real> Near<T> {
+    /// Whether this point is nearer than another one, whose squared distance is `d2`, or comes before it among equals.
+    #[inline(always)]
+    fn comes_before(self, other: impl FnOnce() -> Self, d2: T) -> bool {
+        if self.d2 != d2 {
+            return self.d2 < d2;
+        }
+        let other = other();
+        let by_place = compare_points(self.point, other.point);
+        by_place.then(self.index.cmp(&other.index)) == Ordering::Less
     }
 }

@@ -6,9 +6,7 @@ use super::candidates::Candidates;
 use super::cell_index::CellIndex;
 use super::cells::Search;
 use super::census::Census;
-use super::rule::{
-    self, AUTO_NEIGHBORS, AUTO_SAMPLES, FEWEST_NEIGHBORS, FEWEST_POINTS, GROWTH_MARGIN,
-};
+use super::rule::{self, AUTO_NEIGHBORS, FEWEST_NEIGHBORS, FEWEST_POINTS, GROWTH_MARGIN};
 use crate::{Real, vector};
 
 /// Share of a neighborhood whose own radius must reach back to the sample, or the sample is isolated.
@@ -17,8 +15,9 @@ const SMALLEST_MUTUAL_SHARE: f64 = 0.125;
 /// How large a neighborhood is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Radius {
-    /// 1.001 times the median, over a fixed choice of points, of the distance to the 24th sample: half the
-    /// points have more neighbors than that, half fewer.
+    /// 1.001 times the median, over all points, of the distance to the 24th sample: half the points have more
+    /// neighbors than that, half fewer. Independent of the order of the points, and continuous in them unless 24 come to
+    /// lie in one place.
     #[default]
     Auto,
     /// This length, in the unit of the points.
@@ -216,7 +215,7 @@ pub(crate) fn forward_with<T: Real, U: Copy + Default + Send + Sync>(
     check(points)?;
     out.index.rebuild(points);
     check_extent(&out.index)?;
-    let automatic = automatic_radius(&out.index);
+    let automatic = automatic_radius(&out.index, &mut out.crowd);
     out.spacing = rule::spacing(automatic, points.len());
     out.rule = radius;
     out.common_radius = rule::common(radius, automatic)?;
@@ -318,22 +317,21 @@ fn check_extent<T: Real>(index: &CellIndex<T>) -> Result<(), Error> {
     rule::check_extent(index.len(), index.bounds().into())
 }
 
-/// By the median, over a fixed stride of points, of the distance to the 24th sample.
-fn automatic_radius<T: Real>(index: &CellIndex<T>) -> T {
+/// By the median over all points of the distance to the 24th sample; `squares` is scratch.
+fn automatic_radius<T: Real>(index: &CellIndex<T>, squares: &mut Vec<T>) -> T {
     let n = index.len();
-    let stride = n.div_ceil(AUTO_SAMPLES);
-    let mut distances: Vec<T> = (0..n.div_ceil(stride))
-        .into_par_iter()
-        .map_init(Vec::new, |distances, sample| {
-            let point = index.point(sample * stride);
-            index.reach_squared(point, AUTO_NEIGHBORS, distances).sqrt()
-        })
-        .filter(|&distance| distance > T::zero())
-        .collect();
-    let middle = distances.len() / 2;
-    let median = (!distances.is_empty()).then(|| {
+    let reach = |distances: &mut Vec<T>, position: usize| {
+        index.reach_squared(index.point(position), AUTO_NEIGHBORS, distances)
+    };
+    let positions = (0..n).into_par_iter();
+    positions
+        .map_init(Vec::new, reach)
+        .collect_into_vec(squares);
+    squares.retain(|&square| square > T::zero());
+    let middle = squares.len() / 2;
+    let median = (!squares.is_empty()).then(|| {
         let order = |a: &T, b: &T| a.f64().total_cmp(&b.f64());
-        *distances.select_nth_unstable_by(middle, order).1
+        squares.select_nth_unstable_by(middle, order).1.sqrt()
     });
     rule::automatic(median, n, index.bounds().into())
 }

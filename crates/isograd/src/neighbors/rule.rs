@@ -20,11 +20,8 @@ pub const AUTO_NEIGHBORS: usize = 24;
 /// another, and the least motion would change their neighborhoods.
 pub const AUTO_MARGIN: f64 = 1.001;
 
-/// Most points that are asked for the automatic radius.
-pub const AUTO_SAMPLES: usize = 1024;
-
-/// The automatic radius, where `median` is that of the distances to the 24th sample. Points on which 24 samples lie
-/// have no say; where there are only such, there is no median, and the samples are spread evenly over the extent
+/// The automatic radius, where `median` is that over all points of the distance to the 24th sample. Points on which 24
+/// samples lie do not count; where there are only such, there is no median, and the samples are spread evenly over the extent
 /// instead. `bounds` are the low and the high corner of the box round all `points`.
 pub fn automatic<T: Real>(median: Option<T>, points: usize, bounds: [[T; 3]; 2]) -> T {
     let [low, high] = bounds;

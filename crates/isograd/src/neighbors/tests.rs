@@ -20,7 +20,7 @@ impl Random {
         (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    fn point(&mut self, scale: f64) -> [f64; 3] {
+    pub(super) fn point(&mut self, scale: f64) -> [f64; 3] {
         [0; 3].map(|_| scale * self.uniform())
     }
 }
@@ -108,12 +108,17 @@ fn distance_squared<T: Real>(a: [T; 3], b: [T; 3]) -> T {
     d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
 }
 
-/// All points by `(distance², index)`.
+/// All points by `(distance², coordinates, index)`.
 fn by_distance<T: Real>(points: &[[T; 3]], query: [T; 3]) -> Vec<(u32, T)> {
     let mut all: Vec<_> = (0u32..)
         .zip(points.iter().map(|&p| distance_squared(p, query)))
         .collect();
-    all.sort_by(|a, b| a.1.f64().total_cmp(&b.1.f64()).then(a.0.cmp(&b.0)));
+    let place = |&(i, _): &(u32, T)| points[i as usize];
+    all.sort_by(|a, b| {
+        let by_distance = a.1.f64().total_cmp(&b.1.f64());
+        let by_place = place(a).partial_cmp(&place(b)).expect("finite points");
+        by_distance.then(by_place).then(a.0.cmp(&b.0))
+    });
     all
 }
 

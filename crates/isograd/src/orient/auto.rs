@@ -8,13 +8,15 @@ use super::evidence::{self, of_view};
 use super::fill::Fill;
 use super::graph::Graph;
 use super::signs::{Interpretation, Place, Signs, Verdict};
+use super::sites::Sites;
 use crate::Real;
 use crate::neighbors::Neighborhoods;
 use crate::vector;
 
-/// Scratch of the automatic method; all in sorted order.
+/// Scratch of the automatic method; all in the order of the sites.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Auto {
+    sites: Sites,
     graph: Graph,
     clusters: Clusters,
     fill: Fill,
@@ -39,16 +41,19 @@ struct Evidence {
     views: Vec<f32>,
 }
 
-/// Positions of the points, in sorted order.
-struct Sorted<'a, T>(&'a Neighborhoods<T>);
+/// Positions of the points, in the order of the sites.
+struct Places<'a, T> {
+    neighborhoods: &'a Neighborhoods<T>,
+    sites: &'a Sites,
+}
 
-impl<T: Real> Place for Sorted<'_, T> {
+impl<T: Real> Place for Places<'_, T> {
     fn user(&self, p: usize) -> [f64; 3] {
-        vector::to_f64(self.0.index.point(p))
+        vector::to_f64(self.neighborhoods.index.point(self.sites.position(p)))
     }
 
     fn spacing(&self) -> f64 {
-        self.0.spacing().f64()
+        self.neighborhoods.spacing().f64()
     }
 }
 
@@ -61,14 +66,19 @@ impl Auto {
         neighborhoods: &Neighborhoods<T>,
         views: Option<&[f32]>,
     ) {
-        let place = Sorted(neighborhoods);
-        self.graph.build(axes, neighborhoods);
+        let mut sites = std::mem::take(&mut self.sites);
+        sites.find(neighborhoods);
+        let place = Places {
+            neighborhoods,
+            sites: &sites,
+        };
+        self.graph.build(axes, neighborhoods, &sites);
         self.clusters.find(&self.graph, |p| place.user(p));
         self.collect(&place);
         let of_sensors = &mut self.evidence.views;
         of_sensors.clear();
         if let Some(views) = views {
-            let order = neighborhoods.index.order().iter();
+            let order = sites.order().iter();
             of_sensors.extend(order.map(|&i| of_view(views[i as usize])));
         }
         let (graph, observed, next) = (&self.graph, &self.evidence, &mut self.next);
@@ -86,11 +96,13 @@ impl Auto {
                 graph.relax(evidence, belief, next);
             },
         );
+        self.sites = sites;
     }
 
-    /// The sign of the point at a sorted position.
-    pub(super) fn verdict(&self, p: usize) -> Verdict {
-        self.signs.verdict(p)
+    /// Input index and sign of every point.
+    pub(super) fn verdicts(&self) -> impl Iterator<Item = (usize, Verdict)> {
+        let order = self.sites.order().iter().enumerate();
+        order.map(|(p, &i)| (i as usize, self.signs.verdict(p)))
     }
 
     /// Collects the evidence of the fills and of the sheets.

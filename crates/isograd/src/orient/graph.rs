@@ -11,18 +11,18 @@ use rayon::prelude::*;
 
 pub use super::coupling::NEIGHBORS;
 use super::coupling::{self, RING, ROUNDS};
+use super::sites::Sites;
 use super::{Axes, sheet};
 use crate::neighbors::Neighborhoods;
 use crate::normals::Plane;
 use crate::parallel::CHUNK;
 use crate::{Real, vector};
 
-/// Neighbors, axes and couplings, all in the sorted order of the neighbor index
-/// ([`CellIndex::order`](crate::neighbors::CellIndex::order)); lengths are in sample spacings
+/// Neighbors, axes and couplings, all in the order of the [`Sites`]; lengths are in sample spacings
 /// ([`Neighborhoods::spacing`]) of the whole cloud, so that single precision serves any unit.
 #[derive(Clone, Debug, Default)]
 pub struct Graph {
-    /// `(N, 16)` sorted positions of the nearest other samples, nearest first; where there are too few, the point
+    /// `(N, 16)` sites of the nearest other samples, nearest first; where there are too few, the point
     /// itself.
     pub near: Vec<[u32; NEIGHBORS]>,
     /// `(N, 16, 3)` offset to each of them, in spacings.
@@ -53,9 +53,14 @@ impl Graph {
     ///
     /// # Panics
     /// There are fewer axes than points.
-    pub fn build<T: Real>(&mut self, axes: &Axes<'_, T>, neighborhoods: &Neighborhoods<T>) {
+    pub fn build<T: Real>(
+        &mut self,
+        axes: &Axes<'_, T>,
+        neighborhoods: &Neighborhoods<T>,
+        sites: &Sites,
+    ) {
         let n = neighborhoods.index.len();
-        self.take_axes(axes, neighborhoods);
+        self.take_axes(axes, neighborhoods, sites);
         self.near.resize(n, [0; NEIGHBORS]);
         self.offset.resize(n, [[0.0; 3]; NEIGHBORS]);
         self.coupling.resize(n, [0.0; NEIGHBORS]);
@@ -67,15 +72,20 @@ impl Graph {
         ] {
             lengths.resize(n, 0.0);
         }
-        self.find_neighbors(neighborhoods);
+        self.find_neighbors(neighborhoods, sites);
         self.find_sheets();
         self.measure();
         self.couple();
         self.measure_areas();
     }
 
-    fn take_axes<T: Real>(&mut self, axes: &Axes<'_, T>, neighborhoods: &Neighborhoods<T>) {
-        let order = neighborhoods.index.order();
+    fn take_axes<T: Real>(
+        &mut self,
+        axes: &Axes<'_, T>,
+        neighborhoods: &Neighborhoods<T>,
+        sites: &Sites,
+    ) {
+        let order = sites.order();
         self.axis.clear();
         self.axis.extend(order.iter().map(|&i| {
             let axis = vector::normalized(vector::to_f64(axes.normals[i as usize]));
@@ -101,8 +111,9 @@ impl Graph {
         }
     }
 
-    fn find_neighbors<T: Real>(&mut self, neighborhoods: &Neighborhoods<T>) {
-        let (index, position) = (&neighborhoods.index, neighborhoods.position());
+    fn find_neighbors<T: Real>(&mut self, neighborhoods: &Neighborhoods<T>, sites: &Sites) {
+        let index = &neighborhoods.index;
+        let place = |site: usize| index.point(sites.position(site));
         let unit = 1.0 / neighborhoods.spacing().f64();
         let near = self.near.par_chunks_mut(CHUNK);
         let offset = self.offset.par_chunks_mut(CHUNK);
@@ -111,18 +122,18 @@ impl Graph {
             .for_each_init(Vec::new, |nearest, (chunk, (near, offset))| {
                 for (k, (near, offset)) in near.iter_mut().zip(offset).enumerate() {
                     let own = chunk * CHUNK + k;
-                    let point = index.point(own);
+                    let point = place(own);
                     index.nearest(point, NEIGHBORS + 1, nearest);
                     *near = [own as u32; NEIGHBORS];
                     *offset = [[0.0; 3]; NEIGHBORS];
-                    let others = nearest.iter().map(|&(i, _)| position[i as usize]);
+                    let others = nearest.iter().map(|&(i, _)| sites.of(i));
                     for (slot, other) in others
                         .filter(|&q| q as usize != own)
                         .take(NEIGHBORS)
                         .enumerate()
                     {
                         near[slot] = other;
-                        let d = vector::sub(index.point(other as usize), point);
+                        let d = vector::sub(place(other as usize), point);
                         offset[slot] = d.map(|x| (x.f64() * unit) as f32);
                     }
                 }
@@ -235,7 +246,7 @@ impl Graph {
         });
     }
 
-    /// Evidence in −1..1 for the sign of the axis at a sorted position from a second sheet close by: the samples of
+    /// Evidence in −1..1 for the sign of the axis of a site from a second sheet close by: the samples of
     /// the other side of a thin body lie behind this one. Positive where the axis points away from them.
     ///
     /// # Panics

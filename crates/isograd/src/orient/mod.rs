@@ -79,6 +79,7 @@ mod shapes;
 mod sheet;
 mod sight;
 mod signs;
+mod sites;
 #[cfg(test)]
 mod tests;
 mod visibility;
@@ -322,8 +323,7 @@ fn automatically<T: Real>(
     out: &mut Orientation<T>,
 ) {
     auto.run(axes, neighborhoods, views);
-    for (position, &i) in neighborhoods.index.order().iter().enumerate() {
-        let i = i as usize;
+    for (i, verdict) in auto.verdicts() {
         match views
             .map(|views| views[i])
             .filter(|&view| evidence::is_clear(view))
@@ -332,7 +332,7 @@ fn automatically<T: Real>(
                 out.set_sign(i, view < 0.0, 1.0);
                 out.decided.given += 1;
             }
-            None => take_verdict(i, auto.verdict(position), out),
+            None => take_verdict(i, verdict, out),
         }
     }
     out.method = MethodUsed::Auto;
