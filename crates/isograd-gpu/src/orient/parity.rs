@@ -49,7 +49,7 @@ pub(super) fn forward<R: Runtime, T: Scalar>(
         <T as isograd::Real>::of(radius),
         <T as isograd::Real>::of(step),
         (radius / step) as u32,
-        ((diagonal + 4.0 * radius) / step) as u32 + 2,
+        options.probes(radius, step, diagonal) as u32,
     );
     let (crossings, leading): (Buffer<u32>, Buffer<u32>) =
         (device.empty(2 * n)?, device.empty(2 * n)?);
@@ -128,7 +128,8 @@ fn look_both_ways<F: Float + CubeElement>(
             }
             inside = detected;
             // A little less than the bound, so that rounding never skips a probe that differs.
-            m += max(u32::cast_from(F::new(0.999) * same / ray.step), 1u32);
+            let skipped = min(F::new(0.999) * same / ray.step, F::cast_from(ray.probes));
+            m += max(u32::cast_from(skipped), 1u32);
         }
         if inside == 1u32 {
             first = select(blocks == 0u32, m, first);

@@ -40,7 +40,8 @@ impl Lattice {
     pub fn new(low: [f64; 3], high: [f64; 3], cell: f64, budget: usize) -> Self {
         let count = |cell: f64, a: usize| ((high[a] - low[a]) / cell).ceil() + 2.0 * MARGIN;
         let budget = budget.max(FEWEST);
-        let mut cell = cell;
+        // At most 15,000 steps from the least positive number to the greatest.
+        let mut cell = cell.max(f64::MIN_POSITIVE);
         while count(cell, 0) * count(cell, 1) * count(cell, 2) > budget as f64 {
             cell *= 1.1;
         }

@@ -50,7 +50,13 @@ impl ParityOptions {
 
     /// `r_d`, where `lonely` is how far the most lonely point is from its nearest other.
     pub fn detection_radius(&self, lonely: f64) -> f64 {
-        self.gamma * 0.5 * lonely
+        (self.gamma * 0.5 * lonely).min(f64::MAX)
+    }
+
+    /// Number of probes that no ray along a unit vector exceeds, for a cloud whose box has this diagonal: at most 1e6,
+    /// and 4 for each `Δs` in `r_d`.
+    pub fn probes(&self, radius: f64, step: f64, diagonal: f64) -> usize {
+        (diagonal / step + 4.0 * (radius / step)) as usize + 2
     }
 
     /// `Δs` of the detection radius, for a cloud whose box has this diagonal.
@@ -58,7 +64,7 @@ impl ParityOptions {
     /// # Errors
     /// [`Error::DetectionRadius`].
     pub fn probe_step(&self, radius: f64, diagonal: f64) -> Result<f64, Error> {
-        let step = self.step * radius;
+        let step = (self.step * radius).min(f64::MAX);
         if diagonal <= MOST_PROBES * step {
             Ok(step)
         } else {
@@ -116,10 +122,12 @@ pub(super) fn forward<T: Real>(
     let radius = detection_radius(neighborhoods, options);
     let (low, high) = index.bounds();
     let (low, high) = (vector::to_f64(low), vector::to_f64(high));
-    let step = options.probe_step(radius, vector::norm(vector::sub(high, low)))?;
+    let diagonal = vector::norm(vector::sub(high, low));
+    let step = options.probe_step(radius, diagonal)?;
     let ray = Ray {
         radius,
         step,
+        probes: options.probes(radius, step, diagonal),
         low,
         high,
     };
@@ -157,6 +165,8 @@ pub(super) fn flip(along: Pattern, against: Pattern, tolerance: usize) -> bool {
 struct Ray {
     radius: f64,
     step: f64,
+    /// No ray in a direction of unit length has more probes.
+    probes: usize,
     low: [f64; 3],
     high: [f64; 3],
 }
@@ -179,8 +189,8 @@ impl Ray {
             crossings: 0,
             leading: 0,
         };
-        let (mut m, mut inside, mut blocks) = (0, true, 0usize);
-        loop {
+        let (mut m, mut inside, mut blocks) = (0usize, true, 0usize);
+        while m <= self.probes {
             let at = vector::add(start, vector::scale(direction, m as f64 * self.step));
             if !self.in_reach_of_box(at) {
                 break;
@@ -195,7 +205,8 @@ impl Ray {
             }
             blocks += usize::from(inside && !detected);
             inside = detected;
-            m += self.same_ahead(distance);
+            // A distance beyond the number type counts as infinite.
+            m = m.saturating_add(self.same_ahead(distance));
         }
         if inside {
             pattern.leading = if blocks == 0 { m } else { pattern.leading };

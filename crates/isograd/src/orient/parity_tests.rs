@@ -206,3 +206,42 @@ fn clouds_of_equal_pairs_are_refused_by_name() {
     );
     assert_eq!(outcome, Err(Error::DetectionRadius { radius: 0.0 }));
 }
+
+#[test]
+fn rays_end_whatever_the_options() {
+    // Probes so far apart that in single precision no sample has a finite distance from the second one.
+    for (gamma, step) in [(1e30, 1.0), (1e30, 0.01), (1e308, 1.0), (2.5, 1e308)] {
+        let options = ParityOptions {
+            gamma,
+            step,
+            ..ParityOptions::default()
+        };
+        let (points, normals) = sphere(200, [0.0; 3], 1.0, 5);
+        let of = |v: &[[f64; 3]]| {
+            v.iter()
+                .map(|&v| vector::of_f64::<f32>(v))
+                .collect::<Vec<_>>()
+        };
+        let (points, normals) = (of(&points), of(&normals));
+        let mut neighborhoods = Neighborhoods::default();
+        neighbors::forward(&points, Radius::Auto, &mut neighborhoods).expect("valid");
+        let mut out = Orientation::default();
+        let method = Method::Parity(options);
+        let scratch = &mut Scratch::default();
+        forward(
+            &points,
+            &normals,
+            &neighborhoods,
+            None,
+            &method,
+            scratch,
+            &mut out,
+        )
+        .expect("options in range");
+        assert!(out.normals.iter().all(|&n| vector::is_finite(n)));
+        let MethodUsed::Parity { detection_radius } = out.method else {
+            panic!("{:?}", out.method);
+        };
+        assert!(detection_radius.is_finite(), "{detection_radius}");
+    }
+}
