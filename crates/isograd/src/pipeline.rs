@@ -9,6 +9,7 @@ mod options;
 mod orienter;
 mod pullback;
 mod restore;
+mod scaling;
 mod stages;
 mod surface;
 mod text;

@@ -391,6 +391,13 @@ fn given_normals_are_pulled_back_through_their_length() {
         inner(&units, &w)
     });
     let mut bars = vec![[1.0f32; 3]; 2];
-    crate::orient::given_pullback(&[[1e-40f32, 0.0, 0.0], [f32::MAX; 3]], &mut bars);
+    let replaced = crate::orient::given_pullback(&[[1e-40f32, 0.0, 0.0], [f32::MAX; 3]], &mut bars);
     assert!(bars.iter().all(|&b| vector::is_finite(b)), "{bars:?}");
+    assert_eq!(replaced, 2);
+    let mut bars = vec![[1.0; 3]; 2];
+    let replaced =
+        crate::orient::given_pullback(&[[1e-310, 0.0, 0.0], [0.0, 1e-310, 1e-310]], &mut bars);
+    assert!(bars.iter().all(|&b| vector::is_finite(b)), "{bars:?}");
+    assert_eq!(bars[0], [0.0, f64::MAX, f64::MAX]);
+    assert_eq!(replaced, 3);
 }

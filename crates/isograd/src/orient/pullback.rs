@@ -25,20 +25,28 @@ pub(crate) fn hold<T: Real>(axes: &[[T; 3]], held: &Orientation<T>, out: &mut Or
 }
 
 /// Turns cotangents of unit normals into those of the `given` vectors that were divided by their lengths:
-/// `(n̄_i − n_i (n_i·n̄_i)) / |g_i|`, in place. Finite for every vector that the forward map takes, as far as
-/// the number type holds it.
-pub fn given_pullback<T: Real>(given: &[[T; 3]], bars: &mut [[T; 3]]) {
-    bars.par_iter_mut().zip(given).for_each(|(bar, &g)| {
+/// `(n̄_i − n_i (n_i·n̄_i)) / |g_i|`, in place. Finite for every vector that the forward map takes: returns how many
+/// numbers are larger than the type can hold, and were replaced by the largest.
+pub fn given_pullback<T: Real>(given: &[[T; 3]], bars: &mut [[T; 3]]) -> usize {
+    let most = T::max_value().f64();
+    let pull = |(bar, &g): (&mut [T; 3], &[T; 3])| {
         let (g, n_bar) = (to_f64(g), to_f64(*bar));
         let Some(n) = normalized(g) else {
             *bar = [T::zero(); 3];
-            return;
+            return 0;
         };
         let tangential = sub(n_bar, scale(n, dot(n, n_bar)));
-        let most = T::max_value().f64();
-        // A vector so short that its square is 0 in double precision still has a length.
+        // A vector so short that its square is 0 in double precision still has a length, and so has one so short that
+        // one over it is not finite.
         let largest = g.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-        let length = largest * norm(scale(g, 1.0 / largest));
-        *bar = tangential.map(|x| T::of((x / length).clamp(-most, most)));
-    });
+        let inverse = 1.0 / largest;
+        let length = match inverse.is_finite() {
+            true => largest * norm(scale(g, inverse)),
+            false => largest * norm(g.map(|x| x / largest)),
+        };
+        let exact = tangential.map(|x| x / length);
+        *bar = exact.map(|x| T::of(x.clamp(-most, most)));
+        exact.iter().filter(|x| x.abs() > most).count()
+    };
+    bars.par_iter_mut().zip(given).map(pull).sum()
 }

@@ -54,7 +54,8 @@ pub struct CloudCotangent<T> {
     pub attributes: Vec<Vec<T>>,
     /// Of the grid, at fixed points.
     pub grid: GridCotangent<T>,
-    /// Number of derivatives that do not exist or have no bound, and were replaced by a bounded one.
+    /// Number of derivatives that do not exist, have no bound, or are larger than the number type can hold, and were
+    /// replaced by a bounded one.
     pub guarded: usize,
 }
 

@@ -49,8 +49,8 @@ impl<T: Pipeline> Reconstruction<T> {
     /// of the whole pipeline, stage by stage in reverse.
     ///
     /// Held constant, as the stages say: neighborhoods and their radii, signs of the normals, which cells are
-    /// inside, which face is closest. A derivative without a bound is replaced by a bounded one, and counted in
-    /// [`CloudCotangent::guarded`]. The result has the same bits for any number of threads.
+    /// inside, which face is closest. A derivative without a bound is replaced by a bounded one, one that the number type
+    /// cannot hold by the nearest number that it can, or 0; both are counted in [`CloudCotangent::guarded`]. The result has the same bits for any number of threads.
     ///
     /// # Errors
     /// As [`PullbackError`] lists.
@@ -87,15 +87,13 @@ impl<T: Pipeline> Reconstruction<T> {
 }
 
 impl<T: Real> Reconstruction<T> {
-    /// [`Self::pullback_into`], compiled where it is called: see [`concrete`](super::concrete).
-    pub(super) fn pull(
+    /// The pullback of cotangents that were [checked](Cotangent::check). Numbers may overflow.
+    pub(super) fn pull_plain(
         &self,
         cotangent: &Cotangent<'_, T>,
         scratch: &mut PullbackScratch<T>,
         out: &mut CloudCotangent<T>,
     ) -> Result<(), PullbackError> {
-        let cells = [&self.sdf, &self.indicator].map(|field| field.values().len());
-        cotangent.check(cells, self.mesh.vertices().len(), self.areas.len())?;
         scratch.start(cotangent, self.points.len(), self.mesh.vertices().len());
         out.guarded = 0;
         let ratio = self.indicator.grid().spacing().f64() / self.sdf.grid().spacing().f64();
@@ -295,7 +293,7 @@ impl<T: Real> Reconstruction<T> {
         out.normals.clear();
         match self.options.orient {
             Method::Given => {
-                orient::given_pullback(&self.given, normals_bar);
+                out.guarded += orient::given_pullback(&self.given, normals_bar);
                 out.normals.extend_from_slice(normals_bar);
             }
             _ => {
