@@ -88,9 +88,10 @@ pub use data::{
     PointCloud, PointCloudError, Resolution, Sensors,
 };
 pub use pipeline::{
-    CloudCotangent, Cotangent, Error, ExtensionCotangent, Options, Orienter, ParseOptionError,
-    Pipeline, PullbackError, Reconstruction, Reconstructor, RestoreError, Saved, SurfaceResolution,
-    available_memory, check_memory,
+    AvailableMemory, CloudCotangent, Cotangent, Error, ExtensionCotangent, MemoryError,
+    MemoryLimit, MemoryUse, Options, Orienter, ParseOptionError, Pipeline, PullbackError,
+    Reconstruction, Reconstructor, RestoreError, Saved, SurfaceResolution, available_memory,
+    check_memory,
 };
 pub use real::Real;
 pub use report::{JsonReport, Report, Seconds, Stage, Warning};

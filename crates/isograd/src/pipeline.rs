@@ -26,7 +26,9 @@ use crate::{Real, distance, isosurface, neighbors, normals, orient, poisson, spl
 
 pub use concrete::Pipeline;
 pub use cotangent::{CloudCotangent, Cotangent, ExtensionCotangent, PullbackError};
-pub use memory::{available_memory, check_memory};
+pub use memory::{
+    AvailableMemory, MemoryError, MemoryLimit, MemoryUse, available_memory, check_memory,
+};
 pub use options::{Error, Options};
 pub use orienter::Orienter;
 pub use restore::{RestoreError, Saved};
@@ -59,7 +61,7 @@ impl<T: Pipeline> Reconstructor<T> {
     /// A plan for clouds that lie on `grid`, at least 2 cells off its walls.
     ///
     /// # Errors
-    /// [`Error::Memory`] for a grid that needs more memory than is free, where the system tells (Linux).
+    /// [`Error::Memory`] for a grid that needs more memory than is [free](available_memory).
     /// [`Error::Smoothing`], [`Error::Screening`] and [`Error::Surface`] for what is out of range. Other options are
     /// checked by the stages that use them.
     pub fn new(grid: Grid<T>, options: Options) -> Result<Self, Error> {
@@ -131,6 +133,8 @@ impl<T: Pipeline> Reconstructor<T> {
         held: Option<&Reconstruction<T>>,
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
     ) -> Result<&Reconstruction<T>, Error> {
+        let cells = self.result.sdf.values().len();
+        memory::check_points::<T>(cloud.len(), self.result.points.capacity(), cells)?;
         self.result.start(cloud);
         for stage in Stage::ALL {
             if observer(stage).is_break() {

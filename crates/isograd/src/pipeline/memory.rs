@@ -1,38 +1,175 @@
 //! Memory that a reconstruction needs, and memory that it keeps for its pullback.
 
+#[cfg(any(target_os = "linux", test))]
+mod linux;
+
+use std::fmt;
+
 use super::{Error, Reconstruction};
 use crate::{Grid, Real};
 
 /// Largest number of values held at once for each cell: φ, χ, the closest triangles, and the scratch buffers of the
 /// Fourier transform and of the distance. Measurements are on the scaling page.
-const VALUES: f64 = 4.5;
+const CELL_VALUES: f64 = 4.5;
+/// Those of them that a plan holds from the beginning: φ and χ.
+const FIRST_CELL_VALUES: f64 = 2.0;
+/// Bytes held at once for each sample, as measured there: search trees, neighborhoods, fitted planes and evidence for
+/// signs; the first part does not depend on the number type.
+const POINT_BYTES: f64 = 500.0;
+/// The second part, in values.
+const POINT_VALUES: f64 = 75.0;
 
+const MIB: f64 = (1u64 << 20) as f64;
 const GIB: f64 = (1u64 << 30) as f64;
 
-/// Checks that the reconstruction on `grid` fits into the free memory, where the system reports it (Linux).
+/// Free memory of this process.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AvailableMemory {
+    /// Bytes.
+    pub bytes: f64,
+    /// The limit that leaves no more.
+    pub limit: MemoryLimit,
+}
+
+/// Limits of memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum MemoryLimit {
+    /// Memory of the machine that programs can get without swapping.
+    Machine,
+    /// A control group of Linux: a container, or a unit of systemd.
+    ControlGroup,
+    /// Address space of the process: `ulimit -v`.
+    AddressSpace,
+    /// Data of the process: `ulimit -d`.
+    Data,
+}
+
+impl fmt::Display for MemoryLimit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Machine => "in this machine",
+            Self::ControlGroup => "in its control group or container",
+            Self::AddressSpace => "below the limit of its address space, ulimit -v",
+            Self::Data => "below the limit of its data, ulimit -d",
+        })
+    }
+}
+
+/// Purpose of memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MemoryUse {
+    /// A grid of this shape.
+    Grid([usize; 3]),
+    /// This number of samples.
+    Points(usize),
+}
+
+/// A reconstruction needs more memory than there is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MemoryError {
+    /// Purpose of the memory.
+    pub purpose: MemoryUse,
+    /// Bytes that it needs, approximately.
+    pub needed: f64,
+    /// Free memory.
+    pub available: AvailableMemory,
+}
+
+impl std::error::Error for MemoryError {}
+
+impl fmt::Display for MemoryError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (needed, free) = (Amount(self.needed), Amount(self.available.bytes));
+        match self.purpose {
+            MemoryUse::Grid(shape) => write!(f, "a grid of {shape:?} cells needs about {needed}"),
+            MemoryUse::Points(points) => write!(f, "{points} points need about {needed}"),
+        }?;
+        write!(f, ", and {free} are free ({}); ", self.available.limit)?;
+        f.write_str(match self.purpose {
+            MemoryUse::Grid(_) => "use a lower resolution, a larger spacing or tighter bounds",
+            MemoryUse::Points(_) => "use fewer points or a lower resolution",
+        })
+    }
+}
+
+/// An amount of memory in bytes, shown in MiB or GiB.
+struct Amount(f64);
+
+impl fmt::Display for Amount {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 < GIB {
+            true => write!(f, "{:.1} MiB", self.0 / MIB),
+            false => write!(f, "{:.1} GiB", self.0 / GIB),
+        }
+    }
+}
+
+/// Checks that the reconstruction on `grid` fits into the free memory, where that is known.
 ///
 /// # Errors
 /// [`Error::Memory`].
 pub fn check_memory<T: Real>(grid: &Grid<T>) -> Result<(), Error> {
     let cells: f64 = grid.shape().iter().map(|&n| n as f64).product();
-    let needed = cells * VALUES * size_of::<T>() as f64;
-    match available_memory() {
-        Some(available) if needed > available => Err(Error::Memory {
-            shape: grid.shape(),
-            needed: needed / GIB,
-            available: available / GIB,
+    let needed = cells * CELL_VALUES * size_of::<T>() as f64;
+    Ok(check(MemoryUse::Grid(grid.shape()), needed, free)?)
+}
+
+/// Checks that the stages get memory for `points` samples and, in the first call of a plan, for what else they need on
+/// its grid. From previous calls the plan holds memory for `held` samples.
+///
+/// # Errors
+/// [`Error::Memory`].
+pub(super) fn check_points<T: Real>(points: usize, held: usize, cells: usize) -> Result<(), Error> {
+    if points <= held {
+        return Ok(());
+    }
+    let value = size_of::<T>() as f64;
+    let cells = if held == 0 { cells as f64 } else { 0.0 };
+    let needed = (points - held) as f64 * (POINT_BYTES + POINT_VALUES * value)
+        + cells * (CELL_VALUES - FIRST_CELL_VALUES) * value;
+    Ok(check(MemoryUse::Points(points), needed, free)?)
+}
+
+fn check(
+    purpose: MemoryUse,
+    needed: f64,
+    free: impl FnOnce() -> Option<AvailableMemory>,
+) -> Result<(), MemoryError> {
+    match free() {
+        Some(available) if needed > available.bytes => Err(MemoryError {
+            purpose,
+            needed,
+            available,
         }),
         _ => Ok(()),
     }
 }
 
-/// Free memory in bytes on Linux; `None` elsewhere.
+/// Free memory of this process in bytes: on Linux the least of what the machine, the control groups (versions 1 and 2)
+/// and the limits of the process leave; on macOS and Windows that of the machine; `None` elsewhere.
 pub fn available_memory() -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let mut lines = text.lines();
-    let line = lines.find(|line| line.starts_with("MemAvailable:"))?;
-    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kib * 1024.0)
+    free().map(|available| available.bytes)
+}
+
+#[cfg(target_os = "linux")]
+fn free() -> Option<AvailableMemory> {
+    linux::free(std::path::Path::new("/"))
+}
+
+#[cfg(any(target_os = "macos", windows))]
+fn free() -> Option<AvailableMemory> {
+    let mut system = sysinfo::System::new();
+    system.refresh_memory();
+    Some(AvailableMemory {
+        bytes: system.available_memory() as f64,
+        limit: MemoryLimit::Machine,
+    })
+}
+
+#[cfg(not(any(target_os = "linux", target_os = "macos", windows)))]
+fn free() -> Option<AvailableMemory> {
+    None
 }
 
 impl<T: Real> Reconstruction<T> {
@@ -85,5 +222,39 @@ mod tests {
         let text = error.to_string();
         assert!(text.contains("needs about 137.3 GiB"), "{text}");
         assert!(text.contains("lower resolution"), "{text}");
+    }
+
+    #[test]
+    fn the_error_names_the_purpose_and_the_limit() {
+        let text = |purpose, limit| {
+            let available = AvailableMemory {
+                bytes: 3.0 * MIB,
+                limit,
+            };
+            let enough = check(purpose, 2.9 * MIB, || Some(available));
+            assert_eq!(enough, Ok(()));
+            let error = check(purpose, 2.5 * GIB, || Some(available));
+            error.expect_err("too little").to_string()
+        };
+        assert_eq!(
+            text(MemoryUse::Points(7), MemoryLimit::ControlGroup),
+            "7 points need about 2.5 GiB, and 3.0 MiB are free (in its control group or container); use fewer points or a lower resolution"
+        );
+        assert_eq!(
+            text(MemoryUse::Grid([2, 3, 4]), MemoryLimit::AddressSpace),
+            "a grid of [2, 3, 4] cells needs about 2.5 GiB, and 3.0 MiB are free (below the limit of its address space, ulimit -v); use a lower resolution, a larger spacing or tighter bounds"
+        );
+        assert_eq!(check(MemoryUse::Points(7), f64::MAX, || None), Ok(()));
+    }
+
+    #[test]
+    fn memory_that_a_plan_holds_is_not_asked_for_again() {
+        let points = usize::MAX >> 11;
+        if available_memory().is_some() {
+            check_points::<f32>(points, 0, 8).expect_err("more than any machine has");
+            check_points::<f32>(9, 0, points).expect_err("more than any machine has");
+        }
+        check_points::<f32>(points, points, points).expect("is there");
+        check_points::<f32>(points + 1, points, points).expect("little is missing");
     }
 }

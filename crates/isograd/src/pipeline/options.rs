@@ -1,6 +1,6 @@
 //! What to compute, and why it may fail.
 
-use super::SurfaceResolution;
+use super::{MemoryError, SurfaceResolution};
 use crate::data::GridError;
 use crate::report::Stage;
 use crate::{distance, isosurface, neighbors, orient, poisson, splat};
@@ -92,18 +92,9 @@ pub enum Error {
         /// Number of points.
         points: usize,
     },
-    /// The grid needs more memory than there is.
-    #[error(
-        "a grid of {shape:?} cells needs about {needed:.1} GiB, and {available:.1} GiB are free; use a lower resolution, a larger spacing or tighter bounds"
-    )]
-    Memory {
-        /// Cells along each axis.
-        shape: [usize; 3],
-        /// GiB.
-        needed: f64,
-        /// GiB.
-        available: f64,
-    },
+    /// The grid or the points need more memory than there is.
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
     /// Orientation.
     #[error(transparent)]
     Orient(#[from] orient::Error),

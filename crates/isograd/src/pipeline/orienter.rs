@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use super::memory::check_points;
 use super::stages::find_axes;
 use super::{Error, Pipeline, Residuals};
 use crate::Real;
@@ -53,7 +54,7 @@ impl<T: Pipeline> Orienter<T> {
     /// Outward unit normals of a cloud, and the confidence in each.
     ///
     /// # Errors
-    /// Errors of the neighborhoods and of the orientation, or [`Error::NoPlane`]; the result of the previous call is
+    /// [`Error::Memory`], errors of the neighborhoods and of the orientation, or [`Error::NoPlane`]; the result of the previous call is
     /// then lost.
     pub fn orient(&mut self, cloud: &PointCloud<T>) -> Result<&Orientation<T>, Error> {
         T::orient(self, cloud)?;
@@ -73,6 +74,7 @@ impl<T: Pipeline> Orienter<T> {
             points: cloud.len(),
             ..Report::default()
         };
+        check_points::<T>(cloud.len(), orientation.normals.capacity(), 0)?;
         let start = Instant::now();
         let is_given = self.method == Method::Given;
         find_axes(
