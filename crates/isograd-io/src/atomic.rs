@@ -1,41 +1,57 @@
 //! Atomic writing of files.
 //!
-//! A file is written under a temporary name in its own folder and renamed when it is complete; an existing
-//! file is unchanged until then. The temporary file is removed on an error, and by [`remove_unfinished`],
-//! which a program calls before it exits on Ctrl-C.
+//! A file is written under a temporary name in its own folder and renamed when it is complete and on the disk; an existing
+//! file is unchanged until then. The temporary file is removed on an error, and by [`remove_unfinished`], which a program
+//! calls before it ends early. Temporary files of processes that were killed are removed by the next write into
+//! their folder.
+
+mod temporary;
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+use std::time::Duration;
 
 use crate::error::Error;
+
+/// Links that [`resolve`] follows at most, as many as Linux does.
+const MAX_LINKS: usize = 40;
 
 /// Existing temporary files; `stopped` forbids new ones.
 struct Unfinished {
     files: Vec<PathBuf>,
+    /// Folders from which temporary files of dead processes were removed.
+    clean: Vec<PathBuf>,
     stopped: bool,
 }
 
 static UNFINISHED: Mutex<Unfinished> = Mutex::new(Unfinished {
     files: Vec::new(),
+    clean: Vec::new(),
     stopped: false,
 });
 
-static NEXT: AtomicU64 = AtomicU64::new(0);
-
-fn unfinished() -> std::sync::MutexGuard<'static, Unfinished> {
+fn unfinished() -> MutexGuard<'static, Unfinished> {
     // The list is valid even if a thread panicked while it held the lock.
-    UNFINISHED
-        .lock()
-        .unwrap_or_else(std::sync::PoisonError::into_inner)
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Removes every temporary file of this process; from now on every write fails. To be called before the
-/// process exits on Ctrl-C.
+/// process ends early: on a signal, or when no memory is left.
 pub fn remove_unfinished() {
-    let mut unfinished = unfinished();
+    // A thread that waits for memory may hold the lock for ever, and never for long otherwise.
+    let mut unfinished = (0..500).find_map(|_| match UNFINISHED.try_lock() {
+        Ok(unfinished) => Some(unfinished),
+        Err(TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),
+        Err(TryLockError::WouldBlock) => {
+            std::thread::sleep(Duration::from_millis(2));
+            None
+        }
+    });
+    let Some(unfinished) = &mut unfinished else {
+        return;
+    };
     unfinished.stopped = true;
     for file in unfinished.files.drain(..) {
         // The file may be gone already; the process exits in any case.
@@ -43,9 +59,11 @@ pub fn remove_unfinished() {
     }
 }
 
-/// Writes the output of `content` to `path`; the file is created or replaced only on success.
+/// Writes the output of `content` to `path`; the file is created or replaced only on success, when its content is on
+/// the disk.
 ///
-/// Devices and pipes (`/dev/stdout`) are written to directly; a symbolic link is followed.
+/// Devices and pipes (`/dev/stdout`) are written to directly; a symbolic link is followed, also where its target does
+/// not exist yet.
 ///
 /// # Errors
 /// [`Error::Write`].
@@ -63,6 +81,47 @@ pub fn write(
         .map_err(failed)
 }
 
+/// The file that `path` leads to, which may not exist yet: links are followed, the last one also if its target is missing.
+///
+/// # Errors
+/// A missing folder, and errors of the operating system.
+pub fn resolve(path: &Path) -> io::Result<PathBuf> {
+    let mut path = path.to_path_buf();
+    for _ in 0..MAX_LINKS {
+        match fs::canonicalize(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            found => return found,
+        }
+        let folder = fs::canonicalize(folder_of(&path))?;
+        let name = path.file_name().ok_or(io::ErrorKind::InvalidInput)?;
+        let file = folder.join(name);
+        match fs::read_link(&file) {
+            Ok(target) => path = folder.join(target),
+            Err(_) => return Ok(file),
+        }
+    }
+    Err(io::Error::other("too many symbolic links"))
+}
+
+/// The folder of a file.
+pub(crate) fn folder_of(path: &Path) -> &Path {
+    let folder = path.parent();
+    let folder = folder.filter(|folder| !folder.as_os_str().is_empty());
+    folder.unwrap_or(Path::new("."))
+}
+
+/// Removes temporary files of dead processes, once per folder.
+fn clean(folder: &Path) {
+    let mut unfinished = unfinished();
+    if unfinished.clean.iter().any(|clean| clean == folder) {
+        return;
+    }
+    unfinished.clean.push(folder.to_path_buf());
+    let own = unfinished.files.clone();
+    drop(unfinished);
+    temporary::remove_stale(folder, &own);
+}
+
 /// A file that is being written.
 pub struct Output {
     writer: BufWriter<File>,
@@ -72,29 +131,25 @@ pub struct Output {
 
 impl Output {
     fn create(path: &Path) -> io::Result<Self> {
-        // Follow links, so that their target is replaced.
-        let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
-        if let Ok(metadata) = fs::metadata(&target) {
-            if metadata.is_dir() {
-                return Err(io::ErrorKind::IsADirectory.into());
-            }
-            if !metadata.is_file() {
-                let file = OpenOptions::new().write(true).open(&target)?;
-                return Ok(Self {
-                    writer: BufWriter::new(file),
-                    rename: None,
-                });
-            }
+        match fs::metadata(path) {
+            Ok(metadata) if metadata.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
+            Ok(metadata) if !metadata.is_file() => Ok(Self {
+                writer: BufWriter::new(OpenOptions::new().write(true).open(path)?),
+                rename: None,
+            }),
+            // Links are followed, so that their target is replaced.
+            _ => Self::replacing(resolve(path)?),
         }
-        let temporary = temporary_name(&target)?;
+    }
+
+    fn replacing(target: PathBuf) -> io::Result<Self> {
+        let folder = folder_of(&target);
+        clean(folder);
         let mut unfinished = unfinished();
         if unfinished.stopped {
             return Err(io::ErrorKind::Interrupted.into());
         }
-        let file = OpenOptions::new()
-            .write(true)
-            .create_new(true)
-            .open(&temporary)?;
+        let (temporary, file) = temporary::create(folder)?;
         unfinished.files.push(temporary.clone());
         Ok(Self {
             writer: BufWriter::with_capacity(1 << 16, file),
@@ -102,7 +157,7 @@ impl Output {
         })
     }
 
-    /// Moves the file to its final path.
+    /// Moves the file to its final path, once its content is on the disk.
     fn commit(mut self) -> io::Result<()> {
         self.writer.flush()?;
         let Some((temporary, target)) = &self.rename else {
@@ -111,6 +166,7 @@ impl Output {
         if let Ok(old) = fs::metadata(target) {
             fs::set_permissions(temporary, old.permissions())?;
         }
+        sync(self.writer.get_ref())?;
         // The lock is held during the rename: a file is either finished or removed.
         let mut unfinished = unfinished();
         if unfinished.stopped {
@@ -119,8 +175,9 @@ impl Output {
         fs::rename(temporary, target)?;
         unfinished.files.retain(|file| file != temporary);
         drop(unfinished);
+        let renamed = sync_folder(folder_of(target));
         self.rename = None;
-        Ok(())
+        renamed
     }
 }
 
@@ -144,95 +201,31 @@ impl Write for Output {
     }
 }
 
-/// A unique hidden path in the folder of `target`.
-fn temporary_name(target: &Path) -> io::Result<PathBuf> {
-    let name = target
-        .file_name()
-        .ok_or_else(|| io::Error::from(io::ErrorKind::InvalidInput))?;
-    let number = NEXT.fetch_add(1, Ordering::Relaxed);
-    let mut hidden = std::ffi::OsString::from(".");
-    hidden.push(name);
-    hidden.push(format!(".{}-{number}.tmp", std::process::id()));
-    Ok(target.with_file_name(hidden))
+/// Waits until the content of a file is on the disk, if its file system can do that.
+fn sync(file: &File) -> io::Result<()> {
+    match file.sync_all() {
+        Err(error) if is_unsupported(&error) => Ok(()),
+        result => result,
+    }
+}
+
+fn is_unsupported(error: &io::Error) -> bool {
+    use io::ErrorKind::{InvalidInput, Unsupported};
+    matches!(error.kind(), InvalidInput | Unsupported)
+}
+
+/// Waits until the names in a folder are on the disk, if it can be opened for that.
+#[cfg(unix)]
+fn sync_folder(folder: &Path) -> io::Result<()> {
+    // A folder may permit new files and no reading.
+    File::open(folder).map_or(Ok(()), |folder| sync(&folder))
+}
+
+/// Folders can't be opened as files here; the file system keeps the order of renames.
+#[cfg(not(unix))]
+fn sync_folder(_: &Path) -> io::Result<()> {
+    Ok(())
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn names(folder: &Path) -> Vec<String> {
-        let mut names: Vec<String> = fs::read_dir(folder)
-            .expect("folder")
-            .map(|entry| entry.expect("entry").file_name().to_string_lossy().into())
-            .collect();
-        names.sort();
-        names
-    }
-
-    #[test]
-    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
-        let folder = tempfile::tempdir().expect("temporary folder");
-        let path = folder.path().join("a.txt");
-        write(&path, |out| out.write_all(b"old")).expect("writes");
-        let failed = write(&path, |out| {
-            out.write_all(&[b'x'; 1 << 18])?;
-            Err(io::ErrorKind::StorageFull.into())
-        });
-        let message = failed.expect_err("fails").to_string();
-        assert!(
-            message.contains("a.txt") && message.contains("space"),
-            "{message}"
-        );
-        assert_eq!(fs::read(&path).expect("still there"), b"old");
-        assert_eq!(names(folder.path()), ["a.txt"]);
-    }
-
-    #[test]
-    fn a_finished_write_replaces_the_old_file() {
-        let folder = tempfile::tempdir().expect("temporary folder");
-        let path = folder.path().join("a.txt");
-        for content in [b"first".as_slice(), b"second"] {
-            write(&path, |out| out.write_all(content)).expect("writes");
-            assert_eq!(fs::read(&path).expect("there"), content);
-        }
-        assert_eq!(names(folder.path()), ["a.txt"]);
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn a_link_stays_a_link() {
-        let folder = tempfile::tempdir().expect("temporary folder");
-        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
-        fs::write(&file, b"old").expect("writes");
-        std::os::unix::fs::symlink(&file, &link).expect("links");
-        write(&link, |out| out.write_all(b"new")).expect("writes");
-        assert!(fs::symlink_metadata(&link).expect("there").is_symlink());
-        assert_eq!(fs::read(&file).expect("there"), b"new");
-    }
-
-    #[test]
-    fn a_missing_folder_says_what_to_do() {
-        let folder = tempfile::tempdir().expect("temporary folder");
-        let path = folder.path().join("missing/a.txt");
-        let message = write(&path, |_| Ok(())).expect_err("fails").to_string();
-        assert!(message.contains("create its folder"), "{message}");
-        assert!(names(folder.path()).is_empty());
-    }
-
-    #[cfg(target_os = "linux")]
-    #[test]
-    fn a_full_device_is_an_error_and_stays_a_device() {
-        use std::os::unix::fs::FileTypeExt;
-        let full = Path::new("/dev/full");
-        let message = write(full, |out| out.write_all(b"x"))
-            .expect_err("full")
-            .to_string();
-        assert!(message.contains("free some space"), "{message}");
-        assert!(
-            fs::metadata(full)
-                .expect("there")
-                .file_type()
-                .is_char_device()
-        );
-    }
-}
+mod tests;

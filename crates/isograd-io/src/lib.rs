@@ -28,7 +28,7 @@
 //! - No input causes a panic. Memory is bounded by the size of the file, not by the counts in its header or by the size
 //!   to which it unpacks ([`Limits`]), and so is the number of steps.
 //! - Every error names the file, the location (line, byte, element or row), the problem, and the remedy.
-//! - Writing is atomic: a file is complete or absent ([`atomic`]).
+//! - Writing is atomic: a file is complete, and on the disk, or absent ([`atomic`]).
 //! - Numbers are read in double precision, exactly, and written in their own type; numbers that are
 //!   written and read back have the same bits (except STL, which is single precision).
 #![warn(missing_docs)]
@@ -43,6 +43,7 @@ mod format;
 mod geometry;
 mod limits;
 mod lines;
+mod message;
 mod names;
 mod number;
 mod numpy;
@@ -61,6 +62,7 @@ pub use field::FieldFile;
 pub use format::Format;
 pub use geometry::Geometry;
 pub use limits::{Limits, parse_size};
+pub use message::{LONGEST_LINE, printable};
 pub use number::Dtype;
 pub use options::{Attributes, Columns, ReadOptions};
 pub use read::{Content, parse_field, parse_geometry, read, read_field, read_geometry, read_mesh};

@@ -74,11 +74,12 @@ pub fn check_output(path: &Path, extensions: &[&str]) -> Result<(), Error> {
     if path.is_dir() {
         return Err(Error::Folder { file });
     }
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    match folder.metadata() {
+    // A device or a pipe has no folder of its own.
+    if path.exists() {
+        return Ok(());
+    }
+    let target = atomic::resolve(path).and_then(|target| atomic::folder_of(&target).metadata());
+    match target {
         Ok(metadata) if metadata.is_dir() => Ok(()),
         Ok(_) => Err(Error::Write {
             file,

@@ -6,6 +6,36 @@ use std::process::Command;
 /// Set in the process that is stopped: stopping ends all writing in a process.
 const STOPPED: &str = "ISOGRAD_IO_TEST_STOPPED";
 
+/// Set to the output of the process that dies.
+const KILLED: &str = "ISOGRAD_IO_TEST_KILLED";
+
+#[test]
+fn the_next_write_removes_what_a_killed_process_has_left() {
+    if let Some(path) = std::env::var_os(KILLED) {
+        let killed = isograd_io::atomic::write(path.as_ref(), |out| {
+            out.write_all(b"half")?;
+            // Like a kill: nothing is dropped.
+            std::process::exit(9)
+        });
+        unreachable!("{killed:?}");
+    }
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = folder.path().join("a.ply");
+    let mut program = Command::new(std::env::current_exe().expect("path of this program"));
+    program.args([
+        "--exact",
+        "stopping::the_next_write_removes_what_a_killed_process_has_left",
+    ]);
+    let output = program.env(KILLED, &path).output().expect("starts");
+    assert!(!output.status.success(), "it is killed");
+    let count = || std::fs::read_dir(folder.path()).expect("folder").count();
+    assert_eq!(count(), 1, "a temporary file is left");
+    assert!(!path.exists());
+    isograd_io::atomic::write(&path, |out| out.write_all(b"new")).expect("writes");
+    assert_eq!(std::fs::read(&path).expect("there"), b"new");
+    assert_eq!(count(), 1, "the temporary file is gone");
+}
+
 #[test]
 fn stopping_removes_unfinished_files_and_keeps_existing_ones() {
     if std::env::var_os(STOPPED).is_none() {
