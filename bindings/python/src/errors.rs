@@ -12,7 +12,8 @@ pub fn value(error: impl std::fmt::Display) -> PyErr {
 
 /// The exception for a file: that of the operating system, or a `ValueError` for invalid content.
 pub fn file(error: isograd_io::Error) -> PyErr {
-    let text = error.to_string();
+    // Names and content of files may hold control characters.
+    let text = isograd_io::printable(&error.to_string());
     match error {
         isograd_io::Error::Read { source, .. } | isograd_io::Error::Write { source, .. } => {
             match source.kind() {

@@ -28,7 +28,7 @@ pub struct Cli {
 }
 
 const STATUS: &str = "Exit status: 0 done, 1 the work failed, 2 the command line is wrong, \
-130 stopped by Ctrl-C.";
+130 stopped by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP, 141 if the reader of the output went away.";
 
 /// Commands.
 #[derive(Debug, Subcommand)]
@@ -180,7 +180,7 @@ pub struct Info {
 /// Arguments of the run, which have no influence on the results.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct Running {
-    /// Number of threads [default: one per core]
+    /// Number of threads [default: one per core]; at most 16 are started, or one per core if that is more
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024),
         help_heading = "Running")]
     pub threads: Option<u32>,

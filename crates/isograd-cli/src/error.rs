@@ -4,6 +4,9 @@ use std::path::Path;
 
 use isograd_shapes::{SampleError, ShapeError};
 
+/// 128 + SIGPIPE.
+const BROKEN_PIPE: u8 = 141;
+
 /// Error of a command.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -44,7 +47,7 @@ pub enum Error {
     /// A fit failed.
     #[error(transparent)]
     Fit(#[from] isograd_fit::Error),
-    /// Ctrl-C; the state is in a checkpoint.
+    /// Ctrl-C or another signal; the state is in a checkpoint.
     #[error("stopped after epoch {epoch}; go on with --resume {file}")]
     Stopped {
         /// The last completed epoch.
@@ -71,8 +74,13 @@ pub enum Error {
         error: isograd_backend::Error,
     },
     /// The threads could not be started.
-    #[error("the threads could not be started: {0}; use fewer")]
+    #[error(
+        "the threads could not be started: {0}; use fewer (--threads N), or raise the limit of memory or processes (ulimit -v, ulimit -u)"
+    )]
     Threads(#[from] rayon::ThreadPoolBuildError),
+    /// Standard output is full, closed, or a pipe without a reader. The files are complete.
+    #[error("cannot write to standard output: {0}; redirect it to another place, or use -q")]
+    Stdout(std::io::Error),
 }
 
 impl Error {
@@ -85,16 +93,27 @@ impl Error {
         }
     }
 
-    /// 2 where the command line is wrong, 130 after Ctrl-C, else 1.
+    /// 2 where the command line is wrong, 128 and the number of the signal after a signal, of which a pipe without a
+    /// reader is one (SIGPIPE), else 1.
     pub fn status(&self) -> u8 {
         use isograd_fit::Error as Fit;
         match self {
             Self::Usage(_) | Self::Shape(_) => 2,
             Self::Fit(Fit::NoParameters | Fit::Whole { .. } | Fit::Option { .. }) => 2,
             Self::Fit(Fit::Shape(_) | Fit::NoStart { .. }) => 2,
-            Self::Stopped { .. } => crate::interrupt::STATUS as u8,
+            Self::Stopped { .. } => crate::interrupt::status(),
+            _ if self.is_broken_pipe() => BROKEN_PIPE,
             _ => 1,
         }
+    }
+
+    /// Whether nobody reads the output any more, which needs no message.
+    pub fn is_broken_pipe(&self) -> bool {
+        let source = match self {
+            Self::Stdout(source) | Self::File(isograd_io::Error::Write { source, .. }) => source,
+            _ => return false,
+        };
+        source.kind() == std::io::ErrorKind::BrokenPipe
     }
 }
 

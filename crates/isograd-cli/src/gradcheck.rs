@@ -9,8 +9,9 @@ use serde::Serialize;
 
 use crate::args;
 use crate::error::Error;
-use crate::outputs::{check_extension, write_report};
-use crate::progress::{Progress, to_stdout};
+use crate::outputs::{check_extension, check_not_input, write_report};
+use crate::progress::Progress;
+use crate::streams::to_stdout;
 
 /// Fraction of the derivative of uniform growth below which a derivative is negligible, and its ratio is not shown.
 const NEGLIGIBLE: f64 = 0.005;
@@ -27,6 +28,7 @@ pub fn run(args: &args::Gradcheck) -> Result<(), Error> {
     let file = args.cloud.display().to_string();
     if let Some(report) = &args.report {
         check_extension(report, &["json"])?;
+        check_not_input(report, &args.cloud)?;
         isograd_io::check_output(report, &["json"])?;
     }
     let options = args.reading.options(Attributes::Sensors);
@@ -55,8 +57,10 @@ pub fn run(args: &args::Gradcheck) -> Result<(), Error> {
             grid.spacing()
         ));
         to_stdout(LOSS);
-        to_stdout(&table(&check, args.step));
-        to_stdout(&verdict(&check, args.step, args.tolerance));
+        table(&check, args.step).lines().for_each(to_stdout);
+        verdict(&check, args.step, args.tolerance)
+            .lines()
+            .for_each(to_stdout);
     }
     if let Some(report) = &args.report {
         write(report, &file, &check)?;

@@ -6,7 +6,7 @@ use isograd_io::{Attributes, Content, FieldFile, Geometry};
 
 use crate::args;
 use crate::error::Error;
-use crate::progress::to_stdout;
+use crate::streams::to_stdout;
 
 /// Runs the command.
 ///

@@ -3,11 +3,13 @@
 
 mod args;
 mod backend;
+mod closed;
 mod error;
 mod fit;
 mod gradcheck;
 mod info;
 mod interrupt;
+mod memory;
 mod orient;
 mod outputs;
 mod plot;
@@ -17,42 +19,57 @@ mod reconstruct;
 mod report;
 mod resample;
 mod sample;
+mod streams;
+mod threads;
 
 use std::ffi::OsString;
 
 use clap::Parser;
-use peak_alloc::PeakAlloc;
+use isograd_io::printable;
 
 use args::{Cli, Command};
 use error::Error;
-use progress::to_stderr;
+use memory::Allocator;
+use streams::to_stderr;
 
 /// Counts allocated bytes for the peak memory in reports.
 #[global_allocator]
-static ALLOCATOR: PeakAlloc = PeakAlloc;
+static ALLOCATOR: Allocator = Allocator;
 
 /// Runs a command line, the first argument of which is the name of the program, and returns the exit status.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
-    let cli = match Cli::try_parse_from(arguments) {
+    ALLOCATOR.end_on_failure();
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
         Err(error) => {
-            // Help and version come this way too, with status 0.
-            let _ = error.print();
-            return error.exit_code().clamp(0, 255) as u8;
+            // Help and version come this way too, with status 0. An argument may be the name of a file.
+            let arguments = arguments
+                .iter()
+                .map(|text| printable(&text.to_string_lossy()));
+            let shown = Cli::try_parse_from(arguments).err();
+            streams::print_clap(shown.as_ref().unwrap_or(&error));
+            let status = error.exit_code().clamp(0, 255) as u8;
+            return streams::finish().map_or_else(report, |()| status);
         }
     };
     interrupt::handle();
-    match dispatch(&cli.command) {
-        Ok(()) => 0,
-        Err(error) => {
-            to_stderr(&format!("error: {error}"));
-            error.status()
-        }
+    let result = dispatch(&cli.command);
+    // An error of the work comes first.
+    let printed = streams::finish();
+    result.and(printed).map_or_else(report, |()| 0)
+}
+
+/// Prints an error and returns its exit status.
+fn report(error: Error) -> u8 {
+    if !error.is_broken_pipe() {
+        to_stderr(&format!("error: {error}"));
     }
+    error.status()
 }
 
 fn dispatch(command: &Command) -> Result<(), Error> {
-    start_threads(command)?;
+    threads::start(running(command).and_then(|running| running.threads))?;
     match command {
         Command::Reconstruct(args) => reconstruct::run(args),
         Command::Orient(args) => orient::run(args),
@@ -64,20 +81,14 @@ fn dispatch(command: &Command) -> Result<(), Error> {
     }
 }
 
-/// Starts the threads of `--threads`.
-fn start_threads(command: &Command) -> Result<(), Error> {
-    let running = match command {
-        Command::Reconstruct(args) => &args.running,
-        Command::Orient(args) => &args.running,
-        Command::Sample(args) => &args.running,
-        Command::Query(args) => &args.running,
-        Command::Fit(args) => &args.running,
-        Command::Gradcheck(args) => &args.running,
-        Command::Info(_) => return Ok(()),
-    };
-    if let Some(threads) = running.threads {
-        let builder = rayon::ThreadPoolBuilder::new().num_threads(threads as usize);
-        builder.build_global()?;
+fn running(command: &Command) -> Option<&args::Running> {
+    match command {
+        Command::Reconstruct(args) => Some(&args.running),
+        Command::Orient(args) => Some(&args.running),
+        Command::Sample(args) => Some(&args.running),
+        Command::Query(args) => Some(&args.running),
+        Command::Fit(args) => Some(&args.running),
+        Command::Gradcheck(args) => Some(&args.running),
+        Command::Info(_) => None,
     }
-    Ok(())
 }

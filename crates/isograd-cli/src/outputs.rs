@@ -137,9 +137,12 @@ pub fn check_extension(path: &Path, endings: &[&str]) -> Result<(), Error> {
     )))
 }
 
-/// Checks that an output is not the input.
+/// Checks that an output is not the input, under whatever name.
+///
+/// # Errors
+/// [`Error::Usage`].
 pub fn check_not_input(path: &Path, input: &Path) -> Result<(), Error> {
-    if canonical(path) != canonical(input) {
+    if canonical(path) != canonical(input) && !is_same_file(path, input) {
         return Ok(());
     }
     Err(Error::Usage(format!(
@@ -150,16 +153,21 @@ pub fn check_not_input(path: &Path, input: &Path) -> Result<(), Error> {
 
 /// The canonical path of a file, which may not exist yet.
 fn canonical(path: &Path) -> PathBuf {
-    let resolve = |path: &Path| std::fs::canonicalize(path).ok();
-    let in_folder = || {
-        let folder = path
-            .parent()
-            .filter(|folder| !folder.as_os_str().is_empty());
-        Some(resolve(folder.unwrap_or(Path::new(".")))?.join(path.file_name()?))
-    };
-    resolve(path)
-        .or_else(in_folder)
-        .unwrap_or_else(|| path.to_path_buf())
+    isograd_io::atomic::resolve(path).unwrap_or_else(|_| path.to_path_buf())
+}
+
+/// Whether two paths lead to one file, such as hard links.
+#[cfg(unix)]
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let place = |path: &Path| std::fs::metadata(path).map(|file| (file.dev(), file.ino()));
+    matches!((place(a), place(b)), (Ok(a), Ok(b)) if a == b)
+}
+
+/// Hard links are not found out here.
+#[cfg(not(unix))]
+fn is_same_file(_: &Path, _: &Path) -> bool {
+    false
 }
 
 /// Writes a report as indented JSON, atomically.

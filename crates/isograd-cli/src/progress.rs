@@ -1,21 +1,12 @@
 //! Progress of the work: a bar on a terminal, nothing in a pipe.
 
-use std::io::{self, IsTerminal, Write};
+use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::args::Running;
-
-/// Prints a line to standard output. A closed pipe (`| head`) is no error.
-pub fn to_stdout(text: &str) {
-    let _ = writeln!(io::stdout(), "{text}");
-}
-
-/// Prints a line to standard error.
-pub fn to_stderr(text: &str) {
-    let _ = writeln!(io::stderr(), "{text}");
-}
+use crate::streams::{to_stderr, to_stdout};
 
 /// A bar with one step per part of the work.
 pub struct Progress {
@@ -28,7 +19,7 @@ pub struct Progress {
 impl Progress {
     /// A bar of `steps`, drawn on standard error where that is a terminal.
     pub fn new(steps: usize, running: Running) -> Self {
-        let visible = io::stderr().is_terminal() && !running.quiet && !running.verbose;
+        let visible = std::io::stderr().is_terminal() && !running.quiet && !running.verbose;
         let target = match visible {
             true => ProgressDrawTarget::stderr(),
             false => ProgressDrawTarget::hidden(),

@@ -7,8 +7,8 @@ use isograd_io::{Attributes, CLOUD_EXTENSIONS, Content, FieldFile, Geometry};
 
 use crate::args;
 use crate::error::Error;
-use crate::outputs::check_extension;
-use crate::progress::{to_stderr, to_stdout};
+use crate::outputs::{check_extension, check_not_input};
+use crate::streams::{to_stderr, to_stdout};
 
 /// Runs the command. Everything is computed and written in double precision.
 ///
@@ -17,6 +17,9 @@ use crate::progress::{to_stderr, to_stdout};
 pub fn run(args: &args::Query) -> Result<(), Error> {
     check_extension(&args.output, CLOUD_EXTENSIONS)?;
     isograd_io::check_output(&args.output, CLOUD_EXTENSIONS)?;
+    for input in [&args.source, &args.at] {
+        check_not_input(&args.output, input)?;
+    }
     let source = args.reading.memory.options().read(&args.source)?;
     let options = args.reading.options(Attributes::Sensors);
     let points = options.read_geometry(&args.at)?.points;

@@ -7,7 +7,7 @@ use isograd_shapes::{Density, Sampling, Shape, all, by_name};
 use crate::args::{self, Layout, Precision};
 use crate::error::Error;
 use crate::outputs::check_extension;
-use crate::progress::to_stdout;
+use crate::streams::to_stdout;
 
 /// Runs the command.
 ///

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::args;
 use crate::error::Error;
-use crate::outputs::check_extension;
+use crate::outputs::{check_extension, check_not_input};
 use crate::plot;
 use crate::progress::Progress;
 
@@ -61,6 +61,11 @@ impl Folder {
             // Its folder may be the one that is created later.
             if path.parent() != Some(&args.output) {
                 isograd_io::check_output(path, &["json"])?;
+            }
+        }
+        for name in ["cloud.ply", "mesh.ply", "sdf.vti"] {
+            for input in args.points.iter().chain([&args.target]) {
+                check_not_input(&args.output.join(name), input)?;
             }
         }
         Ok(Self {

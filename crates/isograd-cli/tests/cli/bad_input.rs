@@ -185,7 +185,7 @@ fn grids_that_no_memory_holds_are_refused() {
     if isograd::available_memory().is_some_and(|free| free < 64e9) {
         sandbox
             .run("reconstruct a.ply --resolution 1600")
-            .says(1, &["a.ply", "GiB are free; use a lower resolution"]);
+            .says(1, &["a.ply", "iB are free (", "use a lower resolution"]);
     }
     sandbox
         .run("reconstruct a.ply --spacing 1e-30")
@@ -281,39 +281,5 @@ mod on_linux {
             }
             let _ = std::fs::remove_dir_all(sandbox.path("out"));
         }
-    }
-
-    #[test]
-    fn an_interrupt_while_waiting_for_input_ends_with_130() {
-        let sandbox = Sandbox::new();
-        let mut command = sandbox.command("reconstruct - -o out");
-        command
-            .stdin(Stdio::piped())
-            .stderr(Stdio::piped())
-            .stdout(Stdio::null());
-        let mut child = command.spawn().expect("starts");
-        // Kept open, or `wait` would close it, and the end of the input could be first.
-        let input = child.stdin.take();
-        std::thread::sleep(Duration::from_millis(500));
-        let kill = Command::new("kill")
-            .args(["-INT", &child.id().to_string()])
-            .output();
-        kill.expect("kill is there");
-        assert_eq!(child.wait().expect("it ends").code(), Some(130));
-        drop(input);
-        assert!(sandbox.files().is_empty());
-    }
-
-    #[test]
-    fn a_reader_that_goes_away_is_no_panic() {
-        let sandbox = Sandbox::new();
-        let script = "set -o pipefail; \"$0\" sample --list | head -1";
-        let output = Command::new("bash")
-            .args(["-c", script, env!("CARGO_BIN_EXE_isograd")])
-            .current_dir(sandbox.path("."))
-            .output()
-            .expect("bash starts");
-        assert_eq!(output.status.code(), Some(0));
-        assert!(output.stderr.is_empty());
     }
 }

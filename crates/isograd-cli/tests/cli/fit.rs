@@ -284,12 +284,12 @@ fn a_run_that_is_interrupted_keeps_its_state_and_can_go_on() {
         );
     }
     let killed = Command::new("kill")
-        .arg("-INT")
+        .arg("-TERM")
         .arg(child.id().to_string())
         .status();
     assert!(killed.expect("kill").success());
     let output = child.wait_with_output().expect("it ends");
-    assert_eq!(output.status.code(), Some(130), "{output:?}");
+    assert_eq!(output.status.code(), Some(143), "{output:?}");
     let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(stderr.contains("--resume out/checkpoint.json"), "{stderr}");
     let done = sandbox.json("out/history.json")["epochs"]

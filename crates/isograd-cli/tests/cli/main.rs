@@ -4,10 +4,16 @@ mod backend;
 mod bad_input;
 mod fit;
 mod gradcheck;
+#[cfg(target_os = "linux")]
+mod memory;
 mod orient;
+#[cfg(target_os = "linux")]
+mod process;
 mod reading;
 mod real_clouds;
 mod real_gradients;
 mod reconstruct;
 mod sandbox;
 mod tools;
+#[cfg(unix)]
+mod writing;

@@ -132,7 +132,10 @@ impl<T: Real> Reconstructor<T> {
             }
         };
         if *result.indicator.grid() != grid {
-            check_memory(&grid)?;
+            // A plan holds the memory of the last one.
+            if grid.cells() > result.indicator.values().len() {
+                check_memory(&grid)?;
+            }
             if result.indicator.grid().shape() != grid.shape() {
                 result.poisson = Arc::new(poisson::Plan::new(grid.shape()));
             }

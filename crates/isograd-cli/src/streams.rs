@@ -1,0 +1,62 @@
+//! Standard output and standard error.
+
+use std::io::{self, Write};
+use std::sync::{Mutex, PoisonError};
+
+use isograd_io::{LONGEST_LINE, printable};
+
+use crate::error::Error;
+
+/// The first error of standard output. The work goes on without it: files may still have to be written.
+static FAILED: Mutex<Option<io::Error>> = Mutex::new(None);
+
+/// Prints a line to standard output. [`finish`] returns the error if that fails.
+pub fn to_stdout(text: &str) {
+    print(|out| writeln!(out, "{}", printable(text)));
+}
+
+/// Prints a line to standard error. If that fails, there is no place to report it.
+pub fn to_stderr(text: &str) {
+    let _ = writeln!(io::stderr(), "{}", printable(text));
+}
+
+/// Prints help, the version, or the error of a command line.
+pub fn print_clap(error: &clap::Error) {
+    if !error.use_stderr() {
+        print(|_| error.print());
+        return;
+    }
+    let text = error.render().to_string();
+    match text.lines().any(|line| line.chars().count() > LONGEST_LINE) {
+        true => text.lines().for_each(to_stderr),
+        // In color, on a terminal.
+        false => drop(error.print()),
+    }
+}
+
+fn print(write: impl FnOnce(&mut io::Stdout) -> io::Result<()>) {
+    let mut failed = failed();
+    if failed.is_some() {
+        return;
+    }
+    *failed = match crate::closed::was_closed() {
+        true => Some(io::Error::other("it is closed")),
+        false => write(&mut io::stdout()).err(),
+    };
+}
+
+fn failed() -> std::sync::MutexGuard<'static, Option<io::Error>> {
+    FAILED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Completes standard output.
+///
+/// # Errors
+/// The first error since the last call.
+pub fn finish() -> Result<(), Error> {
+    let last = io::stdout().flush();
+    match failed().take().map_or(last, Err) {
+        Ok(()) => Ok(()),
+        Err(source) => Err(Error::Stdout(source)),
+    }
+}
