@@ -20,14 +20,26 @@ fn status_line(child: &Child, name: &str) -> u64 {
     u64::from_str_radix(line.expect("a line").trim(), 16).expect("a number")
 }
 
-/// A child that waits for its standard input and handles Ctrl-C.
+/// A child that waits for its standard input, and handles or ignores SIGHUP, SIGINT and SIGTERM.
 fn waiting(mut command: Command) -> Child {
+    const SIGNALS: u64 = 1 | 1 << 1 | 1 << 14;
     command.stdin(Stdio::piped()).stdout(Stdio::null());
     let child = command.stderr(Stdio::piped()).spawn().expect("starts");
-    while status_line(&child, "SigCgt:") & 2 == 0 {
+    let is_ready = |masks: [u64; 2]| (masks[0] | masks[1]) & SIGNALS == SIGNALS;
+    while !is_ready(["SigCgt:", "SigIgn:"].map(|name| status_line(&child, name))) {
         std::thread::sleep(Duration::from_millis(5));
     }
     child
+}
+
+/// The exit status of a waiting child after a signal.
+fn stopped(mut child: Child, signal: &str) -> Option<i32> {
+    // Kept open, or `wait` would close it, and the end of the input could be first.
+    let input = child.stdin.take();
+    kill(&child, signal);
+    let status = child.wait().expect("it ends");
+    drop(input);
+    status.code()
 }
 
 fn kill(child: &Child, signal: &str) {
@@ -48,9 +60,8 @@ fn bash(sandbox: &Sandbox, script: &str) -> Run {
 fn each_signal_ends_with_128_and_its_number() {
     let sandbox = Sandbox::new();
     for (signal, status) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
-        let mut child = waiting(sandbox.command("reconstruct - -o out"));
-        kill(&child, signal);
-        assert_eq!(child.wait().expect("it ends").code(), Some(status));
+        let child = waiting(sandbox.command("reconstruct - -o out"));
+        assert_eq!(stopped(child, signal), Some(status));
     }
     assert!(sandbox.files().is_empty());
 }
@@ -61,12 +72,11 @@ fn a_signal_that_was_ignored_at_the_start_stays_ignored() {
     let mut command = Command::new("bash");
     let script = "trap '' HUP; exec \"$0\" reconstruct -";
     command.args(["-c", script, env!("CARGO_BIN_EXE_isograd")]);
-    let mut child = waiting(command);
+    let child = waiting(command);
     assert_eq!(status_line(&child, "SigIgn:") & 1, 1);
     assert_eq!(status_line(&child, "SigCgt:") & 1, 0);
     kill(&child, "-HUP");
-    kill(&child, "-TERM");
-    assert_eq!(child.wait().expect("it ends").code(), Some(143));
+    assert_eq!(stopped(child, "-TERM"), Some(143));
     assert!(sandbox.files().is_empty());
 }
 
@@ -177,7 +187,7 @@ fn lines_are_cut_at_500_characters() {
 #[test]
 fn no_more_threads_are_started_than_are_useful() {
     let sandbox = Sandbox::new();
-    let mut child = waiting(sandbox.command("reconstruct - --threads 1024"));
+    let child = waiting(sandbox.command("reconstruct - --threads 1024"));
     let threads = || {
         let tasks = std::fs::read_dir(format!("/proc/{}/task", child.id()));
         tasks.expect("it runs").count()
@@ -193,6 +203,5 @@ fn no_more_threads_are_started_than_are_useful() {
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     // Its own, that of signals, and those of the pool.
     assert!(count <= 2 + cores.max(16), "{count}");
-    kill(&child, "-TERM");
-    child.wait().expect("it ends");
+    assert_eq!(stopped(child, "-TERM"), Some(143));
 }
