@@ -32,7 +32,7 @@ pub enum SurfaceResolution {
     Auto,
     /// The grid of φ itself.
     Grid,
-    /// Cells of at most this size, in the cloud's unit.
+    /// Cells of at most this size, in the cloud's unit, at least 1/64 of those of φ.
     Spacing(f64),
     /// Cells smaller by at least this factor, 1 or more.
     Factor(f64),
@@ -51,7 +51,7 @@ impl SurfaceResolution {
     /// Grid of the surface in the box of `grid`, for samples that are `sample_spacing` apart.
     ///
     /// # Errors
-    /// [`Error::Grid`] for too many or too small cells.
+    /// [`Error::Surface`] for cells more than 64 times as fine, [`Error::Grid`] for too many or too small cells.
     pub(super) fn grid<T: Real>(
         self,
         grid: &Grid<T>,
@@ -67,9 +67,10 @@ impl SurfaceResolution {
             Self::Spacing(length) => spacing / length,
             Self::Factor(factor) => factor,
         };
-        match factor > 1.0 {
-            true => Ok(refine(grid, factor.min(MAX_FACTOR))?),
-            false => Ok(*grid),
+        match factor {
+            _ if factor > MAX_FACTOR => Err(Error::Surface(self)),
+            _ if factor > 1.0 => Ok(refine(grid, factor)?),
+            _ => Ok(*grid),
         }
     }
 }
@@ -182,5 +183,7 @@ mod tests {
     fn more_cells_than_can_be_indexed_are_an_error() {
         let fine = SurfaceResolution::Spacing(1e-3).grid(&grid([600; 3]), f64::NAN);
         assert!(matches!(fine, Err(Error::Grid(_))));
+        let fine = SurfaceResolution::Spacing(1e-300).grid(&grid([8; 3]), f64::NAN);
+        assert!(matches!(fine, Err(Error::Surface(_))));
     }
 }
