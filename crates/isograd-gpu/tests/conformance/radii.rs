@@ -192,5 +192,6 @@ fn check_heaps<R: Runtime>(device: &Device<R>) {
     };
     let (common, each) = run();
     assert_eq!((common, each.clone()), run());
-    assert!(each[7] > common && each[8] > common && each[9] == common);
+    // The median is that of the two points that are not in the heap: the distance of the farther one from it.
+    assert!(common > 1.7e6 && each.iter().all(|&radius| radius == common));
 }
