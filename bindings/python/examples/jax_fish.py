@@ -45,13 +45,14 @@ body.defvjp(lambda parameters: (body(parameters), parameters), body_pullback)
 # What is known: the field of another fish, from other samples.
 sought = isograd.sample("fish", 8_000, seed=2, dtype=np.float32, **TRUTH).points
 grid = isograd.Grid.fit(sought, 96)
-target = isograd.jax.signed_distance(sought, grid)
+options = isograd.Options(surface="grid")  # the same cells at every step
+target = isograd.jax.signed_distance(sought, grid, options=options)
 near = jnp.abs(target) < 4 * grid.spacing
 start = jnp.array([fish.values[name] for name in NAMES], jnp.float32)
 
 
 def loss(logs):
-    error = isograd.jax.signed_distance(body(start * jnp.exp(logs)), grid) - target
+    error = isograd.jax.signed_distance(body(start * jnp.exp(logs)), grid, options=options) - target
     return jnp.mean((error / grid.spacing) ** 2, where=near)
 
 

@@ -13,7 +13,7 @@ from test_jax import GIVEN, GRID, dtype, torus, x64  # noqa: E402, F401
 
 FIXED = isograd.Options(radius=0.25)
 """A radius that does not follow the points, as the gradient holds it constant."""
-SIZES = {"max_vertices": 5000, "max_faces": 10000}
+SIZES = {"max_vertices": 10000, "max_faces": 20000}
 SMALL_STEPS = {"order": 1, "modes": ["rev"], "eps": 1e-7, "atol": 1e-6, "rtol": 1e-6}
 RNG = np.random.default_rng(3)
 PLACES = RNG.uniform(-1.8, 1.8, (400, 3)) * [1, 1, 0.5]
@@ -62,8 +62,8 @@ def test_mesh_is_padded_and_counted(dtype):  # noqa: F811
     points, _ = torus(dtype=dtype)
     surface = jax.jit(lambda p: ij.mesh(p, GRID, **SIZES))(points)
     vertices, faces = int(surface.vertex_count), int(surface.face_count)
-    assert surface.vertices.dtype == dtype and surface.vertices.shape == (5000, 3)
-    assert faces == 2 * vertices and 2000 < faces < 10000, "a torus has Euler number 0"
+    assert surface.vertices.dtype == dtype and surface.vertices.shape == (10000, 3)
+    assert faces == 2 * vertices and 2000 < faces < 20000, "a torus has Euler number 0"
     used = np.asarray(surface.faces)
     np.testing.assert_array_equal(np.unique(used[:faces]), np.arange(vertices))
     assert not used[faces:].any() and not surface.vertices[vertices:].any()

@@ -214,13 +214,15 @@ impl Canvas {
             .flatten()
             .map(|&c| (c.clamp(0.0, 1.0) * 255.0).round() as u8)
             .collect();
-        let mut encoder = png::Encoder::new(out, self.width as u32, self.height as u32);
+        // In memory first: the encoder would lose the kind of an error of `out`.
+        let mut file = Vec::new();
+        let mut encoder = png::Encoder::new(&mut file, self.width as u32, self.height as u32);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         let mut writer = encoder.write_header()?;
         writer.write_image_data(&bytes)?;
         writer.finish()?;
-        Ok(())
+        out.write_all(&file)
     }
 }
 
