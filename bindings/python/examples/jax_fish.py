@@ -47,13 +47,12 @@ sought = isograd.sample("fish", 8_000, seed=2, dtype=np.float32, **TRUTH).points
 grid = isograd.Grid.fit(sought, 96)
 options = isograd.Options(surface="grid")  # the same cells at every step
 target = isograd.jax.signed_distance(sought, grid, options=options)
-near = jnp.abs(target) < 4 * grid.spacing
 start = jnp.array([fish.values[name] for name in NAMES], jnp.float32)
 
 
 def loss(logs):
     error = isograd.jax.signed_distance(body(start * jnp.exp(logs)), grid, options=options) - target
-    return jnp.mean((error / grid.spacing) ** 2, where=near)
+    return jnp.mean((error / grid.spacing) ** 2, where=jnp.abs(target) < 4 * grid.spacing)
 
 
 optimizer = optax.adam(optax.cosine_decay_schedule(0.05, 40))
