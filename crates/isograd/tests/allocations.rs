@@ -1,5 +1,6 @@
 //! A plan that is used again takes no memory of the size of a field, nor does its pullback.
 
+#[path = "isograd/common.rs"]
 mod common;
 
 use common::TORUS;

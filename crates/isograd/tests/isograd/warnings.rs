@@ -1,10 +1,9 @@
 //! Every warning on a cloud that deserves it, and none on one that does not.
 
-mod common;
-
-use common::{TORUS, Uniform};
 use isograd::orient::doubt::Reason;
 use isograd::{Error, Grid, Options, PointCloud, Reconstructor, Report, Resolution, Warning};
+
+use crate::common::{TORUS, Uniform};
 
 fn report(points: Vec<[f64; 3]>, cells: usize) -> Report {
     let cloud = PointCloud::new(points).expect("finite points");

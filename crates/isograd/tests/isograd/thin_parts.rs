@@ -1,12 +1,11 @@
 //! Parts thinner than a cell of the surface: cut off by default, kept by `Level::Thin`.
 
-mod common;
-
-use common::Uniform;
 use isograd::isosurface::Level;
 use isograd::orient::Method;
 use isograd::{Grid, Options, PointCloud, Reconstructor, Resolution, SurfaceResolution};
 use isograd_element::vector;
+
+use crate::common::Uniform;
 
 /// A lens of radius 1, `thickness` in its middle, and a ball beside it, with exact normals.
 fn lens_and_ball(count: usize, thickness: f64) -> PointCloud<f64> {

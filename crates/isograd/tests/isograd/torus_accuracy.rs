@@ -1,10 +1,9 @@
 //! The reconstructed torus against its closed form.
 
-mod common;
-
-use common::{TORUS, Torus};
 use isograd::orient::Method;
 use isograd::{Grid, Options, PointCloud, Reconstruction, Reconstructor, Resolution};
+
+use crate::common::{TORUS, Torus};
 
 fn reconstruct(cloud: &PointCloud<f32>, cells: usize, options: Options) -> Reconstruction<f32> {
     let grid = Grid::fit(cloud, Resolution::Cells(cells), 0.1).expect("the cloud has an extent");

@@ -1,10 +1,8 @@
 //! Finite results and gradients for any cloud, unit, option and cotangent; clouds that make no sense are errors.
 
-#[path = "../common/mod.rs"]
-mod common;
 mod random;
 
-use common::Uniform;
+use crate::common::Uniform;
 use isograd::orient::Method;
 use isograd::{
     CloudCotangent, Cotangent, Grid, Options, Pipeline, PointCloud, Reconstruction, Reconstructor,

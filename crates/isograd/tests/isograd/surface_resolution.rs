@@ -1,15 +1,14 @@
 //! A surface on a grid of its own: φ is the exact distance to it, whatever the grid of φ, and parts thinner than a cell of
 //! φ are there.
 
-mod common;
-
-use common::{TORUS, Uniform};
 use isograd::distance::{Band, Query};
 use isograd::isosurface::Level;
 use isograd::orient::Method;
 use isograd::{
     Grid, Mesh, Options, Pipeline, PointCloud, Reconstruction, Reconstructor, SurfaceResolution,
 };
+
+use crate::common::{TORUS, Uniform};
 
 fn coarse<T: Pipeline>() -> Grid<T> {
     let lower = [-1.213, -1.206, -0.619].map(T::of);

@@ -5,9 +5,6 @@
 //! whose last bit is not the same everywhere: the test runs where a hash of those is the recorded one, and is skipped
 //! with a message elsewhere.
 
-mod common;
-
-use common::Uniform;
 use isograd::distance::Band;
 use isograd::isosurface::Level;
 use isograd::orient::{Method, ParityOptions};
@@ -17,6 +14,8 @@ use isograd::{
     Attribute, Cotangent, ExtensionCotangent, Grid, Options, Pipeline, PointCloud, Reconstruction,
     Reconstructor, Resolution, SurfaceResolution,
 };
+
+use crate::common::Uniform;
 
 /// FNV-1a, 64 bits.
 struct Hash(u64);

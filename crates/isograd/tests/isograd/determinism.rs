@@ -1,11 +1,10 @@
 //! Same input, same bits, whatever the number of threads.
 
-mod common;
-
-use common::TORUS;
 use isograd::orient::{Method, ParityOptions};
 use isograd::poisson::Smoothing;
 use isograd::{Grid, Options, Pipeline, PointCloud, Reconstruction, Reconstructor, Resolution};
+
+use crate::common::TORUS;
 
 fn with_threads<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R {
     rayon::ThreadPoolBuilder::new()

@@ -1,6 +1,6 @@
 //! Orientation measured on the real shapes of `../shared/data`, against their true normals.
 //!
-//! `cargo test -p isograd --test orientation -- --nocapture` prints the table.
+//! `cargo test -p isograd --test isograd orientation -- --nocapture` prints the table.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;

@@ -1,9 +1,6 @@
 //! The pullback of the whole pipeline: every result and every input, the same bits on any number of threads,
 //! memory, and input that makes no sense. Whole bodies are in `isograd-shapes/tests/gradients.rs`.
 
-mod common;
-
-use common::{TORUS, Uniform};
 use isograd::distance::extend;
 use isograd::isosurface::Level;
 use isograd::neighbors::Radius;
@@ -14,6 +11,8 @@ use isograd::{
     Attribute, CloudCotangent, Cotangent, ExtensionCotangent, Grid, Options, Pipeline, PointCloud,
     Reconstruction, Reconstructor, Saved, SurfaceResolution,
 };
+
+use crate::common::{TORUS, Uniform};
 
 /// A motion of a point in cells over which nothing that has no derivative is likely to change.
 const STEP: f64 = 1e-7;

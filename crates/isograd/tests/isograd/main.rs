@@ -1,0 +1,12 @@
+//! One program for all tests that need none of their own, since each program compiles the stages again.
+
+mod common;
+mod determinism;
+mod finite;
+mod gradients;
+mod orientation;
+mod pinned_bits;
+mod surface_resolution;
+mod thin_parts;
+mod torus_accuracy;
+mod warnings;
