@@ -45,7 +45,7 @@ pub struct PointCloud<T> {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PointCloudError {
     /// A coordinate is NaN or infinite.
-    #[error("point {index} is not finite: ({x}, {y}, {z}); remove it or mend it")]
+    #[error("point {index} is not finite: ({x:?}, {y:?}, {z:?}); remove it or mend it")]
     NotFinite {
         /// Index of the point, from 0.
         index: usize,

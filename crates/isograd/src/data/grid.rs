@@ -119,7 +119,7 @@ pub enum GridError {
     },
     /// Neighboring cell centers are not distinct numbers of this type.
     #[error(
-        "cells of {spacing} at coordinates up to {extent} can't be told apart in {real}; use f64, a coarser grid, or move the cloud toward the origin"
+        "cells of {spacing:?} at coordinates up to {extent:?} can't be told apart in {real}; use f64, a coarser grid, or move the cloud toward the origin"
     )]
     Unresolvable {
         /// Cell size.
@@ -313,6 +313,12 @@ impl<T: Real> Grid<T> {
 mod tests {
     use super::*;
     use crate::data::PointCloud;
+
+    #[test]
+    fn huge_numbers_keep_messages_short() {
+        let error = Grid::new([1e300f64; 3], 1e200, [4; 3]).expect_err("not resolvable");
+        assert!(error.to_string().len() < 250, "{error}");
+    }
 
     #[test]
     fn index_and_cell_are_inverse() {

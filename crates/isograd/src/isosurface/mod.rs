@@ -105,7 +105,7 @@ pub enum Error {
     },
     /// No cell is inside.
     #[error(
-        "no cell is below the level {level} (values run from {min} to {max}), so there is no surface; use smaller cells if the body is thinner than a few of them, and check that the normals point outward"
+        "no cell is below the level {level:?} (values run from {min:?} to {max:?}), so there is no surface; use smaller cells if the body is thinner than a few of them, and check that the normals point outward"
     )]
     NothingInside {
         /// The level.
@@ -117,7 +117,7 @@ pub enum Error {
     },
     /// No cell is outside.
     #[error(
-        "every cell is below the level {level} (values run from {min} to {max}), so there is no surface; check that the normals point outward and that the grid is larger than the body"
+        "every cell is below the level {level:?} (values run from {min:?} to {max:?}), so there is no surface; check that the normals point outward and that the grid is larger than the body"
     )]
     NothingOutside {
         /// The level.
