@@ -6,6 +6,8 @@
 
 use rayon::prelude::*;
 
+use crate::data::blocks::{Blocks, Overlap};
+use crate::data::cells::{Cells, CellsMut};
 use crate::element::linear::lerp;
 use crate::splat::SortedSamples;
 use crate::{Field, Grid, Real};
@@ -16,7 +18,9 @@ const SLAB: usize = 8;
 /// The eight cells round a point, and the position of the point between them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cube<T> {
-    /// Place in memory of the lowest of the eight cells.
+    /// The lowest of the eight cells.
+    cell: [usize; 3],
+    /// Its place in memory.
     base: usize,
     strides: [usize; 3],
     /// Distance from its center, per axis, in cells: 0 to 1.
@@ -31,6 +35,7 @@ impl<T: Real> Cube<T> {
     pub(crate) fn new(grid: &Grid<T>, x: [T; 3]) -> Self {
         let (shape, strides) = (grid.shape(), grid.strides());
         let mut cube = Self {
+            cell: [0; 3],
             base: 0,
             strides,
             fraction: [T::zero(); 3],
@@ -40,6 +45,7 @@ impl<T: Real> Cube<T> {
             let last = shape[axis] - 1;
             let (u, between) = clamp(x[axis] - T::of(0.5), T::of_usize(last));
             let cell = u.to_usize().unwrap_or(0).min(last - 1);
+            cube.cell[axis] = cell;
             cube.base += cell * strides[axis];
             cube.fraction[axis] = u - T::of_usize(cell);
             cube.between[axis] = between;
@@ -74,8 +80,22 @@ impl<T: Real> Cube<T> {
     /// The value at the point, and the gradient in values per cell.
     #[inline(always)]
     pub(crate) fn value_and_gradient(&self, values: &[T]) -> (T, [T; 3]) {
+        self.from_corners(self.cells().map(|c| values[c]))
+    }
+
+    /// Like [`Self::value_and_gradient`], of a field that is dense or in blocks.
+    #[inline(always)]
+    pub(crate) fn value_and_gradient_of(&self, field: Cells<'_, T>) -> (T, [T; 3]) {
+        let [x, y, z] = self.cell;
+        let [a, b, c, d] =
+            [[x, y], [x, y + 1], [x + 1, y], [x + 1, y + 1]].map(|[x, y]| field.row::<2>([x, y, z]));
+        self.from_corners([a[0], a[1], b[0], b[1], c[0], c[1], d[0], d[1]])
+    }
+
+    /// The value and the gradient, from the values of the eight cells.
+    #[inline(always)]
+    fn from_corners(&self, v: [T; 8]) -> (T, [T; 3]) {
         let [x, y, z] = self.fraction;
-        let v = self.cells().map(|c| values[c]);
         let edge: [T; 4] = std::array::from_fn(|e| lerp(v[2 * e], v[2 * e + 1], z));
         let slope: [T; 4] = std::array::from_fn(|e| v[2 * e + 1] - v[2 * e]);
         let (low, high) = (lerp(edge[0], edge[1], y), lerp(edge[2], edge[3], y));
@@ -93,6 +113,31 @@ impl<T: Real> Cube<T> {
         };
         (lerp(low, high, x), std::array::from_fn(across))
     }
+}
+
+/// Like [`spread`], to a field that is dense or in blocks.
+pub(crate) fn spread_on<T: Real>(
+    out: CellsMut<'_, T>,
+    sorted: SortedSamples<'_, T>,
+    value: impl Fn(usize) -> T + Sync,
+) {
+    let field = match out {
+        CellsMut::Dense(grid, out) => return spread(grid, sorted, value, out),
+        CellsMut::Blocks(field) => field,
+    };
+    let (grid, points) = (&field.grid, sorted.samples.points);
+    let cube = |i: usize| Cube::new(grid, grid.to_index(points[i]));
+    let blocks: &Blocks = &field.blocks;
+    let corner = |i: usize| Some(cube(i).cell);
+    blocks.scatter(&mut field.values, points.len(), 2, corner, |block, values, items| {
+        for &i in items {
+            let (cube, part) = (cube(i as usize), value(i as usize));
+            let weights = cube.weights();
+            Overlap::new(cube.cell, [2; 3], blocks.corner(block)).for_each(|[i, j, k], at| {
+                values[at] += part * weights[4 * i + 2 * j + k];
+            });
+        }
+    });
 }
 
 /// Adds `value(i)` at every sample to the eight cells round it, in memory order: the transpose of

@@ -1,5 +1,7 @@
 //! Plain data with checked constructors: what goes into the stages and what comes out.
 
+pub(crate) mod blocks;
+pub(crate) mod cells;
 mod cloud;
 mod field;
 mod grid;

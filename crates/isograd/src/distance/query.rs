@@ -119,7 +119,7 @@ impl<T: Real> Query<T> {
         let face = self.bvh.face(place);
         let found = closest_point(to_f64(point), corners(&self.mesh, face));
         let inside = signs
-            .and_then(|field| corners_agree(field, T::zero(), to_f64(point)))
+            .and_then(|field| corners_agree(field.into(), T::zero(), to_f64(point)))
             .unwrap_or_else(|| self.is_inside(face, &found));
         let sign = if inside { -1.0 } else { 1.0 };
         Hit {
@@ -149,8 +149,12 @@ impl<T: Real> Query<T> {
     }
 }
 
-/// Whether a point is below the level `c` of a field, where the eight values round it agree.
-pub(super) fn corners_agree<T: Real>(field: &Field<T>, c: T, point: [f64; 3]) -> Option<bool> {
+/// Whether a point is below the level `c` of a field, where the eight values round it are there and agree.
+pub(super) fn corners_agree<T: Real>(
+    field: Cells<'_, T>,
+    c: T,
+    point: [f64; 3],
+) -> Option<bool> {
     let grid = field.grid();
     let (lower, spacing) = (to_f64(grid.lower()), grid.spacing().f64());
     let mut cell = [0; 3];
@@ -166,10 +170,12 @@ pub(super) fn corners_agree<T: Real>(field: &Field<T>, c: T, point: [f64; 3]) ->
     }
     let below = |corner: usize| {
         let at = std::array::from_fn(|a| cell[a] + (corner >> a & 1));
-        field.at(at) < c
+        field.get(grid.index(at)).map(|value| value < c)
     };
-    let first = below(0);
-    (1..8).all(|corner| below(corner) == first).then_some(first)
+    let first = below(0)?;
+    (1..8)
+        .all(|corner| below(corner) == Some(first))
+        .then_some(first)
 }
 
 /// Infinity for NaN, since comparisons with NaN all fail and would admit it to absent boxes.

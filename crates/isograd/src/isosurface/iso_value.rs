@@ -20,7 +20,8 @@ use rayon::prelude::*;
 
 use crate::splat::{SampleCotangent, Samples, SortedSamples};
 use crate::trilinear::{self, Cube};
-use crate::{Field, Grid, Real, parallel, vector};
+use crate::data::cells::{Cells, CellsMut};
+use crate::{Grid, Real, parallel, vector};
 
 /// Values that the pullback needs besides the inputs.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -74,8 +75,8 @@ pub enum Error {
 ///
 /// # Errors
 /// As [`Error`] lists; `residual` is then not to be used.
-pub fn forward<T: Real>(
-    chi: &Field<T>,
+pub fn forward<'a, T: Real>(
+    chi: impl Into<Cells<'a, T>>,
     points: &[[T; 3]],
     areas: &[T],
     residual: &mut Residual<T>,
@@ -86,9 +87,10 @@ pub fn forward<T: Real>(
             areas: areas.len(),
         });
     }
-    let (grid, values) = (chi.grid(), chi.values());
+    let chi = chi.into();
+    let grid = chi.grid();
     let at = |&point: &[T; 3]| {
-        let (value, gradient) = Cube::new(grid, grid.to_index(point)).value_and_gradient(values);
+        let (value, gradient) = Cube::new(grid, grid.to_index(point)).value_and_gradient_of(chi);
         AtSample { value, gradient }
     };
     let at_samples = points.par_iter().map(at);
@@ -123,6 +125,20 @@ pub fn pullback<T: Real>(
     chi_bar: &mut [T],
     out: &mut SampleCotangent<T>,
 ) {
+    let chi_bar = CellsMut::Dense(grid, chi_bar);
+    pullback_on(sorted, residual, bar, values_bar, chi_bar, out);
+}
+
+/// Like [`pullback`], for fields that are dense or in blocks.
+pub(crate) fn pullback_on<T: Real>(
+    sorted: SortedSamples<'_, T>,
+    residual: &Residual<T>,
+    bar: T,
+    values_bar: &[T],
+    chi_bar: CellsMut<'_, T>,
+    out: &mut SampleCotangent<T>,
+) {
+    let grid = &chi_bar.cells().grid().clone();
     let samples = sorted.samples;
     let Samples { areas, .. } = samples;
     let share = bar.f64() / residual.area;
@@ -140,12 +156,13 @@ pub fn pullback<T: Real>(
         *area += T::of(share * (residual.at_samples[i].value.f64() - residual.value));
     });
     out.add(grid, samples, false, |i| (point_bar(i), T::zero()));
-    trilinear::spread(grid, sorted, value_bar, chi_bar);
+    trilinear::spread_on(chi_bar, sorted, value_bar);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Field;
 
     /// `χ = 2x − y + 3z`, which interpolation gives back exactly.
     fn linear() -> Field<f64> {

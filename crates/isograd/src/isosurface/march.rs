@@ -204,7 +204,7 @@ fn emit_vertices<T: Real>(
 /// The point at the fraction `eta` of the way from the center of `cell` to the next along `axis`. Each
 /// step rounds monotonically, so the point lies between the two rounded centers.
 #[inline(always)]
-fn position<T: Real>(grid: &Grid<T>, cell: [usize; 3], axis: usize, eta: T) -> [T; 3] {
+pub(super) fn position<T: Real>(grid: &Grid<T>, cell: [usize; 3], axis: usize, eta: T) -> [T; 3] {
     let mut point = grid.center_f64(cell);
     let along = cell[axis] as f64 + 0.5 + eta.f64();
     point[axis] = grid.lower()[axis].f64() + grid.spacing().f64() * along;
@@ -221,7 +221,7 @@ fn report(signs: &Signs) -> Report {
 }
 
 /// Cuts a slice into pieces of the given lengths.
-fn split<E>(mut whole: &mut [E], lengths: impl Iterator<Item = usize>) -> Vec<&mut [E]> {
+pub(super) fn split<E>(mut whole: &mut [E], lengths: impl Iterator<Item = usize>) -> Vec<&mut [E]> {
     lengths
         .map(|n| {
             let (piece, rest) = std::mem::take(&mut whole).split_at_mut(n);

@@ -37,6 +37,7 @@
 //! Scopigno, *A modified look-up table for implicit disambiguation of marching cubes*, 1994. The table is
 //! computed, not copied.
 
+pub(crate) mod blocks;
 pub mod iso_value;
 pub mod local_level;
 mod march;
@@ -54,6 +55,7 @@ pub use crate::element::crossing::crossing;
 pub use march::{Scratch, forward};
 pub use measure::Measures;
 pub use measure_pullback::pullback as measure_pullback;
+pub(crate) use pullback::pullback_on;
 pub use pullback::{LevelCotangent, SMALLEST_DIFFERENCE, pullback};
 pub use tables::triangles;
 

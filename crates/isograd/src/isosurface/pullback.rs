@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use crate::data::cells::{Cells, CellsMut};
 use crate::data::{Field, GridCotangent, LatticeEdge, Mesh};
 use crate::element::crossing::{bounded, crossing};
 use crate::{Real, parallel, vector};
@@ -34,6 +35,18 @@ pub fn pullback<T: Real>(
     vertices_bar: &[[T; 3]],
     chi_bar: &mut [T],
 ) -> LevelCotangent {
+    let chi_bar = CellsMut::Dense(chi.grid(), chi_bar);
+    pullback_on(chi.into(), level, mesh, vertices_bar, chi_bar)
+}
+
+/// Like [`pullback`], for fields that are dense or in blocks.
+pub(crate) fn pullback_on<T: Real>(
+    chi: Cells<'_, T>,
+    level: T,
+    mesh: &Mesh<T>,
+    vertices_bar: &[[T; 3]],
+    chi_bar: CellsMut<'_, T>,
+) -> LevelCotangent {
     let vertices = Vertices {
         chi,
         level,
@@ -41,9 +54,16 @@ pub fn pullback<T: Real>(
         bars: vertices_bar,
         smallest: T::of(SMALLEST_DIFFERENCE) * range(chi.values()),
     };
-    let plane = chi.grid().strides()[0];
-    let slabs = chi_bar.par_chunks_mut(SLAB * plane).enumerate();
-    slabs.for_each(|(task, slab)| vertices.add(task * SLAB * plane, plane, slab));
+    match chi_bar {
+        CellsMut::Dense(grid, chi_bar) => {
+            let plane = grid.strides()[0];
+            let slabs = chi_bar.par_chunks_mut(SLAB * plane).enumerate();
+            slabs.for_each(|(task, slab)| vertices.add(task * SLAB * plane, plane, slab));
+        }
+        CellsMut::Blocks(chi_bar) => {
+            chi_bar.add_at_ends(mesh.edges(), |vertex| vertices.parts(vertex));
+        }
+    }
     vertices.level(mesh)
 }
 
@@ -59,7 +79,7 @@ fn range<T: Real>(values: &[T]) -> T {
 }
 
 struct Vertices<'a, T> {
-    chi: &'a Field<T>,
+    chi: Cells<'a, T>,
     level: T,
     edges: &'a [LatticeEdge],
     bars: &'a [[T; 3]],
@@ -69,7 +89,7 @@ struct Vertices<'a, T> {
 
 /// A vertex on its lattice edge.
 struct EdgeVertex<T> {
-    /// The two cells.
+    /// The two cells, by their places in a dense field.
     cells: [usize; 2],
     eta: T,
     /// `s/(χ_q − χ_p)`, in which `s = ȳ·(q − p)`.
@@ -80,18 +100,26 @@ struct EdgeVertex<T> {
 impl<T: Real> Vertices<'_, T> {
     #[inline(always)]
     fn edge_vertex(&self, vertex: usize) -> EdgeVertex<T> {
-        let (grid, values) = (self.chi.grid(), self.chi.values());
+        let grid = self.chi.grid();
         let (p, axis) = (self.edges[vertex].cell(), self.edges[vertex].axis());
         let q = p + grid.strides()[axis];
-        let difference = values[q] - values[p];
+        let [low, high] = self.chi.ends(self.edges[vertex]);
+        let difference = high - low;
         let guarded = difference.abs() < self.smallest;
         let s = self.bars[vertex][axis] * grid.spacing();
         EdgeVertex {
             cells: [p, q],
-            eta: crossing(values[p], values[q], self.level),
+            eta: crossing(low, high, self.level),
             pull: s / bounded(difference, self.smallest),
             guarded: guarded && s != T::zero(),
         }
+    }
+
+    /// Cotangents of the indicator at both cells of a vertex.
+    #[inline(always)]
+    fn parts(&self, vertex: usize) -> [T; 2] {
+        let EdgeVertex { eta, pull, .. } = self.edge_vertex(vertex);
+        [pull * (eta - T::one()), -pull * eta]
     }
 
     /// Adds to the cells of `slab`, the first of which is cell `first`. Vertices are stored in the order of
@@ -99,11 +127,8 @@ impl<T: Real> Vertices<'_, T> {
     fn add(&self, first: usize, plane: usize, slab: &mut [T]) {
         let near = |cell: usize| self.edges.partition_point(|edge| edge.cell() < cell);
         for vertex in near(first.saturating_sub(plane))..near(first + slab.len()) {
-            let EdgeVertex {
-                cells, eta, pull, ..
-            } = self.edge_vertex(vertex);
-            let parts = [pull * (eta - T::one()), -pull * eta];
-            for (cell, part) in cells.into_iter().zip(parts) {
+            let cells = self.edge_vertex(vertex).cells;
+            for (cell, part) in cells.into_iter().zip(self.parts(vertex)) {
                 if let Some(value) = cell.checked_sub(first).and_then(|at| slab.get_mut(at)) {
                     *value += part;
                 }

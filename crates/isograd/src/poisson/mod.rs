@@ -38,12 +38,15 @@
 
 mod axis;
 mod passes;
+pub(crate) mod pyramid;
 mod scratch;
 pub mod screened;
 pub mod smoothing;
 pub mod spectrum;
 #[cfg(test)]
 pub(crate) mod tests;
+
+use std::f64::consts::PI;
 
 use axis::Axis;
 use pulp::Arch;
@@ -79,7 +82,22 @@ pub enum Error {
 pub struct Plan<T: Real> {
     shape: [usize; 3],
     axes: [Axis<T>; 3],
+    symbols: Option<Symbols<T>>,
     arch: Arch,
+}
+
+/// Factors that replace those of the equation.
+enum Symbols<T> {
+    /// Amplitudes per axis, with which the stiffnesses are replaced, too.
+    Axes([Vec<T>; 3]),
+    /// The gain of every frequency, `(ny, nz, nx)`.
+    Table(Vec<T>),
+}
+
+/// Factors along an axis at one frequency: the gain is the product of the amplitudes over the sum of the stiffnesses.
+struct Symbol {
+    amplitude: f64,
+    stiffness: f64,
 }
 
 impl<T: Real> Plan<T> {
@@ -90,8 +108,35 @@ impl<T: Real> Plan<T> {
         Self {
             shape,
             axes: shape.map(|n| Axis::new(n, &mut planner)),
+            symbols: None,
             arch: Arch::new(),
         }
+    }
+
+    /// A plan with the factors `symbol(θ)` at each angle `θ` per cell, from 0 to π.
+    fn with_symbols(shape: [usize; 3], symbol: impl Fn(f64) -> Symbol) -> Self {
+        let mut plan = Self::new(shape);
+        let amplitudes = [0, 1, 2].map(|a| {
+            let (n, axis) = (shape[a], &mut plan.axes[a]);
+            let symbols = (0..n).map(|k| symbol(PI * k as f64 / n as f64));
+            let (amplitudes, stiffness) = symbols
+                .map(|symbol| (T::of(symbol.amplitude), T::of(symbol.stiffness)))
+                .unzip();
+            axis.stiffness = stiffness;
+            axis.mass.fill(T::one());
+            amplitudes
+        });
+        plan.symbols = Some(Symbols::Axes(amplitudes));
+        plan
+    }
+
+    /// A plan with the gains of all frequencies, `(ny, nz, nx)`.
+    fn with_gains(shape: [usize; 3], gains: impl Iterator<Item = f64>) -> Self {
+        let mut plan = Self::new(shape);
+        let factor = 8.0 * shape.map(|n| n as f64).iter().product::<f64>();
+        let table = gains.map(|gain| T::of(gain / factor)).collect();
+        plan.symbols = Some(Symbols::Table(table));
+        plan
     }
 
     /// Number of cells along each axis, `(nx, ny, nz)`.
@@ -126,12 +171,27 @@ impl<T: Real> Plan<T> {
         if field.is_empty() {
             return Ok(());
         }
+        self.prepare(smoothing, scratch);
+        self.filter(field, scratch);
+        Ok(())
+    }
+
+    /// Fills the amplitudes of the frequencies.
+    fn prepare(&self, smoothing: f64, scratch: &mut Scratch<T>) {
         for axis in 0..3 {
-            self.axes[axis].gaussian(smoothing, &mut scratch.gaussian[axis]);
+            let amplitude = &mut scratch.gaussian[axis];
+            match &self.symbols {
+                Some(Symbols::Axes(amplitudes)) => amplitude.clone_from(&amplitudes[axis]),
+                Some(Symbols::Table(_)) => amplitude.clear(),
+                None => self.axes[axis].gaussian(smoothing, amplitude),
+            }
         }
+    }
+
+    /// Solves in place, after [`Self::prepare`].
+    fn filter(&self, field: &mut [T], scratch: &Scratch<T>) {
         self.forward_planes(field, scratch);
         self.filter_columns(field, scratch);
         self.inverse_planes(field, scratch);
-        Ok(())
     }
 }

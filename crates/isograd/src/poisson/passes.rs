@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 
-use super::Plan;
+use super::{Plan, Symbols};
 use super::axis::{Axis, Gain};
 use super::scratch::{Lines, Scratch, first};
 use crate::{Real, simd};
@@ -89,8 +89,16 @@ impl<T: Real> Plan<T> {
             axis.fft(lines, &mut buffers.fft);
             for (m, line) in lines.chunks_exact_mut(axis.n).enumerate() {
                 let c = column + start + 2 * m;
-                let pair = [self.gain(c, scratch), self.gain(c + 1, scratch)];
-                axis.write_gains(&scratch.gaussian[0], pair, gains);
+                match &self.symbols {
+                    Some(Symbols::Table(table)) => {
+                        let (a, b) = table[c * axis.n..].split_at(axis.n);
+                        pack(a, b, gains, &axis.natural);
+                    }
+                    _ => {
+                        let pair = [self.gain(c, scratch), self.gain(c + 1, scratch)];
+                        axis.write_gains(&scratch.gaussian[0], pair, gains);
+                    }
+                }
                 axis.filter(line, gains);
             }
             axis.inverse_fft(lines, &mut buffers.fft);

@@ -6,7 +6,8 @@ use rayon::prelude::*;
 use super::stencil::{self, Gathered, REACH, WIDTH};
 use super::{Residual, Samples, central_cell};
 use crate::data::GridCotangent;
-use crate::{Field, Grid, Real, parallel, simd, vector};
+use crate::data::cells::Cells;
+use crate::{Grid, Real, parallel, simd, vector};
 
 /// Samples in one task.
 const TASK: usize = 512;
@@ -67,13 +68,14 @@ pub struct PullbackScratch<T> {
 
 /// Pulls the cotangent `b_bar` of the right-hand side back, and adds to `out` the cotangents of the samples and the
 /// grid. `samples` and `residual` are those of [`forward`](super::forward); `b_bar` is on its grid.
-pub fn pullback<T: Real>(
+pub fn pullback<'a, T: Real>(
     samples: Samples<'_, T>,
     residual: &Residual,
-    b_bar: &Field<T>,
+    b_bar: impl Into<Cells<'a, T>>,
     scratch: &mut PullbackScratch<T>,
     out: &mut SampleCotangent<T>,
 ) {
+    let b_bar = b_bar.into();
     let (grid, arch) = (b_bar.grid(), Arch::new());
     scratch
         .sorted
@@ -124,8 +126,8 @@ impl<T: Real> Samples<'_, T> {
 
     /// Cotangents of sample `i` from the 5³ cells of `b_bar` round it.
     #[inline(always)]
-    fn gather(&self, i: usize, residual: &Residual, b_bar: &Field<T>) -> Gathered<T> {
-        let (grid, values) = (b_bar.grid(), b_bar.values());
+    fn gather(&self, i: usize, residual: &Residual, b_bar: Cells<'_, T>) -> Gathered<T> {
+        let grid = b_bar.grid();
         let x = grid.to_index(self.points[i]);
         let Some(cell) = central_cell(grid.shape(), x) else {
             return Gathered::default();
@@ -136,13 +138,11 @@ impl<T: Real> Samples<'_, T> {
             #[inline(always)]
             |a| x[a] - T::of_usize(cell[a]) - T::of(0.5),
         );
-        let [plane, row, _] = grid.strides();
-        let corner = grid.index(cell.map(|c| c - REACH));
+        let corner = cell.map(|c| c - REACH);
         let mut block = [[[T::zero(); WIDTH]; WIDTH]; WIDTH];
         for (p, rows) in block.iter_mut().enumerate() {
             for (j, out) in rows.iter_mut().enumerate() {
-                let start = corner + p * plane + j * row;
-                out.copy_from_slice(&values[start..start + WIDTH]);
+                *out = b_bar.row([corner[0] + p, corner[1] + j, corner[2]]);
             }
         }
         stencil::gather(residual.weights, vector, f, &block)

@@ -77,9 +77,9 @@ impl<T> Scratch<T> {
 ///
 /// # Errors
 /// [`Error::Empty`], [`Error::Range`], and [`Error::Band`].
-pub fn forward<T: Real>(
-    mesh: &Mesh<T>,
-    chi: &Field<T>,
+pub fn forward<'a, T: Real>(
+    mesh: &'a Mesh<T>,
+    chi: impl Into<Cells<'a, T>>,
     c: T,
     band: Band,
     scratch: &mut Scratch<T>,
@@ -92,6 +92,9 @@ pub fn forward<T: Real>(
         Band::Within(width) if width > 0.0 && width.is_finite() => width,
         Band::Within(width) => return Err(Error::Band { width }),
     };
+    let chi = chi.into();
+    // Beyond the blocks of χ, the closest face decides on the side.
+    let reach = if chi.is_whole() { width } else { f64::INFINITY };
     scratch.bvh.rebuild(mesh)?;
     let magnitude = magnitude(&grid).max(scratch.bvh.magnitude());
     scratch
@@ -107,11 +110,24 @@ pub fn forward<T: Real>(
     for (wave, (phi, closest)) in waves.enumerate() {
         let planes = wave * planes_per_wave..wave * planes_per_wave + phi.len() / plane;
         let first = planes.start * plane;
-        solve_wave(&grid, mesh, planes, width, scratch);
+        solve_wave(&grid, mesh, planes, reach, scratch);
         let inside = |i: usize, face: u32| sides.is_inside(first + i, face);
         write_wave(&grid, scratch, inside, phi, closest);
+        if reach > width {
+            clamp(T::of(width), phi, closest);
+        }
     }
     Ok(())
+}
+
+/// Limits φ to a band; cells beyond it have no closest face.
+fn clamp<T: Real>(width: T, phi: &mut [T], closest: &mut [u32]) {
+    for (phi, closest) in phi.iter_mut().zip(closest) {
+        if phi.abs() > width {
+            *phi = phi.signum() * width;
+            *closest = NO_TRIANGLE;
+        }
+    }
 }
 
 /// Planes of cells in a wave: whole blocks.

@@ -4,21 +4,24 @@ use crate::distance::pseudonormals::Pseudonormals;
 use crate::distance::triangle::closest_point;
 use crate::distance::{NO_TRIANGLE, corners_agree};
 use crate::vector::{dot, to_f64};
-use crate::{Field, Grid, Mesh, Real};
+use crate::data::cells::Cells;
+use crate::trilinear::Cube;
+use crate::{Grid, Mesh, Real};
 
 /// Inside and outside, from the indicator `χ` whose surface `χ = c` the mesh is.
 pub(super) struct Sides<'a, T> {
-    chi: &'a Field<T>,
+    chi: Cells<'a, T>,
     c: T,
     mesh: &'a Mesh<T>,
-    /// Pseudonormals of the mesh and the grid of φ, where that is not the grid of `χ`.
+    /// Pseudonormals of the mesh and the grid of φ, unless `χ` has a value at each of its cells.
     between: Option<(Pseudonormals, Grid<T>)>,
 }
 
 impl<'a, T: Real> Sides<'a, T> {
     /// Sides at the cells of `grid`.
-    pub(super) fn new(mesh: &'a Mesh<T>, chi: &'a Field<T>, c: T, grid: &Grid<T>) -> Self {
-        let between = (chi.grid() != grid).then(|| (Pseudonormals::new(mesh), *grid));
+    pub(super) fn new(mesh: &'a Mesh<T>, chi: Cells<'a, T>, c: T, grid: &Grid<T>) -> Self {
+        let is_between = chi.grid() != grid || !chi.is_whole();
+        let between = is_between.then(|| (Pseudonormals::new(mesh), *grid));
         Self {
             chi,
             c,
@@ -45,7 +48,9 @@ impl<'a, T: Real> Sides<'a, T> {
 
     fn is_behind(&self, pseudonormals: &Pseudonormals, center: [f64; 3], closest: u32) -> bool {
         if closest == NO_TRIANGLE {
-            return self.chi.interpolate(center.map(T::of)) < self.c;
+            let grid = self.chi.grid();
+            let cube = Cube::new(grid, grid.to_index(center.map(T::of)));
+            return cube.value(self.chi.values()) < self.c;
         }
         let found = closest_point(center, self.mesh.corners(closest as usize).map(to_f64));
         let normal = pseudonormals.of(self.mesh, closest, found.feature);

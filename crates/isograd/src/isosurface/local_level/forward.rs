@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::layer::{Layer, NODES};
 use super::means::{CellMean, GridSamples, Reading};
 use super::{PASSES, Pass, Residual};
+use crate::data::cells::CellsMut;
 use crate::isosurface::iso_value;
 use crate::splat::SortedSamples;
 use crate::{Field, Real};
@@ -47,12 +48,26 @@ pub fn forward<T: Real>(
     residual: &mut Residual<T>,
 ) {
     let grid = *chi.grid();
+    let chi = CellsMut::Dense(&grid, chi.values_mut());
+    forward_on(chi, samples, options, level, scratch, residual);
+}
+
+/// Like [`forward`], for a field that is dense or in blocks, which contain those within 2 cells of the samples.
+pub(crate) fn forward_on<T: Real>(
+    mut chi: CellsMut<'_, T>,
+    samples: SortedSamples<'_, T>,
+    options: Options,
+    level: &iso_value::Residual<T>,
+    scratch: &mut Scratch<T>,
+    residual: &mut Residual<T>,
+) {
+    let grid = *chi.cells().grid();
     let near = GridSamples::new(&grid, samples.samples, options.area);
     scratch.start(&near, samples, level);
     if residual.passes.is_empty() {
         residual.passes.push(Pass::default());
     }
-    near.fill_trust(chi, options, &mut scratch.remaining, residual);
+    near.fill_trust(chi.cells(), options, &mut scratch.remaining, residual);
     let (mut flattened, mut done) = (0.0, 0);
     while done < PASSES {
         if residual.passes.len() == done {
@@ -73,16 +88,11 @@ pub fn forward<T: Real>(
     }
     residual.passes.truncate(done);
     let layer = &scratch.layer;
-    layer.zip_rows(
-        &scratch.correction,
-        grid.shape(),
-        chi.values_mut(),
-        |e, chi| {
-            for (chi, &e) in chi.iter_mut().zip(e) {
-                *chi -= e;
-            }
-        },
-    );
+    layer.zip_rows(&scratch.correction, &mut chi, |e, chi| {
+        for (chi, &e) in chi.iter_mut().zip(e) {
+            *chi -= e;
+        }
+    });
 }
 
 impl<T: Real> Scratch<T> {

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::stencil::Stencil;
+use crate::data::cells::{Cells, CellsMut};
 use crate::splat::SortedSamples;
 use crate::{Grid, Real};
 
@@ -131,14 +132,29 @@ impl Layer {
     }
 
     /// Runs `f(entries, cells)` on the rows of cells along z that blocks and grid share; `nodes` are entries of the
-    /// layer, `field` is on a grid of `shape`. Each task owns some planes of the field.
+    /// layer. Each task owns some planes of a dense field, or a block.
     pub(super) fn zip_rows<T: Real>(
         &self,
         nodes: &[T],
-        shape: [usize; 3],
-        field: &mut [T],
+        field: &mut CellsMut<'_, T>,
         f: impl Fn(&[T], &mut [T]) + Sync,
     ) {
+        let (grid, field) = match field {
+            CellsMut::Dense(grid, field) => (*grid, &mut **field),
+            CellsMut::Blocks(field) => {
+                let blocks = &field.blocks;
+                let work = field.values.par_chunks_exact_mut(NODES).enumerate();
+                return work.for_each(|(block, cells)| {
+                    let [x, y, z] = blocks.corner(block).map(|c| c / EDGE);
+                    let entry = self.table[(x * self.shape[1] + y) * self.shape[2] + z];
+                    if entry != NONE {
+                        let first = entry as usize * NODES;
+                        f(&nodes[first..first + NODES], cells);
+                    }
+                });
+            }
+        };
+        let shape = grid.shape();
         let [_, ny, nz] = shape;
         let layers = field.par_chunks_mut(EDGE * ny * nz).enumerate();
         layers.for_each(|(layer, cells)| {
@@ -156,6 +172,24 @@ impl Layer {
                 }
             }
         });
+    }
+
+    /// Copies the cells of a block of the layer; those beyond the grid, or absent, stay as they are.
+    pub(super) fn copy_block<T: Real>(&self, block: usize, cells: Cells<'_, T>, out: &mut [T]) {
+        match cells {
+            Cells::Dense(grid, values) => {
+                let rows = self.rows(block, grid.shape());
+                for (row, out) in rows.zip(out.chunks_exact_mut(EDGE)) {
+                    let Some((start, count)) = row else { continue };
+                    out[..count].copy_from_slice(&values[start..start + count]);
+                }
+            }
+            Cells::Blocks(field) => {
+                if let Some(first) = field.blocks.place(self.corner(block)) {
+                    out.copy_from_slice(&field.values[first..first + NODES]);
+                }
+            }
+        }
     }
 
     /// For each row along z of a block, the place of its first cell in the field and the number of cells; `None`

@@ -71,8 +71,10 @@ mod step;
 mod tests;
 mod trust;
 
+pub(crate) use forward::forward_on;
 pub use forward::{Options, Scratch, forward};
 pub use gain::Sums;
+pub(crate) use pullback::pullback_on;
 pub use pullback::{Cotangent, PullbackScratch, pullback};
 pub use step::{STEEPEST, Step};
 

@@ -7,6 +7,8 @@ use super::layer::{EDGE, Layer, NODES};
 use super::means::{CellMean, GridSamples, Reading};
 use super::pull_means::CellBars;
 use super::{Pass, Residual};
+use crate::data::blocks::BlockField;
+use crate::data::cells::{Cells, CellsMut};
 use crate::splat::{SampleCotangent, SortedSamples};
 use crate::{Field, Grid, Real, parallel, vector};
 
@@ -79,9 +81,23 @@ pub fn pullback<T: Real>(
     bars: &mut Cotangent<T>,
     out: &mut SampleCotangent<T>,
 ) {
+    let chi_bar = CellsMut::Dense(chi.grid(), chi_bar);
+    pullback_on(chi.into(), samples, residual, chi_bar, scratch, bars, out);
+}
+
+/// Like [`pullback`], for fields that are dense or in blocks.
+pub(crate) fn pullback_on<T: Real>(
+    chi: Cells<'_, T>,
+    samples: SortedSamples<'_, T>,
+    residual: &Residual<T>,
+    mut chi_bar: CellsMut<'_, T>,
+    scratch: &mut PullbackScratch<T>,
+    bars: &mut Cotangent<T>,
+    out: &mut SampleCotangent<T>,
+) {
     let grid = chi.grid();
     let near = GridSamples::new(grid, samples.samples, residual.area);
-    scratch.start(grid, samples, chi_bar);
+    scratch.start(grid, samples, chi_bar.cells());
     let mut flattened_bar = 0.0;
     for pass in residual.passes.iter().rev() {
         flattened_bar = scratch.pull_pass(&near, pass, &residual.trust, flattened_bar);
@@ -95,7 +111,7 @@ pub fn pullback<T: Real>(
         ..
     } = scratch;
     near.spread_slopes(layer, found, total);
-    layer.zip_rows(total, grid.shape(), chi_bar, |part, bars| {
+    layer.zip_rows(total, &mut chi_bar, |part, bars| {
         for (bar, &part) in bars.iter_mut().zip(part) {
             *bar += part;
         }
@@ -108,7 +124,7 @@ pub fn pullback<T: Real>(
 }
 
 impl<T: Real> PullbackScratch<T> {
-    fn start(&mut self, grid: &Grid<T>, samples: SortedSamples<'_, T>, chi_bar: &[T]) {
+    fn start(&mut self, grid: &Grid<T>, samples: SortedSamples<'_, T>, chi_bar: Cells<'_, T>) {
         self.pass.layer.build(grid, samples);
         let count = samples.samples.points.len();
         self.samples.clear();
@@ -121,13 +137,9 @@ impl<T: Real> PullbackScratch<T> {
         self.corrections.resize(self.total.len(), T::zero());
         let work = self.total.par_chunks_exact_mut(NODES).enumerate();
         work.for_each(|(block, total)| {
-            let rows = layer.rows(block, grid.shape());
-            for (row, total) in rows.zip(total.chunks_exact_mut(EDGE)) {
-                let Some((start, count)) = row else { continue };
-                let bars = &chi_bar[start..start + count];
-                for (total, &bar) in total.iter_mut().zip(bars) {
-                    *total = -bar;
-                }
+            layer.copy_block(block, chi_bar, total);
+            for total in total {
+                *total = -*total;
             }
         });
     }
@@ -227,7 +239,7 @@ impl<T: Real> PullbackScratch<T> {
     }
 
     /// From the slopes before the first pass to places and normals.
-    fn pull_slopes(&mut self, near: &GridSamples<'_, T>, chi: &Field<T>) {
+    fn pull_slopes(&mut self, near: &GridSamples<'_, T>, chi: Cells<'_, T>) {
         let (layer, corrections) = (&self.pass.layer, &self.corrections);
         near.for_each(
             &mut self.samples,
@@ -241,6 +253,16 @@ impl<T: Real> PullbackScratch<T> {
                 bars.place = vector::add(bars.place, bend);
             },
         );
+    }
+
+    /// Adds to `field` what [`forward`](super::forward) subtracted from `χ`.
+    pub(crate) fn add_corrections(&self, field: &mut BlockField<T>) {
+        let (layer, mut field) = (&self.pass.layer, CellsMut::Blocks(field));
+        layer.zip_rows(&self.corrections, &mut field, |e, field| {
+            for (value, &e) in field.iter_mut().zip(e) {
+                *value += e;
+            }
+        });
     }
 
     /// `Σ f(start, corrections)` over the rows of cells along z near the samples: `start` is the place of the first

@@ -7,13 +7,14 @@ use super::forward::Options;
 use super::means::GridSamples;
 use super::stencil::Derivatives;
 use super::step::Step;
-use crate::{Field, Real, parallel, vector};
+use crate::data::cells::Cells;
+use crate::{Real, parallel, vector};
 
 impl<T: Real> GridSamples<'_, T> {
     /// Fills the slopes `u_i` of the first pass and the trust `ω_i`, and adds the shifts `δ_i` to `remaining`.
     pub(super) fn fill_trust(
         &self,
-        chi: &Field<T>,
+        chi: Cells<'_, T>,
         options: Options,
         remaining: &mut [T],
         residual: &mut Residual<T>,
@@ -49,20 +50,18 @@ impl<T: Real> GridSamples<'_, T> {
     #[inline(always)]
     pub(super) fn derivatives(
         &self,
-        chi: &Field<T>,
+        chi: Cells<'_, T>,
         i: usize,
         correction: impl Fn([usize; 3]) -> [[[T; 3]; 3]; 3],
     ) -> Option<Derivatives<T>> {
         let stencil = self.stencil(i)?;
-        let [_, ny, nz] = self.grid.shape();
         let [x, y, z] = stencil.corner;
         let correction = correction(stencil.corner);
         Some(stencil.derivatives(
             #[inline(always)]
             |i, j| {
-                let start = ((x + i) * ny + y + j) * nz + z;
                 let added = correction[i][j];
-                let row = &chi.values()[start..start + 3];
+                let row = chi.row::<3>([x + i, y + j, z]);
                 [row[0] + added[0], row[1] + added[1], row[2] + added[2]]
             },
         ))

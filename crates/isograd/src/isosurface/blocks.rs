@@ -1,0 +1,342 @@
+//! Marching cubes on the blocks of a field: vertices, triangles and rules are those of [`forward`](super::forward), vertices
+//! and faces in the order of the blocks.
+
+use rayon::prelude::*;
+
+use super::march::{position, split};
+use super::signs::ones;
+use super::tables::TABLE;
+use super::{Error, Report};
+use crate::data::blocks::{BlockField, Blocks, EDGE, NODES};
+use crate::data::cells::Cells;
+use crate::data::{LatticeEdge, Mesh};
+use crate::element::crossing::crossing;
+use crate::Real;
+
+/// Cells along each side of a block and the first ones of the next blocks.
+const SIDE: usize = EDGE + 1;
+
+/// Cells along each side of a block with one more all round.
+const WIDE: usize = EDGE + 2;
+
+/// Crossed edges and triangles of a block.
+#[derive(Clone, Copy, Debug, Default)]
+struct Crossings {
+    /// Per axis and plane of cells, which of the edges that start there are crossed.
+    crossed: [[u64; EDGE]; 3],
+    /// Number of vertices of the block before those.
+    before: [[u16; EDGE]; 3],
+    vertices: usize,
+    faces: usize,
+    first_vertex: usize,
+    inside: usize,
+    walls: [[bool; 2]; 3],
+    is_finite: bool,
+}
+
+/// Signs at a block and the first cells of the next ones.
+struct Corners {
+    /// `(SIDE, SIDE, SIDE)`; `None` where there is no value.
+    inside: Vec<Option<bool>>,
+}
+
+/// Writes the surface `χ = level` of a field in blocks into `mesh`, in the user's unit. A cube without a value at each of
+/// its corners has no triangles. The same bits for any number of threads.
+///
+/// # Errors
+/// As [`forward`](super::forward).
+pub(crate) fn forward<T: Real>(
+    chi: &BlockField<T>,
+    level: T,
+    mesh: &mut Mesh<T>,
+) -> Result<Report, Error> {
+    mesh.vertices.clear();
+    mesh.faces.clear();
+    mesh.edges.clear();
+    if !level.is_finite() {
+        return Err(Error::Level { level: level.f64() });
+    }
+    let blocks = 0..chi.blocks.len();
+    let mut crossings: Vec<Crossings> = blocks
+        .into_par_iter()
+        .map(|block| Crossings::new(chi, level, block))
+        .collect();
+    if let Some(block) = crossings.iter().position(|of| !of.is_finite) {
+        return Err(Error::NotFinite {
+            cell: chi.blocks.corner(block),
+            value: f64::NAN,
+        });
+    }
+    let [mut vertices, mut faces, mut inside] = [0; 3];
+    let mut walls = [[false; 2]; 3];
+    for of in &mut crossings {
+        of.first_vertex = vertices;
+        vertices += of.vertices;
+        faces += of.faces;
+        inside += of.inside;
+        for (wall, touched) in walls.as_flattened_mut().iter_mut().zip(of.walls.as_flattened()) {
+            *wall |= touched;
+        }
+    }
+    if faces == 0 {
+        return Err(one_sided(chi, level, inside == 0));
+    }
+    if vertices >= u32::MAX as usize {
+        return Err(Error::TooManyVertices { vertices });
+    }
+    mesh.vertices.resize(vertices, [T::zero(); 3]);
+    mesh.edges.resize(vertices, LatticeEdge::new(0, 0));
+    mesh.faces.resize(faces, [0; 3]);
+    let vertices = split(&mut mesh.vertices, crossings.iter().map(|of| of.vertices));
+    let edges = split(&mut mesh.edges, crossings.iter().map(|of| of.vertices));
+    let faces = split(&mut mesh.faces, crossings.iter().map(|of| of.faces));
+    let work = vertices.into_par_iter().zip(edges).zip(faces).enumerate();
+    work.for_each(|(block, ((vertices, edges), faces))| {
+        if !vertices.is_empty() {
+            emit_vertices(chi, level, block, &crossings[block], vertices, edges);
+        }
+        if !faces.is_empty() {
+            emit_faces(chi, level, block, &crossings, faces);
+        }
+    });
+    Ok(Report {
+        touches_wall: walls.as_flattened().contains(&true),
+        walls,
+        inside,
+    })
+}
+
+/// Absent blocks into which the surface `χ = level` continues.
+pub(crate) fn open_ends<T: Real>(chi: &BlockField<T>, level: T) -> Vec<[usize; 3]> {
+    let blocks = &chi.blocks;
+    let shape = blocks.cells().map(|n| n.div_ceil(EDGE));
+    let of_block = |block: usize| {
+        let place = blocks.corner(block).map(|c| c / EDGE);
+        let mut inside = None;
+        let mut found = Vec::new();
+        for next in 0..27 {
+            let step = [next / 9, next / 3 % 3, next % 3];
+            let at: [Option<usize>; 3] = std::array::from_fn(|a| {
+                let at = (place[a] + step[a]).checked_sub(1)?;
+                (at < shape[a]).then_some(at)
+            });
+            let [Some(x), Some(y), Some(z)] = at else {
+                continue;
+            };
+            if blocks.at([x, y, z]).is_some() {
+                continue;
+            }
+            let inside = inside.get_or_insert_with(|| surroundings(chi, level, block));
+            if is_mixed(inside, step) {
+                found.push([x, y, z]);
+            }
+        }
+        found
+    };
+    let found = (0..blocks.len()).into_par_iter().flat_map_iter(of_block);
+    found.collect()
+}
+
+/// Whether cells that touch the neighboring block in the direction `step − 1` are on both sides.
+fn is_mixed(inside: &[Option<bool>], step: [usize; 3]) -> bool {
+    let [x, y, z] = step.map(|s| match s {
+        0 => 1..2,
+        1 => 0..WIDE,
+        _ => EDGE..EDGE + 1,
+    });
+    let mut sides = [false; 2];
+    for i in x {
+        for j in y.clone() {
+            for k in z.clone() {
+                if let Some(inside) = inside[(i * WIDE + j) * WIDE + k] {
+                    sides[usize::from(inside)] = true;
+                }
+            }
+        }
+    }
+    sides == [true; 2]
+}
+
+/// Signs at a block and the cells round it; `None` where there is no value.
+fn surroundings<T: Real>(chi: &BlockField<T>, level: T, block: usize) -> Vec<Option<bool>> {
+    let corner = chi.blocks.corner(block);
+    let sign = |place: usize| {
+        let step = [place / WIDE / WIDE, place / WIDE % WIDE, place % WIDE];
+        let mut cell = [0; 3];
+        for a in 0..3 {
+            cell[a] = (corner[a] + step[a]).checked_sub(1)?;
+            if cell[a] >= chi.blocks.cells()[a] {
+                return None;
+            }
+        }
+        chi.get(cell).map(|value| value < level)
+    };
+    (0..WIDE * WIDE * WIDE).map(sign).collect()
+}
+
+impl Corners {
+    fn new<T: Real>(chi: &BlockField<T>, level: T, block: usize) -> Self {
+        let (blocks, corner) = (&chi.blocks, chi.blocks.corner(block));
+        let place = corner.map(|c| c / EDGE);
+        let next: [Option<usize>; 8] = std::array::from_fn(|n| {
+            let at = [place[0] + (n >> 2), place[1] + (n >> 1 & 1), place[2] + (n & 1)];
+            let is_inside = (0..3).all(|a| at[a] * EDGE < blocks.cells()[a]);
+            is_inside.then(|| blocks.at(at)).flatten()
+        });
+        let sign = |at: usize| {
+            let cell = [at / SIDE / SIDE, at / SIDE % SIDE, at % SIDE];
+            let [x, y, z] = cell.map(|c| c / EDGE);
+            let block = next[4 * x + 2 * y + z]?;
+            let is_inside = (0..3).all(|a| corner[a] + cell[a] < blocks.cells()[a]);
+            let node = Blocks::node(cell);
+            is_inside.then(|| chi.values[block * NODES + node] < level)
+        };
+        Self {
+            inside: (0..SIDE * SIDE * SIDE).map(sign).collect(),
+        }
+    }
+
+    #[inline(always)]
+    fn at(&self, [i, j, k]: [usize; 3]) -> Option<bool> {
+        self.inside[(i * SIDE + j) * SIDE + k]
+    }
+
+    /// Sign pattern of a cube; `None` without a value at a corner.
+    #[inline(always)]
+    fn case(&self, [i, j, k]: [usize; 3]) -> Option<u8> {
+        let mut case = 0;
+        for c in 0..8 {
+            let inside = self.at([i + (c >> 2), j + (c >> 1 & 1), k + (c & 1)])?;
+            case |= u8::from(inside) << c;
+        }
+        Some(case)
+    }
+}
+
+/// The cells of a block.
+fn cells() -> impl Iterator<Item = [usize; 3]> {
+    (0..NODES).map(|n| [n / EDGE / EDGE, n / EDGE % EDGE, n % EDGE])
+}
+
+impl Crossings {
+    fn new<T: Real>(chi: &BlockField<T>, level: T, block: usize) -> Self {
+        let own = &chi.values[block * NODES..(block + 1) * NODES];
+        let mut of = Self {
+            is_finite: own.iter().all(|value| value.is_finite()),
+            ..Self::default()
+        };
+        let corners = Corners::new(chi, level, block);
+        of.count_inside(chi, block, &corners);
+        let mixed = corners.inside.iter().flatten().any(|&inside| inside)
+            && corners.inside.iter().flatten().any(|&inside| !inside);
+        if !mixed {
+            return of;
+        }
+        for cell in cells() {
+            let Some(inside) = corners.at(cell) else {
+                continue;
+            };
+            for axis in 0..3 {
+                let mut next = cell;
+                next[axis] += 1;
+                if corners.at(next).is_some_and(|other| other != inside) {
+                    of.crossed[axis][cell[0]] |= 1 << (EDGE * cell[1] + cell[2]);
+                }
+            }
+            if let Some(case) = corners.case(cell) {
+                of.faces += TABLE.count(case);
+            }
+        }
+        let words = of.crossed.as_flattened().iter();
+        for (word, before) in words.zip(of.before.as_flattened_mut()) {
+            *before = of.vertices as u16;
+            of.vertices += word.count_ones() as usize;
+        }
+        of
+    }
+
+    fn count_inside<T: Real>(&mut self, chi: &BlockField<T>, block: usize, corners: &Corners) {
+        let (corner, shape) = (chi.blocks.corner(block), chi.blocks.cells());
+        for cell in cells().filter(|&cell| corners.at(cell) == Some(true)) {
+            self.inside += 1;
+            for a in 0..3 {
+                let at = corner[a] + cell[a];
+                self.walls[a][0] |= at == 0;
+                self.walls[a][1] |= at == shape[a] - 1;
+            }
+        }
+    }
+
+    /// Number of the vertex on the edge from a cell of the block along an axis.
+    #[inline(always)]
+    fn vertex(&self, axis: usize, [i, j, k]: [usize; 3]) -> u32 {
+        let below = (1u64 << (EDGE * j + k)) - 1;
+        let own = (self.crossed[axis][i] & below).count_ones();
+        self.first_vertex as u32 + u32::from(self.before[axis][i]) + own
+    }
+}
+
+fn emit_vertices<T: Real>(
+    chi: &BlockField<T>,
+    level: T,
+    block: usize,
+    of: &Crossings,
+    vertices: &mut [[T; 3]],
+    edges: &mut [LatticeEdge],
+) {
+    let corner = chi.blocks.corner(block);
+    let mut places = vertices.iter_mut().zip(edges);
+    for (n, word) in of.crossed.as_flattened().iter().enumerate() {
+        let (axis, i) = (n / EDGE, n % EDGE);
+        for bit in ones(*word) {
+            let (j, k) = (bit as usize / EDGE, bit as usize % EDGE);
+            let cell = plus(corner, [i, j, k]);
+            let edge = LatticeEdge::new(chi.grid.index(cell), axis);
+            let [low, high] = Cells::from(chi).ends(edge);
+            if let Some((vertex, place)) = places.next() {
+                *vertex = position(&chi.grid, cell, axis, crossing(low, high, level));
+                *place = edge;
+            }
+        }
+    }
+}
+
+fn plus(a: [usize; 3], b: [usize; 3]) -> [usize; 3] {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+fn emit_faces<T: Real>(
+    chi: &BlockField<T>,
+    level: T,
+    block: usize,
+    crossings: &[Crossings],
+    faces: &mut [[u32; 3]],
+) {
+    let corners = Corners::new(chi, level, block);
+    let place = chi.blocks.corner(block).map(|c| c / EDGE);
+    let vertex = |cell: [usize; 3], edge: u8| {
+        let (axis, u, v) = (edge as usize / 4, edge as usize / 2 % 2, edge as usize % 2);
+        let step = [[0, u, v], [u, 0, v], [u, v, 0]][axis];
+        let cell = plus(cell, step);
+        let owner = chi.blocks.at(plus(place, cell.map(|c| c / EDGE)));
+        let local = cell.map(|c| c % EDGE);
+        owner.map_or(0, |owner| crossings[owner].vertex(axis, local))
+    };
+    let mut places = faces.iter_mut();
+    for cell in cells() {
+        let case = corners.case(cell).unwrap_or(0);
+        for (triangle, place) in TABLE.triangles(case).iter().zip(&mut places) {
+            *place = triangle.map(|edge| vertex(cell, edge));
+        }
+    }
+}
+
+fn one_sided<T: Real>(chi: &BlockField<T>, level: T, nothing_inside: bool) -> Error {
+    let wider = |[low, high]: [f64; 2], v: &T| [low.min(v.f64()), high.max(v.f64())];
+    let [min, max] = chi.values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], wider);
+    let level = level.f64();
+    match nothing_inside {
+        true => Error::NothingInside { level, min, max },
+        false => Error::NothingOutside { level, min, max },
+    }
+}
