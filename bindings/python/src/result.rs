@@ -64,6 +64,11 @@ impl ReconstructionArrays {
         each!(&self.0, this => this.result.view().backend())
     }
 
+    /// Number of cells of the surface's grid along each axis.
+    fn surface_shape(&self) -> [usize; 3] {
+        each!(&self.0, this => this.result.view().surface_grid().shape())
+    }
+
     /// The report as JSON.
     fn report(&self, py: Python<'_>) -> PyResult<String> {
         each!(&self.0, this => {
@@ -138,14 +143,12 @@ fn array<'py, T: Number>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let result = this.result.view();
     let (shape, count) = (result.grid().shape(), this.cloud.len());
-    let surface_shape = result.surface_grid().shape();
     match name {
         "sdf" => arrays::shaped(py, failure(result.sdf())?.values().to_vec(), shape),
-        "indicator" => arrays::shaped(
-            py,
-            failure(result.indicator())?.values().to_vec(),
-            surface_shape,
-        ),
+        "indicator" => {
+            let indicator = failure(result.indicator())?;
+            arrays::shaped(py, indicator.values().to_vec(), indicator.grid().shape())
+        }
         "closest" => arrays::shaped(py, failure(result.closest())?.to_vec(), shape),
         "vertices" => Ok(arrays::from_vectors(py, failure(result.mesh())?.vertices())),
         "faces" => Ok(arrays::from_vectors(py, failure(result.mesh())?.faces())),

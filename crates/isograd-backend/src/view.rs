@@ -61,7 +61,8 @@ impl<'a, T: Number> View<'a, T> {
     results! {
         /// The signed distance φ at every cell center, in the cloud's unit, negative inside.
         sdf: &'a Field<T>;
-        /// The indicator χ at every cell center of [the surface's grid](Self::surface_grid).
+        /// The indicator χ at every cell center of [the surface's grid](Self::surface_grid); after a sparse solve that of a
+        /// coarse grid.
         indicator: &'a Field<T>;
         /// The level of the surface.
         iso_value: T;
@@ -79,7 +80,7 @@ impl<'a, T: Number> View<'a, T> {
         neighbor_counts: &'a [u32];
     }
 
-    /// Grid of the surface and of the indicator.
+    /// Grid of the surface.
     pub fn surface_grid(self) -> &'a Grid<T> {
         match self.0 {
             Of::Cpu(of) => of.surface_grid(),

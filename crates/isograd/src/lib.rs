@@ -90,7 +90,7 @@ pub use data::{
 pub use pipeline::{
     AvailableMemory, CloudCotangent, Cotangent, Error, ExtensionCotangent, MemoryError,
     MemoryLimit, MemoryUse, Options, Orienter, ParseOptionError, Pipeline, PullbackError,
-    Reconstruction, Reconstructor, RestoreError, Saved, SurfaceResolution, available_memory,
+    Reconstruction, Reconstructor, RestoreError, Saved, Solve, SurfaceResolution, available_memory,
     check_memory,
 };
 pub use real::Real;

@@ -10,6 +10,7 @@ mod orienter;
 mod pullback;
 mod restore;
 mod scaling;
+mod sparse;
 mod stages;
 mod surface;
 mod text;
@@ -32,6 +33,7 @@ pub use memory::{
 pub use options::{Error, Options};
 pub use orienter::Orienter;
 pub use restore::{RestoreError, Saved};
+pub use sparse::Solve;
 pub use surface::SurfaceResolution;
 pub use text::ParseOptionError;
 
@@ -164,7 +166,10 @@ pub struct Reconstruction<T: Real> {
     /// Normals of the cloud, with [`orient::Method::Given`].
     given: Vec<[T; 3]>,
     sdf: Field<T>,
+    /// With a sparse solve, that of the coarsest cells.
     indicator: Field<T>,
+    /// The indicator of a sparse solve.
+    sparse: Option<sparse::Sparse<T>>,
     iso_value: T,
     mesh: Mesh<T>,
     closest: Vec<u32>,
@@ -196,6 +201,7 @@ impl<T: Pipeline> Reconstruction<T> {
             given: Vec::new(),
             sdf: Field::zeros(grid),
             indicator: Field::zeros(grid),
+            sparse: None,
             iso_value: T::zero(),
             mesh: Mesh::default(),
             closest: Vec::new(),
@@ -251,14 +257,23 @@ impl<T: Real> Reconstruction<T> {
 
     /// The indicator χ at every cell center of [the surface's grid](SurfaceResolution): below the iso-value inside, above it outside, what the
     /// [local iso-value](isosurface::local_level) takes off included. It has no unit; without area weights also no
-    /// scale.
+    /// scale. With a [sparse](Solve) solve, it is the far part of χ on the coarsest cells: those near the surface are
+    /// not given.
     pub fn indicator(&self) -> &Field<T> {
         &self.indicator
     }
 
-    /// The grid that the surface was found on: that of the indicator.
+    /// The grid that the surface was found on: that of the indicator, unless the solve was sparse.
     pub fn surface_grid(&self) -> &Grid<T> {
-        self.indicator.grid()
+        self.chi().grid()
+    }
+
+    /// How the Poisson equation was solved: [`Solve::Dense`] or [`Solve::Sparse`].
+    pub fn solve(&self) -> Solve {
+        match self.sparse {
+            Some(_) => Solve::Sparse,
+            None => Solve::Dense,
+        }
     }
 
     /// The level `c` of the surface `χ = c`.

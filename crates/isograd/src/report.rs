@@ -97,6 +97,9 @@ pub struct Report {
     pub guarded: usize,
     /// Cell size of the grid of the surface.
     pub surface_spacing: f64,
+    /// Number of cells of that grid at which the indicator was computed: all, or with a sparse solve those near the
+    /// surface.
+    pub surface_cells: usize,
     /// Width of the smoothing of the indicator, in cells of that grid.
     pub smoothing: f64,
     /// Name of the way the signs were found.

@@ -87,8 +87,8 @@ impl<T: Real> Cube<T> {
     #[inline(always)]
     pub(crate) fn value_and_gradient_of(&self, field: Cells<'_, T>) -> (T, [T; 3]) {
         let [x, y, z] = self.cell;
-        let [a, b, c, d] =
-            [[x, y], [x, y + 1], [x + 1, y], [x + 1, y + 1]].map(|[x, y]| field.row::<2>([x, y, z]));
+        let [a, b, c, d] = [[x, y], [x, y + 1], [x + 1, y], [x + 1, y + 1]]
+            .map(|[x, y]| field.row::<2>([x, y, z]));
         self.from_corners([a[0], a[1], b[0], b[1], c[0], c[1], d[0], d[1]])
     }
 
@@ -129,15 +129,21 @@ pub(crate) fn spread_on<T: Real>(
     let cube = |i: usize| Cube::new(grid, grid.to_index(points[i]));
     let blocks: &Blocks = &field.blocks;
     let corner = |i: usize| Some(cube(i).cell);
-    blocks.scatter(&mut field.values, points.len(), 2, corner, |block, values, items| {
-        for &i in items {
-            let (cube, part) = (cube(i as usize), value(i as usize));
-            let weights = cube.weights();
-            Overlap::new(cube.cell, [2; 3], blocks.corner(block)).for_each(|[i, j, k], at| {
-                values[at] += part * weights[4 * i + 2 * j + k];
-            });
-        }
-    });
+    blocks.scatter(
+        &mut field.values,
+        points.len(),
+        2,
+        corner,
+        |block, values, items| {
+            for &i in items {
+                let (cube, part) = (cube(i as usize), value(i as usize));
+                let weights = cube.weights();
+                Overlap::new(cube.cell, 2, blocks.corner(block)).for_each(|[i, j, k], at| {
+                    values[at] += part * weights[4 * i + 2 * j + k];
+                });
+            }
+        },
+    );
 }
 
 /// Adds `value(i)` at every sample to the eight cells round it, in memory order: the transpose of

@@ -47,9 +47,21 @@ class Level(str, Enum):
     """The mean at all samples, as in the paper."""
 
 
+class Solve(str, Enum):
+    """Cells at which the indicator is computed."""
+
+    AUTO = "auto"
+    """All of the surface's cells up to 2²⁵ of them, else as ``SPARSE``."""
+    DENSE = "dense"
+    """All of them."""
+    SPARSE = "sparse"
+    """Those near the samples and the surface; coarse cells elsewhere."""
+
+
 OrientLike = Orient | Literal["auto", "parity", "given", "signs", "sensors", "previous"]
 SplatLike = Splat | Literal["bspline", "paper"]
 LevelLike = Level | Literal["local", "thin", "mean"]
+SolveLike = Solve | Literal["auto", "dense", "sparse"]
 
 
 @dataclass(frozen=True)
@@ -68,6 +80,7 @@ class Options:
         surface: cells that the surface is found on: ``"auto"`` for about the distance between samples, up to twice as
             fine as the grid of φ, ``"grid"`` for those of φ, a cell size in the unit of the points, or a factor such as
             ``"3x"``. φ stays on its own grid.
+        solve: cells at which the indicator is computed; see :class:`Solve`.
         band: distance from the surface up to which φ is computed, in the unit of the points, or ``"full"``.
         checks: whether to measure the result and to check whether it can be trusted.
 
@@ -83,6 +96,7 @@ class Options:
     screening: float = 0.0
     level: LevelLike = Level.LOCAL
     surface: float | str = "auto"
+    solve: SolveLike = Solve.AUTO
     band: float | Literal["full"] = "full"
     checks: bool = True
 
@@ -96,6 +110,7 @@ class Options:
             "screening": _not_negative(self.screening, "screening", "0 or more"),
             "level": _choice(Level, self.level, "level"),
             "surface": _surface(self.surface),
+            "solve": _choice(Solve, self.solve, "solve"),
             "band": length(self.band, "band", "full"),
             "checks": bool(self.checks),
         }

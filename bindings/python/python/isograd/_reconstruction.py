@@ -101,13 +101,16 @@ class Reconstruction:
 
     @cached_property
     def indicator(self) -> np.ndarray:
-        """Indicator χ, in the shape of the surface's grid: below :attr:`iso_value` inside, above it outside."""
+        """Indicator χ, in the shape of the surface's grid: below :attr:`iso_value` inside, above it outside.
+
+        After a sparse solve, the far part of χ on coarse cells.
+        """
         return self._core.array("indicator")
 
     @cached_property
     def surface_grid(self) -> Grid:
-        """The grid that the surface was found on: that of :attr:`indicator`."""
-        shape = self.indicator.shape
+        """The grid that the surface was found on: that of :attr:`indicator`, unless the solve was sparse."""
+        shape = tuple(self._core.surface_shape())
         return Grid(self.grid.lower, self.grid.spacing * self.grid.shape[0] / shape[0], shape)
 
     @cached_property
@@ -190,7 +193,7 @@ class Reconstruction:
             sdf: ``(nx, ny, nz)`` derivative of a loss in φ.
             vertices: ``(V, 3)`` in the vertices of the mesh.
             normals: ``(N, 3)`` in the outward normals.
-            indicator: in χ, in its shape.
+            indicator: in χ, in its shape; not after a sparse solve.
             areas: ``(N,)`` in the areas.
             iso_value: in the level.
             extensions: triples of an :class:`Extension` and its derivatives in ``vertices`` and ``values``, or ``None``.

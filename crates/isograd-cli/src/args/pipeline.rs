@@ -5,7 +5,7 @@ use isograd::distance::Band;
 use isograd::isosurface::Level;
 use isograd::poisson::Smoothing;
 use isograd::splat::Weights;
-use isograd::{Grid, GridError, Options, PointCloud, Real, Resolution, SurfaceResolution};
+use isograd::{Grid, GridError, Options, PointCloud, Real, Resolution, Solve, SurfaceResolution};
 
 use super::{OrientArgs, finite, not_negative, positive};
 
@@ -56,6 +56,10 @@ pub struct MethodArgs {
     /// φ), grid (those of φ), a cell size in the cloud's unit, or a factor such as 3x; φ stays on its own grid
     #[arg(long, value_name = "auto|grid|H|Fx", default_value = "auto")]
     pub surface: SurfaceResolution,
+    /// Cells at which the indicator is computed: dense (all of the surface's), sparse (near the samples, with coarse ones for
+    /// the rest) or auto (sparse beyond 2²⁵)
+    #[arg(long, value_name = "auto|dense|sparse", default_value = "auto")]
+    pub solve: Solve,
     /// Distance from the surface up to which φ is computed, in the cloud's unit
     #[arg(long, value_name = "H|full", default_value = "full")]
     pub band: Band,
@@ -93,6 +97,7 @@ impl MethodArgs {
             .screening(self.screening)
             .level(self.level)
             .surface(self.surface)
+            .solve(self.solve)
             .band(self.band)
     }
 }

@@ -48,7 +48,7 @@ fn the_folder_gets_its_five_files_and_the_report_its_fields() {
     let report = sandbox.json("out/new/report.json");
     assert_keys(
         &report,
-        "version backend input grid normals orientation smoothing iso_value surface surface_spacing sdf seconds peak_memory_bytes warnings",
+        "version backend input grid normals orientation smoothing iso_value surface surface_spacing surface_cells sdf seconds peak_memory_bytes warnings",
     );
     assert_keys(&report["input"], "path points");
     assert_keys(&report["grid"], "shape origin spacing");

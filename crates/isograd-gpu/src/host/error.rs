@@ -20,6 +20,9 @@ pub enum Error {
         "the surface is {0:?}; a device finds it on the grid of φ only: give 'grid', or compute on the CPU"
     )]
     Surface(SurfaceResolution),
+    /// A sparse solve.
+    #[error("a device has no sparse solve: give 'auto' or 'dense', or compute on the CPU")]
+    Sparse,
     /// The device.
     #[error(transparent)]
     Device(#[from] crate::Error),

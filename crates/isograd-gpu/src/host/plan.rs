@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use isograd::orient::Method;
 use isograd::{
-    Backend, Grid, Options, PointCloud, Report, Saved, Seconds, Stage, SurfaceResolution,
+    Backend, Grid, Options, PointCloud, Report, Saved, Seconds, Solve, Stage, SurfaceResolution,
 };
 
 use super::work::{CallStart, Work};
@@ -35,6 +35,9 @@ impl<T: Number> Plan<T> {
         use SurfaceResolution::{Auto, Grid};
         if !matches!(options.surface, Auto | Grid) {
             return Err(Error::Surface(options.surface));
+        }
+        if options.solve == Solve::Sparse {
+            return Err(Error::Sparse);
         }
         let device = T::open(backend, grid, (&options).into())?;
         Ok(Self {

@@ -181,6 +181,7 @@ impl<T: Number> Reconstruction<T> {
         let start = Instant::now();
         let mut report = self.begun.clone();
         report.surface_spacing = isograd::Real::f64(self.grid.spacing());
+        report.surface_cells = self.grid.cells();
         report.smoothing = self.result.smoothing();
         report.iso_value = isograd::Real::f64(self.iso_value()?);
         if self.result.surface.report.touches_wall {

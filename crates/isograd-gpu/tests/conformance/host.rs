@@ -4,7 +4,7 @@ use isograd::distance::extend;
 use isograd::orient::Method;
 use isograd::{
     Attribute, Backend, Cotangent, ExtensionCotangent, Grid, Options, PointCloud, PullbackError,
-    Real, Reconstructor, Resolution, Saved, Stage, SurfaceResolution,
+    Real, Reconstructor, Resolution, Saved, Solve, Stage, SurfaceResolution,
 };
 use isograd_gpu::host::{Choice, Error, Number, Plan, choose};
 use isograd_shapes::Sampling;
@@ -474,6 +474,8 @@ fn what_devices_do_not_have_is_named() {
     assert!(text.contains("0 or more"), "{text}");
     let text = refused(options().surface(SurfaceResolution::Factor(2.0)));
     assert!(text.contains("on the grid of φ only"), "{text}");
+    let text = refused(options().solve(Solve::Sparse));
+    assert!(text.contains("no sparse solve"), "{text}");
     let plan = Plan::new(Backend::Cpu, grid(&cloud), options());
     assert!(matches!(plan.err(), Some(Error::NoDevice(Backend::Cpu))));
 }

@@ -43,7 +43,7 @@ pub(crate) struct Brick {
     pub(crate) blocks: [usize; 2],
 }
 
-/// Overlap of a box of cells with a block: ranges of places in the box, per axis.
+/// Overlap of a cube of cells with a block: ranges of places in the cube, per axis.
 pub(crate) struct Overlap {
     corner: [usize; 3],
     block: [usize; 3],
@@ -78,6 +78,13 @@ impl Marks {
                 let row = (i * self.shape[1] + j) * self.shape[2];
                 self.marked[row + z[0]..=row + z[1]].fill(0);
             }
+        }
+    }
+
+    /// Marks blocks by their coordinates.
+    pub(crate) fn add_blocks(&mut self, places: &[[usize; 3]]) {
+        for [i, j, k] in places {
+            self.marked[(i * self.shape[1] + j) * self.shape[2] + k] = 0;
         }
     }
 
@@ -152,10 +159,6 @@ impl Blocks {
     /// Cells of the grid along each axis.
     pub(crate) fn cells(&self) -> [usize; 3] {
         self.cells
-    }
-
-    pub(crate) fn bricks(&self) -> &[Brick] {
-        &self.bricks
     }
 
     /// Size in bytes.
@@ -305,14 +308,14 @@ impl Blocks {
 }
 
 impl Overlap {
-    /// Of the box of cells with `width` of them per axis from `corner` on, and the block that begins at `block`.
+    /// Of the cube of `width`³ cells from `corner` on with the block that begins at `block`.
     #[inline(always)]
-    pub(crate) fn new(corner: [usize; 3], width: [usize; 3], block: [usize; 3]) -> Self {
+    pub(crate) fn new(corner: [usize; 3], width: usize, block: [usize; 3]) -> Self {
         let mut ranges = [(0, 0); 3];
         for a in 0..3 {
             ranges[a] = (
                 block[a].saturating_sub(corner[a]),
-                width[a].min((block[a] + EDGE).saturating_sub(corner[a])),
+                width.min((block[a] + EDGE).saturating_sub(corner[a])),
             );
         }
         Self {
@@ -322,7 +325,7 @@ impl Overlap {
         }
     }
 
-    /// Runs `f([i, j, k], place)` on the shared cells: the place in the box, and the place in the block.
+    /// Runs `f([i, j, k], place)` on the shared cells: the place in the cube, and the place in the block.
     #[inline(always)]
     pub(crate) fn for_each(&self, mut f: impl FnMut([usize; 3], usize)) {
         let [(x0, x1), (y0, y1), (z0, z1)] = self.ranges;

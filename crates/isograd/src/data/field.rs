@@ -61,6 +61,11 @@ impl<T: Real> Field<T> {
         &mut self.values
     }
 
+    /// The grid, and the values to be changed in place.
+    pub(crate) fn split_mut(&mut self) -> (&Grid<T>, &mut [T]) {
+        (&self.grid, &mut self.values)
+    }
+
     /// The values alone.
     pub fn into_values(self) -> Vec<T> {
         self.values

@@ -139,12 +139,33 @@ impl<T: Real> Grid<T> {
 
     pub(super) const MAX_CELLS: usize = u32::MAX as usize - 1;
 
+    /// Most cells of a grid of which only some blocks are stored.
+    const MAX_CELLS_IN_BLOCKS: usize = 1 << 36;
+
     /// A grid with low corner `lower`, cell size `spacing` and `shape` cells.
     ///
     /// # Errors
     /// A spacing that is not positive, a corner that is not finite, fewer than [`Self::MIN_CELLS`] or too
     /// many cells, or cells too small for the number type at these coordinates.
     pub fn new(lower: [T; 3], spacing: T, shape: [usize; 3]) -> Result<Self, GridError> {
+        Self::with_limit(lower, spacing, shape, Self::MAX_CELLS)
+    }
+
+    /// Like [`Self::new`], for a grid of which only some blocks are stored: with up to 2³⁶ cells.
+    pub(crate) fn in_blocks(
+        lower: [T; 3],
+        spacing: T,
+        shape: [usize; 3],
+    ) -> Result<Self, GridError> {
+        Self::with_limit(lower, spacing, shape, Self::MAX_CELLS_IN_BLOCKS)
+    }
+
+    fn with_limit(
+        lower: [T; 3],
+        spacing: T,
+        shape: [usize; 3],
+        max: usize,
+    ) -> Result<Self, GridError> {
         if !(spacing > T::zero()) || !spacing.is_finite() {
             return Err(GridError::Spacing {
                 spacing: spacing.f64(),
@@ -169,11 +190,8 @@ impl<T: Real> Grid<T> {
         let cells = shape[0]
             .checked_mul(shape[1])
             .and_then(|n| n.checked_mul(shape[2]));
-        if cells.is_none_or(|n| n > Self::MAX_CELLS) {
-            return Err(GridError::TooMany {
-                shape,
-                max: Self::MAX_CELLS,
-            });
+        if cells.is_none_or(|n| n > max) {
+            return Err(GridError::TooMany { shape, max });
         }
         let extent = (0..3).fold(T::zero(), |m, a| m.max(lower[a].abs()).max(upper[a].abs()));
         if extent + spacing / T::of(4.0) == extent {

@@ -8,6 +8,7 @@ use super::bvh::{Bvh, LANES, NOWHERE, NearestTriangles, Points, Stack, corners, 
 use super::lattice::NO_TRIANGLE;
 use super::pseudonormals::Pseudonormals;
 use super::triangle::{Closest, closest_point};
+use crate::data::cells::Cells;
 use crate::vector::{dot, normalized, of_f64, scale, to_f64};
 use crate::{Field, Mesh, Real};
 
@@ -150,11 +151,7 @@ impl<T: Real> Query<T> {
 }
 
 /// Whether a point is below the level `c` of a field, where the eight values round it are there and agree.
-pub(super) fn corners_agree<T: Real>(
-    field: Cells<'_, T>,
-    c: T,
-    point: [f64; 3],
-) -> Option<bool> {
+pub(super) fn corners_agree<T: Real>(field: Cells<'_, T>, c: T, point: [f64; 3]) -> Option<bool> {
     let grid = field.grid();
     let (lower, spacing) = (to_f64(grid.lower()), grid.spacing().f64());
     let mut cell = [0; 3];

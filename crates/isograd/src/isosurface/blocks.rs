@@ -7,11 +7,11 @@ use super::march::{position, split};
 use super::signs::ones;
 use super::tables::TABLE;
 use super::{Error, Report};
+use crate::Real;
 use crate::data::blocks::{BlockField, Blocks, EDGE, NODES};
 use crate::data::cells::Cells;
 use crate::data::{LatticeEdge, Mesh};
 use crate::element::crossing::crossing;
-use crate::Real;
 
 /// Cells along each side of a block and the first ones of the next blocks.
 const SIDE: usize = EDGE + 1;
@@ -74,7 +74,11 @@ pub(crate) fn forward<T: Real>(
         vertices += of.vertices;
         faces += of.faces;
         inside += of.inside;
-        for (wall, touched) in walls.as_flattened_mut().iter_mut().zip(of.walls.as_flattened()) {
+        for (wall, touched) in walls
+            .as_flattened_mut()
+            .iter_mut()
+            .zip(of.walls.as_flattened())
+        {
             *wall |= touched;
         }
     }
@@ -179,7 +183,11 @@ impl Corners {
         let (blocks, corner) = (&chi.blocks, chi.blocks.corner(block));
         let place = corner.map(|c| c / EDGE);
         let next: [Option<usize>; 8] = std::array::from_fn(|n| {
-            let at = [place[0] + (n >> 2), place[1] + (n >> 1 & 1), place[2] + (n & 1)];
+            let at = [
+                place[0] + (n >> 2),
+                place[1] + (n >> 1 & 1),
+                place[2] + (n & 1),
+            ];
             let is_inside = (0..3).all(|a| at[a] * EDGE < blocks.cells()[a]);
             is_inside.then(|| blocks.at(at)).flatten()
         });
@@ -333,7 +341,10 @@ fn emit_faces<T: Real>(
 
 fn one_sided<T: Real>(chi: &BlockField<T>, level: T, nothing_inside: bool) -> Error {
     let wider = |[low, high]: [f64; 2], v: &T| [low.min(v.f64()), high.max(v.f64())];
-    let [min, max] = chi.values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], wider);
+    let [min, max] = chi
+        .values
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], wider);
     let level = level.f64();
     match nothing_inside {
         true => Error::NothingInside { level, min, max },

@@ -18,9 +18,9 @@
 
 use rayon::prelude::*;
 
+use crate::data::cells::{Cells, CellsMut};
 use crate::splat::{SampleCotangent, Samples, SortedSamples};
 use crate::trilinear::{self, Cube};
-use crate::data::cells::{Cells, CellsMut};
 use crate::{Grid, Real, parallel, vector};
 
 /// Values that the pullback needs besides the inputs.

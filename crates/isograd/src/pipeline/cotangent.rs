@@ -13,7 +13,8 @@ use crate::{Real, poisson, vector};
 pub struct Cotangent<'a, T> {
     /// `(nx, ny, nz)` of φ, in memory order.
     pub sdf: Option<&'a [T]>,
-    /// Of the indicator χ, in the shape of [the surface's grid](crate::Reconstruction::surface_grid).
+    /// Of the indicator χ, in the shape of [the surface's grid](crate::Reconstruction::surface_grid); `None` if the solve
+    /// was sparse.
     pub indicator: Option<&'a [T]>,
     /// Of the iso-value `c`.
     pub iso_value: T,
@@ -85,6 +86,11 @@ pub enum PullbackError {
         /// The first such entry.
         index: usize,
     },
+    /// The indicator of a sparse solve has no cotangent.
+    #[error(
+        "a cotangent of the indicator was given, and the solve was sparse; use the option solve = dense, or cotangents of other results"
+    )]
+    SparseIndicator,
     /// An extended attribute.
     #[error(transparent)]
     Extension(#[from] extend::Error),

@@ -5,7 +5,9 @@ mod linux;
 
 use std::fmt;
 
+use super::sparse::Sparse;
 use super::{Error, Reconstruction};
+use crate::data::blocks::Blocks;
 use crate::{Grid, Real};
 
 /// Largest number of values held at once for each cell: φ, χ, the closest triangles, and the scratch buffers of the
@@ -18,6 +20,12 @@ const FIRST_CELL_VALUES: f64 = 2.0;
 const POINT_BYTES: f64 = 500.0;
 /// The second part, in values.
 const POINT_VALUES: f64 = 75.0;
+
+/// Largest number of values held at once for each cell in a block of a sparse solve: right-hand side and indicator of all
+/// octaves, and what the local iso-value needs.
+const BLOCK_VALUES: f64 = 6.0;
+/// The same for each cell of its coarsest grid.
+const COARSE_VALUES: f64 = 4.0;
 
 const MIB: f64 = (1u64 << 20) as f64;
 const GIB: f64 = (1u64 << 30) as f64;
@@ -131,6 +139,26 @@ pub(super) fn check_points<T: Real>(points: usize, held: usize, cells: usize) ->
     Ok(check(MemoryUse::Points(points), needed, free)?)
 }
 
+/// Checks that a sparse solve in `blocks` of `grid` fits into the free memory; its coarsest cells are those of the grid, halved
+/// `octaves` times.
+///
+/// # Errors
+/// [`Error::Memory`].
+pub(super) fn check_blocks<T: Real>(
+    grid: &Grid<T>,
+    octaves: usize,
+    blocks: &Blocks,
+) -> Result<(), Error> {
+    let coarse: f64 = grid
+        .shape()
+        .iter()
+        .map(|&n| (n >> octaves) as f64)
+        .product();
+    let values = BLOCK_VALUES * blocks.nodes() as f64 + COARSE_VALUES * coarse;
+    let needed = values * size_of::<T>() as f64 + blocks.bytes() as f64;
+    Ok(check(MemoryUse::Grid(grid.shape()), needed, free)?)
+}
+
 fn check(
     purpose: MemoryUse,
     needed: f64,
@@ -173,12 +201,13 @@ fn free() -> Option<AvailableMemory> {
 }
 
 impl<T: Real> Reconstruction<T> {
-    /// Bytes kept for the pullback beside φ, the mesh and the oriented normals: the indicator and the closest face of
+    /// Bytes kept for the pullback beside φ, the mesh and the oriented normals: the indicator (the blocks of a sparse one) and the closest face of
     /// every cell, the edges of the vertices, the samples and their areas, and the residuals of the stages at the
     /// samples (search tree, radii, fitted planes, order, values of the indicator, local iso-value).
     pub fn residual_bytes(&self) -> usize {
         let [[neighbors, _], [normals, _]] = self.sample_bytes();
         size_of_val(self.indicator.values())
+            + self.sparse.as_ref().map_or(0, Sparse::bytes)
             + size_of_val(self.closest.as_slice())
             + size_of_val(self.mesh.edges())
             + size_of_val(self.points.as_slice())

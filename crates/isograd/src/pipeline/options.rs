@@ -1,6 +1,6 @@
 //! What to compute, and why it may fail.
 
-use super::{MemoryError, SurfaceResolution};
+use super::{MemoryError, Solve, SurfaceResolution};
 use crate::data::GridError;
 use crate::report::Stage;
 use crate::{distance, isosurface, neighbors, orient, poisson, splat};
@@ -49,6 +49,8 @@ options! {
     level: isosurface::Level = isosurface::Level::default(),
     /// Cell size of the grid that the surface is found on.
     surface: SurfaceResolution = SurfaceResolution::default(),
+    /// Whether the indicator is computed at all cells, or at those near the samples.
+    solve: Solve = Solve::default(),
     /// Region in which φ is computed.
     band: distance::Band = distance::Band::default(),
     /// Whether to measure the result and to check whether it can be trusted.
@@ -81,6 +83,11 @@ pub enum Error {
     /// The screening is negative or not finite.
     #[error("the screening is {0}; it must be 0 or more, and finite")]
     Screening(f64),
+    /// A screened equation has no sparse solve.
+    #[error(
+        "a screening of {0} needs the dense solve; leave the solve 'auto' or 'dense', or the screening 0"
+    )]
+    SparseScreening(f64),
     /// Neighbors.
     #[error(transparent)]
     Neighbors(#[from] neighbors::Error),

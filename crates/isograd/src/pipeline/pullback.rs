@@ -4,6 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
+use super::sparse::Bars;
 use super::{CloudCotangent, Cotangent, Pipeline, PullbackError, Reconstruction, Residuals};
 use crate::data::{Field, GridCotangent};
 use crate::distance::{extend, lattice};
@@ -96,7 +97,7 @@ impl<T: Real> Reconstruction<T> {
     ) -> Result<(), PullbackError> {
         scratch.start(cotangent, self.points.len(), self.mesh.vertices().len());
         out.guarded = 0;
-        let ratio = self.indicator.grid().spacing().f64() / self.sdf.grid().spacing().f64();
+        let ratio = self.surface_grid().spacing().f64() / self.sdf.grid().spacing().f64();
         self.pull_extensions(cotangent, scratch, out)?;
         if cotangent.reaches_indicator() {
             self.pull_distance(cotangent, scratch);
@@ -180,18 +181,16 @@ impl<T: Real> Reconstruction<T> {
         scratch: &mut PullbackScratch<T>,
         out: &mut CloudCotangent<T>,
     ) -> Result<(), PullbackError> {
-        let (chi, residuals) = (&self.indicator, &self.residuals);
-        let mut field = scratch.take_field(chi, cotangent.indicator);
+        let (chi, residuals) = (self.chi(), &self.residuals);
+        let mut bars = match &self.sparse {
+            Some(sparse) => Bars::Blocks(sparse.zeros()),
+            None => Bars::Dense(scratch.take_field(&self.indicator, cotangent.indicator)),
+        };
         let PullbackScratch {
             vertices, samples, ..
         } = scratch;
-        let found = isosurface::pullback(
-            chi,
-            self.iso_value,
-            &self.mesh,
-            vertices,
-            field.values_mut(),
-        );
+        let found =
+            isosurface::pullback_on(chi, self.iso_value, &self.mesh, vertices, bars.cells_mut());
         samples.grid.add(&found.grid);
         out.guarded += found.guarded;
         let given = self.splat_samples();
@@ -203,11 +202,11 @@ impl<T: Real> Reconstruction<T> {
             order: &residuals.splat,
         };
         if self.options.level != Level::Mean {
-            local_level::pullback(
+            local_level::pullback_on(
                 chi,
                 sorted,
                 &residuals.local_level,
-                field.values_mut(),
+                bars.cells_mut(),
                 &mut scratch.level,
                 &mut scratch.level_bars,
                 samples,
@@ -215,38 +214,60 @@ impl<T: Real> Reconstruction<T> {
             level_bar += scratch.level_bars.level;
             smoothing_bar = scratch.level_bars.smoothing;
         }
-        isosurface::iso_value::pullback(
-            chi.grid(),
+        isosurface::iso_value::pullback_on(
             sorted,
             &residuals.iso_value,
             T::of(level_bar),
             &scratch.level_bars.values,
-            field.values_mut(),
+            bars.cells_mut(),
             samples,
         );
-        if self.options.screening > 0.0 {
+        if let (true, Bars::Dense(field)) = (self.options.screening > 0.0, &mut bars) {
             let equation = self.screened_equation(sorted);
             let (level, scratch) = (&residuals.iso_value, &mut scratch.screened);
             screened::pullback(&equation, level, field.values_mut(), scratch, samples)?;
         }
         let smoothing = residuals.smoothing;
         if self.options.smoothing_follows() {
-            smoothing_bar += self.smoothing_bar(field.values(), &scratch.level);
+            smoothing_bar += self.smoothing_bar(&bars, &scratch.level);
             self.pull_smoothing(smoothing_bar, samples);
         }
-        self.poisson
-            .solve(field.values_mut(), smoothing, &mut scratch.poisson)?;
-        splat::pullback(given, &residuals.splat, &field, &mut scratch.splat, samples);
-        scratch.field = Some(field);
+        match (&mut bars, &self.sparse) {
+            (Bars::Blocks(field), Some(sparse)) => {
+                sparse.solve(&mut field.values, smoothing)?;
+            }
+            (Bars::Dense(field), _) => {
+                let buffers = &mut scratch.poisson;
+                self.poisson.solve(field.values_mut(), smoothing, buffers)?;
+            }
+            _ => {}
+        }
+        let buffers = &mut scratch.splat;
+        splat::pullback(given, &residuals.splat, bars.cells(), buffers, samples);
+        if let Bars::Dense(field) = bars {
+            scratch.field = Some(field);
+        }
         Ok(())
     }
 
     /// The cotangent of the smoothing for that of the indicator before anything was taken off it.
-    fn smoothing_bar(&self, bars: &[T], level: &local_level::PullbackScratch<T>) -> f64 {
+    fn smoothing_bar(&self, bars: &Bars<T>, level: &local_level::PullbackScratch<T>) -> f64 {
+        let is_local = self.options.level != Level::Mean;
+        let bars = match (bars, &self.sparse) {
+            (Bars::Blocks(bars), Some(sparse)) => {
+                let mut chi = sparse.chi.clone();
+                if is_local {
+                    level.add_corrections(&mut chi);
+                }
+                let smoothing = self.residuals.smoothing;
+                return poisson::smoothing::pullback_in_blocks(smoothing, &chi, bars);
+            }
+            (bars, _) => bars.cells().values(),
+        };
         let (chi, smoothing) = (&self.indicator, self.residuals.smoothing);
         let shape = chi.grid().shape();
         let whole = poisson::smoothing::pullback(smoothing, shape, chi.values(), bars);
-        if self.options.level == Level::Mean {
+        if !is_local {
             return whole;
         }
         let taken = level.sum_of_corrections(chi.grid(), |start, part| {
@@ -264,7 +285,7 @@ impl<T: Real> Reconstruction<T> {
         }
         let share = T::of(0.5 * by_logarithm / (mean * count as f64));
         samples.areas.par_iter_mut().for_each(|area| *area += share);
-        samples.grid.spacing -= by_logarithm / self.indicator.grid().spacing().f64();
+        samples.grid.spacing -= by_logarithm / self.surface_grid().spacing().f64();
     }
 
     fn screened_equation<'a>(&'a self, samples: SortedSamples<'a, T>) -> screened::Equation<'a, T> {

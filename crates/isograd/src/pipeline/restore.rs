@@ -4,7 +4,6 @@
 use super::{Error, Pipeline, Reconstruction, Reconstructor};
 use crate::data::PointCloud;
 use crate::distance::NO_TRIANGLE;
-use crate::isosurface;
 
 /// The most expensive results, from which the others are recomputed: arrays with the length of the cloud or of the grid,
 /// which are known before the computation.
@@ -77,19 +76,13 @@ impl<T: Pipeline> Reconstructor<T> {
         self.splat(None)?;
         // The pullback needs residuals of the indicator before the local iso-value was subtracted.
         self.solve(None)?;
+        self.isosurface()?;
         let Reconstruction {
-            sdf,
-            indicator,
-            iso_value,
-            mesh,
-            closest,
-            ..
+            sdf, mesh, closest, ..
         } = &mut self.result;
         sdf.values_mut().copy_from_slice(saved.sdf);
         closest.clear();
         closest.extend_from_slice(saved.closest);
-        isosurface::forward(indicator, *iso_value, &mut self.scratch.isosurface, mesh)
-            .map_err(Error::from)?;
         let faces = mesh.faces().len();
         if closest
             .iter()

@@ -57,6 +57,9 @@ impl<T: Real> Reconstruction<T> {
         scratch: &mut PullbackScratch<T>,
         out: &mut CloudCotangent<T>,
     ) -> Result<(), PullbackError> {
+        if self.sparse.is_some() && cotangent.indicator.is_some() {
+            return Err(PullbackError::SparseIndicator);
+        }
         let cells = [&self.sdf, &self.indicator].map(|field| field.values().len());
         cotangent.check(cells, self.mesh.vertices().len(), self.areas.len())?;
         let all = T::max_value().f64().log2();

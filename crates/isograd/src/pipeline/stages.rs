@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use super::surface::with_shape;
-use super::{Error, Reconstruction, Reconstructor, Residuals, check_memory};
-use crate::data::{Field, PointCloud};
+use super::{Error, Reconstruction, Reconstructor, Residuals, Solve, check_memory};
+use crate::data::cells::{Cells, CellsMut};
+use crate::data::{Field, Grid, PointCloud};
 use crate::isosurface::{Level, local_level};
 use crate::neighbors::{Neighborhoods, Radius};
 use crate::poisson::screened;
@@ -101,7 +102,14 @@ impl<T: Real> Reconstructor<T> {
     }
 
     pub(super) fn splat(&mut self, held: Option<&Reconstruction<T>>) -> Result<(), Error> {
-        self.choose_surface_grid(held)?;
+        let (grid, octaves) = self.choose_surface_grid(held)?;
+        let report = &mut self.result.report;
+        report.surface_spacing = grid.spacing().f64();
+        if octaves > 0 {
+            return self.splat_in_blocks(grid, octaves);
+        }
+        report.surface_cells = grid.cells();
+        self.allocate(grid)?;
         let Reconstruction {
             options,
             points,
@@ -121,33 +129,55 @@ impl<T: Real> Reconstructor<T> {
         Ok(())
     }
 
-    /// Puts the indicator and the Poisson plan on the grid of the surface: as fine as that of `held` if given.
-    fn choose_surface_grid(&mut self, held: Option<&Reconstruction<T>>) -> Result<(), Error> {
-        let result = &mut self.result;
-        let grid = match held {
-            Some(held) => with_shape(result.sdf.grid(), held.indicator.grid().shape())?,
-            None => {
-                let (sdf, spacing) = (result.sdf.grid(), result.sample_spacing());
-                result.options.surface.grid(sdf, spacing)?
-            }
+    /// The grid of the surface, and the octaves of a sparse solve, 0 for a dense one: those of `held` if given.
+    fn choose_surface_grid(
+        &self,
+        held: Option<&Reconstruction<T>>,
+    ) -> Result<(Grid<T>, usize), Error> {
+        let Reconstruction { sdf, options, .. } = &self.result;
+        if let Some(held) = held {
+            let octaves = held.sparse.as_ref().map_or(0, |sparse| sparse.count());
+            return Ok((
+                with_shape(sdf.grid(), held.surface_grid().shape())?,
+                octaves,
+            ));
+        }
+        let solve = match options.solve {
+            _ if options.screening == 0.0 => options.solve,
+            Solve::Sparse => return Err(Error::SparseScreening(options.screening)),
+            _ => Solve::Dense,
         };
+        let spacing = self.result.sample_spacing();
+        options.surface.grid_and_octaves(sdf.grid(), spacing, solve)
+    }
+
+    /// Puts the indicator and the Poisson plan of a dense solve on the grid of the surface.
+    fn allocate(&mut self, grid: Grid<T>) -> Result<(), Error> {
+        let result = &mut self.result;
+        result.sparse = None;
         if *result.indicator.grid() != grid {
             // A plan holds the memory of the last one.
             if grid.cells() > result.indicator.values().len() {
                 check_memory(&grid)?;
             }
-            if result.indicator.grid().shape() != grid.shape() {
+            if result.poisson.shape() != grid.shape() {
                 result.poisson = Arc::new(poisson::Plan::new(grid.shape()));
             }
             result.indicator = Field::zeros(grid);
         }
-        result.report.surface_spacing = grid.spacing().f64();
         Ok(())
     }
 
     /// The indicator and the level of its surface.
     pub(super) fn solve(&mut self, held: Option<&Reconstruction<T>>) -> Result<(), Error> {
         let smoothing = self.smoothing(held);
+        if self.result.sparse.is_some() {
+            let Reconstruction {
+                residuals, report, ..
+            } = &mut self.result;
+            (residuals.smoothing, report.smoothing) = (smoothing, smoothing);
+            return self.solve_in_blocks(smoothing);
+        }
         let Reconstruction {
             poisson,
             indicator,
@@ -169,7 +199,7 @@ impl<T: Real> Reconstructor<T> {
         match held.filter(|_| !result.options.smoothing_follows()) {
             Some(held) => held.residuals.smoothing,
             None => {
-                let spacing = result.indicator.grid().spacing().f64();
+                let spacing = result.surface_grid().spacing().f64();
                 let in_cells = result.sample_spacing() / spacing;
                 result.options.smoothing.cells(in_cells)
             }
@@ -212,24 +242,32 @@ impl<T: Real> Reconstructor<T> {
     }
 
     /// The iso-value, and the indicator relative to the local one.
-    fn level(&mut self) -> Result<(), Error> {
+    pub(super) fn level(&mut self) -> Result<(), Error> {
         let Reconstruction {
             options,
             points,
             orientation,
             areas,
             indicator,
+            sparse,
             iso_value,
             residuals,
             report,
             ..
         } = &mut self.result;
         let level = &mut residuals.iso_value;
-        *iso_value = isosurface::iso_value::forward(indicator, points, areas, level)?;
+        let chi = match sparse {
+            Some(sparse) => CellsMut::Blocks(&mut sparse.chi),
+            None => {
+                let (grid, values) = indicator.split_mut();
+                CellsMut::Dense(grid, values)
+            }
+        };
+        *iso_value = isosurface::iso_value::forward(chi.cells(), points, areas, level)?;
         report.iso_value = iso_value.f64();
         if options.level != Level::Mean {
-            local_level::forward(
-                indicator,
+            local_level::forward_on(
+                chi,
                 splat::SortedSamples {
                     samples: splat::Samples {
                         points,
@@ -251,15 +289,20 @@ impl<T: Real> Reconstructor<T> {
         Ok(())
     }
 
-    fn isosurface(&mut self) -> Result<(), Error> {
+    pub(super) fn isosurface(&mut self) -> Result<(), Error> {
         let Reconstruction {
             indicator,
+            sparse,
             iso_value,
             mesh,
             report,
             ..
         } = &mut self.result;
-        let found = isosurface::forward(indicator, *iso_value, &mut self.scratch.isosurface, mesh)?;
+        let scratch = &mut self.scratch.isosurface;
+        let found = match sparse {
+            Some(sparse) => isosurface::blocks::forward(&sparse.chi, *iso_value, mesh)?,
+            None => isosurface::forward(indicator, *iso_value, scratch, mesh)?,
+        };
         if found.touches_wall {
             report.warnings.push(Warning::TouchesWall);
         }
@@ -270,15 +313,20 @@ impl<T: Real> Reconstructor<T> {
         let Reconstruction {
             options,
             indicator,
+            sparse,
             iso_value,
             mesh,
             sdf,
             closest,
             ..
         } = &mut self.result;
+        let chi: Cells<'_, T> = match sparse {
+            Some(sparse) => (&sparse.chi).into(),
+            None => (&*indicator).into(),
+        };
         distance::lattice::forward(
             mesh,
-            indicator,
+            chi,
             *iso_value,
             options.band,
             &mut self.scratch.distance,

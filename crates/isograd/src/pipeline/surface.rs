@@ -1,6 +1,6 @@
 //! Resolution of the surface: the grid of the indicator, which may be finer than the grid of φ.
 
-use super::Error;
+use super::{Error, Solve};
 use crate::{Grid, GridError, Real};
 
 /// Cells of the surface's grid per sample spacing with [`SurfaceResolution::Auto`]. Mean distance from the surface to the
@@ -11,8 +11,11 @@ const CELLS_PER_SPACING: f64 = 1.2;
 /// Automatic ratios of the cell sizes. Few, so that the ratio seldom changes as the points move.
 const AUTO_FACTORS: [f64; 3] = [1.25, 1.5, 2.0];
 
-/// Largest number of cells of an automatic grid of the surface: 2²⁵, 0.6 GB in `f32`.
-const MAX_AUTO_CELLS: usize = 1 << 25;
+/// Largest number of cells of a dense solve that is chosen automatically: 2²⁵, 0.6 GB in `f32`.
+const MAX_DENSE_CELLS: usize = 1 << 25;
+
+/// Cells of the coarsest grid of a sparse solve, approximately.
+const COARSE_CELLS: usize = 1 << 22;
 
 /// Largest ratio of the two cell sizes.
 const MAX_FACTOR: f64 = 64.0;
@@ -48,6 +51,38 @@ impl SurfaceResolution {
         }
     }
 
+    /// Like [`Self::grid`], and the number of octaves of the sparse solve, 0 for a dense one. A sparse one may have smaller
+    /// cells.
+    ///
+    /// # Errors
+    /// As [`Self::grid`].
+    pub(super) fn grid_and_octaves<T: Real>(
+        self,
+        grid: &Grid<T>,
+        sample_spacing: f64,
+        solve: Solve,
+    ) -> Result<(Grid<T>, usize), Error> {
+        let fine = self.grid(grid, sample_spacing, solve)?;
+        if solve == Solve::Dense || solve == Solve::Auto && fine.cells() <= MAX_DENSE_CELLS {
+            return Ok((dense(fine)?, 0));
+        }
+        let parts = grid.shape().into_iter().fold(0, gcd);
+        let count = fine.shape()[0] / (grid.shape()[0] / parts);
+        let wanted = (1..8)
+            .find(|octaves| fine.cells() >> (3 * octaves) <= COARSE_CELLS)
+            .unwrap_or(8);
+        let rounded = |octaves: usize| count.next_multiple_of(1 << octaves);
+        let is_close = |&octaves: &usize| rounded(octaves) as f64 <= SLACK * count as f64;
+        match (1..=wanted).rev().find(is_close) {
+            None if solve == Solve::Auto => Ok((dense(fine)?, 0)),
+            octaves => {
+                let octaves = octaves.unwrap_or(1);
+                let scaled = grid.shape().map(|n| n / parts * rounded(octaves));
+                Ok((with_shape(grid, scaled)?, octaves))
+            }
+        }
+    }
+
     /// Grid of the surface in the box of `grid`, for samples that are `sample_spacing` apart.
     ///
     /// # Errors
@@ -56,13 +91,14 @@ impl SurfaceResolution {
         self,
         grid: &Grid<T>,
         sample_spacing: f64,
+        solve: Solve,
     ) -> Result<Grid<T>, Error> {
         let spacing = grid.spacing().f64();
         let factor = match self {
             Self::Grid => 1.0,
             Self::Auto => {
                 let wanted = CELLS_PER_SPACING * spacing / sample_spacing;
-                return Ok(automatic(grid, wanted));
+                return Ok(automatic(grid, wanted, solve));
             }
             Self::Spacing(length) => spacing / length,
             Self::Factor(factor) => factor,
@@ -76,14 +112,14 @@ impl SurfaceResolution {
 }
 
 /// The coarsest automatic grid with at least the wanted ratio of cell sizes, or else the finest affordable one.
-fn automatic<T: Real>(grid: &Grid<T>, wanted: f64) -> Grid<T> {
+fn automatic<T: Real>(grid: &Grid<T>, wanted: f64, solve: Solve) -> Grid<T> {
     let mut finest = *grid;
     for factor in AUTO_FACTORS {
         if !(wanted > grid.spacing().f64() / finest.spacing().f64()) {
             break;
         }
         match refine(grid, factor) {
-            Ok(fine) if fine.cells() <= MAX_AUTO_CELLS => finest = fine,
+            Ok(fine) if solve != Solve::Dense || fine.cells() <= MAX_DENSE_CELLS => finest = fine,
             _ => break,
         }
     }
@@ -105,13 +141,18 @@ fn refine<T: Real>(grid: &Grid<T>, factor: f64) -> Result<Grid<T>, GridError> {
     with_shape(grid, scaled(count))
 }
 
+/// A grid that is small enough to have a value at each cell.
+fn dense<T: Real>(grid: Grid<T>) -> Result<Grid<T>, GridError> {
+    Grid::new(grid.lower(), grid.spacing(), grid.shape())
+}
+
 /// The grid of the same box with `shape` cells, which must be cubes.
 pub(super) fn with_shape<T: Real>(grid: &Grid<T>, shape: [usize; 3]) -> Result<Grid<T>, GridError> {
     if shape == grid.shape() {
         return Ok(*grid);
     }
     let spacing = grid.spacing().f64() * grid.shape()[0] as f64 / shape[0] as f64;
-    Grid::new(grid.lower(), T::of(spacing), shape)
+    Grid::in_blocks(grid.lower(), T::of(spacing), shape)
 }
 
 /// The greatest common divisor.
@@ -143,7 +184,7 @@ mod tests {
             let coarse = grid(shape);
             for factor in [1.0, 1.2, 1.5, 2.0, 3.0] {
                 let fine = SurfaceResolution::Factor(factor)
-                    .grid(&coarse, f64::NAN)
+                    .grid(&coarse, f64::NAN, Solve::Dense)
                     .expect("fits");
                 let ratio = coarse.spacing() / fine.spacing();
                 assert!(ratio >= factor * (1.0 - 1e-9), "{shape:?} {factor} {ratio}");
@@ -157,16 +198,18 @@ mod tests {
 
     #[test]
     fn lengths_suit_a_fourier_transform_where_the_box_allows() {
-        let fine = SurfaceResolution::Factor(1.3).grid(&grid([128; 3]), f64::NAN);
+        let fine = SurfaceResolution::Factor(1.3).grid(&grid([128; 3]), f64::NAN, Solve::Dense);
         assert_eq!(fine.expect("fits").shape(), [168; 3]);
-        let fine = SurfaceResolution::Factor(2.0).grid(&grid([338, 120, 151]), f64::NAN);
+        let fine =
+            SurfaceResolution::Factor(2.0).grid(&grid([338, 120, 151]), f64::NAN, Solve::Dense);
         assert_eq!(fine.expect("fits").shape(), [676, 240, 302]);
     }
 
     #[test]
     fn automatic_cells_follow_the_samples_up_to_half_a_cell_and_what_is_affordable() {
         let cells = |shape, sample_spacing: f64| {
-            let fine = SurfaceResolution::Auto.grid(&grid(shape), 0.05 * sample_spacing);
+            let fine =
+                SurfaceResolution::Auto.grid(&grid(shape), 0.05 * sample_spacing, Solve::Dense);
             fine.expect("fits").shape()
         };
         let cube = [40; 3];
@@ -180,10 +223,28 @@ mod tests {
     }
 
     #[test]
+    fn cells_of_a_sparse_solve_can_be_halved_and_hardly_shrink() {
+        let of = |shape, factor, solve| {
+            let surface = SurfaceResolution::Factor(factor);
+            let found = surface.grid_and_octaves(&grid(shape), f64::NAN, solve);
+            let (fine, octaves) = found.expect("fits");
+            assert!(fine.shape().iter().all(|n| n % (1 << octaves) == 0));
+            (fine.shape(), octaves)
+        };
+        assert_eq!(of([128; 3], 2.0, Solve::Auto), ([256; 3], 0));
+        assert_eq!(of([128; 3], 4.0, Solve::Auto), ([512; 3], 2));
+        assert_eq!(of([128; 3], 4.0, Solve::Dense), ([512; 3], 0));
+        assert_eq!(of([128; 3], 1.0, Solve::Sparse), ([128; 3], 1));
+        assert_eq!(of([125; 3], 3.0, Solve::Auto), ([376; 3], 2));
+        assert_eq!(of([338, 120, 151], 3.0, Solve::Auto), ([1014, 360, 453], 0));
+        assert_eq!(of([338, 120, 151], 4.0, Solve::Auto), ([1352, 480, 604], 2));
+    }
+
+    #[test]
     fn more_cells_than_can_be_indexed_are_an_error() {
-        let fine = SurfaceResolution::Spacing(1e-3).grid(&grid([600; 3]), f64::NAN);
+        let fine = SurfaceResolution::Spacing(1e-3).grid(&grid([600; 3]), f64::NAN, Solve::Dense);
         assert!(matches!(fine, Err(Error::Grid(_))));
-        let fine = SurfaceResolution::Spacing(1e-300).grid(&grid([8; 3]), f64::NAN);
+        let fine = SurfaceResolution::Spacing(1e-300).grid(&grid([8; 3]), f64::NAN, Solve::Dense);
         assert!(matches!(fine, Err(Error::Surface(_))));
     }
 }

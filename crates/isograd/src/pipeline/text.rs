@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use serde::de::{Deserialize, Deserializer, Error, Visitor};
 
-use super::SurfaceResolution;
+use super::{Solve, SurfaceResolution};
 use crate::backend::Backend;
 use crate::distance::Band;
 use crate::isosurface::Level;
@@ -67,6 +67,11 @@ from_str!(Level, "level", "'local', 'thin' or 'mean'", {
     "local" => Self::Local,
     "thin" => Self::Thin,
     "mean" => Self::Mean,
+});
+from_str!(Solve, "solve", "'auto', 'dense' or 'sparse'", {
+    "auto" => Self::Auto,
+    "dense" => Self::Dense,
+    "sparse" => Self::Sparse,
 });
 impl FromStr for SurfaceResolution {
     type Err = ParseOptionError;
@@ -137,6 +142,7 @@ deserialize!(
     Smoothing,
     Level,
     SurfaceResolution,
+    Solve,
     Band,
     Backend
 );
@@ -149,7 +155,7 @@ mod tests {
     #[test]
     fn options_read_from_json_with_the_names_of_the_command_line() {
         let text = r#"{"radius": 0.1, "orient": "signs", "splat": "paper", "area": false, "smoothing": 0,
-            "screening": 4, "level": "thin", "surface": "1.5x", "band": 0.30000000000000004, "checks": false}"#;
+            "screening": 4, "level": "thin", "surface": "1.5x", "solve": "sparse", "band": 0.30000000000000004, "checks": false}"#;
         let options: Options = serde_json::from_str(text).expect("valid");
         let expected = Options::default()
             .radius(Radius::Fixed(0.1))
@@ -160,6 +166,7 @@ mod tests {
             .screening(4.0)
             .level(Level::Thin)
             .surface(SurfaceResolution::Factor(1.5))
+            .solve(Solve::Sparse)
             .band(Band::Within(0.1 + 0.2))
             .checks(false);
         assert_eq!(options, expected);
@@ -186,6 +193,7 @@ mod tests {
                 "surface is '0.5x'; give 'grid', 'auto'",
             ),
             (r#"{"surface": -1}"#, "surface is '-1'"),
+            (r#"{"solve": "fast"}"#, "give 'auto', 'dense' or 'sparse'"),
             (r#"{"level": "global"}"#, "give 'local', 'thin' or 'mean'"),
             (r#"{"smothing": 1}"#, "unknown field `smothing`"),
         ] {

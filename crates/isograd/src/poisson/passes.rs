@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 
-use super::{Plan, Symbols};
 use super::axis::{Axis, Gain};
 use super::scratch::{Lines, Scratch, first};
+use super::{Plan, Symbols};
 use crate::{Real, simd};
 
 /// Complex lines handled together where a line's places are far apart in memory: neighboring lines

@@ -3,6 +3,7 @@
 use pulp::Arch;
 use rayon::prelude::*;
 
+use crate::data::blocks::{BlockField, NODES};
 use crate::{Real, simd};
 
 /// Cells of smoothing for each cell of distance between samples. Errors of the vertices of a torus, in cells, mean
@@ -61,6 +62,46 @@ pub fn pullback<T: Real>(smoothing: f64, shape: [usize; 3], chi: &[T], chi_bar: 
     };
     let planes = chi.par_chunks_exact(ny * nz).enumerate();
     smoothing * planes.map(plane).collect::<Vec<f64>>().iter().sum::<f64>()
+}
+
+/// Like [`pullback`], for fields in blocks. An absent neighbor counts as equal.
+pub(crate) fn pullback_in_blocks<T: Real>(
+    smoothing: f64,
+    chi: &BlockField<T>,
+    chi_bar: &BlockField<T>,
+) -> f64 {
+    let shape = chi.grid.shape();
+    let of_cell = |cell: [usize; 3], bar: T| {
+        let own = chi.get(cell).unwrap_or(T::zero());
+        let mut sum = T::zero();
+        for a in 0..3 {
+            for step in [0, 2] {
+                let mut next = cell;
+                next[a] = (cell[a] + step).saturating_sub(1).min(shape[a] - 1);
+                sum += chi.get(next).unwrap_or(own) - own;
+            }
+        }
+        (sum * bar).f64()
+    };
+    let of_block = |(block, bars): (usize, &[T])| {
+        let corner = chi_bar.blocks.corner(block);
+        let bars = bars
+            .iter()
+            .enumerate()
+            .filter(|(_, bar)| **bar != T::zero());
+        let terms = bars.map(|(n, &bar)| {
+            let node = [n / 64, n / 8 % 8, n % 8];
+            of_cell(std::array::from_fn(|a| corner[a] + node[a]), bar)
+        });
+        terms.sum()
+    };
+    let blocks = chi_bar.values.par_chunks_exact(NODES).enumerate();
+    smoothing
+        * blocks
+            .map(of_block)
+            .collect::<Vec<f64>>()
+            .iter()
+            .sum::<f64>()
 }
 
 /// `Σ_k part_k (Lv)_k` over cells along z from place `start` in memory on.

@@ -59,6 +59,7 @@ struct Confidence {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 struct Reconstructed {
     surface_spacing: f64,
+    surface_cells: usize,
     smoothing: f64,
     iso_value: f64,
     surface: Surface,
@@ -102,6 +103,7 @@ impl JsonReport {
         Self {
             surface: Some(Reconstructed {
                 surface_spacing: report.surface_spacing,
+                surface_cells: report.surface_cells,
                 smoothing: report.smoothing,
                 iso_value: report.iso_value,
                 surface: surface(&report.surface),

@@ -26,6 +26,7 @@
 //! misses the jumps.
 
 pub mod area;
+mod blocks;
 mod order;
 mod pullback;
 mod stencil;
@@ -36,6 +37,7 @@ use pulp::Arch;
 use rayon::prelude::*;
 
 use crate::{Field, Grid, Real, simd, vector};
+pub(crate) use blocks::{blocks_near, forward_in_blocks};
 pub use order::Scratch;
 pub(crate) use order::central_cell;
 pub use pullback::{PullbackScratch, SampleCotangent, pullback};

@@ -9,7 +9,7 @@ use isograd::poisson::Smoothing;
 use isograd::splat::Weights;
 use isograd::{
     Attribute, CloudCotangent, Cotangent, ExtensionCotangent, Grid, Options, Pipeline, PointCloud,
-    Reconstruction, Reconstructor, Saved, SurfaceResolution,
+    Reconstruction, Reconstructor, Saved, Solve, SurfaceResolution,
 };
 
 use crate::common::{TORUS, Uniform};
@@ -104,7 +104,7 @@ impl<T: Pipeline> Extended<T> {
 
 impl<T: Pipeline> Weighted<T> {
     fn new(result: &Reconstruction<T>, extended: &Extended<T>) -> Self {
-        let [cells, of_surface] = [result.sdf(), result.indicator()].map(|f| f.values().len());
+        let (cells, of_surface) = (result.sdf().values().len(), dense_indicator(result).len());
         let (vertices, samples) = (result.mesh().vertices().len(), result.areas().len());
         Self {
             sdf: random(cells, 11),
@@ -130,7 +130,7 @@ impl<T: Pipeline> Weighted<T> {
         }];
         let cotangent = Cotangent {
             sdf: Some(&self.sdf),
-            indicator: Some(&self.indicator),
+            indicator: (!self.indicator.is_empty()).then_some(&self.indicator),
             iso_value: T::of(40.0),
             vertices: Some(&self.vertices),
             normals: Some(&self.normals),
@@ -160,13 +160,21 @@ impl Weighted<f64> {
     }
 }
 
+/// The indicator, unless the solve was sparse.
+fn dense_indicator<T: Pipeline>(result: &Reconstruction<T>) -> &[T] {
+    match result.solve() {
+        Solve::Sparse => &[],
+        _ => result.indicator().values(),
+    }
+}
+
 /// All results, one after the other.
 fn results(result: &Reconstruction<f64>, extended: &Extended<f64>) -> Vec<f64> {
     let vectors = [result.mesh().vertices(), result.normals()].map(|v| flat(v).collect());
     let [vertices, normals]: [Vec<f64>; 2] = vectors;
     [
         result.sdf().values(),
-        result.indicator().values(),
+        dense_indicator(result),
         &[result.iso_value()],
         &vertices,
         &normals,
@@ -250,7 +258,20 @@ fn all_results_are_pulled_back_to_all_inputs() {
         .clone()
         .screening(2.0)
         .surface(SurfaceResolution::Factor(1.5));
-    for options in [estimated, given, signs, plain, screened] {
+    let sparse = estimated
+        .clone()
+        .solve(Solve::Sparse)
+        .surface(SurfaceResolution::Factor(2.0));
+    let sparse_mean = sparse.clone().level(Level::Mean);
+    for options in [
+        estimated,
+        given,
+        signs,
+        plain,
+        screened,
+        sparse,
+        sparse_mean,
+    ] {
         let cloud = cloud::<f64>();
         let mut plan = Reconstructor::new(grid(), options.clone()).expect("options");
         let base = plan.reconstruct(&cloud).expect("a torus").clone();
@@ -287,13 +308,12 @@ fn bits<T: Pipeline>(values: impl IntoIterator<Item = T>) -> Vec<u64> {
     values.into_iter().map(|v| v.f64().to_bits()).collect()
 }
 
-fn assert_same_bits<T: Pipeline>(orientation: Method) {
+fn assert_same_bits<T: Pipeline>(options: Options) {
     let cloud = cloud::<T>();
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         pool.expect("threads").install(|| {
-            let options = Options::default().orient(orientation);
-            let mut plan = Reconstructor::new(grid(), options).expect("options");
+            let mut plan = Reconstructor::new(grid(), options.clone()).expect("options");
             let result = plan.reconstruct(&cloud).expect("a torus");
             let extended = Extended::new(result, &cloud);
             let bar = Weighted::new(result, &extended).pull(result, &extended);
@@ -312,10 +332,12 @@ fn assert_same_bits<T: Pipeline>(orientation: Method) {
 
 #[test]
 fn one_two_and_five_threads_give_the_same_bits() {
-    assert_same_bits::<f32>(Method::Auto);
-    assert_same_bits::<f64>(Method::Auto);
-    assert_same_bits::<f32>(Method::Given);
-    assert_same_bits::<f64>(Method::Signs);
+    let orient = |method| Options::default().orient(method);
+    assert_same_bits::<f32>(orient(Method::Auto));
+    assert_same_bits::<f64>(orient(Method::Auto));
+    assert_same_bits::<f32>(orient(Method::Given));
+    assert_same_bits::<f64>(orient(Method::Signs));
+    assert_same_bits::<f32>(orient(Method::Given).solve(Solve::Sparse));
 }
 
 #[test]

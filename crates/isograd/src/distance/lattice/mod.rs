@@ -20,6 +20,7 @@ use rayon::prelude::*;
 
 use super::Error;
 use super::bvh::Bvh;
+use crate::data::cells::Cells;
 use crate::{Field, Grid, Mesh, Real};
 use block::{BLOCK, Block};
 pub use pullback::{PullbackScratch, pullback};

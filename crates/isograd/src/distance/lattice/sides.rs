@@ -1,11 +1,11 @@
 //! Side of the surface at the cell centers of a grid.
 
+use crate::data::cells::Cells;
 use crate::distance::pseudonormals::Pseudonormals;
 use crate::distance::triangle::closest_point;
 use crate::distance::{NO_TRIANGLE, corners_agree};
-use crate::vector::{dot, to_f64};
-use crate::data::cells::Cells;
 use crate::trilinear::Cube;
+use crate::vector::{dot, to_f64};
 use crate::{Grid, Mesh, Real};
 
 /// Inside and outside, from the indicator `χ` whose surface `χ = c` the mesh is.

@@ -3,15 +3,10 @@
 use rayon::prelude::*;
 
 use super::stencil::Stencil;
+pub(super) use crate::data::blocks::{EDGE, NODES, Overlap};
 use crate::data::cells::{Cells, CellsMut};
 use crate::splat::SortedSamples;
 use crate::{Grid, Real};
-
-/// Cells along each side of a block.
-pub(super) const EDGE: usize = 8;
-
-/// Cells in a block.
-pub(super) const NODES: usize = EDGE * EDGE * EDGE;
 
 /// Table entry of a block that no sample is near.
 const NONE: u32 = u32::MAX;
@@ -30,13 +25,6 @@ pub(super) struct Layer {
     samples: Vec<u32>,
     /// While sorting, where the next sample of each block goes.
     next: Vec<usize>,
-}
-
-/// Overlap of a cube of cells with a block: ranges of places in the cube, per axis.
-pub(super) struct Overlap {
-    corner: [usize; 3],
-    block: [usize; 3],
-    ranges: [(usize, usize); 3],
 }
 
 impl Layer {
@@ -205,40 +193,6 @@ impl Layer {
             let (i, j) = (x + row / EDGE, y + row % EDGE);
             (i < nx && j < ny).then(|| ((i * ny + j) * nz + z, count))
         })
-    }
-}
-
-impl Overlap {
-    /// Of the cube of `width`³ cells from `corner` on with the block that begins at `block`.
-    #[inline(always)]
-    pub(super) fn new(corner: [usize; 3], width: usize, block: [usize; 3]) -> Self {
-        let mut ranges = [(0, 0); 3];
-        for a in 0..3 {
-            ranges[a] = (
-                block[a].saturating_sub(corner[a]),
-                width.min((block[a] + EDGE).saturating_sub(corner[a])),
-            );
-        }
-        Self {
-            corner,
-            block,
-            ranges,
-        }
-    }
-
-    /// Runs `f([i, j, k], place)` on the shared cells: the place in the cube, and the place in the block.
-    #[inline(always)]
-    pub(super) fn for_each(&self, mut f: impl FnMut([usize; 3], usize)) {
-        let [(x0, x1), (y0, y1), (z0, z1)] = self.ranges;
-        let local = |a: usize, n: usize| self.corner[a] + n - self.block[a];
-        for i in x0..x1 {
-            for j in y0..y1 {
-                let row = (local(0, i) * EDGE + local(1, j)) * EDGE;
-                for k in z0..z1 {
-                    f([i, j, k], row + local(2, k));
-                }
-            }
-        }
     }
 }
 

@@ -80,11 +80,6 @@ impl Octaves {
         }
         Self(blocks)
     }
-
-    /// The blocks of the finest grid.
-    pub(crate) fn finest(&self) -> &Arc<Blocks> {
-        &self.0[0]
-    }
 }
 
 /// Blocks of cells twice as large whose values contribute to those of `small`.
@@ -132,7 +127,8 @@ impl<T: Real> Pyramid<T> {
         let coarsest = &octaves.0[self.near.len()];
         let mut chi = rhs.pop().unwrap_or_default();
         coarsest.write_dense(&chi, &mut self.field);
-        self.far.solve(&mut self.field, 0.0, &mut self.far_scratch)?;
+        self.far
+            .solve(&mut self.field, 0.0, &mut self.far_scratch)?;
         coarsest.read_dense(&self.field, &mut chi);
         for (octave, b) in rhs.into_iter().enumerate().rev() {
             let [small, large] = [octave, octave + 1].map(|o| &octaves.0[o]);
@@ -145,9 +141,9 @@ impl<T: Real> Pyramid<T> {
         Ok(())
     }
 
-    /// The solution on the coarsest grid, of the last call of [`Self::solve`].
-    pub(crate) fn coarsest(&self) -> &[T] {
-        &self.field
+    /// The solution on the coarsest grid, of the last call of [`Self::solve`]: without the near parts.
+    pub(crate) fn into_coarsest(self) -> Vec<T> {
+        self.field
     }
 
     /// Writes the near part of an octave.

@@ -33,7 +33,10 @@ fn ellipsoid<T: Real>(cells: usize, axes: [f64; 3], count: usize) -> (Vec<[T; 3]
         normals: &normals,
         areas: &areas,
     };
-    let (scratch, residual) = (&mut splat::Scratch::default(), &mut splat::Residual::default());
+    let (scratch, residual) = (
+        &mut splat::Scratch::default(),
+        &mut splat::Residual::default(),
+    );
     splat::forward(samples, splat::Weights::BSpline, scratch, residual, &mut b).expect("inside");
     (points, b)
 }
@@ -51,7 +54,7 @@ fn near_samples<T: Real>(points: &[[T; 3]], cells: usize) -> Arc<Blocks> {
 fn errors<T: Real>(cells: usize, octaves: usize, smoothing: f64, axes: [f64; 3]) -> [f64; 3] {
     let (points, mut b) = ellipsoid::<T>(cells, axes, 40 * cells * cells / 48);
     let sets = Octaves::new(near_samples(&points, cells), octaves);
-    let blocks = sets.finest();
+    let blocks = &sets.0[0];
     let mut values = vec![T::zero(); blocks.nodes()];
     blocks.read_dense(b.values(), &mut values);
     let mut pyramid = Pyramid::new([cells; 3], octaves, smoothing);
@@ -95,7 +98,7 @@ fn map_is_its_own_transpose() {
     let mut pyramid = Pyramid::new([cells; 3], 2, 0.7);
     let mut random = Random::new(11);
     let mut numbers = || -> Vec<f64> {
-        let count = sets.finest().nodes();
+        let count = sets.0[0].nodes();
         (0..count).map(|_| random.uniform() - 0.5).collect()
     };
     let [u, v] = [numbers(), numbers()];
@@ -116,8 +119,8 @@ fn bits_do_not_depend_on_the_number_of_threads() {
     let (points, b) = ellipsoid::<f32>(cells, [40.0, 30.0, 20.0], 2000);
     let sets = Octaves::new(near_samples(&points, cells), 1);
     crate::testing::assert_same_bits(|| {
-        let mut values = vec![0.0; sets.finest().nodes()];
-        sets.finest().read_dense(b.values(), &mut values);
+        let mut values = vec![0.0; sets.0[0].nodes()];
+        sets.0[0].read_dense(b.values(), &mut values);
         let mut pyramid = Pyramid::new([cells; 3], 1, 0.8);
         pyramid.solve(&sets, &mut values).expect("sizes match");
         values

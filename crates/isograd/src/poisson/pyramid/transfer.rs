@@ -60,12 +60,13 @@ pub(super) fn prolong<T: Real>(large: &Blocks, coefficients: &[T], small: &Block
 /// Writes the transpose of [`prolong`]: sums over the cells of `small`.
 pub(super) fn restrict<T: Real>(small: &Blocks, values: &[T], large: &Blocks, out: &mut [T]) {
     const TAPS: usize = 4 * REACH as usize;
-    let weights: [T; TAPS] =
-        std::array::from_fn(|m| T::of(weight(m as isize - 2 * REACH + 1, 0)));
+    let weights: [T; TAPS] = std::array::from_fn(|m| T::of(weight(m as isize - 2 * REACH + 1, 0)));
     let rows: [(usize, [T; TAPS]); EDGE] = std::array::from_fn(|n| (2 * n, weights));
     let work = out.par_chunks_exact_mut(NODES).enumerate();
     work.for_each_init(Rooms::default, |rooms, (block, out)| {
-        let origin = large.corner(block).map(|c| (2 * c) as isize - 2 * REACH + 1);
+        let origin = large
+            .corner(block)
+            .map(|c| (2 * c) as isize - 2 * REACH + 1);
         if rooms.read(small, values, origin, BELOW) {
             rooms.contract(BELOW, &rows);
             out.copy_from_slice(&rooms.to[..NODES]);
