@@ -113,6 +113,21 @@ def test_the_surface_may_be_finer_than_the_field():
     assert off[1] < off[0]
 
 
+def test_a_sparse_solve_agrees_with_the_dense_one():
+    dense, sparse = (
+        isograd.reconstruct(SPHERE, GRID, surface="2x", solve=solve, checks=False) for solve in ("dense", "sparse")
+    )
+    assert sparse.surface_grid == dense.surface_grid and sparse.indicator.shape == GRID.shape
+    assert sparse.report["surface_cells"] < dense.report["surface_cells"]
+    # The indicator differs by less than 1e-4 of its jump, which takes about two cells.
+    assert np.abs(sparse.sdf - dense.sdf).max() < 1e-3 * GRID.spacing
+    bar = np.exp(-((dense.sdf / GRID.spacing) ** 2))
+    gradients = [result.pullback(sdf=bar).points for result in (dense, sparse)]
+    assert np.abs(gradients[0] - gradients[1]).max() < 5e-3 * np.abs(gradients[0]).max()
+    with pytest.raises(ValueError, match="solve = dense"):
+        sparse.pullback(indicator=np.ones(GRID.shape))
+
+
 def test_attributes_are_carried_to_the_surface():
     values = SPHERE[:, 0]
     result = isograd.reconstruct(SPHERE, GRID, attributes={"x": values})
@@ -217,6 +232,7 @@ def test_bad_arguments_are_refused_with_a_reason():
         (ValueError, "smoothing", lambda: isograd.Options(smoothing=-1)),
         (ValueError, "surface is '0.5x'", lambda: isograd.Options(surface="0.5x")),
         (ValueError, "surface is 0", lambda: isograd.Options(surface=0)),
+        (ValueError, "'sparse'", lambda: isograd.Options(solve="fast")),
         (ValueError, "screening", lambda: isograd.Options(screening=float("inf"))),
         (ValueError, "'local'", lambda: isograd.Options(level="median")),
         (ValueError, "radius", lambda: isograd.Options(radius=0)),

@@ -206,7 +206,7 @@ class Reconstruction:
         shape = self.grid.shape
         given = {
             "sdf": (sdf, shape),
-            "indicator": (indicator, shape if indicator is None else self.surface_grid.shape),
+            "indicator": (indicator, shape if indicator is None else self.indicator.shape),
             "vertices": (vertices, (None, 3)),
             "normals": (normals, (self._count, 3)),
             "areas": (areas, (self._count,)),

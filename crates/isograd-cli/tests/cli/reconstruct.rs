@@ -86,6 +86,25 @@ fn the_folder_gets_its_five_files_and_the_report_its_fields() {
 }
 
 #[test]
+fn a_sparse_solve_gives_the_same_volume_from_fewer_cells() {
+    let sandbox = sphere();
+    let [dense, sparse] = ["dense", "sparse"].map(|solve| {
+        let line = format!("reconstruct cloud.ply --surface 2x --solve {solve} --report r.json -q");
+        sandbox.done(&line);
+        let report = sandbox.json("r.json");
+        let volume = report["surface"]["volume"].as_f64().expect("a number");
+        (report["surface_cells"].as_u64().expect("a number"), volume)
+    });
+    assert!(2 * sparse.0 < dense.0, "{} of {}", sparse.0, dense.0);
+    // The indicator is right to 1e-4 of its jump: that much of a cell, of which the radius has 100.
+    let off = sparse.1 / dense.1 - 1.0;
+    assert!(off.abs() < 1e-5, "{off}");
+    sandbox
+        .run("reconstruct cloud.ply --solve sparse --screening 4 --mesh m.ply")
+        .says(1, &["needs the dense solve"]);
+}
+
+#[test]
 fn the_points_keep_their_order_and_their_attributes() {
     let sandbox = Sandbox::new();
     sandbox.done("sample fish -n 1500 -o cloud.npz --param amplitude=0.1");

@@ -6,6 +6,7 @@ mod finite;
 mod gradients;
 mod orientation;
 mod pinned_bits;
+mod sparse_solve;
 mod surface_resolution;
 mod thin_parts;
 mod torus_accuracy;

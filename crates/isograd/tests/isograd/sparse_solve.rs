@@ -1,8 +1,6 @@
 //! A sparse solve, with the dense one as the oracle.
 
-mod common;
-
-use common::TORUS;
+use crate::common::TORUS;
 use isograd::distance::Band;
 use isograd::isosurface::Level;
 use isograd::orient::Method;
