@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use crate::data::cells::{Cells, CellsMut};
 use crate::splat::{SampleCotangent, Samples, SortedSamples};
 use crate::trilinear::{self, Cube};
-use crate::{Grid, Real, parallel, vector};
+use crate::{Field, Grid, Real, parallel, vector};
 
 /// Values that the pullback needs besides the inputs.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -75,8 +75,18 @@ pub enum Error {
 ///
 /// # Errors
 /// As [`Error`] lists; `residual` is then not to be used.
-pub fn forward<'a, T: Real>(
-    chi: impl Into<Cells<'a, T>>,
+pub fn forward<T: Real>(
+    chi: &Field<T>,
+    points: &[[T; 3]],
+    areas: &[T],
+    residual: &mut Residual<T>,
+) -> Result<T, Error> {
+    forward_on(chi.into(), points, areas, residual)
+}
+
+/// Like [`forward`], for a field that is dense or in blocks.
+pub(crate) fn forward_on<T: Real>(
+    chi: Cells<'_, T>,
     points: &[[T; 3]],
     areas: &[T],
     residual: &mut Residual<T>,
@@ -87,7 +97,6 @@ pub fn forward<'a, T: Real>(
             areas: areas.len(),
         });
     }
-    let chi = chi.into();
     let grid = chi.grid();
     let at = |&point: &[T; 3]| {
         let (value, gradient) = Cube::new(grid, grid.to_index(point)).value_and_gradient_of(chi);
@@ -162,7 +171,6 @@ pub(crate) fn pullback_on<T: Real>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Field;
 
     /// `χ = 2x − y + 3z`, which interpolation gives back exactly.
     fn linear() -> Field<f64> {

@@ -243,7 +243,7 @@ impl<T: Real> Reconstruction<T> {
             _ => {}
         }
         let buffers = &mut scratch.splat;
-        splat::pullback(given, &residuals.splat, bars.cells(), buffers, samples);
+        splat::pullback_on(given, &residuals.splat, bars.cells(), buffers, samples);
         if let Bars::Dense(field) = bars {
             scratch.field = Some(field);
         }

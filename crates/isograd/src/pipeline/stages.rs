@@ -160,10 +160,10 @@ impl<T: Real> Reconstructor<T> {
             if grid.cells() > result.indicator.values().len() {
                 check_memory(&grid)?;
             }
-            if result.poisson.shape() != grid.shape() {
-                result.poisson = Arc::new(poisson::Plan::new(grid.shape()));
-            }
             result.indicator = Field::zeros(grid);
+        }
+        if result.poisson.shape() != grid.shape() {
+            result.poisson = Arc::new(poisson::Plan::new(grid.shape()));
         }
         Ok(())
     }
@@ -263,7 +263,7 @@ impl<T: Real> Reconstructor<T> {
                 CellsMut::Dense(grid, values)
             }
         };
-        *iso_value = isosurface::iso_value::forward(chi.cells(), points, areas, level)?;
+        *iso_value = isosurface::iso_value::forward_on(chi.cells(), points, areas, level)?;
         report.iso_value = iso_value.f64();
         if options.level != Level::Mean {
             local_level::forward_on(
@@ -324,7 +324,7 @@ impl<T: Real> Reconstructor<T> {
             Some(sparse) => (&sparse.chi).into(),
             None => (&*indicator).into(),
         };
-        distance::lattice::forward(
+        distance::lattice::forward_on(
             mesh,
             chi,
             *iso_value,

@@ -72,8 +72,12 @@ impl SurfaceResolution {
             .find(|octaves| fine.cells() >> (3 * octaves) <= COARSE_CELLS)
             .unwrap_or(8);
         let rounded = |octaves: usize| count.next_multiple_of(1 << octaves);
-        let is_close = |&octaves: &usize| rounded(octaves) as f64 <= SLACK * count as f64;
-        match (1..=wanted).rev().find(is_close) {
+        let thinnest = grid.shape().into_iter().min().unwrap_or(0) / parts;
+        let fits = |&octaves: &usize| {
+            let is_close = rounded(octaves) as f64 <= SLACK * count as f64;
+            is_close && thinnest * rounded(octaves) >> octaves >= Grid::<T>::MIN_CELLS
+        };
+        match (1..=wanted).rev().find(fits) {
             None if solve == Solve::Auto => Ok((dense(fine)?, 0)),
             octaves => {
                 let octaves = octaves.unwrap_or(1);

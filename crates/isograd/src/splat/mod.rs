@@ -40,6 +40,7 @@ use crate::{Field, Grid, Real, simd, vector};
 pub(crate) use blocks::{blocks_near, forward_in_blocks};
 pub use order::Scratch;
 pub(crate) use order::central_cell;
+pub(crate) use pullback::pullback_on;
 pub use pullback::{PullbackScratch, SampleCotangent, pullback};
 use stencil::{REACH, Term, WIDTH};
 pub(crate) use stencil::{bspline_slopes, bspline_weights};

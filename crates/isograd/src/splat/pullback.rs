@@ -7,7 +7,7 @@ use super::stencil::{self, Gathered, REACH, WIDTH};
 use super::{Residual, Samples, central_cell};
 use crate::data::GridCotangent;
 use crate::data::cells::Cells;
-use crate::{Grid, Real, parallel, simd, vector};
+use crate::{Field, Grid, Real, parallel, simd, vector};
 
 /// Samples in one task.
 const TASK: usize = 512;
@@ -68,14 +68,24 @@ pub struct PullbackScratch<T> {
 
 /// Pulls the cotangent `b_bar` of the right-hand side back, and adds to `out` the cotangents of the samples and the
 /// grid. `samples` and `residual` are those of [`forward`](super::forward); `b_bar` is on its grid.
-pub fn pullback<'a, T: Real>(
+pub fn pullback<T: Real>(
     samples: Samples<'_, T>,
     residual: &Residual,
-    b_bar: impl Into<Cells<'a, T>>,
+    b_bar: &Field<T>,
     scratch: &mut PullbackScratch<T>,
     out: &mut SampleCotangent<T>,
 ) {
-    let b_bar = b_bar.into();
+    pullback_on(samples, residual, b_bar.into(), scratch, out);
+}
+
+/// Like [`pullback`], for a field that is dense or in blocks.
+pub(crate) fn pullback_on<T: Real>(
+    samples: Samples<'_, T>,
+    residual: &Residual,
+    b_bar: Cells<'_, T>,
+    scratch: &mut PullbackScratch<T>,
+    out: &mut SampleCotangent<T>,
+) {
     let (grid, arch) = (b_bar.grid(), Arch::new());
     scratch
         .sorted

@@ -262,7 +262,10 @@ fn all_results_are_pulled_back_to_all_inputs() {
         .clone()
         .solve(Solve::Sparse)
         .surface(SurfaceResolution::Factor(2.0));
-    let sparse_mean = sparse.clone().level(Level::Mean);
+    let sparse_mean = sparse
+        .clone()
+        .smoothing(Smoothing::Cells(0.9))
+        .level(Level::Mean);
     for options in [
         estimated,
         given,

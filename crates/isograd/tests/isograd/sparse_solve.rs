@@ -50,6 +50,7 @@ fn gradient<T: Pipeline>(result: &Reconstruction<T>) -> CloudCotangent<T> {
     result.pullback(&cotangent).expect("a pullback")
 }
 
+/// Checks that topology, φ and gradients agree.
 fn assert_agreement<T: Pipeline>(cloud: &PointCloud<T>, options: &Options) {
     let [dense, sparse] = both(cloud, options);
     let [a, b] = [&dense, &sparse].map(|result| &result.report().surface);
@@ -60,10 +61,14 @@ fn assert_agreement<T: Pipeline>(cloud: &PointCloud<T>, options: &Options) {
     let cell = dense.surface_grid().spacing().f64();
     let pairs = dense.sdf().values().iter().zip(sparse.sdf().values());
     let differences = pairs.map(|(a, b)| (*a - *b).f64().abs() / cell);
-    let worst = differences.fold(0.0, f64::max);
-    // χ is right to 1e-4 of its jump, and rises by a third of it or more in a cell.
-    println!("φ differs by up to {worst:e} cells");
-    assert!(worst < 1e-3, "{worst}");
+    let mut differences: Vec<f64> = differences.collect();
+    differences.sort_by(f64::total_cmp);
+    let last = differences.len() - 1;
+    let [most, worst] = [last - last / 1000, last].map(|i| differences[i]);
+    println!("φ differs by up to {most:e} cells, at a thousandth of them by up to {worst:e}");
+    // χ is right to 1e-4 of its jump, and rises by a third of it or more in a cell. Where a value at a cell changes sides,
+    // its triangles are others: then φ changes by the height of an arc of one cell.
+    assert!(most < 1e-3 && worst < 0.02);
     let [a, b] = [&dense, &sparse].map(gradient);
     let norm = |v: &[[T; 3]]| {
         v.iter()

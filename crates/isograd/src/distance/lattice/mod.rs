@@ -78,9 +78,22 @@ impl<T> Scratch<T> {
 ///
 /// # Errors
 /// [`Error::Empty`], [`Error::Range`], and [`Error::Band`].
-pub fn forward<'a, T: Real>(
-    mesh: &'a Mesh<T>,
-    chi: impl Into<Cells<'a, T>>,
+pub fn forward<T: Real>(
+    mesh: &Mesh<T>,
+    chi: &Field<T>,
+    c: T,
+    band: Band,
+    scratch: &mut Scratch<T>,
+    phi: &mut Field<T>,
+    closest: &mut Vec<u32>,
+) -> Result<(), Error> {
+    forward_on(mesh, chi.into(), c, band, scratch, phi, closest)
+}
+
+/// Like [`forward`], for an indicator that is dense or in blocks.
+pub(crate) fn forward_on<T: Real>(
+    mesh: &Mesh<T>,
+    chi: Cells<'_, T>,
     c: T,
     band: Band,
     scratch: &mut Scratch<T>,
@@ -93,7 +106,6 @@ pub fn forward<'a, T: Real>(
         Band::Within(width) if width > 0.0 && width.is_finite() => width,
         Band::Within(width) => return Err(Error::Band { width }),
     };
-    let chi = chi.into();
     // Beyond the blocks of χ, the closest face decides on the side.
     let reach = if chi.is_whole() { width } else { f64::INFINITY };
     scratch.bvh.rebuild(mesh)?;

@@ -17,7 +17,8 @@
 //! The blocks.
 //!
 //! # Pullback
-//! The map is symmetric to rounding: it is its own pullback.
+//! The map is symmetric to rounding: it is its own pullback. `σ̄` is that of the dense map, [`smoothing`](super::smoothing), which
+//! differs as `χ` does.
 //!
 //! # Not differentiable
 //! Which blocks are there. A step of one block changes `χ` by no more than its error.
