@@ -10,7 +10,7 @@ use isograd::poisson::Smoothing;
 use isograd::splat::Weights;
 use isograd::{
     Cotangent, Grid, Options, Pipeline, PointCloud, Reconstruction, Reconstructor, Resolution,
-    Sensors, SurfaceResolution,
+    Sensors, Solve, SurfaceResolution,
 };
 use isograd_shapes::Shape;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -152,6 +152,9 @@ fn options(random: &mut Random) -> Options {
         ]);
     }
     if random.one_in(4) {
+        options.solve = Solve::Sparse;
+    }
+    if random.one_in(4) {
         options.band = Band::Within(random.power(-4.0, 2.0));
     }
     options.level = random.pick(&[Level::Local, Level::Local, Level::Thin, Level::Mean]);
@@ -258,7 +261,9 @@ fn pullback_bits<T: Pipeline>(
     let (areas, iso_value) = (numbers(points, 3), numbers(1, 3));
     let cotangent = Cotangent {
         sdf: sdf.as_deref(),
-        indicator: indicator.as_deref(),
+        indicator: indicator
+            .as_deref()
+            .filter(|_| result.solve() == Solve::Dense),
         iso_value: iso_value.map_or(T::zero(), |value| value[0]),
         vertices: of_vertices.as_deref().map(|v| v.as_chunks().0),
         normals: normals.as_deref().map(|v| v.as_chunks().0),

@@ -80,7 +80,7 @@ impl<T: Real> Cube<T> {
     /// The value at the point, and the gradient in values per cell.
     #[inline(always)]
     pub(crate) fn value_and_gradient(&self, values: &[T]) -> (T, [T; 3]) {
-        self.from_corners(self.cells().map(|c| values[c]))
+        self.of_corners(self.cells().map(|c| values[c]))
     }
 
     /// Like [`Self::value_and_gradient`], of a field that is dense or in blocks.
@@ -89,12 +89,12 @@ impl<T: Real> Cube<T> {
         let [x, y, z] = self.cell;
         let [a, b, c, d] = [[x, y], [x, y + 1], [x + 1, y], [x + 1, y + 1]]
             .map(|[x, y]| field.row::<2>([x, y, z]));
-        self.from_corners([a[0], a[1], b[0], b[1], c[0], c[1], d[0], d[1]])
+        self.of_corners([a[0], a[1], b[0], b[1], c[0], c[1], d[0], d[1]])
     }
 
     /// The value and the gradient, from the values of the eight cells.
     #[inline(always)]
-    fn from_corners(&self, v: [T; 8]) -> (T, [T; 3]) {
+    fn of_corners(&self, v: [T; 8]) -> (T, [T; 3]) {
         let [x, y, z] = self.fraction;
         let edge: [T; 4] = std::array::from_fn(|e| lerp(v[2 * e], v[2 * e + 1], z));
         let slope: [T; 4] = std::array::from_fn(|e| v[2 * e + 1] - v[2 * e]);

@@ -75,7 +75,7 @@ impl SurfaceResolution {
         let thinnest = grid.shape().into_iter().min().unwrap_or(0) / parts;
         let fits = |&octaves: &usize| {
             let is_close = rounded(octaves) as f64 <= SLACK * count as f64;
-            is_close && thinnest * rounded(octaves) >> octaves >= Grid::<T>::MIN_CELLS
+            is_close && (thinnest * rounded(octaves)) >> octaves >= Grid::<T>::MIN_CELLS
         };
         match (1..=wanted).rev().find(fits) {
             None if solve == Solve::Auto => Ok((dense(fine)?, 0)),

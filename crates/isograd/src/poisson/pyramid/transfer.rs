@@ -40,7 +40,7 @@ pub(super) fn symbol(angle: f64) -> f64 {
 /// Adds the values at the cells of `small` of the spline with `coefficients` at the cells of `large`.
 pub(super) fn prolong<T: Real>(large: &Blocks, coefficients: &[T], small: &Blocks, out: &mut [T]) {
     let rows: [(usize, [T; 6]); EDGE] = std::array::from_fn(|n| {
-        let first = (n + 1) / 2;
+        let first = n.div_ceil(2);
         let large = |m: usize| (first + m) as isize - REACH;
         let weights = std::array::from_fn(|m| T::of(weight(n as isize, large(m))));
         (first, weights)
