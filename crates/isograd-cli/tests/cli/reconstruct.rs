@@ -96,9 +96,9 @@ fn a_sparse_solve_gives_the_same_volume_from_fewer_cells() {
         (report["surface_cells"].as_u64().expect("a number"), volume)
     });
     assert!(2 * sparse.0 < dense.0, "{} of {}", sparse.0, dense.0);
-    // The indicator is right to 1e-4 of its jump: that much of a cell, of which the radius has 100.
+    // The indicator is right to 1e-4 of its jump, which takes about ten cells; the radius has 100.
     let off = sparse.1 / dense.1 - 1.0;
-    assert!(off.abs() < 1e-5, "{off}");
+    assert!(off.abs() < 1e-4, "{off}");
     sandbox
         .run("reconstruct cloud.ply --solve sparse --screening 4 --mesh m.ply")
         .says(1, &["needs the dense solve"]);
