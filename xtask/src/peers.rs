@@ -24,9 +24,9 @@ fn environment() -> Result<Environment, String> {
 }
 
 /// Path of a program of `package`, built for release.
-fn release(package: &str, program: &str) -> Result<PathBuf, String> {
+fn release(package: &str, program: &str, features: &[&str]) -> Result<PathBuf, String> {
     let build = ["build", "--release", "--package", package, "--bin", program];
-    process::run(&mut process::cargo(build))?;
+    process::run(process::cargo(build).args(features))?;
     let name = format!("{program}{}", std::env::consts::EXE_SUFFIX);
     Ok(Workspace::load()?.target.join("release").join(name))
 }
@@ -38,7 +38,7 @@ pub fn surfaces(arguments: &[String]) -> Outcome {
         Command::new(&environment.python)
             .arg(folder().join("surfaces.py"))
             .arg("--program")
-            .arg(release("isograd-cli", "isograd")?)
+            .arg(release("isograd-cli", "isograd", &[])?)
             .args(arguments)
             .current_dir(process::root()),
     )?;
@@ -55,7 +55,11 @@ pub fn run(arguments: &[String]) -> Outcome {
         Ok(()) => {}
         Err(Obstacle::Absent(reason) | Obstacle::Failure(reason)) => eprintln!("skipped: {reason}"),
     }
-    let program = release("isograd-benches", "stage-times")?;
+    let program = release(
+        "isograd-benches",
+        "stage-times",
+        &["--features", "stage-times"],
+    )?;
     process::run(
         Command::new(&environment.python)
             .arg(folder.join("compare.py"))
