@@ -88,6 +88,32 @@ pub struct Scene {
     center: [f64; 3],
     /// Pixels per unit length.
     zoom: f64,
+    lights: Lights,
+}
+
+/// Directions to the lights.
+#[derive(Clone, Copy)]
+struct Lights {
+    key: [f64; 3],
+    fill: [f64; 3],
+    /// Normal of a surface that mirrors the key light to the viewer.
+    half: [f64; 3],
+}
+
+impl Lights {
+    fn new([right, up, toward]: [[f64; 3]; 3]) -> Self {
+        let light = |r: f64, u: f64, t: f64| {
+            let direction: [f64; 3] =
+                std::array::from_fn(|a| r * right[a] + u * up[a] + t * toward[a]);
+            vector::normalized(direction).unwrap_or(toward)
+        };
+        let key = light(-0.5, 0.8, 0.7);
+        Self {
+            key,
+            fill: light(0.9, 0.1, 0.5),
+            half: vector::normalized(vector::add(key, toward)).unwrap_or(toward),
+        }
+    }
 }
 
 impl Scene {
@@ -101,6 +127,7 @@ impl Scene {
             zoom: room(size[0], view.size[0]).min(room(size[1], view.size[1])),
             center: view.center,
             axes: view.axes,
+            lights: Lights::new(view.axes),
         }
     }
 
@@ -231,20 +258,18 @@ impl Scene {
 
     /// A key light from above left, a weaker one from the right, light from everywhere, and a highlight.
     fn shade(&self, normal: [f64; 3], color: Color) -> Color {
-        let [right, up, toward] = self.axes;
         let Some(normal) = vector::normalized(normal) else {
             return color;
         };
         // Seen from behind, a surface is lit as from the front.
-        let normal = scale(normal, if dot(normal, toward) < 0.0 { -1.0 } else { 1.0 });
-        let light = |r: f64, u: f64, t: f64| {
-            let direction: [f64; 3] =
-                std::array::from_fn(|a| r * right[a] + u * up[a] + t * toward[a]);
-            vector::normalized(direction).unwrap_or(toward)
+        let side = if dot(normal, self.axes[2]) < 0.0 {
+            -1.0
+        } else {
+            1.0
         };
-        let (key, fill) = (light(-0.5, 0.8, 0.7), light(0.9, 0.1, 0.5));
+        let normal = scale(normal, side);
+        let Lights { key, fill, half } = self.lights;
         let diffuse = 0.36 + 0.58 * dot(normal, key).max(0.0) + 0.16 * dot(normal, fill).max(0.0);
-        let half = vector::normalized(vector::add(key, toward)).unwrap_or(toward);
         let highlight = 0.16 * dot(normal, half).max(0.0).powi(40);
         color.map(|c| (c * diffuse as f32 + highlight as f32).min(1.0))
     }

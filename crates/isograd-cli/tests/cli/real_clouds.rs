@@ -57,15 +57,15 @@ fn distances(to: &Query<f64>, points: &[[f64; 3]], h: f64) -> Vec<f64> {
 fn is_thick(body: &Query<f64>, points: &[[f64; 3]], normals: &[[f64; 3]], h: f64) -> Vec<bool> {
     let mut depth = vec![0.05 * h; points.len()];
     let mut inside = vec![true; points.len()];
+    let mut moving: Vec<usize> = (0..points.len()).collect();
     for _ in 0..200 {
-        let at = |i: usize| vector::sub(points[i], vector::scale(normals[i], depth[i]));
-        let places: Vec<[f64; 3]> = (0..points.len()).map(at).collect();
-        for (i, hit) in body.query(&places, None).iter().enumerate() {
-            if depth[i] < THICK * h {
-                inside[i] &= hit.distance < 0.0;
-                depth[i] += hit.distance.abs().max(1e-3 * h);
-            }
+        let at = |&i: &usize| vector::sub(points[i], vector::scale(normals[i], depth[i]));
+        let places: Vec<[f64; 3]> = moving.iter().map(at).collect();
+        for (&i, hit) in moving.iter().zip(body.query(&places, None)) {
+            inside[i] &= hit.distance < 0.0;
+            depth[i] += hit.distance.abs().max(1e-3 * h);
         }
+        moving.retain(|&i| inside[i] && depth[i] < THICK * h);
     }
     inside
 }
