@@ -2,6 +2,8 @@
 //!
 //! Work is cut into chunks of a fixed length, and what the chunks return is combined in their order.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 /// Items in one chunk of a loop over points or vertices.
@@ -12,19 +14,16 @@ pub(crate) fn sum_array<const M: usize>(
     n: usize,
     f: impl Fn(usize) -> [f64; M] + Sync,
 ) -> [f64; M] {
-    let partial: Vec<[f64; M]> = (0..n.div_ceil(CHUNK))
-        .into_par_iter()
-        .map(|chunk| {
-            let mut total = [0.0; M];
-            for i in chunk * CHUNK..n.min((chunk + 1) * CHUNK) {
-                let term = f(i);
-                for m in 0..M {
-                    total[m] += term[m];
-                }
+    let partial = of_chunks(n, &|items| {
+        let mut total = [0.0; M];
+        for i in items {
+            let term = f(i);
+            for m in 0..M {
+                total[m] += term[m];
             }
-            total
-        })
-        .collect();
+        }
+        total
+    });
     let mut total = [0.0; M];
     for part in partial {
         for m in 0..M {
@@ -32,4 +31,10 @@ pub(crate) fn sum_array<const M: usize>(
         }
     }
     total
+}
+
+/// `f` of each chunk of `0..n`. The closure is `dyn` so that what rayon adds is compiled once for each `R`.
+fn of_chunks<R: Send>(n: usize, f: &(dyn Fn(Range<usize>) -> R + Sync)) -> Vec<R> {
+    let chunk = |k: usize| f(k * CHUNK..n.min((k + 1) * CHUNK));
+    (0..n.div_ceil(CHUNK)).into_par_iter().map(chunk).collect()
 }

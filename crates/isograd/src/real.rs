@@ -3,8 +3,8 @@
 use std::fmt::{Debug, Display, LowerExp};
 use std::iter::Sum;
 
+use isograd_fourier::Fourier;
 use num_traits::{Float, FloatConst, NumAssign};
-use rustfft::FftNum;
 
 use crate::element::Element;
 
@@ -17,7 +17,7 @@ pub trait Real:
     + Float
     + FloatConst
     + NumAssign
-    + FftNum
+    + Fourier
     + Sum
     + Default
     + Debug

@@ -8,7 +8,7 @@
 use std::f64::consts::{PI, SQRT_2};
 use std::sync::Arc;
 
-use rustfft::{Fft, FftPlanner, num_complex::Complex};
+use isograd_fourier::{Fft, num_complex::Complex};
 
 use super::scratch::first;
 use super::spectrum;
@@ -44,7 +44,7 @@ pub(super) struct Gain<T> {
 }
 
 impl<T: Real> Axis<T> {
-    pub(super) fn new(n: usize, planner: &mut FftPlanner<T>) -> Self {
+    pub(super) fn new(n: usize) -> Self {
         let place = |j: usize| {
             if j.is_multiple_of(2) {
                 j / 2
@@ -56,6 +56,7 @@ impl<T: Real> Axis<T> {
             let (sin, cos) = (0.5 * PI * k as f64 / n as f64).sin_cos();
             Complex::new(T::of(cos), T::of(-sin))
         };
+        let [forward, inverse] = T::transforms(n);
         Self {
             n,
             natural: (0..n).collect(),
@@ -63,8 +64,8 @@ impl<T: Real> Axis<T> {
             stiffness: (0..n).map(|k| T::of(spectrum::stiffness(k, n))).collect(),
             mass: (0..n).map(|k| T::of(spectrum::mass(k, n))).collect(),
             twiddle: (0..=n / 2).map(twiddle).collect(),
-            forward: planner.plan_fft_forward(n),
-            inverse: planner.plan_fft_inverse(n),
+            forward,
+            inverse,
         }
     }
 

@@ -50,7 +50,6 @@ use std::f64::consts::PI;
 
 use axis::Axis;
 use pulp::Arch;
-use rustfft::FftPlanner;
 
 use crate::Real;
 pub use scratch::Scratch;
@@ -104,10 +103,9 @@ impl<T: Real> Plan<T> {
     /// A plan for grids of `(nx, ny, nz)` cells, of any size, primes included. Memory and time grow with
     /// `nx + ny + nz` only.
     pub fn new(shape: [usize; 3]) -> Self {
-        let mut planner = FftPlanner::new();
         Self {
             shape,
-            axes: shape.map(|n| Axis::new(n, &mut planner)),
+            axes: shape.map(Axis::new),
             symbols: None,
             arch: Arch::new(),
         }

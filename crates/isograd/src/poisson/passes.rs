@@ -1,7 +1,7 @@
 //! The three passes over memory: planes forward, lines across the planes, planes backward.
 
+use isograd_fourier::num_complex::Complex;
 use rayon::prelude::*;
-use rustfft::num_complex::Complex;
 
 use super::axis::{Axis, Gain};
 use super::scratch::{Lines, Scratch, first};

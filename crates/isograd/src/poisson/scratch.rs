@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use rustfft::num_complex::Complex;
+use isograd_fourier::num_complex::Complex;
 
 use crate::Real;
 
