@@ -26,8 +26,9 @@ const LONGEST: Duration = Duration::from_secs(10);
 /// Smaller files are left out of the ratios: they would show constants, and what other processes do meanwhile.
 const LEAST_BYTES: usize = 1 << 14;
 
-/// Clouds with more columns of attributes are not written again: formats have limits.
+/// Clouds with more columns of attributes, or with longer names, are not written again: formats have limits.
 const MOST_COLUMNS: usize = 4000;
+const LONGEST_NAME: usize = 1 << 15;
 
 /// Readers and their corpus.
 pub struct Readers {
@@ -201,7 +202,8 @@ fn cloud_comes_back(geometry: &Geometry, path: &Path) -> Result<(), String> {
         return Ok(());
     };
     let components = cloud.attributes().iter().map(|a| a.components);
-    if components.sum::<usize>() > MOST_COLUMNS {
+    let too_long = |a: &Attribute<f64>| a.name.len() > LONGEST_NAME;
+    if components.sum::<usize>() > MOST_COLUMNS || cloud.attributes().iter().any(too_long) {
         return Ok(());
     }
     let format = path.extension().unwrap_or_default().display();
