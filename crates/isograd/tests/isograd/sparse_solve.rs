@@ -70,20 +70,21 @@ fn assert_agreement<T: Pipeline>(cloud: &PointCloud<T>, options: &Options) {
     // its triangles are others: then φ changes by the height of an arc of one cell.
     assert!(most < 1e-3 && worst < 0.02);
     let [a, b] = [&dense, &sparse].map(gradient);
-    let norm = |v: &[[T; 3]]| {
-        v.iter()
-            .flatten()
-            .map(|x| x.f64().powi(2))
-            .sum::<f64>()
-            .sqrt()
-    };
+    let norm = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let to_f64 = |v: [T; 3]| v.map(|x| x.f64());
+    let squares = a.points.iter().map(|&v| norm(to_f64(v)).powi(2));
+    let rms = (squares.sum::<f64>() / a.points.len() as f64).sqrt();
     let pairs = a.points.iter().zip(&b.points);
-    let off: Vec<[T; 3]> = pairs
-        .map(|(a, b)| std::array::from_fn(|d| a[d] - b[d]))
-        .collect();
-    let off = norm(&off) / norm(&a.points);
-    println!("gradients differ by {off:e}");
-    assert!(off < 1e-3, "{off}");
+    let off = pairs.map(|(&a, &b)| {
+        let (a, b) = (to_f64(a), to_f64(b));
+        norm(std::array::from_fn(|d| a[d] - b[d])) / rms
+    });
+    let mut off: Vec<f64> = off.collect();
+    off.sort_by(f64::total_cmp);
+    // At such a cell, the gradients of a few samples change, too.
+    let most = off[off.len() - 1 - off.len() / 100];
+    println!("gradients differ by up to {most:e}, at a hundredth of the samples by more");
+    assert!(most < 1e-3, "{most}");
 }
 
 #[test]
