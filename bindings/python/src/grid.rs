@@ -1,6 +1,6 @@
 //! Grids: checks, and grids around clouds.
 
-use isograd::{Grid, PointCloud, Resolution};
+use isograd::{Grid, Outliers, PointCloud, Resolution};
 use pyo3::prelude::*;
 
 use crate::arrays;
@@ -26,12 +26,13 @@ fn cells(shape: [i64; 3]) -> PyResult<[usize; 3]> {
 
 /// Lower corner, spacing and shape of a grid around `(N, 3)` points.
 #[pyfunction]
-#[pyo3(signature = (points, resolution, spacing, padding))]
+#[pyo3(signature = (points, resolution, spacing, padding, outliers))]
 pub fn fit_grid(
     points: &Bound<'_, PyAny>,
     resolution: Option<i64>,
     spacing: Option<f64>,
     padding: f64,
+    outliers: &str,
 ) -> PyResult<Parts> {
     let points = arrays::widened(points, "points")?;
     let resolution = match (spacing, resolution) {
@@ -43,6 +44,7 @@ pub fn fit_grid(
         }
     };
     let cloud = PointCloud::new(points).map_err(value)?;
-    let grid = Grid::fit(&cloud, resolution, padding).map_err(value)?;
+    let outliers: Outliers = outliers.parse().map_err(value)?;
+    let grid = Grid::fit_with(&cloud, resolution, padding, outliers).map_err(value)?;
     Ok((grid.lower(), grid.spacing(), grid.shape()))
 }

@@ -155,6 +155,10 @@ fn array<'py, T: Number>(
         "normals" => Ok(arrays::from_vectors(py, failure(result.normals())?)),
         "confidence" => arrays::shaped(py, failure(result.confidence())?.to_vec(), [count]),
         "areas" => arrays::shaped(py, failure(result.areas())?.to_vec(), [count]),
+        "outliers" => {
+            let outliers = result.outliers().to_vec();
+            arrays::shaped(py, outliers, [result.outliers().len()])
+        }
         "neighbors" => arrays::shaped(py, failure(result.neighbor_counts())?.to_vec(), [count]),
         _ => Err(PyKeyError::new_err(name.to_owned())),
     }

@@ -219,6 +219,25 @@ def test_bad_points_are_refused_with_a_reason(points, error, text):
     assert len(str(caught.value)) > 10
 
 
+def test_outliers_are_left_out_and_have_no_gradient():
+    points = np.insert(SPHERE, 7, (500.0, 0.0, 3.0), axis=0)
+    grid = isograd.Grid.fit(points, 32)
+    assert grid == GRID
+    result = isograd.reconstruct(points, grid)
+    expected = isograd.reconstruct(SPHERE, GRID)
+    assert list(result.outliers) == [7] and result.report["outliers"] == {"count": 1, "indices": [7]}
+    assert "1 samples were left out" in result.warnings[0]
+    assert bits(result.sdf) == bits(expected.sdf)
+    assert not result.normals[7].any() and result.confidence[7] == 0
+    gradient = result.pullback(sdf=result.sdf).points
+    assert not gradient[7].any()
+    assert bits(np.delete(gradient, 7, axis=0)) == bits(expected.pullback(sdf=expected.sdf).points)
+    kept = isograd.Grid.fit(points, 32, outliers="keep")
+    assert kept.spacing > 100 * grid.spacing
+    with pytest.raises(ValueError, match="point 7"):
+        isograd.reconstruct(points, grid, outliers=isograd.Outliers.KEEP)
+
+
 def test_bad_arguments_are_refused_with_a_reason():
     result = isograd.reconstruct(SPHERE, GRID)
     bad = np.zeros(GRID.shape)
@@ -235,6 +254,8 @@ def test_bad_arguments_are_refused_with_a_reason():
         (ValueError, "'sparse'", lambda: isograd.Options(solve="fast")),
         (ValueError, "screening", lambda: isograd.Options(screening=float("inf"))),
         (ValueError, "'local'", lambda: isograd.Options(level="median")),
+        (ValueError, "outliers is 'drop'", lambda: isograd.Options(outliers="drop")),
+        (ValueError, "outliers is 'drop'", lambda: isograd.Grid.fit(SPHERE, outliers="drop")),
         (ValueError, "radius", lambda: isograd.Options(radius=0)),
         (ValueError, "band", lambda: isograd.Options(band=float("nan"))),
         (TypeError, "Grid", lambda: isograd.reconstruct(SPHERE, (1, 2, 3))),

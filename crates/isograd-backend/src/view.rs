@@ -80,7 +80,16 @@ impl<'a, T: Number> View<'a, T> {
         neighbor_counts: &'a [u32];
     }
 
-    /// Grid of the surface.
+    /// Indices of the [outliers](isograd::Outliers) that were left out, ascending.
+    pub fn outliers(self) -> &'a [u32] {
+        match self.0 {
+            Of::Cpu(of) => of.outliers(),
+            #[cfg(feature = "gpu")]
+            Of::Device(of, _) => of.outliers(),
+        }
+    }
+
+    /// Grid of the surface and of the indicator.
     pub fn surface_grid(self) -> &'a Grid<T> {
         match self.0 {
             Of::Cpu(of) => of.surface_grid(),

@@ -39,7 +39,7 @@ pub fn run(args: &args::Gradcheck) -> Result<(), Error> {
     let cloud: PointCloud<f64> = cloud.map_err(Error::input(&args.cloud))?;
     let grid = args.grid.grid(&cloud).map_err(Error::input(&args.cloud))?;
     let options = Options {
-        reconstruction: args.method.options(),
+        reconstruction: args.method.options(args.grid.outliers),
         step: args.step,
         seed: args.seed,
         ..Options::default()

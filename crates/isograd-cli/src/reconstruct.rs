@@ -150,7 +150,7 @@ impl Job<'_> {
             grid.shape(),
             grid.spacing()
         ));
-        let options = self.args.method.options();
+        let options = self.args.method.options(self.args.grid.outliers);
         let plan = Plan::new(self.args.backend, grid, options);
         let mut plan =
             plan.map_err(|e| backend::plan_error(self.args.backend, e, &self.args.cloud))?;

@@ -85,7 +85,7 @@ use isograd_element::{self as element, vector};
 pub use backend::{Backend, UnknownBackend};
 pub use data::{
     Attribute, Field, FieldError, Grid, GridCotangent, GridError, LatticeEdge, Mesh, MeshError,
-    PointCloud, PointCloudError, Resolution, Sensors,
+    Outliers, PointCloud, PointCloudError, Resolution, Selection, Sensors,
 };
 pub use pipeline::{
     AvailableMemory, CloudCotangent, Cotangent, Error, ExtensionCotangent, MemoryError,

@@ -11,6 +11,9 @@ mod pullback;
 mod restore;
 mod scaling;
 mod sparse;
+mod selection;
+#[cfg(test)]
+mod selection_tests;
 mod stages;
 mod surface;
 mod text;
@@ -19,7 +22,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Instant;
 
-use crate::data::{Field, Grid, Mesh, PointCloud};
+use crate::data::{Field, Grid, Mesh, PointCloud, Selection};
 use crate::isosurface::measure;
 use crate::report::Report;
 pub(crate) use crate::report::Stage;
@@ -60,7 +63,7 @@ struct Scratch<T: Real> {
 }
 
 impl<T: Pipeline> Reconstructor<T> {
-    /// A plan for clouds that lie on `grid`, at least 2 cells off its walls.
+    /// A plan for clouds that lie on `grid`, at least 2 cells off its walls, but for [outliers](crate::Outliers).
     ///
     /// # Errors
     /// [`Error::Memory`] for a grid that needs more memory than is [free](available_memory).
@@ -137,16 +140,21 @@ impl<T: Pipeline> Reconstructor<T> {
     ) -> Result<&Reconstruction<T>, Error> {
         let cells = self.result.sdf.values().len();
         memory::check_points::<T>(cloud.len(), self.result.points.capacity(), cells)?;
+        let used = self.result.select(cloud, held);
+        let all = cloud;
+        let cloud = used.as_ref().unwrap_or(cloud);
         self.result.start(cloud);
         for stage in Stage::ALL {
             if observer(stage).is_break() {
                 return Err(Error::Interrupted(stage));
             }
             let start = Instant::now();
-            T::run(self, stage, cloud, held)?;
+            let done = T::run(self, stage, cloud, held);
+            done.map_err(|error| self.result.selection.locate(error))?;
             let seconds = start.elapsed().as_secs_f64();
             self.result.report.seconds.set(stage, seconds);
         }
+        self.result.expand(all);
         Ok(&self.result)
     }
 
@@ -162,6 +170,9 @@ impl<T: Pipeline> Reconstructor<T> {
 pub struct Reconstruction<T: Real> {
     options: Options,
     poisson: Arc<poisson::Plan<T>>,
+    selection: Selection,
+    /// Results for all samples, where some were left out: all others are for those that are used.
+    all: Option<Box<selection::AllSamples<T>>>,
     points: Vec<[T; 3]>,
     /// Normals of the cloud, with [`orient::Method::Given`].
     given: Vec<[T; 3]>,
@@ -197,6 +208,8 @@ impl<T: Pipeline> Reconstruction<T> {
         Self {
             options,
             poisson: Arc::new(T::poisson_plan(grid.shape())),
+            selection: Selection::default(),
+            all: None,
             points: Vec::new(),
             given: Vec::new(),
             sdf: Field::zeros(grid),
@@ -224,7 +237,9 @@ impl<T: Real> Reconstruction<T> {
             self.given.extend_from_slice(normals);
         }
         self.report = Report {
-            points: cloud.len(),
+            points: self.selection.samples(),
+            outliers: self.selection.left_out().to_vec(),
+            warnings: self.selection.warning().into_iter().collect(),
             ..Report::default()
         };
     }
@@ -294,22 +309,30 @@ impl<T: Real> Reconstruction<T> {
 
     /// `(N, 3)` the samples, in the order of the cloud.
     pub fn points(&self) -> &[[T; 3]] {
-        &self.points
+        self.all.as_ref().map_or(&self.points, |all| &all.points)
+    }
+
+    /// Indices of the [outliers](crate::Outliers) that were left out, ascending. Their normals, confidence, areas and gradients are 0.
+    pub fn outliers(&self) -> &[u32] {
+        self.selection.left_out()
     }
 
     /// `(N, 3)` outward unit normals of the samples, in their order.
     pub fn normals(&self) -> &[[T; 3]] {
-        &self.orientation.normals
+        let used = &self.orientation.normals;
+        self.all.as_ref().map_or(used, |all| &all.normals)
     }
 
     /// `(N,)` confidence in the sign of each normal, from 0 to 1.
     pub fn confidence(&self) -> &[T] {
-        &self.orientation.confidence
+        let used = &self.orientation.confidence;
+        self.all.as_ref().map_or(used, |all| &all.confidence)
     }
 
     /// `(N,)` number of samples in the neighborhood of each, itself included.
     pub fn neighbor_counts(&self) -> &[u32] {
-        &self.residuals.neighborhoods.count
+        let used = &self.residuals.neighborhoods.count;
+        self.all.as_ref().map_or(used, |all| &all.counts)
     }
 
     /// `(N,)` number of samples in the neighborhood that each axis was found in; empty with given normals.
@@ -319,7 +342,7 @@ impl<T: Real> Reconstruction<T> {
 
     /// `(N,)` area of surface that each sample stands for, in unit length²; 1 without area weights.
     pub fn areas(&self) -> &[T] {
-        &self.areas
+        self.all.as_ref().map_or(&self.areas, |all| &all.areas)
     }
 
     /// Numbers, times and warnings.

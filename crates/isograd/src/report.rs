@@ -87,6 +87,8 @@ impl Seconds {
 pub struct Report {
     /// Number of points.
     pub points: usize,
+    /// Indices of the samples that were left out as outliers.
+    pub outliers: Vec<u32>,
     /// The common neighborhood radius `R`.
     pub radius: f64,
     /// Typical distance between neighboring samples.
@@ -161,6 +163,11 @@ fn quantile<V: Copy>(sorted: &[V], q: f64) -> Option<V> {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Warning {
+    /// Samples were left out: they are isolated, and further from the others than these extend.
+    Outliers {
+        /// Number of such samples.
+        samples: usize,
+    },
     /// Parts of the body are thinner than three cells.
     Thin {
         /// Share of the samples that lie on such parts, from 0 to 1.
@@ -210,6 +217,10 @@ pub enum Warning {
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Outliers { samples } => write!(
+                f,
+                "{samples} samples were left out as outliers: they are isolated and further from the others than these extend; the option outliers 'keep' keeps them"
+            ),
             Self::Thin { share } => write!(
                 f,
                 "{} of the samples lie on parts thinner than 3 cells; use a finer grid if these parts matter",

@@ -48,7 +48,11 @@ def check_grid(lower: _Vector, spacing: float, shape: _Cells) -> None:
     """Raises ValueError if the grid is invalid."""
 
 def fit_grid(
-    points: _Floats, resolution: int | None, spacing: float | None, padding: float
+    points: _Floats,
+    resolution: int | None,
+    spacing: float | None,
+    padding: float,
+    outliers: str,
 ) -> tuple[_Vector, float, _Cells]:
     """Lower corner, spacing and shape of a grid around ``(N, 3)`` points."""
 

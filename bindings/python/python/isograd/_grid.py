@@ -10,6 +10,7 @@ import numpy as np
 from . import _core
 from ._arrays import floats
 from ._numbers import number, whole
+from ._options import Outliers, OutliersLike, choice
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -50,6 +51,7 @@ class Grid:
         *,
         spacing: float | None = None,
         padding: float = 0.1,
+        outliers: OutliersLike = Outliers.IGNORE,
     ) -> Grid:
         """A grid around a cloud.
 
@@ -58,6 +60,8 @@ class Grid:
             resolution: cells on the longest side; 128 unless ``spacing`` is given.
             spacing: cell size, in the unit of the points, instead of a resolution.
             padding: distance to every wall, as a fraction of the longest side (at least 4 cells).
+            outliers: whether isolated samples that are further from the others than these extend count; see
+                :class:`Outliers`.
 
         Raises:
             ValueError: no valid grid results, or both ``resolution`` and ``spacing`` are given.
@@ -71,8 +75,9 @@ class Grid:
         if spacing is not None:
             spacing = number(spacing, "spacing")
         padding = number(padding, "padding")
+        outliers = choice(Outliers, outliers, "outliers")
         cloud = floats(points, "points", (None, 3))
-        return cls(*_core.fit_grid(cloud, resolution, spacing, padding))
+        return cls(*_core.fit_grid(cloud, resolution, spacing, padding, outliers.value))
 
     @property
     def upper(self) -> tuple[float, float, float]:

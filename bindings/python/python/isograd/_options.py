@@ -58,10 +58,20 @@ class Solve(str, Enum):
     """Those near the samples and the surface; coarse cells elsewhere."""
 
 
+class Outliers(str, Enum):
+    """Use of outliers: isolated samples that are further from the others than these extend."""
+
+    IGNORE = "ignore"
+    """Left out, with a warning. Their gradients are 0."""
+    KEEP = "keep"
+    """Samples like all others."""
+
+
 OrientLike = Orient | Literal["auto", "parity", "given", "signs", "sensors", "previous"]
 SplatLike = Splat | Literal["bspline", "paper"]
 LevelLike = Level | Literal["local", "thin", "mean"]
 SolveLike = Solve | Literal["auto", "dense", "sparse"]
+OutliersLike = Outliers | Literal["ignore", "keep"]
 
 
 @dataclass(frozen=True)
@@ -81,6 +91,7 @@ class Options:
             fine as the grid of φ, ``"grid"`` for those of φ, a cell size in the unit of the points, or a factor such as
             ``"3x"``. φ stays on its own grid.
         solve: cells at which the indicator is computed; see :class:`Solve`.
+        outliers: use of isolated samples that are further from the others than these extend; see :class:`Outliers`.
         band: distance from the surface up to which φ is computed, in the unit of the points, or ``"full"``.
         checks: whether to measure the result and to check whether it can be trusted.
 
@@ -97,20 +108,22 @@ class Options:
     level: LevelLike = Level.LOCAL
     surface: float | str = "auto"
     solve: SolveLike = Solve.AUTO
+    outliers: OutliersLike = Outliers.IGNORE
     band: float | Literal["full"] = "full"
     checks: bool = True
 
     def __post_init__(self) -> None:
         checked = {
             "radius": length(self.radius, "radius", "auto"),
-            "orient": _choice(Orient, self.orient, "orient"),
-            "splat": _choice(Splat, self.splat, "splat"),
+            "orient": choice(Orient, self.orient, "orient"),
+            "splat": choice(Splat, self.splat, "splat"),
             "area": bool(self.area),
             "smoothing": self.smoothing,
             "screening": _not_negative(self.screening, "screening", "0 or more"),
-            "level": _choice(Level, self.level, "level"),
+            "level": choice(Level, self.level, "level"),
             "surface": _surface(self.surface),
-            "solve": _choice(Solve, self.solve, "solve"),
+            "solve": choice(Solve, self.solve, "solve"),
+            "outliers": choice(Outliers, self.outliers, "outliers"),
             "band": length(self.band, "band", "full"),
             "checks": bool(self.checks),
         }
@@ -157,7 +170,12 @@ def check_known(orient: OrientLike, normals: bool, sensors: bool = False) -> Non
             )
 
 
-def _choice(kind: type[Enum], value: object, name: str) -> Enum:
+def choice(kind: type[Enum], value: object, name: str) -> Enum:
+    """One of the values of ``kind``.
+
+    Raises:
+        ValueError: it is none of them.
+    """
     try:
         return kind(value)
     except ValueError:

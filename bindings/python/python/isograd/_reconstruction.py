@@ -144,6 +144,11 @@ class Reconstruction:
         return self._core.array("areas")
 
     @cached_property
+    def outliers(self) -> np.ndarray:
+        """``(M,)`` uint32: indices of the outliers that were left out. Their normals, confidence, areas and gradients are 0."""
+        return self._core.array("outliers")
+
+    @cached_property
     def neighbors(self) -> np.ndarray:
         """``(N,)`` number of samples in the neighborhood of each, itself included."""
         return self._core.array("neighbors")
@@ -299,7 +304,7 @@ def reconstruct(
 
     Args:
         points: ``(N, 3)`` samples of the surface; float32 or float64 decides the type of all results.
-        grid: grid of φ; by default ``Grid.fit(points)``.
+        grid: grid of φ; by default ``Grid.fit(points)``, with the given ``outliers``.
         normals: ``(N, 3)`` outward normals, only with ``orient="given"`` or ``"signs"``.
         sensors: positions of the sensors, only with ``orient="sensors"``: ``(N, 3)`` one for each point, ``(3,)`` one
             for all, or ``(M, 3)`` with another ``M`` where it is unknown which one saw a point.
@@ -316,8 +321,9 @@ def reconstruct(
         KeyboardInterrupt: at once, on Ctrl-C.
     """
     cloud = floats(points, "points", (None, 3))
-    grid = Grid.fit(cloud) if grid is None else grid
-    plan = Reconstructor(grid, options, backend=backend, **changes)
+    options = resolve(options, changes)
+    grid = Grid.fit(cloud, outliers=options.outliers) if grid is None else grid
+    plan = Reconstructor(grid, options, backend=backend)
     return plan(cloud, normals=normals, sensors=sensors, attributes=attributes)
 
 

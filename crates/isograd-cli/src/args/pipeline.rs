@@ -5,7 +5,9 @@ use isograd::distance::Band;
 use isograd::isosurface::Level;
 use isograd::poisson::Smoothing;
 use isograd::splat::Weights;
-use isograd::{Grid, GridError, Options, PointCloud, Real, Resolution, Solve, SurfaceResolution};
+use isograd::{
+    Grid, GridError, Options, Outliers, PointCloud, Real, Resolution, Solve, SurfaceResolution,
+};
 
 use super::{OrientArgs, finite, not_negative, positive};
 
@@ -27,6 +29,10 @@ pub struct GridArgs {
         allow_negative_numbers = true, value_parser = finite, conflicts_with = "padding",
         help_heading = "Grid")]
     pub bounds: Option<Vec<f64>>,
+    /// Use of outliers, isolated samples that are further from the others than these extend: ignore (left out, with a
+    /// warning) or keep
+    #[arg(long, value_name = "ignore|keep", default_value = "ignore", help_heading = "Grid")]
+    pub outliers: Outliers,
 }
 
 /// Arguments of the method: the fields of [`Options`].
@@ -71,6 +77,18 @@ impl GridArgs {
     /// # Errors
     /// See [`GridError`].
     pub fn grid<T: Real>(&self, cloud: &PointCloud<T>) -> Result<Grid<T>, GridError> {
+        self.grid_with(cloud, self.outliers)
+    }
+
+    /// Like [`Self::grid`], with another use of outliers.
+    ///
+    /// # Errors
+    /// See [`GridError`].
+    pub fn grid_with<T: Real>(
+        &self,
+        cloud: &PointCloud<T>,
+        outliers: Outliers,
+    ) -> Result<Grid<T>, GridError> {
         let resolution = match (self.spacing, self.resolution) {
             (Some(h), _) => Resolution::Spacing(T::of(h)),
             (None, n) => Resolution::Cells(n.unwrap_or(128) as usize),
@@ -80,15 +98,19 @@ impl GridArgs {
                 let corners = [[x0, y0, z0], [x1, y1, z1]].map(|corner| corner.map(T::of));
                 Grid::from_bounds(corners[0], corners[1], resolution)
             }
-            _ => Grid::fit(cloud, resolution, T::of(self.padding.unwrap_or(0.1))),
+            _ => {
+                let padding = T::of(self.padding.unwrap_or(0.1));
+                Grid::fit_with(cloud, resolution, padding, outliers)
+            }
         }
     }
 }
 
 impl MethodArgs {
-    /// The options of the pipeline.
-    pub fn options(&self) -> Options {
+    /// The options of the pipeline, with the given use of outliers.
+    pub fn options(&self, outliers: Outliers) -> Options {
         Options::default()
+            .outliers(outliers)
             .radius(self.normals.radius)
             .orient(self.normals.method())
             .splat(self.splat)

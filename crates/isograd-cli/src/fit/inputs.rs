@@ -1,6 +1,6 @@
 //! Target, variables and options of a fit from the command line.
 
-use isograd::{Grid, PointCloud};
+use isograd::{Grid, Outliers, PointCloud};
 use isograd_fit::{Decay, Optimizer, Options, Points, ShapeParameters, Start, Target, Variables};
 use isograd_io::{Attributes, Content, Geometry};
 use isograd_shapes::{Sampling, Shape};
@@ -141,12 +141,18 @@ fn target(args: &args::Fit, variables: &Variables) -> Result<Target, Error> {
         Content::Field(field) => return Target::from_sdf(field.field).map_err(Error::input(path)),
         Content::Geometry(geometry) => geometry,
     };
-    let grid = grid(args, &geometry, variables)?;
-    check_memory(args, &grid)?;
     let as_cloud = args.target_kind == TargetKind::Cloud || geometry.faces.is_empty();
+    let outliers = match as_cloud {
+        true => args.grid.outliers,
+        // Few, far vertices may span large faces.
+        false => Outliers::Keep,
+    };
+    let grid = grid(args, outliers, &geometry, variables)?;
+    check_memory(args, &grid)?;
     if as_cloud {
         let cloud = geometry.cloud::<f64>().map_err(Error::input(path))?;
-        Target::from_cloud(&cloud, grid, &isograd::Options::default()).map_err(Error::input(path))
+        let options = isograd::Options::default().outliers(outliers);
+        Target::from_cloud(&cloud, grid, &options).map_err(Error::input(path))
     } else {
         let mesh = geometry.mesh::<f64>().map_err(Error::input(path))?;
         Target::from_mesh(mesh, grid).map_err(Error::input(path))
@@ -159,12 +165,18 @@ fn has_grid(args: &args::Fit) -> bool {
         spacing,
         padding,
         bounds,
+        outliers: _,
     } = &args.grid;
     resolution.is_some() || spacing.is_some() || padding.is_some() || bounds.is_some()
 }
 
 /// The grid of the command line, by default around the target and the start.
-fn grid(args: &args::Fit, target: &Geometry, variables: &Variables) -> Result<Grid<f64>, Error> {
+fn grid(
+    args: &args::Fit,
+    outliers: Outliers,
+    target: &Geometry,
+    variables: &Variables,
+) -> Result<Grid<f64>, Error> {
     let path = &args.target;
     let mut points = target.points.clone();
     match variables {
@@ -176,5 +188,5 @@ fn grid(args: &args::Fit, target: &Geometry, variables: &Variables) -> Result<Gr
         }
     }
     let all = PointCloud::new(points).map_err(Error::input(path))?;
-    args.grid.grid(&all).map_err(Error::input(path))
+    args.grid.grid_with(&all, outliers).map_err(Error::input(path))
 }

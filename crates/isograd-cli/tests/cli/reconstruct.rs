@@ -48,7 +48,7 @@ fn the_folder_gets_its_five_files_and_the_report_its_fields() {
     let report = sandbox.json("out/new/report.json");
     assert_keys(
         &report,
-        "version backend input grid normals orientation smoothing iso_value surface surface_spacing surface_cells sdf seconds peak_memory_bytes warnings",
+        "version backend input grid outliers normals orientation smoothing iso_value surface surface_spacing surface_cells sdf seconds peak_memory_bytes warnings",
     );
     assert_keys(&report["input"], "path points");
     assert_keys(&report["grid"], "shape origin spacing");
@@ -220,6 +220,34 @@ fn the_grid_is_the_one_that_was_asked_for() {
         .field;
     let greatest = field.values().iter().fold(0.0f64, |m, v| m.max(*v));
     assert!(greatest < 0.1 + 1e-6, "{greatest}");
+}
+
+#[test]
+fn outliers_are_left_out_with_a_warning_unless_they_are_to_be_kept() {
+    let sandbox = sphere();
+    let near = isograd_io::read_geometry(&sandbox.path("cloud.ply")).expect("reads");
+    let mut text: String = near
+        .points
+        .iter()
+        .map(|[x, y, z]| format!("{x:?} {y:?} {z:?}\n"))
+        .collect();
+    text.push_str("60 1 1\n");
+    sandbox.write("far.xyz", text);
+    let line = "reconstruct far.xyz --resolution 32 --report r.json --points p.ply --mesh m.ply";
+    let ran = sandbox.done(line);
+    assert!(ran.stderr.contains("1 samples were left out"), "{}", ran.stderr);
+    let report = sandbox.json("r.json");
+    let last = near.points.len();
+    assert_eq!(report["outliers"]["count"], 1);
+    assert_eq!(report["outliers"]["indices"][0], last);
+    assert_eq!(report["input"]["points"], last + 1);
+    assert!(report["surface"]["faces"].as_u64() > Some(1000));
+    let points = isograd_io::read_geometry(&sandbox.path("p.ply")).expect("reads");
+    assert_eq!(points.points.len(), last + 1);
+    sandbox.done(&format!("{line} --outliers keep"));
+    let report = sandbox.json("r.json");
+    assert_eq!(report["outliers"]["count"], 0);
+    assert!(report["grid"]["spacing"].as_f64() > Some(1.0));
 }
 
 #[test]

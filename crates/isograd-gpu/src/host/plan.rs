@@ -85,6 +85,20 @@ impl<T: Number> Plan<T> {
         if observer(Stage::Normals).is_break() {
             return Err(Error::Interrupted(Stage::Normals));
         }
+        let selection = self.options.outliers.select(cloud.points());
+        let used = selection.used(cloud);
+        let cloud = used.as_ref().unwrap_or(cloud);
+        let mut result = self.reconstruct_used(cloud, observer)?;
+        result.set_selection(selection);
+        Ok(result)
+    }
+
+    /// Runs all stages on the samples that are used.
+    fn reconstruct_used(
+        &mut self,
+        cloud: &PointCloud<T>,
+        observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
+    ) -> Result<Reconstruction<T>, Error> {
         let points = self.device.upload(cloud.points())?;
         let before = self.before.take();
         if let Some(before) = before.filter(|before| before.report.points == cloud.len()) {
@@ -115,6 +129,20 @@ impl<T: Number> Plan<T> {
         saved: &Saved<'_, T>,
     ) -> Result<Reconstruction<T>, Error> {
         saved.check(self.grid.cells(), cloud.len())?;
+        let selection = self.options.outliers.select(cloud.points());
+        let used = selection.used(cloud);
+        let cloud = used.as_ref().unwrap_or(cloud);
+        let mut result = self.restore_used(cloud, selection.gather(saved.normals, 1))?;
+        result.set_selection(selection);
+        Ok(result)
+    }
+
+    /// Restores the result of the samples that are used.
+    fn restore_used(
+        &self,
+        cloud: &PointCloud<T>,
+        normals: Vec<[T; 3]>,
+    ) -> Result<Reconstruction<T>, Error> {
         let mut observer = |_| ControlFlow::Continue(());
         let points = self.device.upload(cloud.points())?;
         if self.options.orient == Method::Given {
@@ -122,7 +150,7 @@ impl<T: Number> Plan<T> {
             return Ok(self.run(&points, cloud.normals(), begun, &mut observer)?.0);
         }
         let sided = PointCloud::new(cloud.points().to_vec())
-            .and_then(|cloud| cloud.with_normals(saved.normals.to_vec()))?;
+            .and_then(|cloud| cloud.with_normals(normals))?;
         let begun = self.find(&sided, &points, Method::Signs, &mut observer)?;
         Ok(self.run(&points, None, begun, &mut observer)?.0)
     }

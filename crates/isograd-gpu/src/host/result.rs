@@ -8,8 +8,8 @@ use isograd::isosurface::measure;
 use isograd::neighbors::{Neighborhoods, Radii};
 use isograd::orient::Orientation;
 use isograd::{
-    Attribute, CloudCotangent, Cotangent, Field, Grid, Mesh, Options, PointCloud, Report, Stage,
-    Warning,
+    Attribute, CloudCotangent, Cotangent, Field, Grid, Mesh, Options, PointCloud, Report,
+    Selection, Stage, Warning,
 };
 
 use super::work::{Work, vectors_of};
@@ -23,6 +23,7 @@ pub struct Reconstruction<T: Number> {
     result: pipeline::Reconstruction<T>,
     grid: Grid<T>,
     checks: bool,
+    selection: Selection,
     /// The report, without what needs copies of results.
     begun: Report,
     /// Radii and signs.
@@ -76,11 +77,13 @@ results! {
     /// [`NO_TRIANGLE`](crate::distance::NO_TRIANGLE) outside the band.
     closest: Vec<u32> => [u32], |of| of.device.indices(of.result.closest());
     /// `(N, 3)` outward unit normals of the samples, in their order.
-    normals: Vec<[T; 3]> => [[T; 3]], |of| of.vectors(&of.result.normals);
+    normals: Vec<[T; 3]> => [[T; 3]], |of| Ok(of.scatter(of.vectors(&of.result.normals)?, [T::zero(); 3]));
     /// `(N,)` area of surface that each sample stands for, in unit length²; 1 without area weights.
-    areas: Vec<T> => [T], |of| of.device.numbers(&of.result.areas);
+    areas: Vec<T> => [T], |of| Ok(of.scatter(of.device.numbers(&of.result.areas)?, T::zero()));
     /// `(N,)` confidence in the sign of each normal, from 0 to 1.
-    confidence: Vec<T> => [T], |of| of.device.numbers(&of.result.confidence);
+    confidence: Vec<T> => [T], |of| Ok(of.scatter(of.device.numbers(&of.result.confidence)?, T::zero()));
+    /// `(N,)` number of samples in the neighborhood of each, itself included.
+    neighbor_counts: Vec<u32> => [u32], |of| Ok(of.scatter(of.neighborhoods()?.count.clone(), 0));
     /// `(1,)` the level of the surface.
     level: Vec<T> => [T], |of| of.device.numbers(&of.result.iso_value);
 }
@@ -99,6 +102,7 @@ impl<T: Number> Reconstruction<T> {
             result,
             grid,
             checks: options.checks,
+            selection: Selection::default(),
             begun,
             held,
             copies: Copies::default(),
@@ -110,9 +114,27 @@ impl<T: Number> Reconstruction<T> {
         &self.grid
     }
 
+    /// Sets the samples that were used.
+    pub(super) fn set_selection(&mut self, selection: Selection) {
+        self.selection = selection;
+    }
+
     /// Number of points.
     pub fn points(&self) -> usize {
-        self.begun.points
+        self.selection.samples()
+    }
+
+    /// Indices of the [outliers](isograd::Outliers) that were left out, ascending.
+    pub fn outliers(&self) -> &[u32] {
+        self.selection.left_out()
+    }
+
+    /// Entries of all samples from those of the ones that are used.
+    fn scatter<E: Copy>(&self, used: Vec<E>, fill: E) -> Vec<E> {
+        match self.selection.is_all() {
+            true => used,
+            false => self.selection.scatter(&used, 1, fill),
+        }
     }
 
     /// The level `c` of the surface `χ = c`.
@@ -145,14 +167,6 @@ impl<T: Number> Reconstruction<T> {
         Ok(self.device.indices(&self.result.turned)?[0] as usize)
     }
 
-    /// `(N,)` number of samples in the neighborhood of each, itself included.
-    ///
-    /// # Errors
-    /// Errors of the device.
-    pub fn neighbor_counts(&self) -> Result<&[u32], Error> {
-        Ok(&self.neighborhoods()?.count)
-    }
-
     /// The neighborhoods, on the CPU.
     fn neighborhoods(&self) -> Result<&Neighborhoods<T>, Error> {
         once(&self.copies.neighborhoods, || {
@@ -180,6 +194,9 @@ impl<T: Number> Reconstruction<T> {
     fn make_report(&self) -> Result<Report, Error> {
         let start = Instant::now();
         let mut report = self.begun.clone();
+        report.points = self.points();
+        report.outliers = self.outliers().to_vec();
+        report.warnings.extend(self.selection.warning());
         report.surface_spacing = isograd::Real::f64(self.grid.spacing());
         report.surface_cells = self.grid.cells();
         report.smoothing = self.result.smoothing();
@@ -190,13 +207,13 @@ impl<T: Number> Reconstruction<T> {
         if self.checks {
             let scratch = &mut measure::Scratch::default();
             let points = self.vectors(&self.result.points)?;
-            let (normals, mesh) = (self.normals()?, self.mesh()?);
-            report.check_field(&points, normals, self.sdf()?, mesh, scratch);
             let orientation = Orientation {
-                normals: normals.to_vec(),
-                confidence: self.confidence()?.to_vec(),
+                normals: self.vectors(&self.result.normals)?,
+                confidence: self.device.numbers(&self.result.confidence)?,
                 ..Orientation::default()
             };
+            let normals = &orientation.normals;
+            report.check_field(&points, normals, self.sdf()?, self.mesh()?, scratch);
             report.check_samples(&points, self.neighborhoods()?, &orientation);
         }
         let before = report.seconds.of(Stage::Checks);
@@ -234,7 +251,8 @@ impl<T: Number> Reconstruction<T> {
         attribute: &Attribute<T>,
         band: f64,
     ) -> Result<(Extension<T>, extend::Residual<T>), Error> {
-        self.device.extend(&self.result, attribute, band)
+        let used = self.selection.attribute(attribute);
+        self.device.extend(&self.result, &used, band)
     }
 
     /// Pulls cotangents of any of the results, and of what was extended, back to the points, the attributes and the
@@ -246,7 +264,12 @@ impl<T: Number> Reconstruction<T> {
     pub fn pullback(&self, cotangent: &Cotangent<'_, T>) -> Result<CloudCotangent<T>, Error> {
         let vertices = self.result.surface.vertices.len() / 3;
         cotangent.check([self.grid.cells(); 2], vertices, self.points())?;
-        let mut found = self.device.pullback(&self.result, cotangent)?;
+        let mut found = match self.selection.is_all() {
+            true => self.device.pullback(&self.result, cotangent)?,
+            false => self.selection.pull(cotangent, |cotangent| {
+                self.device.pullback(&self.result, cotangent)
+            })?,
+        };
         found.guarded += self.begun.guarded;
         Ok(found)
     }

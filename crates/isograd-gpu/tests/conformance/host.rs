@@ -55,6 +55,40 @@ fn relative<T: Number>(found: &[T], expected: &[T]) -> f64 {
 }
 
 #[test]
+fn outliers_are_left_out_as_on_the_cpu() {
+    fn check<T: Number>() {
+        if !is_here::<T>() {
+            return;
+        }
+        let clean = cloud::<T>(2000);
+        let grid = grid(&clean);
+        let mut points = clean.points().to_vec();
+        points.insert(5, [real(90.0), real(0.0), real(-3.0)]);
+        let spoilt = PointCloud::new(points).unwrap();
+        let mut plan = Plan::new(Backend::Vulkan, grid, options()).unwrap();
+        let expected = plan.reconstruct(&clean).unwrap();
+        let found = plan.reconstruct(&spoilt).unwrap();
+        assert_eq!(found.outliers(), [5]);
+        assert_eq!(found.points(), 2001);
+        assert_eq!(found.report().unwrap().outliers, [5]);
+        assert_eq!(found.sdf().unwrap(), expected.sdf().unwrap());
+        let mut normals = found.normals().unwrap().to_vec();
+        assert_eq!(normals.remove(5), [real::<T>(0.0); 3]);
+        assert_eq!(normals, expected.normals().unwrap());
+        let bar = vec![real::<T>(1.0); grid.cells()];
+        let cotangent = Cotangent {
+            sdf: Some(&bar),
+            ..Cotangent::default()
+        };
+        let mut pulled = found.pullback(&cotangent).unwrap();
+        assert_eq!(pulled.points.remove(5), [real::<T>(0.0); 3]);
+        assert_eq!(pulled, expected.pullback(&cotangent).unwrap());
+    }
+    check::<f32>();
+    check::<f64>();
+}
+
+#[test]
 fn all_that_is_asked_for_is_what_the_cpu_gives() {
     fn check<T: Number>(tolerance: f64) {
         if !is_here::<T>() {

@@ -134,6 +134,20 @@ impl<T: Real> PointCloud<T> {
         })
     }
 
+    /// A cloud of parts that were checked.
+    pub(super) fn from_parts(
+        points: Vec<[T; 3]>,
+        normals: Option<Vec<[T; 3]>>,
+        sensors: Option<Sensors<T>>,
+    ) -> Self {
+        Self {
+            points,
+            normals,
+            sensors,
+            attributes: Vec::new(),
+        }
+    }
+
     /// The same cloud with a normal for each point (any length but zero; outward where the method
     /// trusts them).
     ///

@@ -1,13 +1,15 @@
 //! The grid fitted to a cloud, and the pullback to its points.
 
-use super::cloud::PointCloud;
+use super::cloud::{PointCloud, bounds};
 use super::grid::{Grid, GridCotangent, GridError, Resolution};
+use super::outliers::Outliers;
 use crate::Real;
 
 impl<T: Real> Grid<T> {
     /// The grid round a cloud: its bounding box, widened on every side by `padding` times the longest
     /// side and by at least [`Self::MARGIN_CELLS`] cells, centered. The longest side has as many cells as
-    /// asked for; the others are rounded up to a number whose Fourier transform is fast.
+    /// asked for; the others are rounded up to a number whose Fourier transform is fast. [Outliers](Outliers) are
+    /// ignored: they may lie outside.
     ///
     /// # Errors
     /// As [`Self::new`], and [`GridError::NoExtent`] where all points are equal.
@@ -15,6 +17,19 @@ impl<T: Real> Grid<T> {
         cloud: &PointCloud<T>,
         resolution: Resolution<T>,
         padding: T,
+    ) -> Result<Self, GridError> {
+        Self::fit_with(cloud, resolution, padding, Outliers::Ignore)
+    }
+
+    /// Like [`Self::fit`], with or without outliers.
+    ///
+    /// # Errors
+    /// As [`Self::fit`].
+    pub fn fit_with(
+        cloud: &PointCloud<T>,
+        resolution: Resolution<T>,
+        padding: T,
+        outliers: Outliers,
     ) -> Result<Self, GridError> {
         if !(padding >= T::zero()) || !padding.is_finite() {
             return Err(GridError::Padding {
@@ -24,7 +39,12 @@ impl<T: Real> Grid<T> {
         let none = GridError::NoExtent {
             points: cloud.len(),
         };
-        let Some((low, high)) = cloud.bounds() else {
+        let selection = outliers.select(cloud.points());
+        let used = match selection.is_all() {
+            true => cloud.bounds(),
+            false => bounds(&selection.gather(cloud.points(), 1)),
+        };
+        let Some((low, high)) = used else {
             return Err(none);
         };
         let extent: [f64; 3] = std::array::from_fn(|a| high[a].f64() - low[a].f64());
@@ -60,7 +80,7 @@ impl<T: Real> Grid<T> {
         Self::new(lower, T::of(spacing), shape)
     }
 
-    /// Pulls a cotangent of the grid that [`Self::fit`] gives back to the points: to the two that bound the
+    /// Pulls a cotangent of the grid that [`Self::fit_with`] gives back to the points: to the two that bound the
     /// cloud along each axis, the first of them among equals. Adds into `points_bar` `(N, 3)`, per unit length;
     /// the other arguments are those of the forward map.
     ///
@@ -76,6 +96,7 @@ impl<T: Real> Grid<T> {
         cloud: &PointCloud<T>,
         resolution: Resolution<T>,
         padding: T,
+        outliers: Outliers,
         bar: &GridCotangent<T>,
         points_bar: &mut [[T; 3]],
     ) -> Result<(), GridError> {
@@ -86,8 +107,9 @@ impl<T: Real> Grid<T> {
                 points,
             });
         }
-        let shape = Self::fit(cloud, resolution, padding)?.shape();
-        let Some(ends) = ends(cloud.points()) else {
+        let shape = Self::fit_with(cloud, resolution, padding, outliers)?.shape();
+        let selection = outliers.select(cloud.points());
+        let Some(ends) = ends(cloud.points(), selection.left_out()) else {
             return Err(GridError::NoExtent { points });
         };
         let at = |axis: usize, end: usize| cloud.points()[ends[axis][end]][axis].f64();
@@ -143,13 +165,13 @@ fn growth<T: Real>(resolution: Resolution<T>, padding: T) -> f64 {
     }
 }
 
-/// The first points with the least and with the greatest coordinate, `[axis][end]`.
-fn ends<T: Real>(points: &[[T; 3]]) -> Option<[[usize; 2]; 3]> {
-    if points.is_empty() {
-        return None;
-    }
-    let mut ends = [[0; 2]; 3];
-    for (i, p) in points.iter().enumerate() {
+/// The first points with the least and with the greatest coordinate, `[axis][end]`, but for those left out.
+fn ends<T: Real>(points: &[[T; 3]], left_out: &[u32]) -> Option<[[usize; 2]; 3]> {
+    let is_used = |i: &usize| left_out.binary_search(&(*i as u32)).is_err();
+    let mut used = (0..points.len()).filter(is_used).peekable();
+    let mut ends = [[*used.peek()?; 2]; 3];
+    for i in used {
+        let p = points[i];
         for (axis, [low, high]) in ends.iter_mut().enumerate() {
             if p[axis] < points[*low][axis] {
                 *low = i;
@@ -181,6 +203,16 @@ mod tests {
 
     fn cloud(points: &[[f64; 3]]) -> PointCloud<f64> {
         PointCloud::new(points.to_vec()).expect("finite points")
+    }
+
+    fn pull(
+        cloud: &PointCloud<f64>,
+        resolution: Resolution<f64>,
+        padding: f64,
+        bar: &GridCotangent<f64>,
+        points_bar: &mut [[f64; 3]],
+    ) -> Result<(), GridError> {
+        Grid::fit_pullback(cloud, resolution, padding, Outliers::Ignore, bar, points_bar)
     }
 
     #[test]
@@ -228,7 +260,7 @@ mod tests {
             Resolution::Spacing(0.0517),
         ] {
             let mut found = vec![[0.0; 3]; points.len()];
-            Grid::fit_pullback(&cloud(&points), resolution, 0.07, &bar, &mut found).expect("fits");
+            pull(&cloud(&points), resolution, 0.07, &bar, &mut found).expect("fits");
             assert_eq!([found[3][1], found[4][0]], [0.0, 0.0]);
             for i in 0..points.len() {
                 for a in 0..3 {
@@ -267,7 +299,7 @@ mod tests {
         };
         let (cloud, resolution) = (cloud(&points), Resolution::Cells(64));
         let mut found = vec![[1.0; 3]; 50];
-        Grid::fit_pullback(&cloud, resolution, 0.1, &bar, &mut found).expect("fits");
+        pull(&cloud, resolution, 0.1, &bar, &mut found).expect("fits");
         let grid = Grid::fit(&cloud, resolution, 0.1).expect("fits");
         for a in 0..3 {
             let sum: f64 = found.iter().map(|p| p[a] - 1.0).sum();
@@ -282,14 +314,14 @@ mod tests {
     #[test]
     fn cotangents_that_do_not_match_are_refused() {
         let (cloud, bar) = (cloud(&[[0.0; 3], [1.0; 3]]), GridCotangent::default());
-        let refused = Grid::fit_pullback(&cloud, Resolution::Cells(64), 0.1, &bar, &mut [[0.0; 3]]);
+        let refused = pull(&cloud, Resolution::Cells(64), 0.1, &bar, &mut [[0.0; 3]]);
         let expected = GridError::Cotangent {
             entries: 1,
             points: 2,
         };
         assert_eq!(refused, Err(expected));
         let none = PointCloud::new(Vec::new()).expect("empty");
-        let refused = Grid::<f64>::fit_pullback(&none, Resolution::Cells(64), 0.1, &bar, &mut []);
+        let refused = pull(&none, Resolution::Cells(64), 0.1, &bar, &mut []);
         assert!(matches!(refused, Err(GridError::NoExtent { .. })));
     }
 

@@ -7,6 +7,9 @@ mod field;
 mod grid;
 mod grid_fit;
 mod mesh;
+mod outliers;
+#[cfg(test)]
+mod outliers_tests;
 
 pub(crate) use cloud::bounds;
 
@@ -14,3 +17,4 @@ pub use cloud::{Attribute, PointCloud, PointCloudError, Sensors};
 pub use field::{Field, FieldError};
 pub use grid::{Grid, GridCotangent, GridError, Resolution};
 pub use mesh::{LatticeEdge, Mesh, MeshError};
+pub use outliers::{Outliers, Selection};

@@ -59,9 +59,13 @@ impl<T: Real> Reconstruction<T> {
         residual: &mut Residual<T>,
         extension: &mut Extension<T>,
     ) -> Result<(), Error> {
+        let used = match self.selection.is_all() {
+            true => None,
+            false => Some(self.selection.attribute(attribute)),
+        };
         distance::extend::forward(
             self.samples(),
-            attribute,
+            used.as_ref().unwrap_or(attribute),
             self.surface(),
             band,
             scratch,

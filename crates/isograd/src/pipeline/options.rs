@@ -51,6 +51,8 @@ options! {
     surface: SurfaceResolution = SurfaceResolution::default(),
     /// Whether the indicator is computed at all cells, or at those near the samples.
     solve: Solve = Solve::default(),
+    /// Use of samples that are isolated and far from all others.
+    outliers: crate::Outliers = crate::Outliers::default(),
     /// Region in which φ is computed.
     band: distance::Band = distance::Band::default(),
     /// Whether to measure the result and to check whether it can be trusted.

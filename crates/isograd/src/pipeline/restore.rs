@@ -67,11 +67,15 @@ impl<T: Pipeline> Reconstructor<T> {
         saved: &Saved<'_, T>,
     ) -> Result<(), RestoreError> {
         saved.check(self.grid().cells(), cloud.len())?;
+        let used = self.result.select(cloud, None);
+        let all = cloud;
+        let cloud = used.as_ref().unwrap_or(cloud);
         self.result.start(cloud);
+        let normals = self.result.selection.gather(saved.normals, 1);
         let orientation = &mut self.result.orientation;
         orientation.normals.clear();
         orientation.confidence.clear();
-        orientation.normals.extend_from_slice(saved.normals);
+        orientation.normals = normals;
         self.normals(cloud, None)?;
         self.splat(None)?;
         // The pullback needs residuals of the indicator before the local iso-value was subtracted.
@@ -90,6 +94,7 @@ impl<T: Pipeline> Reconstructor<T> {
         {
             return Err(RestoreError::Face { faces });
         }
+        self.result.expand(all);
         Ok(())
     }
 }

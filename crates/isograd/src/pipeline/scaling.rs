@@ -61,7 +61,25 @@ impl<T: Real> Reconstruction<T> {
             return Err(PullbackError::SparseIndicator);
         }
         let cells = [&self.sdf, &self.indicator].map(|field| field.values().len());
-        cotangent.check(cells, self.mesh.vertices().len(), self.areas.len())?;
+        cotangent.check(cells, self.mesh.vertices().len(), self.selection.samples())?;
+        if self.selection.is_all() {
+            return self.pull_used(cotangent, scratch, out);
+        }
+        *out = self.selection.pull(cotangent, |cotangent| {
+            let mut out = CloudCotangent::default();
+            self.pull_used(cotangent, scratch, &mut out)?;
+            Ok::<_, PullbackError>(out)
+        })?;
+        Ok(())
+    }
+
+    /// The pullback for the samples that are used.
+    fn pull_used(
+        &self,
+        cotangent: &Cotangent<'_, T>,
+        scratch: &mut PullbackScratch<T>,
+        out: &mut CloudCotangent<T>,
+    ) -> Result<(), PullbackError> {
         let all = T::max_value().f64().log2();
         let magnitude = self.magnitude(cotangent);
         let is_comfortable = magnitude.abs() <= COMFORTABLE * all;

@@ -9,6 +9,7 @@ use serde::de::{Deserialize, Deserializer, Error, Visitor};
 
 use super::{Solve, SurfaceResolution};
 use crate::backend::Backend;
+use crate::data::Outliers;
 use crate::distance::Band;
 use crate::isosurface::Level;
 use crate::neighbors::Radius;
@@ -94,6 +95,10 @@ impl FromStr for SurfaceResolution {
     }
 }
 
+from_str!(Outliers, "outliers", "'ignore' or 'keep'", {
+    "ignore" => Self::Ignore,
+    "keep" => Self::Keep,
+});
 from_str!(Band, "band", "a finite length above 0, or 'full'", {
     "full" => Self::Full,
 }, |length: f64| length > 0.0 => Self::Within);
@@ -143,6 +148,7 @@ deserialize!(
     Level,
     SurfaceResolution,
     Solve,
+    Outliers,
     Band,
     Backend
 );
@@ -155,7 +161,8 @@ mod tests {
     #[test]
     fn options_read_from_json_with_the_names_of_the_command_line() {
         let text = r#"{"radius": 0.1, "orient": "signs", "splat": "paper", "area": false, "smoothing": 0,
-            "screening": 4, "level": "thin", "surface": "1.5x", "solve": "sparse", "band": 0.30000000000000004, "checks": false}"#;
+            "screening": 4, "level": "thin", "surface": "1.5x", "solve": "sparse", "outliers": "keep", "band": 0.30000000000000004,
+            "checks": false}"#;
         let options: Options = serde_json::from_str(text).expect("valid");
         let expected = Options::default()
             .radius(Radius::Fixed(0.1))
@@ -167,6 +174,7 @@ mod tests {
             .level(Level::Thin)
             .surface(SurfaceResolution::Factor(1.5))
             .solve(Solve::Sparse)
+            .outliers(Outliers::Keep)
             .band(Band::Within(0.1 + 0.2))
             .checks(false);
         assert_eq!(options, expected);

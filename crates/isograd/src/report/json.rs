@@ -14,6 +14,9 @@ pub struct JsonReport {
     /// Number of points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub points: Option<usize>,
+    /// Of an [`Orienter`](crate::Orienter) there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    outliers: Option<Outliers>,
     normals: Normals,
     orientation: Orientation,
     #[serde(flatten)]
@@ -23,6 +26,12 @@ pub struct JsonReport {
     pub seconds: Vec<(&'static str, f64)>,
     /// Warnings.
     pub warnings: Vec<String>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize)]
+struct Outliers {
+    count: usize,
+    indices: Vec<u32>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -101,6 +110,10 @@ impl JsonReport {
     /// The report of a reconstruction.
     pub fn new(report: &Report) -> Self {
         Self {
+            outliers: Some(Outliers {
+                count: report.outliers.len(),
+                indices: report.outliers.clone(),
+            }),
             surface: Some(Reconstructed {
                 surface_spacing: report.surface_spacing,
                 surface_cells: report.surface_cells,
@@ -126,6 +139,7 @@ impl JsonReport {
         let [min, median, max] = report.neighbors;
         Self {
             points: Some(report.points),
+            outliers: None,
             normals: Normals {
                 radius: report.radius,
                 sample_spacing: report.sample_spacing,
