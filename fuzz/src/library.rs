@@ -6,11 +6,11 @@ use isograd::distance::Band;
 use isograd::isosurface::Level;
 use isograd::neighbors::Radius;
 use isograd::orient::{Method, ParityOptions};
-use isograd::poisson::Smoothing;
+use isograd::poisson::{Smoothing, Walls};
 use isograd::splat::Weights;
 use isograd::{
-    Cotangent, Grid, Options, Pipeline, PointCloud, Reconstruction, Reconstructor, Resolution,
-    Sensors, Solve, SurfaceResolution,
+    Cotangent, Grid, Options, Outliers, Pipeline, PointCloud, Reconstruction, Reconstructor,
+    Resolution, Sensors, Solve, SurfaceResolution,
 };
 use isograd_shapes::Shape;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -151,6 +151,8 @@ fn options(random: &mut Random) -> Options {
             SurfaceResolution::Spacing(1e300),
         ]);
     }
+    options.walls = random.pick(&[Walls::Auto, Walls::Free, Walls::Closed]);
+    options.outliers = random.pick(&[Outliers::Ignore, Outliers::Ignore, Outliers::Keep]);
     if random.one_in(4) {
         options.solve = Solve::Sparse;
     }

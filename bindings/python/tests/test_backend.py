@@ -9,7 +9,7 @@ import isograd
 
 POINTS = isograd.sample("torus", 2000).points.astype(np.float32)
 GRID = isograd.Grid.fit(POINTS, 32)
-OPTIONS = isograd.Options(surface="grid")
+OPTIONS = isograd.Options(surface="grid", walls="free")
 
 
 def plan(backend, **changes):

@@ -256,6 +256,7 @@ def test_bad_arguments_are_refused_with_a_reason():
         (ValueError, "'local'", lambda: isograd.Options(level="median")),
         (ValueError, "outliers is 'drop'", lambda: isograd.Options(outliers="drop")),
         (ValueError, "outliers is 'drop'", lambda: isograd.Grid.fit(SPHERE, outliers="drop")),
+        (ValueError, "walls is 'open'", lambda: isograd.Options(walls="open")),
         (ValueError, "radius", lambda: isograd.Options(radius=0)),
         (ValueError, "band", lambda: isograd.Options(band=float("nan"))),
         (TypeError, "Grid", lambda: isograd.reconstruct(SPHERE, (1, 2, 3))),

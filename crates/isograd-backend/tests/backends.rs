@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use isograd::poisson::Walls;
 use isograd::{
     Attribute, Backend, Cotangent, ExtensionCotangent, Grid, Options, PointCloud, Reconstructor,
     Resolution, Saved, Stage, SurfaceResolution,
@@ -27,7 +28,9 @@ fn plan(backend: Backend) -> Option<Plan<f32>> {
     match Plan::new(
         backend,
         grid(&cloud()),
-        Options::default().surface(SurfaceResolution::Grid),
+        Options::default()
+            .surface(SurfaceResolution::Grid)
+            .walls(Walls::Free),
     ) {
         Ok(plan) => Some(plan),
         Err(error) if error.is_of_device() => {
@@ -61,7 +64,9 @@ fn attribute(cloud: &PointCloud<f32>) -> Attribute<f32> {
 fn check(view: View<'_, f32>, cloud: &PointCloud<f32>, tolerance: f32) {
     let mut plan = Reconstructor::new(
         grid(cloud),
-        Options::default().surface(SurfaceResolution::Grid),
+        Options::default()
+            .surface(SurfaceResolution::Grid)
+            .walls(Walls::Free),
     )
     .unwrap();
     let expected = plan.reconstruct(cloud).unwrap();
@@ -204,7 +209,9 @@ fn errors_of_devices_are_told_from_those_of_clouds() {
     let missing = Plan::new(
         Backend::Cuda(77),
         grid,
-        Options::default().surface(SurfaceResolution::Grid),
+        Options::default()
+            .surface(SurfaceResolution::Grid)
+            .walls(Walls::Free),
     );
     let missing = missing.err().expect("there are 78 CUDA devices");
     assert!(missing.is_of_device(), "{missing}");

@@ -1,5 +1,6 @@
 //! The chain: variables → points → φ → loss, and its gradient back.
 
+use isograd::poisson::Walls;
 use isograd::{CloudCotangent, Cotangent, SurfaceResolution};
 use isograd_backend::{Plan, View};
 use serde::{Deserialize, Serialize};
@@ -38,12 +39,7 @@ impl Problem {
     pub fn new(target: &Target, variables: Variables, options: &Options) -> Result<Self, Error> {
         let degrees = Degrees::new(variables, target.grid().spacing())?;
         let of_plan = &options.reconstruction;
-        let of_plan = of_plan
-            .clone()
-            // Nobody reads the report of a reconstruction among hundreds.
-            .checks(false)
-            .surface(fixed(of_plan.surface))
-            .orient(degrees.orientation(of_plan.orient));
+        let of_plan = fixed(of_plan).orient(degrees.orientation(of_plan.orient));
         Ok(Self {
             degrees,
             plan: Plan::new(options.backend, *target.grid(), of_plan)?,
@@ -148,10 +144,16 @@ impl Fingerprints {
     }
 }
 
-/// The resolution of the surface in a fit: steps of an automatic one would be steps of the loss.
-pub fn fixed(surface: SurfaceResolution) -> SurfaceResolution {
-    match surface {
+/// The options of a fit: steps of an automatic resolution, or of automatic walls, would be steps of the loss.
+pub fn fixed(options: &isograd::Options) -> isograd::Options {
+    let surface = match options.surface {
         SurfaceResolution::Auto => SurfaceResolution::Grid,
         other => other,
-    }
+    };
+    let walls = match options.walls {
+        Walls::Auto => Walls::Free,
+        other => other,
+    };
+    // Nobody reads the report of a reconstruction among hundreds.
+    options.clone().checks(false).surface(surface).walls(walls)
 }

@@ -107,9 +107,7 @@ impl Target {
         grid: Grid<f64>,
         options: &isograd::Options,
     ) -> Result<Self, TargetError> {
-        let surface = fixed(options.surface);
-        let options = options.clone().checks(false).surface(surface);
-        let mut plan = Reconstructor::new(grid, options)?;
+        let mut plan = Reconstructor::new(grid, fixed(options))?;
         plan.reconstruct(cloud)?;
         Self::from_sdf(plan.into_reconstruction().sdf().clone())
     }

@@ -10,13 +10,15 @@ mod orienter;
 mod pullback;
 mod restore;
 mod scaling;
-mod sparse;
 mod selection;
 #[cfg(test)]
 mod selection_tests;
+mod sparse;
 mod stages;
 mod surface;
 mod text;
+#[cfg(test)]
+mod walls_tests;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;

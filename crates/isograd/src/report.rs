@@ -114,6 +114,8 @@ pub struct Report {
     pub confidence_median: f64,
     /// How many signs are doubtful, and why.
     pub doubt: Doubt,
+    /// Condition of the indicator at the walls of the grid: `free` or `closed`.
+    pub walls: &'static str,
     /// The level `c` of the surface `χ = c`.
     pub iso_value: f64,
     /// Measures of the surface.
@@ -240,7 +242,7 @@ impl fmt::Display for Warning {
             ),
             Self::TouchesWall => write!(
                 f,
-                "the surface reaches the wall of the grid and is cut off there; use larger bounds or padding"
+                "the surface reaches the wall of the grid and is cut off there; use larger bounds or padding, or the option walls 'closed'"
             ),
             Self::Components { count } => {
                 write!(f, "the surface has {count} separate pieces")

@@ -22,7 +22,7 @@ from ._files import (
 from ._fit import Fit, fit
 from ._grid import Grid
 from ._mesh import Hits, Mesh, query, query_pullback, signed_distance
-from ._options import Level, Options, Orient, Outliers, Solve, Splat
+from ._options import Level, Options, Orient, Outliers, Solve, Splat, Walls
 from ._orient import Oriented, orient
 from ._reconstruction import Extension, Gradients, Reconstruction, Reconstructor, reconstruct
 from ._shapes import Coordinates, Parameter, Samples, Shape, sample, shapes
@@ -48,6 +48,7 @@ __all__ = [
     "Shape",
     "Solve",
     "Splat",
+    "Walls",
     "__version__",
     "fit",
     "orient",

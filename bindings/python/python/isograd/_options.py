@@ -58,6 +58,17 @@ class Solve(str, Enum):
     """Those near the samples and the surface; coarse cells elsewhere."""
 
 
+class Walls(str, Enum):
+    """Condition of the indicator at the walls of the grid."""
+
+    AUTO = "auto"
+    """``FREE`` if a sample lies within 3.5 cells of a wall, which is never so on a fitted grid, else ``CLOSED``."""
+    FREE = "free"
+    """The surface may pass through a wall, at right angles: for half of a body that ends there."""
+    CLOSED = "closed"
+    """The surface never reaches a wall."""
+
+
 class Outliers(str, Enum):
     """Use of outliers: isolated samples that are further from the others than these extend."""
 
@@ -71,6 +82,7 @@ OrientLike = Orient | Literal["auto", "parity", "given", "signs", "sensors", "pr
 SplatLike = Splat | Literal["bspline", "paper"]
 LevelLike = Level | Literal["local", "thin", "mean"]
 SolveLike = Solve | Literal["auto", "dense", "sparse"]
+WallsLike = Walls | Literal["auto", "free", "closed"]
 OutliersLike = Outliers | Literal["ignore", "keep"]
 
 
@@ -91,6 +103,7 @@ class Options:
             fine as the grid of φ, ``"grid"`` for those of φ, a cell size in the unit of the points, or a factor such as
             ``"3x"``. φ stays on its own grid.
         solve: cells at which the indicator is computed; see :class:`Solve`.
+        walls: condition of the indicator at the walls of the grid; see :class:`Walls`.
         outliers: use of isolated samples that are further from the others than these extend; see :class:`Outliers`.
         band: distance from the surface up to which φ is computed, in the unit of the points, or ``"full"``.
         checks: whether to measure the result and to check whether it can be trusted.
@@ -108,6 +121,7 @@ class Options:
     level: LevelLike = Level.LOCAL
     surface: float | str = "auto"
     solve: SolveLike = Solve.AUTO
+    walls: WallsLike = Walls.AUTO
     outliers: OutliersLike = Outliers.IGNORE
     band: float | Literal["full"] = "full"
     checks: bool = True
@@ -123,6 +137,7 @@ class Options:
             "level": choice(Level, self.level, "level"),
             "surface": _surface(self.surface),
             "solve": choice(Solve, self.solve, "solve"),
+            "walls": choice(Walls, self.walls, "walls"),
             "outliers": choice(Outliers, self.outliers, "outliers"),
             "band": length(self.band, "band", "full"),
             "checks": bool(self.checks),

@@ -3,7 +3,7 @@
 use clap::{ArgAction, Args};
 use isograd::distance::Band;
 use isograd::isosurface::Level;
-use isograd::poisson::Smoothing;
+use isograd::poisson::{Smoothing, Walls};
 use isograd::splat::Weights;
 use isograd::{
     Grid, GridError, Options, Outliers, PointCloud, Real, Resolution, Solve, SurfaceResolution,
@@ -31,7 +31,12 @@ pub struct GridArgs {
     pub bounds: Option<Vec<f64>>,
     /// Use of outliers, isolated samples that are further from the others than these extend: ignore (left out, with a
     /// warning) or keep
-    #[arg(long, value_name = "ignore|keep", default_value = "ignore", help_heading = "Grid")]
+    #[arg(
+        long,
+        value_name = "ignore|keep",
+        default_value = "ignore",
+        help_heading = "Grid"
+    )]
     pub outliers: Outliers,
 }
 
@@ -66,6 +71,10 @@ pub struct MethodArgs {
     /// the rest) or auto (sparse beyond 2²⁵)
     #[arg(long, value_name = "auto|dense|sparse", default_value = "auto")]
     pub solve: Solve,
+    /// Condition at the walls of the grid: free (the surface may pass through them: half models), closed (it never reaches
+    /// them), or auto (free if a sample lies within 3.5 cells of a wall, else closed)
+    #[arg(long, value_name = "auto|free|closed", default_value = "auto")]
+    pub walls: Walls,
     /// Distance from the surface up to which φ is computed, in the cloud's unit
     #[arg(long, value_name = "H|full", default_value = "full")]
     pub band: Band,
@@ -120,6 +129,7 @@ impl MethodArgs {
             .level(self.level)
             .surface(self.surface)
             .solve(self.solve)
+            .walls(self.walls)
             .band(self.band)
     }
 }

@@ -188,5 +188,7 @@ fn grid(
         }
     }
     let all = PointCloud::new(points).map_err(Error::input(path))?;
-    args.grid.grid_with(&all, outliers).map_err(Error::input(path))
+    args.grid
+        .grid_with(&all, outliers)
+        .map_err(Error::input(path))
 }

@@ -78,7 +78,7 @@ mod vulkan {
 
     use super::{Sandbox, sphere};
 
-    const METHOD: &str = "--resolution 32 --surface grid";
+    const METHOD: &str = "--resolution 32 --surface grid --walls free";
 
     /// Whether there is a device.
     fn is_here() -> bool {

@@ -48,7 +48,7 @@ fn the_folder_gets_its_five_files_and_the_report_its_fields() {
     let report = sandbox.json("out/new/report.json");
     assert_keys(
         &report,
-        "version backend input grid outliers normals orientation smoothing iso_value surface surface_spacing surface_cells sdf seconds peak_memory_bytes warnings",
+        "version backend input grid outliers normals orientation smoothing iso_value surface surface_spacing surface_cells walls sdf seconds peak_memory_bytes warnings",
     );
     assert_keys(&report["input"], "path points");
     assert_keys(&report["grid"], "shape origin spacing");
@@ -235,7 +235,11 @@ fn outliers_are_left_out_with_a_warning_unless_they_are_to_be_kept() {
     sandbox.write("far.xyz", text);
     let line = "reconstruct far.xyz --resolution 32 --report r.json --points p.ply --mesh m.ply";
     let ran = sandbox.done(line);
-    assert!(ran.stderr.contains("1 samples were left out"), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("1 samples were left out"),
+        "{}",
+        ran.stderr
+    );
     let report = sandbox.json("r.json");
     let last = near.points.len();
     assert_eq!(report["outliers"]["count"], 1);

@@ -23,6 +23,11 @@ pub enum Error {
     /// A sparse solve.
     #[error("a device has no sparse solve: give 'auto' or 'dense', or compute on the CPU")]
     Sparse,
+    /// Closed walls.
+    #[error(
+        "the walls are 'closed', which a device does not have: give 'free' or 'auto', or compute on the CPU"
+    )]
+    Walls,
     /// The device.
     #[error(transparent)]
     Device(#[from] crate::Error),

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use isograd::orient::Method;
+use isograd::poisson::Walls;
 use isograd::{
     Backend, Grid, Options, PointCloud, Report, Saved, Seconds, Solve, Stage, SurfaceResolution,
 };
@@ -38,6 +39,9 @@ impl<T: Number> Plan<T> {
         }
         if options.solve == Solve::Sparse {
             return Err(Error::Sparse);
+        }
+        if options.walls == Walls::Closed {
+            return Err(Error::Walls);
         }
         let device = T::open(backend, grid, (&options).into())?;
         Ok(Self {

@@ -200,6 +200,7 @@ impl<T: Number> Reconstruction<T> {
         report.surface_spacing = isograd::Real::f64(self.grid.spacing());
         report.surface_cells = self.grid.cells();
         report.smoothing = self.result.smoothing();
+        report.walls = "free";
         report.iso_value = isograd::Real::f64(self.iso_value()?);
         if self.result.surface.report.touches_wall {
             report.warnings.push(Warning::TouchesWall);

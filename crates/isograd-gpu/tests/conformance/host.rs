@@ -2,6 +2,7 @@
 
 use isograd::distance::extend;
 use isograd::orient::Method;
+use isograd::poisson::Walls;
 use isograd::{
     Attribute, Backend, Cotangent, ExtensionCotangent, Grid, Options, PointCloud, PullbackError,
     Real, Reconstructor, Resolution, Saved, Solve, Stage, SurfaceResolution,
@@ -41,7 +42,9 @@ fn grid<T: Number>(cloud: &PointCloud<T>) -> Grid<T> {
 }
 
 fn options() -> Options {
-    Options::default().surface(SurfaceResolution::Grid)
+    Options::default()
+        .surface(SurfaceResolution::Grid)
+        .walls(Walls::Free)
 }
 
 /// The largest difference, of the largest number.
@@ -506,6 +509,8 @@ fn what_devices_do_not_have_is_named() {
     };
     let text = refused(options().screening(-1.0));
     assert!(text.contains("0 or more"), "{text}");
+    let text = refused(options().walls(Walls::Closed));
+    assert!(text.contains("give 'free'"), "{text}");
     let text = refused(options().surface(SurfaceResolution::Factor(2.0)));
     assert!(text.contains("on the grid of φ only"), "{text}");
     let text = refused(options().solve(Solve::Sparse));

@@ -4,7 +4,7 @@ use cubecl::prelude::Runtime;
 use isograd::isosurface::Level;
 use isograd::neighbors::Radius;
 use isograd::orient::{Method, ParityOptions};
-use isograd::poisson::Smoothing;
+use isograd::poisson::{Smoothing, Walls};
 use isograd::{Grid, Options, PointCloud, Real, Reconstructor, Resolution, SurfaceResolution};
 use isograd_gpu::distance::Band;
 use isograd_gpu::pipeline::{self, Error, RadiiAndSigns};
@@ -35,9 +35,11 @@ struct Case {
     options: Options,
 }
 
-/// Options with the surface where devices find it.
+/// Options with the surface and the walls of devices.
 fn on_grid() -> Options {
-    Options::default().surface(SurfaceResolution::Grid)
+    Options::default()
+        .surface(SurfaceResolution::Grid)
+        .walls(Walls::Free)
 }
 
 fn cases() -> [Case; 4] {

@@ -198,15 +198,20 @@ impl Blocks {
         Some(self.of_cell(cell)? * NODES + Self::node(cell))
     }
 
-    /// Copies the cube of `side`³ cells from `origin` on into `out`: even reflection beyond the walls, 0 in absent blocks.
-    /// Returns whether any block of the cube is there.
+    /// Copies the cube of `side`³ cells from `origin` on into `out`: reflection beyond the walls, even where these are free,
+    /// odd where `closed`; 0 in absent blocks. Returns whether any block of the cube is there.
     pub(crate) fn read_cube<T: Real>(
         &self,
         values: &[T],
         origin: [isize; 3],
         side: usize,
+        closed: bool,
         out: &mut [T],
     ) -> bool {
+        let odd = |a: usize, n: usize| {
+            let reflections = (origin[a] + n as isize).div_euclid(self.cells[a] as isize);
+            closed && reflections % 2 != 0
+        };
         let inside = |a: usize, n: usize| reflect(origin[a] + n as isize, self.cells[a]);
         let mut any = false;
         for (row, out) in out.chunks_exact_mut(side).enumerate() {
@@ -224,6 +229,11 @@ impl Blocks {
                         any = true;
                     }
                     None => out[n..n + count].fill(T::zero()),
+                }
+                for (m, value) in out[n..n + count].iter_mut().enumerate() {
+                    if odd(0, row / side) ^ odd(1, row % side) ^ odd(2, n + m) {
+                        *value = -*value;
+                    }
                 }
                 n += count;
             }

@@ -212,7 +212,14 @@ mod tests {
         bar: &GridCotangent<f64>,
         points_bar: &mut [[f64; 3]],
     ) -> Result<(), GridError> {
-        Grid::fit_pullback(cloud, resolution, padding, Outliers::Ignore, bar, points_bar)
+        Grid::fit_pullback(
+            cloud,
+            resolution,
+            padding,
+            Outliers::Ignore,
+            bar,
+            points_bar,
+        )
     }
 
     #[test]

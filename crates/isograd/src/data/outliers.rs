@@ -193,7 +193,8 @@ fn reaches_both_ends<T: Real>(points: &[[T; 3]], most: usize) -> bool {
     let axis = (1..3).fold(0, |m, a| if side(a) > side(m) { a } else { m });
     let quarter = 0.25 * side(axis);
     let (first, last) = (low[axis] + quarter, high[axis] - quarter);
-    let count = |is_in: &dyn Fn(f64) -> bool| points.iter().filter(|p| is_in(p[axis].f64())).count();
+    let count =
+        |is_in: &dyn Fn(f64) -> bool| points.iter().filter(|p| is_in(p[axis].f64())).count();
     count(&|x| x <= first) > most && count(&|x| x >= last) > most
 }
 

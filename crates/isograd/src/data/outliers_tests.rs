@@ -11,9 +11,7 @@ fn sphere(count: usize, radius: f64, center: [f64; 3], seed: u64) -> Vec<[f64; 3
         let p = [next(), next(), next()];
         let length = p.iter().map(|x| x * x).sum::<f64>().sqrt();
         if (0.05..0.5).contains(&length) {
-            points.push(std::array::from_fn(|a| {
-                center[a] + radius * p[a] / length
-            }));
+            points.push(std::array::from_fn(|a| center[a] + radius * p[a] / length));
         }
     }
     points
@@ -26,7 +24,12 @@ fn left_out(points: &[[f64; 3]]) -> Vec<u32> {
 #[test]
 fn isolated_far_samples_are_left_out_at_any_scale_place_and_order() {
     let mut points = sphere(2000, 1.0, [0.0; 3], 1);
-    let far = [[100.0, 0.0, 0.0], [-7.0, 30.0, 5.0], [-7.1, 30.0, 5.0], [0.0, 0.0, -1e6]];
+    let far = [
+        [100.0, 0.0, 0.0],
+        [-7.0, 30.0, 5.0],
+        [-7.1, 30.0, 5.0],
+        [0.0, 0.0, -1e6],
+    ];
     for (k, p) in far.into_iter().enumerate() {
         points.insert(300 * k + 7, p);
     }
@@ -34,7 +37,10 @@ fn isolated_far_samples_are_left_out_at_any_scale_place_and_order() {
     assert_eq!(left_out(&points), expected);
     assert!(Outliers::Keep.select(&points).is_all());
     for (scale, shift) in [(1e-6, 0.0), (1e9, -4e9), (3.0, 1e3)] {
-        let moved: Vec<_> = points.iter().map(|p| p.map(|x| scale * x + shift)).collect();
+        let moved: Vec<_> = points
+            .iter()
+            .map(|p| p.map(|x| scale * x + shift))
+            .collect();
         assert_eq!(left_out(&moved), expected, "{scale} {shift}");
     }
     let last = points.len() as u32 - 1;
@@ -115,7 +121,11 @@ fn small_and_degenerate_clouds_are_kept() {
     for seed in 0..50 {
         let power = 1.0 + 0.2 * f64::from(seed);
         let points: Vec<[f64; 3]> = (0..1000)
-            .map(|_| [0; 3].map(|_| 2.0 * next()).map(|x: f64| x.signum() * x.abs().powf(power)))
+            .map(|_| {
+                [0; 3]
+                    .map(|_| 2.0 * next())
+                    .map(|x: f64| x.signum() * x.abs().powf(power))
+            })
             .collect();
         assert_eq!(left_out(&points), [0; 0], "power {power}");
     }

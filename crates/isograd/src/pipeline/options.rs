@@ -51,6 +51,8 @@ options! {
     surface: SurfaceResolution = SurfaceResolution::default(),
     /// Whether the indicator is computed at all cells, or at those near the samples.
     solve: Solve = Solve::default(),
+    /// Condition of the indicator at the walls of the grid.
+    walls: poisson::Walls = poisson::Walls::default(),
     /// Use of samples that are isolated and far from all others.
     outliers: crate::Outliers = crate::Outliers::default(),
     /// Region in which φ is computed.

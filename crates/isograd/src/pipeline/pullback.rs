@@ -265,13 +265,13 @@ impl<T: Real> Reconstruction<T> {
             (bars, _) => bars.cells().values(),
         };
         let (chi, smoothing) = (&self.indicator, self.residuals.smoothing);
-        let shape = chi.grid().shape();
-        let whole = poisson::smoothing::pullback(smoothing, shape, chi.values(), bars);
+        let plan = &self.poisson;
+        let whole = poisson::smoothing::pullback(plan, smoothing, chi.values(), bars);
         if !is_local {
             return whole;
         }
         let taken = level.sum_of_corrections(chi.grid(), |start, part| {
-            poisson::smoothing::laplacian_dot(bars, shape, start, part)
+            poisson::smoothing::laplacian_dot(plan, bars, start, part)
         });
         whole + smoothing * taken
     }

@@ -19,7 +19,10 @@ fn points() -> [Vec<[f64; 3]>; 2] {
     };
     let clean: Vec<_> = (0..600).map(sample).collect();
     let mut spoilt = clean.clone();
-    for (i, p) in FAR.into_iter().zip([[100.0, 3.0, 0.0], [0.0, -50.0, 9.0], [0.0, 0.0, 1e4]]) {
+    for (i, p) in FAR
+        .into_iter()
+        .zip([[100.0, 3.0, 0.0], [0.0, -50.0, 9.0], [0.0, 0.0, 1e4]])
+    {
         spoilt.insert(i, p);
     }
     [clean, spoilt]
@@ -126,7 +129,9 @@ fn restored_and_held_reconstructions_leave_the_same_samples_out() {
     assert_eq!(restored.outliers(), result.outliers());
     assert_eq!(restored.normals(), result.normals());
     assert_eq!(pull(&spoilt, restored), pull(&spoilt, &result));
-    let held = plan.reconstruct_held(&spoilt, &result).expect("reconstructs");
+    let held = plan
+        .reconstruct_held(&spoilt, &result)
+        .expect("reconstructs");
     assert_eq!(held.sdf(), result.sdf());
     assert_eq!(held.outliers(), result.outliers());
 }
@@ -135,7 +140,10 @@ fn restored_and_held_reconstructions_leave_the_same_samples_out() {
 fn outliers_that_are_kept_or_lie_elsewhere_are_an_error_with_their_number() {
     let [clean, mut spoilt] = points();
     let grid = Grid::fit(&cloud(&clean), Resolution::Cells(24), 0.1).expect("fits");
-    assert_eq!(Grid::fit(&cloud(&spoilt), Resolution::Cells(24), 0.1), Ok(grid));
+    assert_eq!(
+        Grid::fit(&cloud(&spoilt), Resolution::Cells(24), 0.1),
+        Ok(grid)
+    );
     let whole = Grid::fit_with(&cloud(&spoilt), Resolution::Cells(24), 0.1, Outliers::Keep);
     assert!(whole.expect("fits").spacing() > 100.0 * grid.spacing());
     let index = |points: &[[f64; 3]], outliers| {

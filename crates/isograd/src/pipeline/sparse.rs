@@ -46,6 +46,7 @@ impl Solve {
 #[derive(Clone)]
 pub(super) struct Sparse<T> {
     count: usize,
+    closed: bool,
     octaves: Octaves,
     pub(super) chi: BlockField<T>,
 }
@@ -77,16 +78,17 @@ impl<T: Real> Bars<T> {
 
 impl<T: Real> Sparse<T> {
     /// Zeros near the samples.
-    fn new(points: &[[T; 3]], grid: Grid<T>, count: usize) -> Result<Self, Error> {
+    fn new(points: &[[T; 3]], grid: Grid<T>, count: usize, closed: bool) -> Result<Self, Error> {
         let blocks = splat::blocks_near(points, &grid, REACH);
         check_blocks(&grid, count, &blocks)?;
-        Ok(Self::with_blocks(grid, blocks, count))
+        Ok(Self::with_blocks(grid, blocks, count, closed))
     }
 
-    fn with_blocks(grid: Grid<T>, blocks: Blocks, count: usize) -> Self {
+    fn with_blocks(grid: Grid<T>, blocks: Blocks, count: usize, closed: bool) -> Self {
         let blocks = Arc::new(blocks);
         Self {
             count,
+            closed,
             octaves: Octaves::new(blocks.clone(), count),
             chi: BlockField::zeros(grid, blocks),
         }
@@ -106,6 +108,11 @@ impl<T: Real> Sparse<T> {
         self.count
     }
 
+    /// Whether the walls are closed.
+    pub(super) fn is_closed(&self) -> bool {
+        self.closed
+    }
+
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&self.chi.values[..]) + self.chi.blocks.bytes()
     }
@@ -116,7 +123,8 @@ impl<T: Real> Sparse<T> {
         values: &mut Vec<T>,
         smoothing: f64,
     ) -> Result<Vec<T>, poisson::Error> {
-        let mut pyramid = Pyramid::new(self.chi.grid.shape(), self.count, smoothing);
+        let shape = self.chi.grid.shape();
+        let mut pyramid = Pyramid::new(shape, self.count, self.closed, smoothing);
         pyramid.solve(&self.octaves, values)?;
         Ok(pyramid.into_coarsest())
     }
@@ -154,11 +162,17 @@ impl<T: Real> Sparse<T> {
                 marks.mark(low, low.map(|c| c + 4 * size - 1));
             }
         }
-        *self = Self::with_blocks(self.chi.grid, marks.build(), self.count);
+        *self = Self::with_blocks(self.chi.grid, marks.build(), self.count, self.closed);
     }
 }
 
 impl<T: Real> Reconstruction<T> {
+    /// Whether χ is 0 at the walls of the grid.
+    pub(super) fn has_closed_walls(&self) -> bool {
+        let sparse = self.sparse.as_ref();
+        sparse.map_or(self.poisson.is_closed(), Sparse::is_closed)
+    }
+
     /// The indicator on the grid of the surface.
     pub(super) fn chi(&self) -> Cells<'_, T> {
         match &self.sparse {
@@ -170,8 +184,13 @@ impl<T: Real> Reconstruction<T> {
 
 impl<T: Real> Reconstructor<T> {
     /// Splats into blocks near the samples of `grid`.
-    pub(super) fn splat_in_blocks(&mut self, grid: Grid<T>, count: usize) -> Result<(), Error> {
-        self.result.sparse = Some(Sparse::new(&self.result.points, grid, count)?);
+    pub(super) fn splat_in_blocks(
+        &mut self,
+        grid: Grid<T>,
+        count: usize,
+        closed: bool,
+    ) -> Result<(), Error> {
+        self.result.sparse = Some(Sparse::new(&self.result.points, grid, count, closed)?);
         self.fill_blocks()
     }
 

@@ -103,13 +103,24 @@ impl<T: Real> Reconstructor<T> {
 
     pub(super) fn splat(&mut self, held: Option<&Reconstruction<T>>) -> Result<(), Error> {
         let (grid, octaves) = self.choose_surface_grid(held)?;
-        let report = &mut self.result.report;
+        let Reconstruction {
+            options,
+            points,
+            sdf,
+            report,
+            ..
+        } = &mut self.result;
+        let closed = match held {
+            Some(held) => held.has_closed_walls(),
+            None => options.walls.are_closed(points, sdf.grid()),
+        };
+        report.walls = if closed { "closed" } else { "free" };
         report.surface_spacing = grid.spacing().f64();
         if octaves > 0 {
-            return self.splat_in_blocks(grid, octaves);
+            return self.splat_in_blocks(grid, octaves, closed);
         }
         report.surface_cells = grid.cells();
-        self.allocate(grid)?;
+        self.allocate(grid, closed)?;
         let Reconstruction {
             options,
             points,
@@ -152,7 +163,7 @@ impl<T: Real> Reconstructor<T> {
     }
 
     /// Puts the indicator and the Poisson plan of a dense solve on the grid of the surface.
-    fn allocate(&mut self, grid: Grid<T>) -> Result<(), Error> {
+    fn allocate(&mut self, grid: Grid<T>, closed: bool) -> Result<(), Error> {
         let result = &mut self.result;
         result.sparse = None;
         if *result.indicator.grid() != grid {
@@ -162,8 +173,8 @@ impl<T: Real> Reconstructor<T> {
             }
             result.indicator = Field::zeros(grid);
         }
-        if result.poisson.shape() != grid.shape() {
-            result.poisson = Arc::new(poisson::Plan::new(grid.shape()));
+        if result.poisson.shape() != grid.shape() || result.poisson.is_closed() != closed {
+            result.poisson = Arc::new(poisson::Plan::with_walls(grid.shape(), closed));
         }
         Ok(())
     }

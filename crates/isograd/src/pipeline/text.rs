@@ -14,7 +14,7 @@ use crate::distance::Band;
 use crate::isosurface::Level;
 use crate::neighbors::Radius;
 use crate::orient::{Method, ParityOptions};
-use crate::poisson::Smoothing;
+use crate::poisson::{Smoothing, Walls};
 use crate::splat::Weights;
 
 /// A text that is no value of an option.
@@ -95,6 +95,11 @@ impl FromStr for SurfaceResolution {
     }
 }
 
+from_str!(Walls, "walls", "'auto', 'free' or 'closed'", {
+    "auto" => Self::Auto,
+    "free" => Self::Free,
+    "closed" => Self::Closed,
+});
 from_str!(Outliers, "outliers", "'ignore' or 'keep'", {
     "ignore" => Self::Ignore,
     "keep" => Self::Keep,
@@ -148,6 +153,7 @@ deserialize!(
     Level,
     SurfaceResolution,
     Solve,
+    Walls,
     Outliers,
     Band,
     Backend
@@ -161,8 +167,8 @@ mod tests {
     #[test]
     fn options_read_from_json_with_the_names_of_the_command_line() {
         let text = r#"{"radius": 0.1, "orient": "signs", "splat": "paper", "area": false, "smoothing": 0,
-            "screening": 4, "level": "thin", "surface": "1.5x", "solve": "sparse", "outliers": "keep", "band": 0.30000000000000004,
-            "checks": false}"#;
+            "screening": 4, "level": "thin", "surface": "1.5x", "solve": "sparse", "walls": "free", "outliers": "keep",
+            "band": 0.30000000000000004, "checks": false}"#;
         let options: Options = serde_json::from_str(text).expect("valid");
         let expected = Options::default()
             .radius(Radius::Fixed(0.1))
@@ -174,6 +180,7 @@ mod tests {
             .level(Level::Thin)
             .surface(SurfaceResolution::Factor(1.5))
             .solve(Solve::Sparse)
+            .walls(Walls::Free)
             .outliers(Outliers::Keep)
             .band(Band::Within(0.1 + 0.2))
             .checks(false);

@@ -17,6 +17,7 @@ use crate::Real;
 /// Tables and Fourier plans of an axis of `n` cells.
 pub(super) struct Axis<T> {
     pub(super) n: usize,
+    closed: bool,
     /// The places `0..n`.
     pub(super) natural: Vec<usize>,
     /// Place in Makhoul order of each place in the line.
@@ -44,7 +45,7 @@ pub(super) struct Gain<T> {
 }
 
 impl<T: Real> Axis<T> {
-    pub(super) fn new(n: usize) -> Self {
+    pub(super) fn new(n: usize, closed: bool) -> Self {
         let place = |j: usize| {
             if j.is_multiple_of(2) {
                 j / 2
@@ -56,23 +57,29 @@ impl<T: Real> Axis<T> {
             let (sin, cos) = (0.5 * PI * k as f64 / n as f64).sin_cos();
             Complex::new(T::of(cos), T::of(-sin))
         };
+        let at = |of: fn(usize, usize) -> f64| {
+            let waves = (0..n).map(|k| wave(k, n, closed));
+            waves.map(|k| T::of(of(k, n))).collect()
+        };
         let [forward, inverse] = T::transforms(n);
         Self {
             n,
+            closed,
             natural: (0..n).collect(),
             makhoul: (0..n).map(place).collect(),
-            stiffness: (0..n).map(|k| T::of(spectrum::stiffness(k, n))).collect(),
-            mass: (0..n).map(|k| T::of(spectrum::mass(k, n))).collect(),
+            stiffness: at(spectrum::stiffness),
+            mass: at(spectrum::mass),
             twiddle: (0..=n / 2).map(twiddle).collect(),
             forward,
             inverse,
         }
     }
 
-    /// Writes `G_k = exp(−σ²(1 − cos θ_k))` for all `k`.
+    /// Writes `G = exp(−σ²(1 − cos θ))` at all frequencies.
     pub(super) fn gaussian(&self, sigma: f64, out: &mut Vec<T>) {
         out.clear();
-        out.extend((0..self.n).map(|k| T::of(spectrum::gaussian(k, self.n, sigma))));
+        let waves = (0..self.n).map(|k| wave(k, self.n, self.closed));
+        out.extend(waves.map(|k| T::of(spectrum::gaussian(k, self.n, sigma))));
     }
 
     /// Lines in Makhoul order → their Fourier transforms.
@@ -156,6 +163,11 @@ impl<T: Real> Axis<T> {
             out[0].im = T::zero();
         }
     }
+}
+
+/// Wave number of place `k` of a transformed line of `n`: with closed walls the sines are in reverse order.
+fn wave(k: usize, n: usize, closed: bool) -> usize {
+    if closed { n - k } else { k }
 }
 
 impl<T: Real> Gain<T> {

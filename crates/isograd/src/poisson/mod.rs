@@ -1,4 +1,4 @@
-//! The Poisson equation, solved directly by cosine transforms.
+//! The Poisson equation, solved directly by cosine or sine transforms.
 //!
 //! # Map
 //! `b → χ`, both one value per cell of a grid of `(nx, ny, nz)` cells, in index space (cell size 1, no
@@ -17,6 +17,12 @@
 //! axis is the smoothing of `χ` by the Gaussian of lattices, of `σ` cells: diffusion for the time `σ²/2`, with the second
 //! differences of the cells as Laplacian (T. Lindeberg, *Scale-space for discrete signals*, IEEE TPAMI 12, 1990). `σ = 0`
 //! is the plain equation `Aχ = b − mean(b)`. No iteration, no tolerance: the relative residual is a few units of rounding.
+//!
+//! With [closed walls](Walls) the reflection is odd (`χ = 0` at the walls: homogeneous Dirichlet), the end rows of `K` are
+//! `(3, −1)` and those of `M` are `(3, 1)/6`, and all is diagonal in the DST-II, at `θ_k = π(k+1)/n`. No mode is constant,
+//! so nothing of `b` is ignored, and the mean of `χ` is not free. That transform is the DCT-II of the line with alternating
+//! signs, in reverse order (`sin(π(j+½)(n−k)/n) = (−1)^j cos(π(j+½)k/n)`), so the same code solves it: `b` and `χ` get the
+//! signs `(−1)^{i+j+k}`, and frequency `k` has the eigenvalues of `θ = π(n−k)/n`.
 //!
 //! # Residual
 //! None: the map is linear and constant. The plan and `σ` are all that the pullback needs.
@@ -45,6 +51,9 @@ pub mod smoothing;
 pub mod spectrum;
 #[cfg(test)]
 pub(crate) mod tests;
+mod walls;
+#[cfg(test)]
+mod walls_tests;
 
 use std::f64::consts::PI;
 
@@ -54,6 +63,7 @@ use pulp::Arch;
 use crate::Real;
 pub use scratch::Scratch;
 pub use smoothing::Smoothing;
+pub use walls::Walls;
 
 /// Errors of the Poisson stage.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -80,6 +90,7 @@ pub enum Error {
 /// between threads.
 pub struct Plan<T: Real> {
     shape: [usize; 3],
+    closed: bool,
     axes: [Axis<T>; 3],
     symbols: Option<Symbols<T>>,
     arch: Arch,
@@ -100,23 +111,30 @@ struct Symbol {
 }
 
 impl<T: Real> Plan<T> {
-    /// A plan for grids of `(nx, ny, nz)` cells, of any size, primes included. Memory and time grow with
+    /// A plan for grids of `(nx, ny, nz)` cells with free walls, of any size, primes included. Memory and time grow with
     /// `nx + ny + nz` only.
     pub fn new(shape: [usize; 3]) -> Self {
+        Self::with_walls(shape, false)
+    }
+
+    /// Like [`Self::new`], with closed or free walls.
+    pub fn with_walls(shape: [usize; 3], closed: bool) -> Self {
         Self {
             shape,
-            axes: shape.map(Axis::new),
+            closed,
+            axes: shape.map(|n| Axis::new(n, closed)),
             symbols: None,
             arch: Arch::new(),
         }
     }
 
     /// A plan with the factors `symbol(θ)` at each angle `θ` per cell, from 0 to π.
-    fn with_symbols(shape: [usize; 3], symbol: impl Fn(f64) -> Symbol) -> Self {
-        let mut plan = Self::new(shape);
+    fn with_symbols(shape: [usize; 3], closed: bool, symbol: impl Fn(f64) -> Symbol) -> Self {
+        let mut plan = Self::with_walls(shape, closed);
         let amplitudes = [0, 1, 2].map(|a| {
             let (n, axis) = (shape[a], &mut plan.axes[a]);
-            let symbols = (0..n).map(|k| symbol(PI * k as f64 / n as f64));
+            let waves = (0..n).map(|k| axis::wave(k, n, closed));
+            let symbols = waves.map(|k| symbol(PI * k as f64 / n as f64));
             let (amplitudes, stiffness) = symbols
                 .map(|symbol| (T::of(symbol.amplitude), T::of(symbol.stiffness)))
                 .unzip();
@@ -140,6 +158,11 @@ impl<T: Real> Plan<T> {
     /// Number of cells along each axis, `(nx, ny, nz)`.
     pub fn shape(&self) -> [usize; 3] {
         self.shape
+    }
+
+    /// Whether the walls are closed.
+    pub fn is_closed(&self) -> bool {
+        self.closed
     }
 
     /// Solves in place: `field` holds `b` and then `χ`, `(nx, ny, nz)` in C order, in index space.

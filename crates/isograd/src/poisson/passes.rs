@@ -19,12 +19,16 @@ impl<T: Real> Plan<T> {
     /// Cosine transforms along z, then y, plane by plane.
     pub(super) fn forward_planes(&self, field: &mut [T], scratch: &Scratch<T>) {
         let [_, y, z] = &self.axes;
-        field.par_chunks_mut(y.n * z.n).for_each(|plane| {
+        let planes = field.par_chunks_mut(y.n * z.n).enumerate();
+        planes.for_each(|(i, plane)| {
             scratch.with_lines(|buffers| {
                 simd::dispatch(
                     self.arch,
                     #[inline(always)]
                     || {
+                        if self.closed {
+                            alternate(plane, z.n, i);
+                        }
                         forward_rows(z, plane, buffers);
                         forward_columns(y, &mut rows_of(plane, z.n), buffers);
                     },
@@ -36,7 +40,8 @@ impl<T: Real> Plan<T> {
     /// The inverse of [`Self::forward_planes`], times `4 n_y n_z`.
     pub(super) fn inverse_planes(&self, field: &mut [T], scratch: &Scratch<T>) {
         let [_, y, z] = &self.axes;
-        field.par_chunks_mut(y.n * z.n).for_each(|plane| {
+        let planes = field.par_chunks_mut(y.n * z.n).enumerate();
+        planes.for_each(|(i, plane)| {
             scratch.with_lines(|buffers| {
                 simd::dispatch(
                     self.arch,
@@ -44,6 +49,9 @@ impl<T: Real> Plan<T> {
                     || {
                         inverse_columns(y, &mut rows_of(plane, z.n), buffers);
                         inverse_rows(z, plane, buffers);
+                        if self.closed {
+                            alternate(plane, z.n, i);
+                        }
                     },
                 );
             });
@@ -124,6 +132,16 @@ impl<T: Real> Plan<T> {
 
 fn rows_of<T>(plane: &mut [T], length: usize) -> Vec<&mut [T]> {
     plane.chunks_mut(length).collect()
+}
+
+/// Multiplies the value at `(j, k)` of plane `i` by `(−1)^{i+j+k}`.
+#[inline(always)]
+fn alternate<T: Real>(plane: &mut [T], length: usize, i: usize) {
+    for (j, row) in plane.chunks_mut(length).enumerate() {
+        for value in row.iter_mut().skip((i + j + 1) % 2).step_by(2) {
+            *value = -*value;
+        }
+    }
 }
 
 /// Cosine transform of the rows of a plane, two at a time.

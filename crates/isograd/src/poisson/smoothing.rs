@@ -3,6 +3,7 @@
 use pulp::Arch;
 use rayon::prelude::*;
 
+use super::Plan;
 use crate::data::blocks::{BlockField, NODES};
 use crate::{Real, simd};
 
@@ -51,13 +52,13 @@ impl Smoothing {
     }
 }
 
-/// `σ χ·Lχ̄`, which is `σ̄` for cotangents `chi_bar` of `chi`, both `(nx, ny, nz)` in C order and `L` the sum of second
+/// `σ χ·Lχ̄`, which is `σ̄` for cotangents `chi_bar` of `chi`, both on the grid of `plan` and `L` the sum of second
 /// differences along the axes. The same bits for any number of threads.
-pub fn pullback<T: Real>(smoothing: f64, shape: [usize; 3], chi: &[T], chi_bar: &[T]) -> f64 {
-    let [_, ny, nz] = shape;
+pub fn pullback<T: Real>(plan: &Plan<T>, smoothing: f64, chi: &[T], chi_bar: &[T]) -> f64 {
+    let [_, ny, nz] = plan.shape;
     let plane = |(i, plane): (usize, &[T])| {
         let rows = plane.chunks_exact(nz).enumerate();
-        rows.map(|(j, row)| laplacian_dot(chi_bar, shape, (i * ny + j) * nz, row))
+        rows.map(|(j, row)| laplacian_dot(plan, chi_bar, (i * ny + j) * nz, row))
             .sum()
     };
     let planes = chi.par_chunks_exact(ny * nz).enumerate();
@@ -106,8 +107,8 @@ pub(crate) fn pullback_in_blocks<T: Real>(
 
 /// `Σ_k part_k (Lv)_k` over cells along z from place `start` in memory on.
 pub(crate) fn laplacian_dot<T: Real>(
+    plan: &Plan<T>,
     values: &[T],
-    shape: [usize; 3],
     start: usize,
     part: &[T],
 ) -> f64 {
@@ -119,7 +120,10 @@ pub(crate) fn laplacian_dot<T: Real>(
             let mut room = [T::zero(); CELLS];
             for (n, part) in part.chunks(CELLS).enumerate() {
                 let differences = &mut room[..part.len()];
-                laplacian(values, shape, start + n * CELLS, differences);
+                laplacian(values, plan.shape, start + n * CELLS, differences);
+                if plan.closed {
+                    reflect_oddly(values, plan.shape, start + n * CELLS, differences);
+                }
                 let products = differences.iter().zip(part);
                 sum += products.map(|(l, p)| (*l * *p).f64()).sum::<f64>();
             }
@@ -156,6 +160,18 @@ fn laplacian<T: Real>(values: &[T], [nx, ny, nz]: [usize; 3], start: usize, out:
     }
 }
 
+/// Turns second differences with even reflection at the walls into those with odd reflection.
+#[inline(always)]
+fn reflect_oddly<T: Real>(values: &[T], [nx, ny, nz]: [usize; 3], start: usize, out: &mut [T]) {
+    let (i, j, first) = (start / (ny * nz), start / nz % ny, start % nz);
+    let walls = [i == 0, i + 1 == nx, j == 0, j + 1 == ny];
+    let walls = walls.into_iter().filter(|&wall| wall).count();
+    for (k, out) in (first..).zip(out) {
+        let walls = walls + usize::from(k == 0) + usize::from(k + 1 == nz);
+        *out -= T::of_usize(2 * walls) * values[start - first + k];
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -172,28 +188,30 @@ mod tests {
                 .collect::<Vec<f64>>()
         };
         let (b, chi_bar) = (numbers(), numbers());
-        let plan = Plan::new(shape);
-        let solve = |smoothing: f64| {
-            let mut chi = b.clone();
-            let solved = plan.solve(&mut chi, smoothing, &mut Scratch::default());
-            solved.expect("sizes match");
-            chi
-        };
-        let value = |smoothing| {
-            let products = solve(smoothing);
-            products
-                .iter()
-                .zip(&chi_bar)
-                .map(|(c, b)| c * b)
-                .sum::<f64>()
-        };
-        let (sigma, step) = (0.7, 1e-5);
-        let difference = (value(sigma + step) - value(sigma - step)) / (2.0 * step);
-        let pulled = pullback(sigma, shape, &solve(sigma), &chi_bar);
-        assert!(
-            (pulled / difference - 1.0).abs() < 1e-8,
-            "{pulled} {difference}"
-        );
+        for closed in [false, true] {
+            let plan = Plan::with_walls(shape, closed);
+            let solve = |smoothing: f64| {
+                let mut chi = b.clone();
+                let solved = plan.solve(&mut chi, smoothing, &mut Scratch::default());
+                solved.expect("sizes match");
+                chi
+            };
+            let value = |smoothing| {
+                let products = solve(smoothing);
+                products
+                    .iter()
+                    .zip(&chi_bar)
+                    .map(|(c, b)| c * b)
+                    .sum::<f64>()
+            };
+            let (sigma, step) = (0.7, 1e-5);
+            let difference = (value(sigma + step) - value(sigma - step)) / (2.0 * step);
+            let pulled = pullback(&plan, sigma, &solve(sigma), &chi_bar);
+            assert!(
+                (pulled / difference - 1.0).abs() < 1e-8,
+                "{pulled} {difference}"
+            );
+        }
     }
 
     #[test]
@@ -201,14 +219,16 @@ mod tests {
         let shape = [3, 4, 11];
         let mut random = Random::new(6);
         let values: Vec<f64> = (0..132).map(|_| random.uniform()).collect();
-        let one = |at: usize| laplacian_dot(&values, shape, at, &[1.0]);
-        for row in [0, 11 * 5, 11 * 11] {
-            for (first, count) in [(0, 11), (0, 4), (3, 5), (7, 4)] {
-                let part: Vec<f64> = (0..count).map(|k| k as f64 - 1.7).collect();
-                let start = row + first;
-                let sum = laplacian_dot(&values, shape, start, &part);
-                let plain = (0..count).map(|k| part[k] * one(start + k)).sum::<f64>();
-                assert!((sum - plain).abs() < 1e-13);
+        for plan in [Plan::new(shape), Plan::with_walls(shape, true)] {
+            let one = |at: usize| laplacian_dot(&plan, &values, at, &[1.0]);
+            for row in [0, 11 * 5, 11 * 11] {
+                for (first, count) in [(0, 11), (0, 4), (3, 5), (7, 4)] {
+                    let part: Vec<f64> = (0..count).map(|k| k as f64 - 1.7).collect();
+                    let start = row + first;
+                    let sum = laplacian_dot(&plan, &values, start, &part);
+                    let plain = (0..count).map(|k| part[k] * one(start + k)).sum::<f64>();
+                    assert!((sum - plain).abs() < 1e-13);
+                }
             }
         }
     }

@@ -146,7 +146,7 @@ fn stencil_gives_back_the_right_hand_side_for_awkward_sizes() {
 #[test]
 fn cosine_transform_is_the_plain_sum() {
     for n in [1, 2, 3, 4, 5, 8, 23, 30, 151] {
-        let axis = Axis::<f64>::new(n);
+        let axis = Axis::<f64>::new(n, false);
         let mut next = noise(n as u64);
         let x: Vec<_> = (0..n).map(|_| (next(), next())).collect();
         let mut line = vec![Default::default(); n];

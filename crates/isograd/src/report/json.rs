@@ -70,6 +70,7 @@ struct Reconstructed {
     surface_spacing: f64,
     surface_cells: usize,
     smoothing: f64,
+    walls: &'static str,
     iso_value: f64,
     surface: Surface,
     sdf: Sdf,
@@ -118,6 +119,7 @@ impl JsonReport {
                 surface_spacing: report.surface_spacing,
                 surface_cells: report.surface_cells,
                 smoothing: report.smoothing,
+                walls: report.walls,
                 iso_value: report.iso_value,
                 surface: surface(&report.surface),
                 sdf: Sdf {

@@ -54,6 +54,7 @@ const FULL: usize = SIDE + 1;
 
 /// Solver for one grid and one smoothing.
 pub(crate) struct Pyramid<T: Real> {
+    closed: bool,
     /// The near part of each octave.
     near: Vec<(Plan<T>, Scratch<T>)>,
     far: Plan<T>,
@@ -95,8 +96,9 @@ fn parents(small: &Blocks, cells: [usize; 3]) -> Blocks {
 }
 
 impl<T: Real> Pyramid<T> {
-    /// A solver for a grid of `cells`, multiples of 2 to the power `octaves`, with the smoothing `σ` in cells.
-    pub(crate) fn new(cells: [usize; 3], octaves: usize, smoothing: f64) -> Self {
+    /// A solver for a grid of `cells`, multiples of 2 to the power `octaves`, with closed or free walls and the smoothing `σ`
+    /// in cells.
+    pub(crate) fn new(cells: [usize; 3], octaves: usize, closed: bool, smoothing: f64) -> Self {
         let symbols = Symbols { smoothing };
         let near = (0..octaves).map(|octave| {
             let gains = symbols.near(octave);
@@ -106,8 +108,9 @@ impl<T: Real> Pyramid<T> {
         });
         let coarse = cells.map(|n| n >> octaves);
         Self {
+            closed,
             near: near.collect(),
-            far: Plan::with_symbols(coarse, |angle| symbols.at(octaves, angle)),
+            far: Plan::with_symbols(coarse, closed, |angle| symbols.at(octaves, angle)),
             far_scratch: Scratch::default(),
             field: vec![T::zero(); coarse.iter().product()],
         }
@@ -122,7 +125,8 @@ impl<T: Real> Pyramid<T> {
         let mut rhs = vec![std::mem::take(values)];
         for pair in octaves.0.windows(2) {
             let mut sums = vec![T::zero(); pair[1].nodes()];
-            transfer::restrict(&pair[0], &rhs[rhs.len() - 1], &pair[1], &mut sums);
+            let last = &rhs[rhs.len() - 1];
+            transfer::restrict(&pair[0], last, &pair[1], self.closed, &mut sums);
             rhs.push(sums);
         }
         let coarsest = &octaves.0[self.near.len()];
@@ -135,7 +139,7 @@ impl<T: Real> Pyramid<T> {
             let [small, large] = [octave, octave + 1].map(|o| &octaves.0[o]);
             let mut sum = vec![T::zero(); small.nodes()];
             self.add_near(octave, small, &b, &mut sum);
-            transfer::prolong(large, &chi, small, &mut sum);
+            transfer::prolong(large, &chi, small, self.closed, &mut sum);
             chi = sum;
         }
         *values = chi;
@@ -153,7 +157,7 @@ impl<T: Real> Pyramid<T> {
         blocks.for_each_brick(out, |brick, out| {
             let mut room = vec![T::zero(); SIDE * SIDE * SIDE];
             let origin = brick.corner.map(|c| c as isize - HALO as isize);
-            blocks.read_cube(b, origin, SIDE, &mut room);
+            blocks.read_cube(b, origin, SIDE, self.closed, &mut room);
             if room.iter().all(|&b| b == T::zero()) {
                 return;
             }

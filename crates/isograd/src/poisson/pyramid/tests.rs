@@ -57,7 +57,7 @@ fn errors<T: Real>(cells: usize, octaves: usize, smoothing: f64, axes: [f64; 3])
     let blocks = &sets.0[0];
     let mut values = vec![T::zero(); blocks.nodes()];
     blocks.read_dense(b.values(), &mut values);
-    let mut pyramid = Pyramid::new([cells; 3], octaves, smoothing);
+    let mut pyramid = Pyramid::new([cells; 3], octaves, false, smoothing);
     pyramid.solve(&sets, &mut values).expect("sizes match");
     let plan = Plan::<T>::new([cells; 3]);
     plan.solve(b.values_mut(), smoothing, &mut Scratch::default())
@@ -95,7 +95,7 @@ fn map_is_its_own_transpose() {
     let cells = 96;
     let (points, _) = ellipsoid::<f64>(cells, [40.0, 43.0, 9.0], 2000);
     let sets = Octaves::new(near_samples(&points, cells), 2);
-    let mut pyramid = Pyramid::new([cells; 3], 2, 0.7);
+    let mut pyramid = Pyramid::new([cells; 3], 2, false, 0.7);
     let mut random = Random::new(11);
     let mut numbers = || -> Vec<f64> {
         let count = sets.0[0].nodes();
@@ -121,7 +121,7 @@ fn bits_do_not_depend_on_the_number_of_threads() {
     crate::testing::assert_same_bits(|| {
         let mut values = vec![0.0; sets.0[0].nodes()];
         sets.0[0].read_dense(b.values(), &mut values);
-        let mut pyramid = Pyramid::new([cells; 3], 1, 0.8);
+        let mut pyramid = Pyramid::new([cells; 3], 1, false, 0.8);
         pyramid.solve(&sets, &mut values).expect("sizes match");
         values
     });

@@ -38,7 +38,13 @@ pub(super) fn symbol(angle: f64) -> f64 {
 }
 
 /// Adds the values at the cells of `small` of the spline with `coefficients` at the cells of `large`.
-pub(super) fn prolong<T: Real>(large: &Blocks, coefficients: &[T], small: &Blocks, out: &mut [T]) {
+pub(super) fn prolong<T: Real>(
+    large: &Blocks,
+    coefficients: &[T],
+    small: &Blocks,
+    closed: bool,
+    out: &mut [T],
+) {
     let rows: [(usize, [T; 6]); EDGE] = std::array::from_fn(|n| {
         let first = n.div_ceil(2);
         let large = |m: usize| (first + m) as isize - REACH;
@@ -48,7 +54,7 @@ pub(super) fn prolong<T: Real>(large: &Blocks, coefficients: &[T], small: &Block
     let work = out.par_chunks_exact_mut(NODES).enumerate();
     work.for_each_init(Rooms::default, |rooms, (block, out)| {
         let origin = small.corner(block).map(|c| (c / 2) as isize - REACH);
-        if rooms.read(large, coefficients, origin, ABOVE) {
+        if rooms.read((large, coefficients), origin, ABOVE, closed) {
             rooms.contract(ABOVE, &rows);
             for (out, &part) in out.iter_mut().zip(&rooms.to) {
                 *out += part;
@@ -58,7 +64,13 @@ pub(super) fn prolong<T: Real>(large: &Blocks, coefficients: &[T], small: &Block
 }
 
 /// Writes the transpose of [`prolong`]: sums over the cells of `small`.
-pub(super) fn restrict<T: Real>(small: &Blocks, values: &[T], large: &Blocks, out: &mut [T]) {
+pub(super) fn restrict<T: Real>(
+    small: &Blocks,
+    values: &[T],
+    large: &Blocks,
+    closed: bool,
+    out: &mut [T],
+) {
     const TAPS: usize = 4 * REACH as usize;
     let weights: [T; TAPS] = std::array::from_fn(|m| T::of(weight(m as isize - 2 * REACH + 1, 0)));
     let rows: [(usize, [T; TAPS]); EDGE] = std::array::from_fn(|n| (2 * n, weights));
@@ -67,7 +79,7 @@ pub(super) fn restrict<T: Real>(small: &Blocks, values: &[T], large: &Blocks, ou
         let origin = large
             .corner(block)
             .map(|c| (2 * c) as isize - 2 * REACH + 1);
-        if rooms.read(small, values, origin, BELOW) {
+        if rooms.read((small, values), origin, BELOW, closed) {
             rooms.contract(BELOW, &rows);
             out.copy_from_slice(&rooms.to[..NODES]);
         } else {
@@ -85,9 +97,15 @@ struct Rooms<T> {
 
 impl<T: Real> Rooms<T> {
     /// Reads a cube of cells; returns whether any block is there.
-    fn read(&mut self, blocks: &Blocks, values: &[T], origin: [isize; 3], side: usize) -> bool {
+    fn read(
+        &mut self,
+        (blocks, values): (&Blocks, &[T]),
+        origin: [isize; 3],
+        side: usize,
+        closed: bool,
+    ) -> bool {
         self.from.resize(side * side * side, T::zero());
-        blocks.read_cube(values, origin, side, &mut self.from)
+        blocks.read_cube(values, origin, side, closed, &mut self.from)
     }
 
     /// Weighted sums along each axis: from `side`³ values to a block. `rows` are the first value and the weights of each

@@ -4,7 +4,7 @@ use isograd::distance::Band;
 use isograd::isosurface::Level;
 use isograd::neighbors::Radius;
 use isograd::orient::{Method, ParityOptions};
-use isograd::poisson::Smoothing;
+use isograd::poisson::{Smoothing, Walls};
 use isograd::splat::Weights;
 use isograd::{
     Attribute, CloudCotangent, Cotangent, ExtensionCotangent, Grid, Options, Pipeline, PointCloud,
@@ -189,6 +189,7 @@ fn options<T: Pipeline>(size: f64, draw: &mut Draw) -> Options {
         1 => SurfaceResolution::Factor(1.0 + 2.0 * draw.0.next()),
         _ => SurfaceResolution::Grid,
     };
+    options.walls = [Walls::Auto, Walls::Free, Walls::Closed][draw.below(3)];
     options.checks = draw.chance(0.2);
     options
 }

@@ -1,0 +1,37 @@
+//! Conditions at the walls of the grid.
+
+use crate::{Grid, Real};
+
+/// Cells of φ from the wall within which a sample reaches it. Samples keep 2 cells off the walls, and a fitted grid keeps
+/// [`Grid::MARGIN_CELLS`] cells off the samples.
+const REACH: f64 = 3.5;
+
+/// Condition of the indicator χ at the walls of the grid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Walls {
+    /// [`Self::Free`] if a sample lies within 3.5 cells (of φ) of a wall, which is never so on a fitted grid, else
+    /// [`Self::Closed`].
+    #[default]
+    Auto,
+    /// No flux, so that the surface may pass through a wall, at right angles: for half of a body that ends there. Holes in
+    /// the samples may lead the surface to a wall.
+    Free,
+    /// χ is 0, which is outside: the surface never reaches a wall.
+    Closed,
+}
+
+impl Walls {
+    /// Whether the walls are closed, for samples at these points.
+    pub fn are_closed<T: Real>(self, points: &[[T; 3]], grid: &Grid<T>) -> bool {
+        match self {
+            Self::Auto => !points.iter().any(|&p| reaches(p, grid)),
+            Self::Free => false,
+            Self::Closed => true,
+        }
+    }
+}
+
+fn reaches<T: Real>(p: [T; 3], grid: &Grid<T>) -> bool {
+    let (x, shape) = (grid.to_index(p), grid.shape());
+    (0..3).any(|a| !(x[a].f64() >= REACH && x[a].f64() <= shape[a] as f64 - REACH))
+}
