@@ -152,6 +152,14 @@ fn array<'py, T: Number>(
         "closest" => arrays::shaped(py, failure(result.closest())?.to_vec(), shape),
         "vertices" => Ok(arrays::from_vectors(py, failure(result.mesh())?.vertices())),
         "faces" => Ok(arrays::from_vectors(py, failure(result.mesh())?.faces())),
+        "closest_vertices" => Ok(arrays::from_vectors(
+            py,
+            failure(result.closest_mesh())?.vertices(),
+        )),
+        "closest_faces" => Ok(arrays::from_vectors(
+            py,
+            failure(result.closest_mesh())?.faces(),
+        )),
         "normals" => Ok(arrays::from_vectors(py, failure(result.normals())?)),
         "confidence" => arrays::shaped(py, failure(result.confidence())?.to_vec(), [count]),
         "areas" => arrays::shaped(py, failure(result.areas())?.to_vec(), [count]),

@@ -238,6 +238,27 @@ def test_outliers_are_left_out_and_have_no_gradient():
         isograd.reconstruct(points, grid, outliers=isograd.Outliers.KEEP)
 
 
+def test_a_trimmed_mesh_is_open_and_a_sheet_has_a_closed_shell():
+    points = SPHERE[SPHERE[:, 2] > 0]
+    whole = isograd.reconstruct(points, GRID, orient="given", normals=points)
+    trimmed = isograd.reconstruct(points, GRID, orient="given", normals=points, trim=0.2)
+    assert bits(trimmed.sdf) == bits(whole.sdf)
+    assert bits(trimmed.closest_mesh.faces) == bits(whole.mesh.faces)
+    removed = len(whole.mesh.faces) - len(trimmed.mesh.faces)
+    assert removed > 100 and trimmed.report["trim"] == {"distance": 0.2, "faces": removed}
+    gradient = trimmed.pullback(vertices=np.ones_like(trimmed.mesh.vertices)).points
+    assert np.isfinite(gradient).all() and gradient.any()
+    sheet = isograd.reconstruct(points, GRID, orient="given", normals=points, sheet=0.4)
+    radius = np.linalg.norm(GRID.centers(), axis=-1)
+    near = (abs(radius - 1) < 0.3) & (GRID.centers()[..., 2] > 0.6)
+    assert abs(sheet.sdf - (abs(radius - 1) - 0.2))[near].max() < 0.02
+    assert sheet.report["surface"]["closed"] and sheet.report["surface"]["components"] == 1
+    gradient = sheet.pullback(vertices=np.ones_like(sheet.mesh.vertices), sdf=sheet.sdf).points
+    assert np.isfinite(gradient).all() and gradient.any()
+    with pytest.raises(ValueError, match="use a larger trim"):
+        isograd.reconstruct(points, GRID, orient="given", normals=points, trim=1e-9)
+
+
 def test_bad_arguments_are_refused_with_a_reason():
     result = isograd.reconstruct(SPHERE, GRID)
     bad = np.zeros(GRID.shape)
@@ -256,6 +277,8 @@ def test_bad_arguments_are_refused_with_a_reason():
         (ValueError, "'local'", lambda: isograd.Options(level="median")),
         (ValueError, "outliers is 'drop'", lambda: isograd.Options(outliers="drop")),
         (ValueError, "outliers is 'drop'", lambda: isograd.Grid.fit(SPHERE, outliers="drop")),
+        (ValueError, "trim is 0", lambda: isograd.Options(trim=0)),
+        (ValueError, "sheet is 'thin'", lambda: isograd.Options(sheet="thin")),
         (ValueError, "walls is 'open'", lambda: isograd.Options(walls="open")),
         (ValueError, "radius", lambda: isograd.Options(radius=0)),
         (ValueError, "band", lambda: isograd.Options(band=float("nan"))),

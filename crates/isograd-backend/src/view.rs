@@ -80,6 +80,18 @@ impl<'a, T: Number> View<'a, T> {
         neighbor_counts: &'a [u32];
     }
 
+    /// The mesh whose faces [`closest`](Self::closest) names: see [`Reconstruction::closest_mesh`].
+    ///
+    /// # Errors
+    /// Errors of the device.
+    pub fn closest_mesh(self) -> Result<&'a Mesh<T>, Error> {
+        match self.0 {
+            Of::Cpu(of) => Ok(of.closest_mesh()),
+            #[cfg(feature = "gpu")]
+            Of::Device(of, _) => Ok(of.mesh()?),
+        }
+    }
+
     /// Indices of the [outliers](isograd::Outliers) that were left out, ascending.
     pub fn outliers(self) -> &'a [u32] {
         match self.0 {

@@ -53,6 +53,7 @@
 //! | [`poisson`] | right-hand side → indicator χ |
 //! | [`isosurface`] | χ → iso-value and mesh |
 //! | [`distance`] | mesh → φ; queries at points; attributes on the surface |
+//! | [`sheet`] | open surface → φ and closed shell of a membrane |
 //! | [`differential`] | φ → gradient, normal and curvature |
 //! | [`gradcheck`] | comparison of the pullback with finite differences |
 #![warn(missing_docs)]
@@ -74,6 +75,7 @@ pub mod poisson;
 mod pullback_tests;
 mod real;
 mod report;
+pub mod sheet;
 pub(crate) mod simd;
 pub mod splat;
 #[cfg(test)]

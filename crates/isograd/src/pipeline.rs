@@ -5,6 +5,9 @@ mod concrete;
 mod cotangent;
 mod extend;
 mod memory;
+mod open;
+#[cfg(test)]
+mod open_tests;
 mod options;
 mod orienter;
 mod pullback;
@@ -69,7 +72,7 @@ impl<T: Pipeline> Reconstructor<T> {
     ///
     /// # Errors
     /// [`Error::Memory`] for a grid that needs more memory than is [free](available_memory).
-    /// [`Error::Smoothing`], [`Error::Screening`] and [`Error::Surface`] for what is out of range. Other options are
+    /// [`Error::Smoothing`], [`Error::Screening`], [`Error::Surface`], [`Error::Trim`] and [`Error::Sheet`] for what is out of range. Other options are
     /// checked by the stages that use them.
     pub fn new(grid: Grid<T>, options: Options) -> Result<Self, Error> {
         check_memory(&grid)?;
@@ -78,6 +81,12 @@ impl<T: Pipeline> Reconstructor<T> {
         }
         if !options.surface.is_valid() {
             return Err(Error::Surface(options.surface));
+        }
+        if !options.trim.is_valid() {
+            return Err(Error::Trim(options.trim));
+        }
+        if !options.sheet.is_valid() {
+            return Err(Error::Sheet(options.sheet));
         }
         if !(options.screening >= 0.0) || !options.screening.is_finite() {
             return Err(Error::Screening(options.screening));
@@ -185,6 +194,7 @@ pub struct Reconstruction<T: Real> {
     sparse: Option<sparse::Sparse<T>>,
     iso_value: T,
     mesh: Mesh<T>,
+    open: Option<Box<open::Open<T>>>,
     closest: Vec<u32>,
     areas: Vec<T>,
     orientation: orient::Orientation<T>,
@@ -219,6 +229,7 @@ impl<T: Pipeline> Reconstruction<T> {
             sparse: None,
             iso_value: T::zero(),
             mesh: Mesh::default(),
+            open: None,
             closest: Vec::new(),
             areas: Vec::new(),
             orientation: orient::Orientation::default(),
@@ -298,12 +309,7 @@ impl<T: Real> Reconstruction<T> {
         self.iso_value
     }
 
-    /// The surface, in the cloud's coordinates.
-    pub fn mesh(&self) -> &Mesh<T> {
-        &self.mesh
-    }
-
-    /// For each cell, in C order, the face of the surface closest to its center;
+    /// For each cell, in C order, the face of [`closest_mesh`](Self::closest_mesh) closest to its center;
     /// [`NO_TRIANGLE`](distance::NO_TRIANGLE) outside the band.
     pub fn closest(&self) -> &[u32] {
         &self.closest

@@ -118,7 +118,9 @@ pub struct Report {
     pub walls: &'static str,
     /// The level `c` of the surface `χ = c`.
     pub iso_value: f64,
-    /// Measures of the surface.
+    /// Distance of the trim, and number of faces that it removed.
+    pub trim: Option<(f64, usize)>,
+    /// Measures of the mesh.
     pub surface: Measures,
     /// Least φ.
     pub sdf_min: f64,
@@ -189,6 +191,11 @@ pub enum Warning {
     },
     /// The surface reaches the wall of the grid.
     TouchesWall,
+    /// A sheet is thinner than two cells of the surface: its shell may have holes.
+    ThinSheet {
+        /// Thickness, in cells.
+        cells: f64,
+    },
     /// The surface has several pieces.
     Components {
         /// Number of pieces.
@@ -243,6 +250,10 @@ impl fmt::Display for Warning {
             Self::TouchesWall => write!(
                 f,
                 "the surface reaches the wall of the grid and is cut off there; use larger bounds or padding, or the option walls 'closed'"
+            ),
+            Self::ThinSheet { cells } => write!(
+                f,
+                "the sheet is {cells:.2} cells of the surface thick and its shell may have holes; φ is exact: use a thicker sheet or a finer surface"
             ),
             Self::Components { count } => {
                 write!(f, "the surface has {count} separate pieces")

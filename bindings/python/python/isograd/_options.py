@@ -61,12 +61,12 @@ class Solve(str, Enum):
 class Walls(str, Enum):
     """Condition of the indicator at the walls of the grid."""
 
-    AUTO = "auto"
-    """``FREE`` if a sample lies within 3.5 cells of a wall, which is never so on a fitted grid, else ``CLOSED``."""
     FREE = "free"
     """The surface may pass through a wall, at right angles: for half of a body that ends there."""
     CLOSED = "closed"
     """The surface never reaches a wall."""
+    AUTO = "auto"
+    """``FREE`` if a sample lies within 3.5 cells of a wall, which is never so on a fitted grid, else ``CLOSED``."""
 
 
 class Outliers(str, Enum):
@@ -82,7 +82,7 @@ OrientLike = Orient | Literal["auto", "parity", "given", "signs", "sensors", "pr
 SplatLike = Splat | Literal["bspline", "paper"]
 LevelLike = Level | Literal["local", "thin", "mean"]
 SolveLike = Solve | Literal["auto", "dense", "sparse"]
-WallsLike = Walls | Literal["auto", "free", "closed"]
+WallsLike = Walls | Literal["free", "closed", "auto"]
 OutliersLike = Outliers | Literal["ignore", "keep"]
 
 
@@ -104,6 +104,10 @@ class Options:
             ``"3x"``. φ stays on its own grid.
         solve: cells at which the indicator is computed; see :class:`Solve`.
         walls: condition of the indicator at the walls of the grid; see :class:`Walls`.
+        trim: distance from all samples, in the unit of the points, beyond which faces of the mesh are removed; ``"auto"`` for
+            4 times the typical distance between samples, ``"off"`` for none. φ is not changed by it.
+        sheet: thickness of a membrane or sail, in the unit of the points, or ``"off"``: φ is the unsigned distance to the
+            trimmed surface less half of it, and the mesh is the closed shell. ``trim`` is ``"auto"`` unless it is given.
         outliers: use of isolated samples that are further from the others than these extend; see :class:`Outliers`.
         band: distance from the surface up to which φ is computed, in the unit of the points, or ``"full"``.
         checks: whether to measure the result and to check whether it can be trusted.
@@ -121,7 +125,9 @@ class Options:
     level: LevelLike = Level.LOCAL
     surface: float | str = "auto"
     solve: SolveLike = Solve.AUTO
-    walls: WallsLike = Walls.AUTO
+    walls: WallsLike = Walls.FREE
+    trim: float | Literal["auto", "off"] = "off"
+    sheet: float | Literal["off"] = "off"
     outliers: OutliersLike = Outliers.IGNORE
     band: float | Literal["full"] = "full"
     checks: bool = True
@@ -138,6 +144,8 @@ class Options:
             "surface": _surface(self.surface),
             "solve": choice(Solve, self.solve, "solve"),
             "walls": choice(Walls, self.walls, "walls"),
+            "trim": length(self.trim, "trim", "auto", "off"),
+            "sheet": length(self.sheet, "sheet", "off"),
             "outliers": choice(Outliers, self.outliers, "outliers"),
             "band": length(self.band, "band", "full"),
             "checks": bool(self.checks),

@@ -55,7 +55,7 @@ class Extension:
 
     @cached_property
     def vertices(self) -> np.ndarray:
-        """``(V, components)`` at the vertices of the mesh."""
+        """``(V, components)`` at the vertices of the mesh (of ``closest_mesh``)."""
         return self._core.array("vertices")
 
     @cached_property
@@ -120,13 +120,18 @@ class Reconstruction:
 
     @cached_property
     def mesh(self) -> Mesh:
-        """The surface, counter-clockwise seen from outside."""
+        """The surface, counter-clockwise seen from outside: with ``trim`` the part near samples, of a ``sheet`` the shell."""
         return Mesh(self._core.array("vertices"), self._core.array("faces"))
 
     @cached_property
     def closest(self) -> np.ndarray:
-        """``(nx, ny, nz)`` uint32: face of the mesh closest to each cell; 2**32 - 1 outside the band."""
+        """``(nx, ny, nz)`` uint32: face of :attr:`closest_mesh` closest to each cell; 2**32 - 1 outside the band."""
         return self._core.array("closest")
+
+    @cached_property
+    def closest_mesh(self) -> Mesh:
+        """The mesh that φ is the distance to: the surface before ``trim``, of a ``sheet`` its middle, else :attr:`mesh`."""
+        return Mesh(self._core.array("closest_vertices"), self._core.array("closest_faces"))
 
     @cached_property
     def normals(self) -> np.ndarray:

@@ -3,7 +3,9 @@
 use clap::{ArgAction, Args};
 use isograd::distance::Band;
 use isograd::isosurface::Level;
+use isograd::isosurface::trim::Trim;
 use isograd::poisson::{Smoothing, Walls};
+use isograd::sheet::Sheet;
 use isograd::splat::Weights;
 use isograd::{
     Grid, GridError, Options, Outliers, PointCloud, Real, Resolution, Solve, SurfaceResolution,
@@ -73,8 +75,16 @@ pub struct MethodArgs {
     pub solve: Solve,
     /// Condition at the walls of the grid: free (the surface may pass through them: half models), closed (it never reaches
     /// them), or auto (free if a sample lies within 3.5 cells of a wall, else closed)
-    #[arg(long, value_name = "auto|free|closed", default_value = "auto")]
+    #[arg(long, value_name = "free|closed|auto", default_value = "free")]
     pub walls: Walls,
+    /// Removes the faces of the mesh further than this from all samples, in the cloud's unit; auto: 4 times the distance
+    /// between samples. φ stays
+    #[arg(long, value_name = "auto|off|DISTANCE", default_value = "off")]
+    pub trim: Trim,
+    /// Membranes and sails: φ is the unsigned distance to the trimmed surface (--trim auto unless given) less half of
+    /// this thickness, in the cloud's unit, and the mesh is the closed shell
+    #[arg(long, value_name = "off|THICKNESS", default_value = "off")]
+    pub sheet: Sheet,
     /// Distance from the surface up to which φ is computed, in the cloud's unit
     #[arg(long, value_name = "H|full", default_value = "full")]
     pub band: Band,
@@ -130,6 +140,8 @@ impl MethodArgs {
             .surface(self.surface)
             .solve(self.solve)
             .walls(self.walls)
+            .trim(self.trim)
+            .sheet(self.sheet)
             .band(self.band)
     }
 }

@@ -48,7 +48,7 @@ fn the_folder_gets_its_five_files_and_the_report_its_fields() {
     let report = sandbox.json("out/new/report.json");
     assert_keys(
         &report,
-        "version backend input grid outliers normals orientation smoothing iso_value surface surface_spacing surface_cells walls sdf seconds peak_memory_bytes warnings",
+        "version backend input grid outliers normals orientation smoothing iso_value surface surface_spacing surface_cells walls trim sdf seconds peak_memory_bytes warnings",
     );
     assert_keys(&report["input"], "path points");
     assert_keys(&report["grid"], "shape origin spacing");
@@ -252,6 +252,42 @@ fn outliers_are_left_out_with_a_warning_unless_they_are_to_be_kept() {
     let report = sandbox.json("r.json");
     assert_eq!(report["outliers"]["count"], 0);
     assert!(report["grid"]["spacing"].as_f64() > Some(1.0));
+}
+
+#[test]
+fn trim_opens_the_mesh_and_a_sheet_has_a_closed_shell() {
+    let sandbox = sphere();
+    let whole = isograd_io::read_geometry(&sandbox.path("cloud.ply")).expect("reads");
+    let above = whole.points.iter().filter(|p| p[2] > 0.0);
+    let text: String = above
+        .map(|[x, y, z]| format!("{x:?} {y:?} {z:?}\n"))
+        .collect();
+    sandbox.write("bowl.xyz", text);
+    let line = "reconstruct bowl.xyz -q --resolution 40 --report r.json --mesh m.ply";
+    let closed = |more: &str| {
+        sandbox.done(&format!("{line} {more}"));
+        let report = sandbox.json("r.json");
+        (
+            report["surface"]["closed"].as_bool(),
+            report["trim"].clone(),
+        )
+    };
+    assert_eq!(closed(""), (Some(true), serde_json::Value::Null));
+    let (is_closed, trim) = closed("--trim 0.1");
+    assert_eq!(
+        (is_closed, trim["distance"].as_f64()),
+        (Some(false), Some(0.1))
+    );
+    assert!(trim["faces"].as_u64() > Some(10));
+    assert_eq!(closed("--sheet 0.2").0, Some(true));
+    for (option, text) in [
+        ("--trim none", "trim is 'none'"),
+        ("--sheet=-1", "sheet is '-1'"),
+    ] {
+        let ran = sandbox.run(&format!("{line} {option}"));
+        assert_eq!(ran.status, Some(2));
+        assert!(ran.stderr.contains(text), "{}", ran.stderr);
+    }
 }
 
 #[test]

@@ -28,6 +28,9 @@ pub enum Error {
         "the walls are 'closed', which a device does not have: give 'free' or 'auto', or compute on the CPU"
     )]
     Walls,
+    /// Trimmed surfaces and sheets.
+    #[error("a device has neither trim nor sheet: give 'off' for both, or compute on the CPU")]
+    Open,
     /// The device.
     #[error(transparent)]
     Device(#[from] crate::Error),

@@ -8,6 +8,7 @@
 //! # What differs from the CPU
 //! - The surface is found on the grid of φ, also with [`Auto`](isograd::SurfaceResolution::Auto); a spacing or a factor is
 //!   an error. The solve is dense; [`Sparse`](isograd::Solve::Sparse) is an error.
+//! - [`trim`](isograd::isosurface::trim) and [`sheet`](isograd::sheet) are errors.
 //! - Walls are free, also with [`Auto`](isograd::poisson::Walls::Auto); closed ones are an error.
 //! - The signs of [`Method::Auto`](isograd::orient::Method::Auto) and
 //!   [`Method::Sensors`](isograd::orient::Method::Sensors), and the radii with them, are found on the CPU.

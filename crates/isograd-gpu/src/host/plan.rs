@@ -4,8 +4,10 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Instant;
 
+use isograd::isosurface::trim::Trim;
 use isograd::orient::Method;
 use isograd::poisson::Walls;
+use isograd::sheet::Sheet;
 use isograd::{
     Backend, Grid, Options, PointCloud, Report, Saved, Seconds, Solve, Stage, SurfaceResolution,
 };
@@ -42,6 +44,9 @@ impl<T: Number> Plan<T> {
         }
         if options.walls == Walls::Closed {
             return Err(Error::Walls);
+        }
+        if options.trim != Trim::Off || options.sheet != Sheet::Off {
+            return Err(Error::Open);
         }
         let device = T::open(backend, grid, (&options).into())?;
         Ok(Self {

@@ -509,6 +509,8 @@ fn what_devices_do_not_have_is_named() {
     };
     let text = refused(options().screening(-1.0));
     assert!(text.contains("0 or more"), "{text}");
+    let text = refused(options().trim(isograd::isosurface::trim::Trim::Auto));
+    assert!(text.contains("neither trim nor sheet"), "{text}");
     let text = refused(options().walls(Walls::Closed));
     assert!(text.contains("give 'free'"), "{text}");
     let text = refused(options().surface(SurfaceResolution::Factor(2.0)));

@@ -152,7 +152,7 @@ impl<'a> Check<'a> {
             between: places.map(|x| x.map(between)).collect(),
             counts: [result.neighbor_counts(), result.axis_counts()].concat(),
             normals: result.normals().to_vec(),
-            surface: held.then(|| (result.mesh().clone(), result.closest().to_vec())),
+            surface: held.then(|| (result.closest_mesh().clone(), result.closest().to_vec())),
         })
     }
 

@@ -50,6 +50,7 @@ mod signs;
 mod tables;
 #[cfg(test)]
 mod tests;
+pub mod trim;
 
 pub use crate::element::crossing::crossing;
 pub use march::{Scratch, forward};

@@ -83,7 +83,7 @@ impl<T: Real> Reconstruction<T> {
 
     pub(super) fn surface(&self) -> Surface<'_, T> {
         Surface {
-            mesh: &self.mesh,
+            mesh: self.distance_mesh(),
             phi: &self.sdf,
             closest: &self.closest,
         }

@@ -3,7 +3,7 @@
 use super::{MemoryError, Solve, SurfaceResolution};
 use crate::data::GridError;
 use crate::report::Stage;
-use crate::{distance, isosurface, neighbors, orient, poisson, splat};
+use crate::{distance, isosurface, neighbors, orient, poisson, sheet, splat};
 
 /// Declares [`Options`] with a default and a setter of the same name for each field.
 macro_rules! options {
@@ -53,6 +53,10 @@ options! {
     solve: Solve = Solve::default(),
     /// Condition of the indicator at the walls of the grid.
     walls: poisson::Walls = poisson::Walls::default(),
+    /// Removal of the faces of the mesh that have no samples nearby. φ is not changed by it.
+    trim: isosurface::trim::Trim = isosurface::trim::Trim::default(),
+    /// Whether the surface is a sheet, such as a membrane or a sail. Its mesh is trimmed, automatically if trimming is off.
+    sheet: sheet::Sheet = sheet::Sheet::default(),
     /// Use of samples that are isolated and far from all others.
     outliers: crate::Outliers = crate::Outliers::default(),
     /// Region in which φ is computed.
@@ -84,6 +88,25 @@ pub enum Error {
     /// The grid of the surface has too many or too small cells.
     #[error("the grid of the surface: {0}")]
     Grid(#[from] GridError),
+    /// The distance of the trim is out of range.
+    #[error(
+        "the trim is {0:?}; give a finite distance above 0 in the cloud's unit, 'auto' or 'off'"
+    )]
+    Trim(isosurface::trim::Trim),
+    /// The thickness of the sheet is out of range.
+    #[error("the sheet is {0:?}; give a finite thickness above 0 in the cloud's unit, or 'off'")]
+    Sheet(sheet::Sheet),
+    /// The trim leaves nothing.
+    #[error(
+        "no face of the surface is within {distance} of samples, so nothing is left of it; use a larger trim"
+    )]
+    Trimmed {
+        /// Distance of the trim.
+        distance: f64,
+    },
+    /// The shell of a sheet.
+    #[error(transparent)]
+    Shell(#[from] sheet::Error),
     /// The screening is negative or not finite.
     #[error("the screening is {0}; it must be 0 or more, and finite")]
     Screening(f64),
@@ -92,6 +115,12 @@ pub enum Error {
         "a screening of {0} needs the dense solve; leave the solve 'auto' or 'dense', or the screening 0"
     )]
     SparseScreening(f64),
+    /// A screened equation has free walls.
+    #[error("a screening of {0} needs free walls; leave the walls 'free', or the screening 0")]
+    ClosedScreening(f64),
+    /// A sheet has no sparse solve.
+    #[error("the shell of a sheet needs the dense solve; leave the solve 'auto' or 'dense'")]
+    SparseSheet,
     /// Neighbors.
     #[error(transparent)]
     Neighbors(#[from] neighbors::Error),

@@ -96,13 +96,21 @@ impl<T: Real> Reconstruction<T> {
         out: &mut CloudCotangent<T>,
     ) -> Result<(), PullbackError> {
         scratch.start(cotangent, self.points.len(), self.mesh.vertices().len());
+        let mut of_mesh = GridCotangent::default();
         out.guarded = 0;
+        if let Some(bars) = cotangent.vertices {
+            let PullbackScratch {
+                vertices, distance, ..
+            } = scratch;
+            (of_mesh, out.guarded) = self.pull_mesh(bars, distance, vertices);
+        }
         let ratio = self.surface_grid().spacing().f64() / self.sdf.grid().spacing().f64();
         self.pull_extensions(cotangent, scratch, out)?;
         if cotangent.reaches_indicator() {
             self.pull_distance(cotangent, scratch);
             // From the cell size of the grid of φ to that of the grid of the surface, and back at the end.
             scratch.samples.grid.spacing /= ratio;
+            scratch.samples.grid.add(&of_mesh);
             self.pull_indicator(cotangent, scratch, out)?;
             scratch.samples.grid.spacing *= ratio;
         }
@@ -142,7 +150,7 @@ impl<T: Real> Reconstruction<T> {
             };
             extend::pullback(&inputs, found)?;
             attribute.clone_from(&found.attribute);
-            add(vertices, &found.vertices, vector::add);
+            self.pull_distance_mesh(&found.vertices, vertices);
             add(&mut samples.points, &found.points, vector::add);
             add(&mut samples.areas, &found.areas, |a, b| a + b);
             samples.grid.add(&GridCotangent {
@@ -163,15 +171,7 @@ impl<T: Real> Reconstruction<T> {
             distance,
             ..
         } = scratch;
-        let grid = lattice::pullback(
-            &self.mesh,
-            &self.sdf,
-            &self.closest,
-            sdf,
-            distance,
-            vertices,
-        );
-        samples.grid.add(&grid);
+        samples.grid.add(&self.pull_sdf(sdf, distance, vertices));
     }
 
     /// From the vertices, the indicator and the iso-value to points, normals and areas.
@@ -351,12 +351,7 @@ impl<T: Real> PullbackScratch<T> {
         );
         fill(&mut samples.areas, cotangent.areas, points, T::zero());
         samples.grid = GridCotangent::default();
-        fill(
-            &mut self.vertices,
-            cotangent.vertices,
-            vertices,
-            [T::zero(); 3],
-        );
+        fill(&mut self.vertices, None, vertices, [T::zero(); 3]);
     }
 
     /// A field on the grid of `chi` with the given values, or zeros, in the memory of the last one.

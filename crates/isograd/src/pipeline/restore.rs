@@ -81,13 +81,11 @@ impl<T: Pipeline> Reconstructor<T> {
         // The pullback needs residuals of the indicator before the local iso-value was subtracted.
         self.solve(None)?;
         self.isosurface()?;
-        let Reconstruction {
-            sdf, mesh, closest, ..
-        } = &mut self.result;
+        let Reconstruction { sdf, closest, .. } = &mut self.result;
         sdf.values_mut().copy_from_slice(saved.sdf);
         closest.clear();
         closest.extend_from_slice(saved.closest);
-        let faces = mesh.faces().len();
+        let faces = self.result.closest_mesh().faces().len();
         if closest
             .iter()
             .any(|&f| f != NO_TRIANGLE && f as usize >= faces)

@@ -61,7 +61,11 @@ impl<T: Real> Reconstruction<T> {
             return Err(PullbackError::SparseIndicator);
         }
         let cells = [&self.sdf, &self.indicator].map(|field| field.values().len());
-        cotangent.check(cells, self.mesh.vertices().len(), self.selection.samples())?;
+        cotangent.check(
+            cells,
+            self.mesh().vertices().len(),
+            self.selection.samples(),
+        )?;
         if self.selection.is_all() {
             return self.pull_used(cotangent, scratch, out);
         }

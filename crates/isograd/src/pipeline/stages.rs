@@ -6,11 +6,12 @@ use super::surface::with_shape;
 use super::{Error, Reconstruction, Reconstructor, Residuals, Solve, check_memory};
 use crate::data::cells::{Cells, CellsMut};
 use crate::data::{Field, Grid, PointCloud};
+use crate::isosurface::measure;
 use crate::isosurface::{Level, local_level};
 use crate::neighbors::{Neighborhoods, Radius};
 use crate::poisson::screened;
 use crate::report::{Report, Stage, Warning};
-use crate::{Real, distance, isosurface, neighbors, normals, orient, poisson, splat};
+use crate::{Real, distance, isosurface, neighbors, normals, orient, poisson, sheet, splat};
 
 impl<T: Real> Reconstructor<T> {
     /// One stage, compiled where it is called: see [`concrete`](super::concrete).
@@ -114,6 +115,9 @@ impl<T: Real> Reconstructor<T> {
             Some(held) => held.has_closed_walls(),
             None => options.walls.are_closed(points, sdf.grid()),
         };
+        if closed && options.screening > 0.0 {
+            return Err(Error::ClosedScreening(options.screening));
+        }
         report.walls = if closed { "closed" } else { "free" };
         report.surface_spacing = grid.spacing().f64();
         if octaves > 0 {
@@ -154,9 +158,12 @@ impl<T: Real> Reconstructor<T> {
             ));
         }
         let solve = match options.solve {
-            _ if options.screening == 0.0 => options.solve,
-            Solve::Sparse => return Err(Error::SparseScreening(options.screening)),
-            _ => Solve::Dense,
+            Solve::Sparse if options.screening > 0.0 => {
+                return Err(Error::SparseScreening(options.screening));
+            }
+            Solve::Sparse if options.sheet != Sheet::Off => return Err(Error::SparseSheet),
+            Solve::Auto if options.screening > 0.0 || options.sheet != Sheet::Off => Solve::Dense,
+            solve => solve,
         };
         let spacing = self.result.sample_spacing();
         options.surface.grid_and_octaves(sdf.grid(), spacing, solve)
@@ -317,7 +324,7 @@ impl<T: Real> Reconstructor<T> {
         if found.touches_wall {
             report.warnings.push(Warning::TouchesWall);
         }
-        Ok(())
+        self.open()
     }
 
     fn distance(&mut self) -> Result<(), Error> {
@@ -327,10 +334,17 @@ impl<T: Real> Reconstructor<T> {
             sparse,
             iso_value,
             mesh,
+            open,
             sdf,
             closest,
             ..
         } = &mut self.result;
+        if let (Some(open), Some(thickness)) = (open, options.sheet.thickness()) {
+            let scratch = &mut self.scratch.distance;
+            let sheet = open.trimmed();
+            sheet::forward(sheet, thickness, options.band, scratch, sdf, closest)?;
+            return Ok(());
+        }
         let chi: Cells<'_, T> = match sparse {
             Some(sparse) => (&sparse.chi).into(),
             None => (&*indicator).into(),
@@ -356,6 +370,7 @@ impl<T: Real> Reconstructor<T> {
             points,
             sdf,
             mesh,
+            open,
             orientation,
             residuals,
             report,
@@ -363,7 +378,13 @@ impl<T: Real> Reconstructor<T> {
         } = &mut self.result;
         let neighborhoods = &residuals.neighborhoods;
         let scratch = &mut self.scratch.measure;
-        report.check_field(points, &orientation.normals, sdf, mesh, scratch);
+        match open.as_deref() {
+            Some(open) if open.is_sheet() => report.measure_field(sdf),
+            _ => report.check_field(points, &orientation.normals, sdf, mesh, scratch),
+        }
+        if let Some(open) = open {
+            report.surface = measure::measure(open.mesh(), scratch);
+        }
         report.check_samples(points, neighborhoods, orientation);
     }
 }

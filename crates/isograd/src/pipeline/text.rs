@@ -12,9 +12,11 @@ use crate::backend::Backend;
 use crate::data::Outliers;
 use crate::distance::Band;
 use crate::isosurface::Level;
+use crate::isosurface::trim::Trim;
 use crate::neighbors::Radius;
 use crate::orient::{Method, ParityOptions};
 use crate::poisson::{Smoothing, Walls};
+use crate::sheet::Sheet;
 use crate::splat::Weights;
 
 /// A text that is no value of an option.
@@ -100,6 +102,13 @@ from_str!(Walls, "walls", "'auto', 'free' or 'closed'", {
     "free" => Self::Free,
     "closed" => Self::Closed,
 });
+from_str!(Trim, "trim", "a finite distance above 0, 'auto' or 'off'", {
+    "off" => Self::Off,
+    "auto" => Self::Auto,
+}, |distance: f64| distance > 0.0 => Self::Distance);
+from_str!(Sheet, "sheet", "a finite thickness above 0, or 'off'", {
+    "off" => Self::Off,
+}, |thickness: f64| thickness > 0.0 => Self::Thickness);
 from_str!(Outliers, "outliers", "'ignore' or 'keep'", {
     "ignore" => Self::Ignore,
     "keep" => Self::Keep,
@@ -154,6 +163,8 @@ deserialize!(
     SurfaceResolution,
     Solve,
     Walls,
+    Trim,
+    Sheet,
     Outliers,
     Band,
     Backend
@@ -167,8 +178,8 @@ mod tests {
     #[test]
     fn options_read_from_json_with_the_names_of_the_command_line() {
         let text = r#"{"radius": 0.1, "orient": "signs", "splat": "paper", "area": false, "smoothing": 0,
-            "screening": 4, "level": "thin", "surface": "1.5x", "solve": "sparse", "walls": "free", "outliers": "keep",
-            "band": 0.30000000000000004, "checks": false}"#;
+            "screening": 4, "level": "thin", "surface": "1.5x", "solve": "sparse", "walls": "free", "trim": 0.5, "sheet": 1,
+            "outliers": "keep", "band": 0.30000000000000004, "checks": false}"#;
         let options: Options = serde_json::from_str(text).expect("valid");
         let expected = Options::default()
             .radius(Radius::Fixed(0.1))
@@ -181,6 +192,8 @@ mod tests {
             .surface(SurfaceResolution::Factor(1.5))
             .solve(Solve::Sparse)
             .walls(Walls::Free)
+            .trim(Trim::Distance(0.5))
+            .sheet(Sheet::Thickness(1.0))
             .outliers(Outliers::Keep)
             .band(Band::Within(0.1 + 0.2))
             .checks(false);

@@ -9,15 +9,15 @@ const REACH: f64 = 3.5;
 /// Condition of the indicator χ at the walls of the grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Walls {
-    /// [`Self::Free`] if a sample lies within 3.5 cells (of φ) of a wall, which is never so on a fitted grid, else
-    /// [`Self::Closed`].
-    #[default]
-    Auto,
     /// No flux, so that the surface may pass through a wall, at right angles: for half of a body that ends there. Holes in
     /// the samples may lead the surface to a wall.
+    #[default]
     Free,
     /// χ is 0, which is outside: the surface never reaches a wall.
     Closed,
+    /// [`Self::Free`] if a sample lies within 3.5 cells (of φ) of a wall, which is never so on a fitted grid, else
+    /// [`Self::Closed`].
+    Auto,
 }
 
 impl Walls {

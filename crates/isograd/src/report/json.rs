@@ -72,8 +72,15 @@ struct Reconstructed {
     smoothing: f64,
     walls: &'static str,
     iso_value: f64,
+    trim: Option<Trim>,
     surface: Surface,
     sdf: Sdf,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize)]
+struct Trim {
+    distance: f64,
+    faces: usize,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -121,6 +128,9 @@ impl JsonReport {
                 smoothing: report.smoothing,
                 walls: report.walls,
                 iso_value: report.iso_value,
+                trim: report
+                    .trim
+                    .map(|(distance, faces)| Trim { distance, faces }),
                 surface: surface(&report.surface),
                 sdf: Sdf {
                     min: report.sdf_min,

@@ -190,9 +190,6 @@ fn hashes<T: Pipeline>(samples: &[([f64; 3], [f64; 3])], options: &Options) -> [
     let cloud = cloud.with_normals(normals).expect("one normal a point");
     let grid = Grid::fit(&cloud, Resolution::Cells(44), T::of(0.15)).expect("a grid");
     let mut options = options.clone().surface(SurfaceResolution::Grid);
-    if options.walls == Walls::Auto {
-        options.walls = Walls::Free;
-    }
     if let Band::Within(cells) = options.band {
         options.band = Band::Within(cells * grid.spacing().f64());
     }
