@@ -86,7 +86,8 @@ impl<T: Pipeline> Reconstructor<T> {
         closest.clear();
         closest.extend_from_slice(saved.closest);
         let faces = self.result.closest_mesh().faces().len();
-        if closest
+        if saved
+            .closest
             .iter()
             .any(|&f| f != NO_TRIANGLE && f as usize >= faces)
         {

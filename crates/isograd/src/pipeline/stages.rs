@@ -11,7 +11,8 @@ use crate::isosurface::{Level, local_level};
 use crate::neighbors::{Neighborhoods, Radius};
 use crate::poisson::screened;
 use crate::report::{Report, Stage, Warning};
-use crate::{Real, distance, isosurface, neighbors, normals, orient, poisson, sheet, splat};
+use crate::sheet::{self, Sheet};
+use crate::{Real, distance, isosurface, neighbors, normals, orient, poisson, splat};
 
 impl<T: Real> Reconstructor<T> {
     /// One stage, compiled where it is called: see [`concrete`](super::concrete).

@@ -166,7 +166,7 @@ impl<T: Real> Axis<T> {
 }
 
 /// Wave number of place `k` of a transformed line of `n`: with closed walls the sines are in reverse order.
-fn wave(k: usize, n: usize, closed: bool) -> usize {
+pub(super) fn wave(k: usize, n: usize, closed: bool) -> usize {
     if closed { n - k } else { k }
 }
 

@@ -51,15 +51,20 @@ fn near_samples<T: Real>(points: &[[T; 3]], cells: usize) -> Arc<Blocks> {
 }
 
 /// Largest and rms difference from the dense solution in the blocks.
-fn errors<T: Real>(cells: usize, octaves: usize, smoothing: f64, axes: [f64; 3]) -> [f64; 3] {
+fn errors<T: Real>(
+    [cells, octaves]: [usize; 2],
+    closed: bool,
+    smoothing: f64,
+    axes: [f64; 3],
+) -> [f64; 3] {
     let (points, mut b) = ellipsoid::<T>(cells, axes, 40 * cells * cells / 48);
     let sets = Octaves::new(near_samples(&points, cells), octaves);
     let blocks = &sets.0[0];
     let mut values = vec![T::zero(); blocks.nodes()];
     blocks.read_dense(b.values(), &mut values);
-    let mut pyramid = Pyramid::new([cells; 3], octaves, false, smoothing);
+    let mut pyramid = Pyramid::new([cells; 3], octaves, closed, smoothing);
     pyramid.solve(&sets, &mut values).expect("sizes match");
-    let plan = Plan::<T>::new([cells; 3]);
+    let plan = Plan::<T>::with_walls([cells; 3], closed);
     plan.solve(b.values_mut(), smoothing, &mut Scratch::default())
         .expect("sizes match");
     let mut dense = vec![T::zero(); blocks.nodes()];
@@ -74,18 +79,24 @@ fn errors<T: Real>(cells: usize, octaves: usize, smoothing: f64, axes: [f64; 3])
 
 #[test]
 fn solution_near_the_samples_is_that_of_the_dense_solve() {
-    for (cells, octaves) in [(96, 1), (96, 2), (192, 2)] {
+    for (cells, octaves, closed) in [
+        (96, 1, false),
+        (96, 2, false),
+        (96, 2, true),
+        (192, 2, false),
+    ] {
         let size = cells as f64;
         for axes in [[0.33, 0.3, 0.25], [0.4, 0.2, 0.008]] {
             for smoothing in [0.0, 0.8, 2.0] {
-                let found = errors::<f64>(cells, octaves, smoothing, axes.map(|a| a * size));
-                println!("{cells} {octaves} {axes:?} {smoothing}: {found:?}");
+                let axes = axes.map(|a| a * size);
+                let found = errors::<f64>([cells, octaves], closed, smoothing, axes);
+                println!("{cells} {octaves} {closed} {axes:?} {smoothing}: {found:?}");
                 // The jump is 1. Cut at the halo, 4 widths off, and images of the splines.
                 assert!(found[0] < 1e-4, "{found:?}");
             }
         }
     }
-    let found = errors::<f32>(96, 1, 0.8, [30.0, 25.0, 20.0]);
+    let found = errors::<f32>([96, 1], false, 0.8, [30.0, 25.0, 20.0]);
     println!("f32: {found:?}");
     assert!(found[0] < 1e-4, "{found:?}");
 }
@@ -95,7 +106,12 @@ fn map_is_its_own_transpose() {
     let cells = 96;
     let (points, _) = ellipsoid::<f64>(cells, [40.0, 43.0, 9.0], 2000);
     let sets = Octaves::new(near_samples(&points, cells), 2);
-    let mut pyramid = Pyramid::new([cells; 3], 2, false, 0.7);
+    for closed in [false, true] {
+        map_is_symmetric(&sets, &mut Pyramid::new([cells; 3], 2, closed, 0.7));
+    }
+}
+
+fn map_is_symmetric(sets: &Octaves, pyramid: &mut Pyramid<f64>) {
     let mut random = Random::new(11);
     let mut numbers = || -> Vec<f64> {
         let count = sets.0[0].nodes();
@@ -104,7 +120,7 @@ fn map_is_its_own_transpose() {
     let [u, v] = [numbers(), numbers()];
     let mut solved = |values: &[f64]| {
         let mut values = values.to_vec();
-        pyramid.solve(&sets, &mut values).expect("sizes match");
+        pyramid.solve(sets, &mut values).expect("sizes match");
         values
     };
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
