@@ -263,8 +263,7 @@ fn trim_opens_the_mesh_and_a_sheet_has_a_closed_shell() {
         .map(|[x, y, z]| format!("{x:?} {y:?} {z:?}\n"))
         .collect();
     sandbox.write("bowl.xyz", text);
-    let line =
-        "reconstruct bowl.xyz -q --resolution 40 --walls closed --report r.json --mesh m.ply";
+    let line = "reconstruct bowl.xyz -q --padding 0.3 --walls closed --report r.json --mesh m.ply";
     let closed = |more: &str| {
         sandbox.done(&format!("{line} {more}"));
         let report = sandbox.json("r.json");
