@@ -7,14 +7,16 @@ use isograd_gpu::splat::area;
 use isograd_gpu::{Device, Scalar, neighbors};
 
 use crate::clouds::{Cloud, clouds, real, relative};
-use crate::devices::{Numbers, in_each_number, on_each_device, tolerance};
+use crate::devices::{Numbers, tests, tolerance};
 
-#[test]
-fn areas_and_their_pullback_are_those_of_the_cpu() {
-    in_each_number!(check_areas);
+tests! {
+    in_each_number:
+        areas_and_their_pullback_are_those_of_the_cpu,
+        the_pullback_is_the_one_printed_where_every_radius_is_another;
+    on_each_device: no_points_have_no_areas;
 }
 
-fn check_areas<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn areas_and_their_pullback_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
     let mut isolated = 0;
     for cloud in clouds::<T>() {
         let Cloud {
@@ -63,13 +65,10 @@ fn numbers_over<T: Scalar>(numbers: &mut Numbers, radius: f64) -> T {
     real(numbers.signed() / radius)
 }
 
-#[test]
-fn the_pullback_is_the_one_printed_where_every_radius_is_another() {
-    in_each_number!(check_printed);
-}
-
 /// Sums over all pairs in double precision.
-fn check_printed<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn the_pullback_is_the_one_printed_where_every_radius_is_another<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+) {
     let n = 307;
     let mut numbers = Numbers(19);
     let points: Vec<[T; 3]> = (0..n)
@@ -103,12 +102,7 @@ fn check_printed<R: Runtime, T: Scalar>(device: &Device<R>) {
     assert!(error <= tolerance::<T>(), "{error:e}");
 }
 
-#[test]
-fn no_points_have_no_areas() {
-    on_each_device!(check_empty);
-}
-
-fn check_empty<R: Runtime>(device: &Device<R>) {
+fn no_points_have_no_areas<R: Runtime>(device: &Device<R>) {
     let none = device.upload::<f32>(&[]).unwrap();
     let near = neighbors::forward(device, &none, &none).unwrap();
     assert!(near.is_empty());

@@ -43,39 +43,39 @@ impl Numbers {
     }
 }
 
-/// Runs a function that is generic over the number type in single precision, to 1e-4, and where the device has
-/// it in double, to 1e-10: `in_both_numbers!(device, function)` calls `function::<R, T>(device, tolerance)`.
-macro_rules! in_both_numbers {
-    ($device:expr, $function:ident) => {{
-        $function::<R, f32>($device, $crate::devices::tolerance::<f32>());
-        match $device.check_number::<f64>() {
-            Ok(()) => $function::<R, f64>($device, $crate::devices::tolerance::<f64>()),
-            Err(reason) => println!("SKIPPED in f64: {reason}"),
-        }
-    }};
-}
-
-pub(crate) use in_both_numbers;
-
-/// Runs a check that is generic over the number type in single precision, and where the device has it in
-/// double: `in_each_number!(device, check)` calls `check::<R, T>(device)`; without a device, on all of them.
+/// Runs a check that is generic over the number type in single precision, and in double on devices that have it:
+/// `in_each_number!(check)` calls `check::<R, T>(device)` on every device.
 macro_rules! in_each_number {
     ($check:ident) => {{
         fn run<R: cubecl::prelude::Runtime>(device: &isograd_gpu::Device<R>) {
-            $crate::devices::in_each_number!(device, $check);
+            $check::<_, f32>(device);
+            match device.check_number::<f64>() {
+                Ok(()) => $check::<_, f64>(device),
+                Err(reason) => println!("SKIPPED in f64: {reason}"),
+            }
         }
         $crate::devices::on_each_device!(run);
-    }};
-    ($device:expr, $check:ident) => {{
-        $check::<_, f32>($device);
-        match $device.check_number::<f64>() {
-            Ok(()) => $check::<_, f64>($device),
-            Err(reason) => println!("SKIPPED in f64: {reason}"),
-        }
     }};
 }
 
 pub(crate) use in_each_number;
+
+/// A test for each function, run by [`on_each_device`] or [`in_each_number`]: `tests! { on_each_device: first, second; }`.
+macro_rules! tests {
+    ($($runner:ident: $($check:ident),+;)+) => {
+        mod on_devices {
+            $($(
+                #[test]
+                fn $check() {
+                    use super::$check as check;
+                    $crate::devices::$runner!(check);
+                }
+            )+)+
+        }
+    };
+}
+
+pub(crate) use tests;
 
 /// What a stage may differ by from the CPU.
 pub fn tolerance<T: isograd::Real>() -> f64 {

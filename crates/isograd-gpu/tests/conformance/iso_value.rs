@@ -7,8 +7,13 @@ use isograd_gpu::isosurface::iso_value::{forward, pullback};
 use isograd_gpu::splat::{self, SampleCotangent, Weights};
 use isograd_gpu::{Device, Error, Scalar};
 
-use crate::devices::{Numbers, in_both_numbers, on_each_device};
+use crate::devices::{Numbers, tests, tolerance};
 use crate::samples::{Cloud, assert_near, distance, report, upload_cotangent};
+
+tests! {
+    on_each_device: there_is_no_value_without_area;
+    in_each_number: values_are_those_of_the_cpu, pullbacks_are_those_of_the_cpu;
+}
 
 /// Cells, samples, and samples in one cell.
 const CLOUDS: [([usize; 3], usize, usize); 4] = [
@@ -24,16 +29,8 @@ fn noise<T: Scalar>(cloud: &Cloud<T>, seed: u64) -> Field<T> {
     Field::new(cloud.grid, values.collect()).expect("sizes match")
 }
 
-#[test]
-fn values_are_those_of_the_cpu() {
-    on_each_device!(check_values);
-}
-
-fn check_values<R: Runtime>(device: &Device<R>) {
-    in_both_numbers!(device, check_values_in);
-}
-
-fn check_values_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
+fn values_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
+    let tolerance = tolerance::<T>();
     for (shape, count, crowd) in CLOUDS {
         let mut cloud = Cloud::<T>::new(shape, count, crowd);
         // Beyond the outermost cell centers and the walls, where the field goes on as a constant.
@@ -83,16 +80,8 @@ fn check_values_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
     }
 }
 
-#[test]
-fn pullbacks_are_those_of_the_cpu() {
-    on_each_device!(check_pullbacks);
-}
-
-fn check_pullbacks<R: Runtime>(device: &Device<R>) {
-    in_both_numbers!(device, check_pullbacks_in);
-}
-
-fn check_pullbacks_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
+fn pullbacks_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
+    let tolerance = tolerance::<T>();
     for (shape, count, crowd) in CLOUDS {
         let cloud = Cloud::<T>::new(shape, count, crowd);
         let mut numbers = Numbers(17);
@@ -164,12 +153,7 @@ fn pull_on_device<R: Runtime, T: Scalar>(
     (device.download(&chi_bar).unwrap(), out)
 }
 
-#[test]
-fn there_is_no_value_without_area() {
-    on_each_device!(check_no_area);
-}
-
-fn check_no_area<R: Runtime>(device: &Device<R>) {
+fn there_is_no_value_without_area<R: Runtime>(device: &Device<R>) {
     let mut cloud = Cloud::<f32>::new([9, 8, 7], 4, 0);
     let chi = device.upload(noise(&cloud, 1).values()).unwrap();
     let mut value = |points: usize, areas: &[f32]| {

@@ -6,7 +6,16 @@ use isograd::{Field, Grid, Mesh};
 use isograd_gpu::isosurface::{Error, Plan, Residual, Surface, forward, forward_at, pullback};
 use isograd_gpu::{Device, Scalar};
 
-use crate::devices::{Numbers, in_each_number, on_each_device};
+use crate::devices::{Numbers, tests};
+
+tests! {
+    in_each_number: surfaces_are_those_of_the_cpu, pullbacks_are_those_of_the_cpu;
+    on_each_device:
+        noise_of_any_shape_has_the_faces_of_the_cpu,
+        more_groups_than_one_dimension_has_are_reached, two_runs_give_the_same_bits,
+        what_has_no_surface_is_refused_in_the_words_of_the_cpu,
+        arrays_that_do_not_fit_are_refused;
+}
 
 /// Values at the cell centers of a grid that is not at the origin.
 fn field<T: Scalar>(shape: [usize; 3], f: impl FnMut([f64; 3]) -> f64) -> Field<T> {
@@ -87,16 +96,7 @@ fn fields<T: Scalar>() -> Vec<(&'static str, Field<T>, f64)> {
     ]
 }
 
-#[test]
-fn surfaces_are_those_of_the_cpu() {
-    on_each_device!(check_surfaces);
-}
-
-fn check_surfaces<R: Runtime>(device: &Device<R>) {
-    in_each_number!(device, compare_surfaces);
-}
-
-fn compare_surfaces<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn surfaces_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
     let mut worst = 0.0f64;
     for (name, chi, level) in fields::<T>().into_iter().chain([far_away()]) {
         let (mesh, report) = on_cpu(&chi, T::of(level));
@@ -128,12 +128,7 @@ fn far_away<T: Scalar>() -> (&'static str, Field<T>, f64) {
     ("far away", chi, 0.05)
 }
 
-#[test]
-fn noise_of_any_shape_has_the_faces_of_the_cpu() {
-    on_each_device!(check_shapes);
-}
-
-fn check_shapes<R: Runtime>(device: &Device<R>) {
+fn noise_of_any_shape_has_the_faces_of_the_cpu<R: Runtime>(device: &Device<R>) {
     let mut numbers = Numbers(77);
     for seed in 0..40 {
         let mut side = |most: u32| (2 + numbers.bits() % most) as usize;
@@ -150,13 +145,8 @@ fn check_shapes<R: Runtime>(device: &Device<R>) {
     }
 }
 
-#[test]
-fn more_groups_than_one_dimension_has_are_reached() {
-    on_each_device!(check_many_groups);
-}
-
 /// Rows of two cells fill words of 32: 65,700 groups of 256 units.
-fn check_many_groups<R: Runtime>(device: &Device<R>) {
+fn more_groups_than_one_dimension_has_are_reached<R: Runtime>(device: &Device<R>) {
     let chi = field::<f32>([720, 730, 2], waves);
     let (mesh, report) = on_cpu(&chi, 0.0);
     let (surface, residual) = made(device, &chi, 0.0);
@@ -193,16 +183,7 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |m, v| m.max(v.abs()))
 }
 
-#[test]
-fn pullbacks_are_those_of_the_cpu() {
-    on_each_device!(check_pullbacks);
-}
-
-fn check_pullbacks<R: Runtime>(device: &Device<R>) {
-    in_each_number!(device, compare_pullbacks);
-}
-
-fn compare_pullbacks<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn pullbacks_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
     let mut worst = [0.0f64; 3];
     let mut guarded = 0;
     for (name, chi, level) in fields::<T>().into_iter().chain([nearly_flat()]) {
@@ -257,12 +238,7 @@ fn nearly_flat<T: Scalar>() -> (&'static str, Field<T>, f64) {
     ("nearly flat", chi, 0.0)
 }
 
-#[test]
-fn two_runs_give_the_same_bits() {
-    on_each_device!(check_bits);
-}
-
-fn check_bits<R: Runtime>(device: &Device<R>) {
+fn two_runs_give_the_same_bits<R: Runtime>(device: &Device<R>) {
     let chi = field::<f32>([31, 30, 45], noise(9));
     let run = || {
         let (surface, residual) = made(device, &chi, 0.0);
@@ -275,12 +251,7 @@ fn check_bits<R: Runtime>(device: &Device<R>) {
     assert!(run() == run());
 }
 
-#[test]
-fn what_has_no_surface_is_refused_in_the_words_of_the_cpu() {
-    on_each_device!(check_refusals);
-}
-
-fn check_refusals<R: Runtime>(device: &Device<R>) {
+fn what_has_no_surface_is_refused_in_the_words_of_the_cpu<R: Runtime>(device: &Device<R>) {
     let refused = |chi: &Field<f32>, level: f32| {
         let plan = Plan::new(device).expect("a plan");
         let values = device.upload(chi.values()).expect("a field");
@@ -309,12 +280,7 @@ fn check_refusals<R: Runtime>(device: &Device<R>) {
     refused(&field([5, 6, 7], |_| 1.0), 1.0);
 }
 
-#[test]
-fn arrays_that_do_not_fit_are_refused() {
-    on_each_device!(check_lengths);
-}
-
-fn check_lengths<R: Runtime>(device: &Device<R>) {
+fn arrays_that_do_not_fit_are_refused<R: Runtime>(device: &Device<R>) {
     let chi = field::<f32>([5, 6, 7], |x| x[0] + 0.5);
     let plan = Plan::new(device).expect("a plan");
     let short = device.upload(&chi.values()[2..]).expect("an array");

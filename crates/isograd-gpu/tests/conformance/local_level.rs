@@ -10,8 +10,14 @@ use isograd_gpu::isosurface::local_level::{Options, Residual, forward, pullback}
 use isograd_gpu::splat::{self, SampleCotangent};
 use isograd_gpu::{Buffer, Device, Scalar};
 
-use crate::devices::{Numbers, in_both_numbers, in_each_number, on_each_device};
+use crate::devices::{Numbers, tests, tolerance};
 use crate::samples::{Cloud, OnDevice, assert_near, distance, report, upload_cotangent};
+
+tests! {
+    in_each_number:
+        values_are_those_of_the_cpu, pullbacks_are_those_of_the_cpu,
+        where_nothing_is_followed_nothing_changes;
+}
 
 /// Samples of a torus, and an indicator that is a little off on it.
 struct Setting<T> {
@@ -189,16 +195,8 @@ fn for_each_setting<T: Scalar>(mut check: impl FnMut(Setting<T>)) {
     }
 }
 
-#[test]
-fn values_are_those_of_the_cpu() {
-    on_each_device!(check_values);
-}
-
-fn check_values<R: Runtime>(device: &Device<R>) {
-    in_both_numbers!(device, check_values_in);
-}
-
-fn check_values_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
+fn values_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
+    let tolerance = tolerance::<T>();
     let mut passes = 0;
     for_each_setting::<T>(|setting| {
         let expected = setting.run_on_cpu();
@@ -221,16 +219,8 @@ fn check_values_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
     assert_eq!(passes, 3);
 }
 
-#[test]
-fn pullbacks_are_those_of_the_cpu() {
-    on_each_device!(check_pullbacks);
-}
-
-fn check_pullbacks<R: Runtime>(device: &Device<R>) {
-    in_both_numbers!(device, check_pullbacks_in);
-}
-
-fn check_pullbacks_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
+fn pullbacks_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
+    let tolerance = tolerance::<T>();
     for_each_setting::<T>(|setting| {
         // In double precision: of thousands of samples in a cell, the CPU's sums in single precision are further off.
         let expected = setting.exactly().pull_on_cpu().rounded();
@@ -387,13 +377,8 @@ impl<T: Scalar> Pulled<T> {
     }
 }
 
-#[test]
-fn where_nothing_is_followed_nothing_changes() {
-    in_each_number!(check_nothing_followed);
-}
-
 /// Samples whose normals point to where `χ` falls, one sample, which nothing foretells, and no samples.
-fn check_nothing_followed<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn where_nothing_is_followed_nothing_changes<R: Runtime, T: Scalar>(device: &Device<R>) {
     let options = Options {
         area: true,
         smoothing: 0.5,

@@ -6,15 +6,19 @@ use isograd_element::vector;
 use isograd_gpu::{Device, Scalar, neighbors, normals};
 
 use crate::clouds::{Cloud, clouds, real, relative};
-use crate::devices::{Numbers, in_each_number, on_each_device, tolerance};
+use crate::devices::{Numbers, tests, tolerance};
 
-#[test]
-fn neighbors_are_those_of_a_plain_loop() {
-    in_each_number!(check_counts);
+tests! {
+    in_each_number:
+        neighbors_are_those_of_a_plain_loop, axes_and_planes_are_those_of_the_cpu,
+        the_pullback_is_that_of_the_cpu,
+        the_pullback_is_the_one_printed_where_every_radius_is_another,
+        lines_and_heaps_are_guarded_and_finite;
+    on_each_device: two_runs_give_the_same_bits, lengths_that_do_not_fit_are_refused;
 }
 
 /// Radii of all sizes; sizes round those of leaves and of full trees.
-fn check_counts<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn neighbors_are_those_of_a_plain_loop<R: Runtime, T: Scalar>(device: &Device<R>) {
     for n in [0, 1, 2, 7, 8, 9, 31, 32, 33, 128, 129, 512, 513, 2053] {
         let mut numbers = Numbers(n as u64);
         let points: Vec<[T; 3]> = (0..n)
@@ -47,12 +51,7 @@ fn check_counts<R: Runtime, T: Scalar>(device: &Device<R>) {
     }
 }
 
-#[test]
-fn axes_and_planes_are_those_of_the_cpu() {
-    in_each_number!(check_planes);
-}
-
-fn check_planes<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn axes_and_planes_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
     for cloud in clouds::<T>() {
         let Cloud { name, axes, .. } = &cloud;
         let radii = device.upload(&axes.radius).unwrap();
@@ -108,12 +107,7 @@ fn check_planes<R: Runtime, T: Scalar>(device: &Device<R>) {
     }
 }
 
-#[test]
-fn the_pullback_is_that_of_the_cpu() {
-    in_each_number!(check_pullback);
-}
-
-fn check_pullback<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn the_pullback_is_that_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
     for cloud in clouds::<T>() {
         let Cloud { name, axes, .. } = &cloud;
         let n = cloud.points.len();
@@ -151,13 +145,10 @@ fn check_pullback<R: Runtime, T: Scalar>(device: &Device<R>) {
     }
 }
 
-#[test]
-fn the_pullback_is_the_one_printed_where_every_radius_is_another() {
-    in_each_number!(check_printed);
-}
-
 /// Sums over all pairs in double precision, from the planes of the device.
-fn check_printed<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn the_pullback_is_the_one_printed_where_every_radius_is_another<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+) {
     let n = 251;
     let mut numbers = Numbers(17);
     let points: Vec<[T; 3]> = (0..n)
@@ -210,15 +201,10 @@ fn check_printed<R: Runtime, T: Scalar>(device: &Device<R>) {
     assert!(error <= tolerance::<T>(), "{error:e}");
 }
 
-#[test]
-fn lines_and_heaps_are_guarded_and_finite() {
-    in_each_number!(check_guarded);
-}
-
 /// A name, and its points by number.
 type Heap = (&'static str, fn(usize) -> [f64; 3]);
 
-fn check_guarded<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn lines_and_heaps_are_guarded_and_finite<R: Runtime, T: Scalar>(device: &Device<R>) {
     let clouds: [Heap; 4] = [
         ("line", |i| [i as f64, 2.0 * i as f64, 0.0]),
         ("all in one place", |_| [3.0, -1.0, 2.0]),
@@ -248,12 +234,7 @@ fn check_guarded<R: Runtime, T: Scalar>(device: &Device<R>) {
     }
 }
 
-#[test]
-fn two_runs_give_the_same_bits() {
-    on_each_device!(check_bits);
-}
-
-fn check_bits<R: Runtime>(device: &Device<R>) {
+fn two_runs_give_the_same_bits<R: Runtime>(device: &Device<R>) {
     let cloud = &clouds::<f32>()[0];
     let run = || {
         let radii = device.upload(&cloud.axes.radius).unwrap();
@@ -268,12 +249,7 @@ fn check_bits<R: Runtime>(device: &Device<R>) {
     assert_eq!(run(), run());
 }
 
-#[test]
-fn lengths_that_do_not_fit_are_refused() {
-    on_each_device!(check_lengths);
-}
-
-fn check_lengths<R: Runtime>(device: &Device<R>) {
+fn lengths_that_do_not_fit_are_refused<R: Runtime>(device: &Device<R>) {
     let (points, radii) = (
         device.upload(&[0f32; 12]).unwrap(),
         device.upload(&[1f32; 4]).unwrap(),

@@ -8,7 +8,17 @@ use isograd_gpu::orient::{self, Error, Method, given};
 use isograd_gpu::{Device, Scalar, neighbors};
 
 use crate::clouds::{Cloud, clouds, real, relative};
-use crate::devices::{Numbers, in_each_number, on_each_device, tolerance};
+use crate::devices::{Numbers, tests, tolerance};
+
+tests! {
+    in_each_number:
+        parities_are_those_of_the_cpu, given_sides_are_those_of_the_cpu,
+        given_normals_and_their_pullback_are_those_of_the_cpu;
+    on_each_device:
+        rays_through_the_center_of_a_sphere_are_not_much_work,
+        options_and_clouds_that_the_cpu_refuses_are_refused,
+        given_normals_without_a_direction_are_refused_by_number;
+}
 
 /// What the CPU makes of a cloud's axes.
 fn expected<T: Scalar>(
@@ -25,14 +35,9 @@ fn expected<T: Scalar>(
     Ok(found)
 }
 
-#[test]
-fn parities_are_those_of_the_cpu() {
-    in_each_number!(check_parity);
-}
-
 /// In single precision, rounding decides about probes that a sample is just in reach of: the CPU places them in
 /// double.
-fn check_parity<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn parities_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
     let fine = ParityOptions {
         gamma: 1.0,
         tolerance: 3,
@@ -76,14 +81,9 @@ fn check_parity<R: Runtime, T: Scalar>(device: &Device<R>) {
     );
 }
 
-#[test]
-fn rays_through_the_center_of_a_sphere_are_not_much_work() {
-    on_each_device!(check_sphere);
-}
-
 /// From the center all samples are about equally far: a search for the nearest would look at all of them from
 /// every ray.
-fn check_sphere<R: Runtime>(device: &Device<R>) {
+fn rays_through_the_center_of_a_sphere_are_not_much_work<R: Runtime>(device: &Device<R>) {
     let mut numbers = Numbers(31);
     let n = 6_000;
     let points: Vec<[f32; 3]> = (0..n)
@@ -119,12 +119,7 @@ fn check_sphere<R: Runtime>(device: &Device<R>) {
     assert_eq!(normals, run());
 }
 
-#[test]
-fn options_and_clouds_that_the_cpu_refuses_are_refused() {
-    on_each_device!(check_refused);
-}
-
-fn check_refused<R: Runtime>(device: &Device<R>) {
+fn options_and_clouds_that_the_cpu_refuses_are_refused<R: Runtime>(device: &Device<R>) {
     let cloud = &clouds::<f32>()[2];
     let refusal = |cloud: &Cloud<f32>, options| {
         let expected = expected(cloud, None, cpu::Method::Parity(options)).unwrap_err();
@@ -167,12 +162,7 @@ fn vectors<T: Scalar>(n: usize) -> Vec<[T; 3]> {
     (0..n).map(&mut vector).collect()
 }
 
-#[test]
-fn given_sides_are_those_of_the_cpu() {
-    in_each_number!(check_signs);
-}
-
-fn check_signs<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn given_sides_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
     let cloud = &clouds::<T>()[1];
     let vectors = vectors::<T>(cloud.points.len());
     let expected = expected(cloud, Some(&vectors), cpu::Method::Signs).unwrap();
@@ -196,12 +186,9 @@ fn check_signs<R: Runtime, T: Scalar>(device: &Device<R>) {
     assert!(expected.flipped > vectors.len() / 4);
 }
 
-#[test]
-fn given_normals_and_their_pullback_are_those_of_the_cpu() {
-    in_each_number!(check_given);
-}
-
-fn check_given<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn given_normals_and_their_pullback_are_those_of_the_cpu<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+) {
     let vectors = vectors::<T>(1003);
     let given = device.upload(vectors.as_flattened()).unwrap();
     let normals = given::forward(device, &given).unwrap();
@@ -233,12 +220,7 @@ fn check_given<R: Runtime, T: Scalar>(device: &Device<R>) {
     assert!(given::pullback(device, &given, &none).is_err());
 }
 
-#[test]
-fn given_normals_without_a_direction_are_refused_by_number() {
-    on_each_device!(check_directions);
-}
-
-fn check_directions<R: Runtime>(device: &Device<R>) {
+fn given_normals_without_a_direction_are_refused_by_number<R: Runtime>(device: &Device<R>) {
     for bad in [[0.0; 3], [f32::NAN, 1.0, 0.0], [1.0, 0.0, f32::INFINITY]] {
         for index in [0, 517, 1002] {
             let mut vectors = vectors::<f32>(1003);

@@ -11,7 +11,12 @@ use isograd_gpu::{Device, Scalar, neighbors};
 use isograd_shapes::Sampling;
 
 use crate::clouds::{Cloud, clouds, real, relative};
-use crate::devices::{in_each_number, on_each_device, tolerance};
+use crate::devices::{tests, tolerance};
+
+tests! {
+    in_each_number: sides_of_the_step_before_are_those_of_the_cpu;
+    on_each_device: a_body_that_turns_keeps_its_sides_on_the_device;
+}
 
 /// The body as it is, and with one in fifty of its points swapped with points elsewhere.
 fn moved<T: Scalar>(cloud: &Cloud<T>) -> Cloud<T> {
@@ -23,12 +28,7 @@ fn moved<T: Scalar>(cloud: &Cloud<T>) -> Cloud<T> {
     Cloud::of(cloud.name, points)
 }
 
-#[test]
-fn sides_of_the_step_before_are_those_of_the_cpu() {
-    in_each_number!(check_previous);
-}
-
-fn check_previous<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn sides_of_the_step_before_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
     let mut all_turned = 0;
     for cloud in &clouds::<T>()[..3] {
         let name = cloud.name;
@@ -92,12 +92,7 @@ fn check_previous<R: Runtime, T: Scalar>(device: &Device<R>) {
     assert!(all_turned > 20, "{all_turned}");
 }
 
-#[test]
-fn a_body_that_turns_keeps_its_sides_on_the_device() {
-    on_each_device!(check_turning);
-}
-
-fn check_turning<R: Runtime>(device: &Device<R>) {
+fn a_body_that_turns_keeps_its_sides_on_the_device<R: Runtime>(device: &Device<R>) {
     let shape = isograd_shapes::by_name("torus").unwrap();
     let samples = shape.sample::<f32>(2000, &Sampling::default(), 3).unwrap();
     let turned = |angle: f32, vectors: &[[f32; 3]]| -> Vec<[f32; 3]> {

@@ -13,11 +13,13 @@ use isograd_gpu::{Device, Scalar, orient};
 use isograd_shapes::Sampling;
 
 use crate::clouds::{real, relative};
-use crate::devices::{Numbers, in_each_number, on_each_device};
+use crate::devices::{Numbers, tests};
 
-#[test]
-fn phi_and_its_gradient_are_those_of_the_cpu() {
-    in_each_number!(compare);
+tests! {
+    in_each_number:
+        phi_and_its_gradient_are_those_of_the_cpu,
+        what_the_device_finds_and_holds_is_what_the_cpu_finds;
+    on_each_device: points_outside_the_grid_are_named;
 }
 
 fn cloud<T: Scalar>(name: &str, count: usize) -> PointCloud<T> {
@@ -122,7 +124,7 @@ impl<T: Scalar> Bars<T> {
     }
 }
 
-fn compare<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn phi_and_its_gradient_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
     // Of the whole chain; gradients pass twice as many stages.
     let tolerance = if T::NAME == "f32" { 1e-4 } else { 1e-10 };
     for Case {
@@ -234,29 +236,22 @@ fn weights<T: Scalar>(phi: &[T], spacing: f64) -> Vec<T> {
         .collect()
 }
 
-#[test]
-fn points_outside_the_grid_are_named() {
-    fn check<R: Runtime>(device: &Device<R>) {
-        let cloud = cloud::<f32>("torus", 500);
-        let grid = Grid::new([0.0; 3], 0.1, [12, 12, 12]).unwrap();
-        let plan = pipeline::Reconstructor::new(device.clone(), grid, Default::default()).unwrap();
-        let held = RadiiAndSigns::find(device, &cloud, Radius::Auto, &Method::Auto).unwrap();
-        let points = device.upload(cloud.points().as_flattened()).unwrap();
-        match plan.reconstruct(&points, &held) {
-            Err(Error::Outside { count, first }) => assert!(count > 100 && first < 500),
-            other => panic!("{:?}", other.err()),
-        }
+fn points_outside_the_grid_are_named<R: Runtime>(device: &Device<R>) {
+    let cloud = cloud::<f32>("torus", 500);
+    let grid = Grid::new([0.0; 3], 0.1, [12, 12, 12]).unwrap();
+    let plan = pipeline::Reconstructor::new(device.clone(), grid, Default::default()).unwrap();
+    let held = RadiiAndSigns::find(device, &cloud, Radius::Auto, &Method::Auto).unwrap();
+    let points = device.upload(cloud.points().as_flattened()).unwrap();
+    match plan.reconstruct(&points, &held) {
+        Err(Error::Outside { count, first }) => assert!(count > 100 && first < 500),
+        other => panic!("{:?}", other.err()),
     }
-    on_each_device!(check);
-}
-
-#[test]
-fn what_the_device_finds_and_holds_is_what_the_cpu_finds() {
-    in_each_number!(compare_held);
 }
 
 /// Points go to the device, and nothing else does.
-fn compare_held<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn what_the_device_finds_and_holds_is_what_the_cpu_finds<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+) {
     let (tight, loose): (f64, f64) = if T::NAME == "f32" {
         (1e-5, 2e-4)
     } else {

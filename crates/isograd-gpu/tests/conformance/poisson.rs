@@ -5,7 +5,16 @@ use isograd::poisson::{Plan, Scratch, smoothing};
 use isograd_gpu::poisson::{Solver, forward, pullback};
 use isograd_gpu::{Device, Error, Scalar};
 
-use crate::devices::{Numbers, in_both_numbers, on_each_device};
+use crate::devices::{Numbers, tests, tolerance};
+
+tests! {
+    on_each_device:
+        stencil_gives_back_the_right_hand_side,
+        constant_part_of_the_right_hand_side_is_ignored, second_solve_has_the_same_bits,
+        what_does_not_fit_is_refused_and_no_cells_are_solved,
+        values_that_are_not_finite_spread;
+    in_each_number: solutions_are_those_of_the_cpu, pullback_is_the_transpose;
+}
 
 /// Powers of two, factors of every pass, primes with a pass of their own and without, lines longer than the shared
 /// memory, single cells.
@@ -59,15 +68,8 @@ fn dot<T: Scalar>(a: &[T], b: &[T]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.f64() * b.f64()).sum()
 }
 
-#[test]
-fn solutions_are_those_of_the_cpu() {
-    fn check<R: Runtime>(device: &Device<R>) {
-        in_both_numbers!(device, check_solutions);
-    }
-    on_each_device!(check);
-}
-
-fn check_solutions<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
+fn solutions_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
+    let tolerance = tolerance::<T>();
     let mut worst = [0.0f64; 2];
     for (seed, shape) in SHAPES.into_iter().enumerate() {
         let b: Vec<T> = noise(shape.iter().product(), seed as u64);
@@ -131,35 +133,24 @@ fn stencil(chi: &[f64], shape: [usize; 3]) -> Vec<f64> {
     out
 }
 
-#[test]
-fn stencil_gives_back_the_right_hand_side() {
-    fn check<R: Runtime>(device: &Device<R>) {
-        for shape in [[20, 24, 30], [11, 131, 8]] {
-            let cells: usize = shape.iter().product();
-            let mut b: Vec<f32> = noise(cells, 7);
-            let mean = b.iter().sum::<f32>() / cells as f32;
-            b.iter_mut().for_each(|v| *v -= mean);
-            let solver = Solver::new(device, shape).unwrap();
-            let chi = solver.solve(device, &device.upload(&b).unwrap(), 0.0);
-            let chi: Vec<f32> = device.download(&chi.unwrap()).unwrap();
-            let chi: Vec<f64> = chi.into_iter().map(f64::from).collect();
-            // Rounding in f32 of χ, which is some tens of times as large as b.
-            let error = error(&b, &stencil(&chi, shape));
-            assert!(error < 1e-4, "{shape:?}: {error:e}");
-        }
+fn stencil_gives_back_the_right_hand_side<R: Runtime>(device: &Device<R>) {
+    for shape in [[20, 24, 30], [11, 131, 8]] {
+        let cells: usize = shape.iter().product();
+        let mut b: Vec<f32> = noise(cells, 7);
+        let mean = b.iter().sum::<f32>() / cells as f32;
+        b.iter_mut().for_each(|v| *v -= mean);
+        let solver = Solver::new(device, shape).unwrap();
+        let chi = solver.solve(device, &device.upload(&b).unwrap(), 0.0);
+        let chi: Vec<f32> = device.download(&chi.unwrap()).unwrap();
+        let chi: Vec<f64> = chi.into_iter().map(f64::from).collect();
+        // Rounding in f32 of χ, which is some tens of times as large as b.
+        let error = error(&b, &stencil(&chi, shape));
+        assert!(error < 1e-4, "{shape:?}: {error:e}");
     }
-    on_each_device!(check);
 }
 
-#[test]
-fn pullback_is_the_transpose() {
-    fn check<R: Runtime>(device: &Device<R>) {
-        in_both_numbers!(device, check_pullback);
-    }
-    on_each_device!(check);
-}
-
-fn check_pullback<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
+fn pullback_is_the_transpose<R: Runtime, T: Scalar>(device: &Device<R>) {
+    let tolerance = tolerance::<T>();
     for shape in [
         [9, 12, 7],
         [10, 131, 21],
@@ -194,85 +185,69 @@ fn check_pullback<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
     }
 }
 
-#[test]
-fn constant_part_of_the_right_hand_side_is_ignored() {
-    fn check<R: Runtime>(device: &Device<R>) {
-        let shape = [6, 10, 149];
-        let b: Vec<f32> = noise(6 * 10 * 149, 8);
-        let shifted: Vec<f32> = b.iter().map(|v| v + 0.75).collect();
-        let solver = Solver::new(device, shape).unwrap();
-        let solve = |b: &[f32]| {
-            let chi = solver.solve(device, &device.upload(b).unwrap(), 0.5);
-            device.download(&chi.unwrap()).unwrap()
-        };
-        let chi: Vec<f64> = solve(&b).into_iter().map(f64::from).collect();
-        let error = error(&solve(&shifted), &chi);
-        assert!(error < 1e-4, "{error:e}");
-        let largest = chi.iter().fold(0.0f64, |a, v| a.max(v.abs()));
-        let mean = chi.iter().sum::<f64>() / chi.len() as f64;
-        assert!(mean.abs() < 1e-5 * largest);
-    }
-    on_each_device!(check);
+fn constant_part_of_the_right_hand_side_is_ignored<R: Runtime>(device: &Device<R>) {
+    let shape = [6, 10, 149];
+    let b: Vec<f32> = noise(6 * 10 * 149, 8);
+    let shifted: Vec<f32> = b.iter().map(|v| v + 0.75).collect();
+    let solver = Solver::new(device, shape).unwrap();
+    let solve = |b: &[f32]| {
+        let chi = solver.solve(device, &device.upload(b).unwrap(), 0.5);
+        device.download(&chi.unwrap()).unwrap()
+    };
+    let chi: Vec<f64> = solve(&b).into_iter().map(f64::from).collect();
+    let error = error(&solve(&shifted), &chi);
+    assert!(error < 1e-4, "{error:e}");
+    let largest = chi.iter().fold(0.0f64, |a, v| a.max(v.abs()));
+    let mean = chi.iter().sum::<f64>() / chi.len() as f64;
+    assert!(mean.abs() < 1e-5 * largest);
 }
 
-#[test]
-fn second_solve_has_the_same_bits() {
-    fn check<R: Runtime>(device: &Device<R>) {
-        for shape in [[24, 40, 64], [37, 5, 48]] {
-            let b: Vec<f32> = noise(shape.iter().product(), 3);
-            let run = || {
-                let solver = Solver::new(device, shape).unwrap();
-                let b = device.upload(&b).unwrap();
-                let (chi, residual) = forward(device, &solver, &b, 0.4).unwrap();
-                let pulled = pullback(device, &solver, &residual, &b).unwrap();
-                let [chi, sigma] = [&chi, &pulled.smoothing].map(|v| device.download(v).unwrap());
-                let bits = chi.into_iter().chain(sigma).map(f32::to_bits);
-                bits.collect::<Vec<u32>>()
-            };
-            assert_eq!(run(), run());
-        }
-    }
-    on_each_device!(check);
-}
-
-#[test]
-fn what_does_not_fit_is_refused_and_no_cells_are_solved() {
-    fn check<R: Runtime>(device: &Device<R>) {
-        let solver = Solver::<f32>::new(device, [3, 4, 5]).unwrap();
-        let b = device.upload(&[1.0f32; 59]).unwrap();
-        let refused = solver.solve(device, &b, 0.0);
-        assert!(matches!(refused, Err(Error::Length { found: 59, .. })));
-        let b = device.upload(&[1.0f32; 60]).unwrap();
-        for sigma in [-1.0, f64::NAN, f64::INFINITY] {
-            let refused = solver.solve(device, &b, sigma);
-            assert!(matches!(refused, Err(Error::Smoothing { .. })));
-        }
-        let (_, residual) = forward(device, &solver, &b, 1.0).unwrap();
-        let cotangent = device.upload(&[1.0f32; 61]).unwrap();
-        let refused = pullback(device, &solver, &residual, &cotangent);
-        assert!(matches!(refused, Err(Error::Length { found: 61, .. })));
-
-        let solver = Solver::<f32>::new(device, [0, 4, 5]).unwrap();
-        let none = device.empty(0).unwrap();
-        let (chi, residual) = forward(device, &solver, &none, 1.0).unwrap();
-        let pulled = pullback(device, &solver, &residual, &none).unwrap();
-        assert!(chi.is_empty() && pulled.b.is_empty());
-        assert_eq!(device.download(&pulled.smoothing).unwrap(), [0.0]);
-    }
-    on_each_device!(check);
-}
-
-#[test]
-fn values_that_are_not_finite_spread() {
-    fn check<R: Runtime>(device: &Device<R>) {
-        for shape in [[7, 8, 9], [1, 1, 1], [3, 37, 2]] {
-            let mut b = vec![0.0f32; shape.iter().product()];
-            b[0] = f32::NAN;
+fn second_solve_has_the_same_bits<R: Runtime>(device: &Device<R>) {
+    for shape in [[24, 40, 64], [37, 5, 48]] {
+        let b: Vec<f32> = noise(shape.iter().product(), 3);
+        let run = || {
             let solver = Solver::new(device, shape).unwrap();
-            let chi = solver.solve(device, &device.upload(&b).unwrap(), 0.0);
-            let chi = device.download(&chi.unwrap()).unwrap();
-            assert!(chi.iter().all(|v| v.is_nan()), "{shape:?}");
-        }
+            let b = device.upload(&b).unwrap();
+            let (chi, residual) = forward(device, &solver, &b, 0.4).unwrap();
+            let pulled = pullback(device, &solver, &residual, &b).unwrap();
+            let [chi, sigma] = [&chi, &pulled.smoothing].map(|v| device.download(v).unwrap());
+            let bits = chi.into_iter().chain(sigma).map(f32::to_bits);
+            bits.collect::<Vec<u32>>()
+        };
+        assert_eq!(run(), run());
     }
-    on_each_device!(check);
+}
+
+fn what_does_not_fit_is_refused_and_no_cells_are_solved<R: Runtime>(device: &Device<R>) {
+    let solver = Solver::<f32>::new(device, [3, 4, 5]).unwrap();
+    let b = device.upload(&[1.0f32; 59]).unwrap();
+    let refused = solver.solve(device, &b, 0.0);
+    assert!(matches!(refused, Err(Error::Length { found: 59, .. })));
+    let b = device.upload(&[1.0f32; 60]).unwrap();
+    for sigma in [-1.0, f64::NAN, f64::INFINITY] {
+        let refused = solver.solve(device, &b, sigma);
+        assert!(matches!(refused, Err(Error::Smoothing { .. })));
+    }
+    let (_, residual) = forward(device, &solver, &b, 1.0).unwrap();
+    let cotangent = device.upload(&[1.0f32; 61]).unwrap();
+    let refused = pullback(device, &solver, &residual, &cotangent);
+    assert!(matches!(refused, Err(Error::Length { found: 61, .. })));
+
+    let solver = Solver::<f32>::new(device, [0, 4, 5]).unwrap();
+    let none = device.empty(0).unwrap();
+    let (chi, residual) = forward(device, &solver, &none, 1.0).unwrap();
+    let pulled = pullback(device, &solver, &residual, &none).unwrap();
+    assert!(chi.is_empty() && pulled.b.is_empty());
+    assert_eq!(device.download(&pulled.smoothing).unwrap(), [0.0]);
+}
+
+fn values_that_are_not_finite_spread<R: Runtime>(device: &Device<R>) {
+    for shape in [[7, 8, 9], [1, 1, 1], [3, 37, 2]] {
+        let mut b = vec![0.0f32; shape.iter().product()];
+        b[0] = f32::NAN;
+        let solver = Solver::new(device, shape).unwrap();
+        let chi = solver.solve(device, &device.upload(&b).unwrap(), 0.0);
+        let chi = device.download(&chi.unwrap()).unwrap();
+        assert!(chi.iter().all(|v| v.is_nan()), "{shape:?}");
+    }
 }

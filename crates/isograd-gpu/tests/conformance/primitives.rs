@@ -5,14 +5,13 @@ use isograd_gpu::Device;
 use isograd_gpu::primitives::scan::exclusive_sum;
 use isograd_gpu::primitives::sort::{order, starts};
 
-use crate::devices::{Numbers, on_each_device};
+use crate::devices::{Numbers, tests};
 
-#[test]
-fn exclusive_sums_are_those_of_a_loop() {
-    on_each_device!(check_sums);
+tests! {
+    on_each_device: exclusive_sums_are_those_of_a_loop, orders_are_stable;
 }
 
-fn check_sums<R: Runtime>(device: &Device<R>) {
+fn exclusive_sums_are_those_of_a_loop<R: Runtime>(device: &Device<R>) {
     for count in [0, 1, 255, 256, 257, 65_535, 65_536, 1_000_003] {
         let mut numbers = Numbers(count as u64);
         let values: Vec<u32> = (0..count).map(|_| numbers.bits() % 5).collect();
@@ -26,12 +25,7 @@ fn check_sums<R: Runtime>(device: &Device<R>) {
     }
 }
 
-#[test]
-fn orders_are_stable() {
-    on_each_device!(check_orders);
-}
-
-fn check_orders<R: Runtime>(device: &Device<R>) {
+fn orders_are_stable<R: Runtime>(device: &Device<R>) {
     for (count, limit) in [(0, 7), (1, 1), (300, 1), (1000, 17), (70_001, 1 << 20)] {
         let mut numbers = Numbers(count as u64);
         let keys: Vec<u32> = (0..count).map(|_| numbers.bits() % limit).collect();

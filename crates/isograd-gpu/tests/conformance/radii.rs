@@ -7,7 +7,14 @@ use isograd_gpu::neighbors::radius::{self, Error};
 use isograd_gpu::{Device, Scalar, neighbors, normals};
 
 use crate::clouds::{Cloud, clouds, real};
-use crate::devices::{Numbers, in_each_number, on_each_device};
+use crate::devices::{Numbers, tests};
+
+tests! {
+    in_each_number: radii_are_those_of_the_cpu, wider_radii_are_those_of_the_cpu;
+    on_each_device:
+        bad_clouds_are_refused_in_the_words_of_the_cpu,
+        heaps_take_no_quadratic_time_and_two_runs_give_the_same_bits;
+}
 
 /// Both sides of a plate that is one and a half spacings thick; with noise, of which one in ten has much, and far
 /// from the origin.
@@ -32,13 +39,8 @@ fn rounding<T: Scalar>() -> f64 {
     if T::NAME == "f32" { 1e-5 } else { 1e-12 }
 }
 
-#[test]
-fn radii_are_those_of_the_cpu() {
-    in_each_number!(check_radii);
-}
-
 /// Even and uneven clouds, and heaps of equal points.
-fn check_radii<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn radii_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
     let mut all: Vec<(&str, Vec<[T; 3]>)> = clouds::<T>()
         .into_iter()
         .map(|cloud| (cloud.name, cloud.points))
@@ -94,13 +96,8 @@ fn check_radii<R: Runtime, T: Scalar>(device: &Device<R>) {
     assert!(isolated >= 2, "{isolated} isolated points");
 }
 
-#[test]
-fn wider_radii_are_those_of_the_cpu() {
-    in_each_number!(check_widened);
-}
-
 /// Where the roughness is within rounding of a limit, one of the two may take a radius that the other leaves.
-fn check_widened<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn wider_radii_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
     let mut all = clouds::<T>();
     for (name, noise) in [("plate", 0.0), ("plate with noise", 0.004)] {
         all.push(Cloud::of(name, plate(3_001, noise)));
@@ -133,12 +130,7 @@ fn check_widened<R: Runtime, T: Scalar>(device: &Device<R>) {
     assert!(10 * wider > points, "{wider} of {points} wider");
 }
 
-#[test]
-fn bad_clouds_are_refused_in_the_words_of_the_cpu() {
-    on_each_device!(check_refused);
-}
-
-fn check_refused<R: Runtime>(device: &Device<R>) {
+fn bad_clouds_are_refused_in_the_words_of_the_cpu<R: Runtime>(device: &Device<R>) {
     let refusal = |points: &[[f32; 3]], rule| {
         let expected = cpu::forward(points, rule, &mut Default::default()).unwrap_err();
         let buffer = device.upload(points.as_flattened()).unwrap();
@@ -174,13 +166,8 @@ fn check_refused<R: Runtime>(device: &Device<R>) {
     ));
 }
 
-#[test]
-fn heaps_take_no_quadratic_time_and_two_runs_give_the_same_bits() {
-    on_each_device!(check_heaps);
-}
-
 /// A walk over all equal points from each of them would take hours.
-fn check_heaps<R: Runtime>(device: &Device<R>) {
+fn heaps_take_no_quadratic_time_and_two_runs_give_the_same_bits<R: Runtime>(device: &Device<R>) {
     let mut points = vec![[0.5f32; 3]; 40_000];
     points[7] = [1e6; 3];
     points[8] = [1e6, 0.0, 3.0];

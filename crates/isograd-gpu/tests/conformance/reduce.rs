@@ -5,19 +5,16 @@ use isograd_gpu::primitives::fill;
 use isograd_gpu::primitives::reduce::{sum, sum_columns};
 use isograd_gpu::{Device, Error, Scalar};
 
-use crate::devices::{Numbers, in_both_numbers, on_each_device};
+use crate::devices::{Numbers, tests, tolerance};
 use crate::samples::distance;
 
-#[test]
-fn sums_are_those_of_a_loop() {
-    on_each_device!(check_sums);
+tests! {
+    on_each_device: rows_that_are_not_whole_are_refused, arrays_are_added_number_by_number;
+    in_each_number: sums_are_those_of_a_loop;
 }
 
-fn check_sums<R: Runtime>(device: &Device<R>) {
-    in_both_numbers!(device, check_sums_in);
-}
-
-fn check_sums_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
+fn sums_are_those_of_a_loop<R: Runtime, T: Scalar>(device: &Device<R>) {
+    let tolerance = tolerance::<T>();
     for (rows, columns) in [
         (0, 1),
         (1, 1),
@@ -59,12 +56,7 @@ fn check_sums_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
     }
 }
 
-#[test]
-fn rows_that_are_not_whole_are_refused() {
-    on_each_device!(check_refusals);
-}
-
-fn check_refusals<R: Runtime>(device: &Device<R>) {
+fn rows_that_are_not_whole_are_refused<R: Runtime>(device: &Device<R>) {
     let values = device.upload(&[1.0f32; 7]).unwrap();
     let refused = sum_columns(device, &values, 2).map(|_| ());
     assert!(matches!(refused, Err(Error::Length { found: 7, .. })));
@@ -80,12 +72,7 @@ fn check_refusals<R: Runtime>(device: &Device<R>) {
     ));
 }
 
-#[test]
-fn arrays_are_added_number_by_number() {
-    on_each_device!(check_additions);
-}
-
-fn check_additions<R: Runtime>(device: &Device<R>) {
+fn arrays_are_added_number_by_number<R: Runtime>(device: &Device<R>) {
     let values: Vec<f32> = (0..1000).map(|i| i as f32).collect();
     let buffer = device.upload(&values).unwrap();
     let out = fill::zeros(device, 1000).unwrap();

@@ -5,8 +5,17 @@ use isograd::Field;
 use isograd_gpu::splat::{Refused, SampleCotangent, Weights, forward, pullback};
 use isograd_gpu::{Device, Error, Scalar};
 
-use crate::devices::{Numbers, in_both_numbers, on_each_device};
+use crate::devices::{Numbers, tests, tolerance};
 use crate::samples::{Cloud, assert_near, upload_cotangent};
+
+tests! {
+    on_each_device:
+        samples_exactly_two_cells_from_the_walls_are_taken,
+        bad_samples_are_left_out_and_told_of,
+        grids_may_have_more_cells_than_one_row_of_groups,
+        arrays_that_do_not_match_are_refused;
+    in_each_number: right_hand_sides_are_those_of_the_cpu, pullbacks_are_those_of_the_cpu;
+}
 
 const BOTH: [Weights; 2] = [Weights::BSpline, Weights::Paper];
 
@@ -20,16 +29,8 @@ const CLOUDS: [([usize; 3], usize, usize); 6] = [
     ([11, 9, 13], 100, 9001),
 ];
 
-#[test]
-fn right_hand_sides_are_those_of_the_cpu() {
-    on_each_device!(check_values);
-}
-
-fn check_values<R: Runtime>(device: &Device<R>) {
-    in_both_numbers!(device, check_values_in);
-}
-
-fn check_values_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
+fn right_hand_sides_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
+    let tolerance = tolerance::<T>();
     for (shape, count, crowd) in CLOUDS {
         let cloud = Cloud::<T>::new(shape, count, crowd);
         let on_device = cloud.upload(device);
@@ -48,16 +49,8 @@ fn check_values_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
     }
 }
 
-#[test]
-fn pullbacks_are_those_of_the_cpu() {
-    on_each_device!(check_pullbacks);
-}
-
-fn check_pullbacks<R: Runtime>(device: &Device<R>) {
-    in_both_numbers!(device, check_pullbacks_in);
-}
-
-fn check_pullbacks_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
+fn pullbacks_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
+    let tolerance = tolerance::<T>();
     for (shape, count, crowd) in CLOUDS {
         let cloud = Cloud::<T>::new(shape, count, crowd);
         let on_device = cloud.upload(device);
@@ -99,12 +92,7 @@ fn assert_same_bits<R: Runtime, T: Scalar>(
     assert!(all(a) == all(b), "other bits the second time");
 }
 
-#[test]
-fn samples_exactly_two_cells_from_the_walls_are_taken() {
-    on_each_device!(check_walls);
-}
-
-fn check_walls<R: Runtime>(device: &Device<R>) {
+fn samples_exactly_two_cells_from_the_walls_are_taken<R: Runtime>(device: &Device<R>) {
     let mut cloud = Cloud::<f32>::new([9, 7, 8], 2, 0);
     cloud.points = [[2.0; 3], [7.0, 5.0, 6.0]]
         .map(|x| cloud.grid.from_index(x))
@@ -118,12 +106,7 @@ fn check_walls<R: Runtime>(device: &Device<R>) {
     }
 }
 
-#[test]
-fn bad_samples_are_left_out_and_told_of() {
-    on_each_device!(check_refusals);
-}
-
-fn check_refusals<R: Runtime>(device: &Device<R>) {
+fn bad_samples_are_left_out_and_told_of<R: Runtime>(device: &Device<R>) {
     let good = Cloud::<f32>::new([21, 9, 12], 300, 0);
     let mut cloud = Cloud::<f32>::new([21, 9, 12], 300, 0);
     let outside = [
@@ -168,12 +151,7 @@ fn check_refusals<R: Runtime>(device: &Device<R>) {
     }
 }
 
-#[test]
-fn grids_may_have_more_cells_than_one_row_of_groups() {
-    on_each_device!(check_large_grids);
-}
-
-fn check_large_grids<R: Runtime>(device: &Device<R>) {
+fn grids_may_have_more_cells_than_one_row_of_groups<R: Runtime>(device: &Device<R>) {
     // 65,792 bricks of 256 cells.
     let cloud = Cloud::<f32>::new([257, 256, 256], 3000, 0);
     let on_device = cloud.upload(device);
@@ -182,12 +160,7 @@ fn check_large_grids<R: Runtime>(device: &Device<R>) {
     assert_near("b", &device.download(&b).unwrap(), expected.values(), 1e-4);
 }
 
-#[test]
-fn arrays_that_do_not_match_are_refused() {
-    on_each_device!(check_lengths);
-}
-
-fn check_lengths<R: Runtime>(device: &Device<R>) {
+fn arrays_that_do_not_match_are_refused<R: Runtime>(device: &Device<R>) {
     let cloud = Cloud::<f32>::new([9, 9, 9], 10, 0);
     let mut on_device = cloud.upload(device);
     let good = on_device.samples();

@@ -12,8 +12,12 @@ use isograd_gpu::distance::{self, extend};
 use isograd_gpu::{Buffer, Device, Scalar};
 
 use super::{grid, meshes, upload};
-use crate::devices::{Numbers, in_both_numbers, in_each_number, on_each_device};
+use crate::devices::{Numbers, tests, tolerance};
 use crate::samples::assert_near;
+
+tests! {
+    in_each_number: values_are_those_of_the_cpu, constants_are_exact;
+}
 
 /// Samples, a surface and the grid round it, on the CPU.
 struct Scene<T> {
@@ -273,16 +277,8 @@ fn downloaded<R: Runtime, T: Scalar>(
     (extension, residual)
 }
 
-#[test]
-fn values_are_those_of_the_cpu() {
-    on_each_device!(check_values);
-}
-
-fn check_values<R: Runtime>(device: &Device<R>) {
-    in_both_numbers!(device, check_values_in);
-}
-
-fn check_values_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
+fn values_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
+    let tolerance = tolerance::<T>();
     for scene in Scene::<T>::all() {
         for (components, band) in [(1, 0.7), (3, 3.0), (6, 50.0)] {
             let attribute = scene.attribute(components);
@@ -307,12 +303,7 @@ fn check_values_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
     }
 }
 
-#[test]
-fn constants_are_exact() {
-    in_each_number!(check_constants);
-}
-
-fn check_constants<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn constants_are_exact<R: Runtime, T: Scalar>(device: &Device<R>) {
     let constant = [0.1, -3.7e5, 2.0 / 3.0, 4.0, 5e-9].map(T::of);
     for scene in Scene::<T>::all() {
         let attribute = Attribute {

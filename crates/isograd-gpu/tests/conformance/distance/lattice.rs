@@ -9,7 +9,17 @@ use isograd_gpu::distance::{self, Error};
 use isograd_gpu::{Device, Scalar};
 
 use super::{grid, meshes, signs, solve, solve_on_cpu, upload};
-use crate::devices::{in_each_number, on_each_device, tolerance};
+use crate::devices::{tests, tolerance};
+
+tests! {
+    in_each_number: distance_is_that_of_the_cpu;
+    on_each_device:
+        distance_is_that_of_all_triangles_tried, places_far_from_the_origin_lose_nothing,
+        of_equal_triangles_the_first_is_named,
+        band_is_exact_within_its_width_and_constant_beyond,
+        cell_on_the_surface_keeps_the_sign_of_its_side,
+        many_cells_and_two_runs_with_the_same_bits, bad_input_is_refused_with_a_reason;
+}
 
 /// The largest difference to the CPU's distances in cells; the signs must agree, and the faces named must be as
 /// near as those of the CPU.
@@ -32,16 +42,7 @@ fn worst<R: Runtime, T: Scalar>(device: &Device<R>, mesh: &Mesh<T>, grid: Grid<T
     worst
 }
 
-#[test]
-fn distance_is_that_of_the_cpu() {
-    on_each_device!(check_meshes);
-}
-
-fn check_meshes<R: Runtime>(device: &Device<R>) {
-    in_each_number!(device, check_meshes_in);
-}
-
-fn check_meshes_in<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn distance_is_that_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
     let coarse = grid::<T>([-1.3, -1.2, -1.1], 0.1, [26, 23, 19]);
     let fine = grid::<T>([0.1, 0.2, -0.3], 0.004, [17, 33, 5]);
     let far = grid::<T>([-9.0, -8.0, 3.0], 0.9, [20, 19, 18]);
@@ -78,12 +79,7 @@ fn check_meshes_in<R: Runtime, T: Scalar>(device: &Device<R>) {
     }
 }
 
-#[test]
-fn distance_is_that_of_all_triangles_tried() {
-    on_each_device!(check_all_triangles);
-}
-
-fn check_all_triangles<R: Runtime>(device: &Device<R>) {
+fn distance_is_that_of_all_triangles_tried<R: Runtime>(device: &Device<R>) {
     let mesh = meshes::soup::<f32>(200, 11);
     let grid = grid([-1.4, -1.2, -1.3], 0.2, [13, 11, 17]);
     let (phi, ..) = solve(device, &mesh, &signs(grid), Band::Full);
@@ -99,13 +95,8 @@ fn check_all_triangles<R: Runtime>(device: &Device<R>) {
     }
 }
 
-#[test]
-fn places_far_from_the_origin_lose_nothing() {
-    on_each_device!(check_far_from_origin);
-}
-
 /// The unit of the last place is 1/16 of a cell there: vertices are rounded, but the cells are where they are.
-fn check_far_from_origin<R: Runtime>(device: &Device<R>) {
+fn places_far_from_the_origin_lose_nothing<R: Runtime>(device: &Device<R>) {
     let base = [1e5f32, -3e5, 2e5];
     let moved = |p: [f32; 3]| std::array::from_fn(|a| base[a] + 40.0 * p[a]);
     let torus = meshes::torus::<f32>(60, 23);
@@ -116,12 +107,7 @@ fn check_far_from_origin<R: Runtime>(device: &Device<R>) {
     assert!(error <= 1e-4, "{error:e}");
 }
 
-#[test]
-fn of_equal_triangles_the_first_is_named() {
-    on_each_device!(check_first_of_equals);
-}
-
-fn check_first_of_equals<R: Runtime>(device: &Device<R>) {
+fn of_equal_triangles_the_first_is_named<R: Runtime>(device: &Device<R>) {
     let chi = signs(grid::<f32>([-1.0; 3], 0.2, [9, 10, 11]));
     for mesh in [meshes::point(700), meshes::copies(1), meshes::copies(700)] {
         let (_, closest, _) = solve(device, &mesh, &chi, Band::Full);
@@ -129,12 +115,7 @@ fn check_first_of_equals<R: Runtime>(device: &Device<R>) {
     }
 }
 
-#[test]
-fn band_is_exact_within_its_width_and_constant_beyond() {
-    on_each_device!(check_band);
-}
-
-fn check_band<R: Runtime>(device: &Device<R>) {
+fn band_is_exact_within_its_width_and_constant_beyond<R: Runtime>(device: &Device<R>) {
     let grid = grid::<f32>([-1.3, -1.2, -1.0], 0.06, [43, 40, 35]);
     let chi = signs(grid);
     for (mesh, cells) in [(meshes::soup(30, 8), 1.5), (meshes::torus(90, 31), 3.0)] {
@@ -157,12 +138,7 @@ fn check_band<R: Runtime>(device: &Device<R>) {
     }
 }
 
-#[test]
-fn cell_on_the_surface_keeps_the_sign_of_its_side() {
-    on_each_device!(check_on_surface);
-}
-
-fn check_on_surface<R: Runtime>(device: &Device<R>) {
+fn cell_on_the_surface_keeps_the_sign_of_its_side<R: Runtime>(device: &Device<R>) {
     let grid = Grid::new([-1.0f32; 3], 0.5, [4; 3]).unwrap();
     let vertices = vec![grid.center([1, 2, 1]), [9.0, 0.0, 0.0], [0.0, 9.0, 0.0]];
     let mesh = Mesh::new(vertices, vec![[0, 1, 2]]).unwrap();
@@ -173,13 +149,8 @@ fn check_on_surface<R: Runtime>(device: &Device<R>) {
     }
 }
 
-#[test]
-fn many_cells_and_two_runs_with_the_same_bits() {
-    on_each_device!(check_runs);
-}
-
 /// More groups than a dimension holds.
-fn check_runs<R: Runtime>(device: &Device<R>) {
+fn many_cells_and_two_runs_with_the_same_bits<R: Runtime>(device: &Device<R>) {
     let grid = grid::<f32>([-1.0; 3], 0.0125, [163, 161, 163]);
     assert!(grid.cells().div_ceil(64) > 65_535);
     let chi = signs(grid);
@@ -193,12 +164,7 @@ fn check_runs<R: Runtime>(device: &Device<R>) {
     }
 }
 
-#[test]
-fn bad_input_is_refused_with_a_reason() {
-    on_each_device!(check_refusals);
-}
-
-fn check_refusals<R: Runtime>(device: &Device<R>) {
+fn bad_input_is_refused_with_a_reason<R: Runtime>(device: &Device<R>) {
     let grid = grid::<f32>([-1.0; 3], 0.5, [4; 3]);
     let chi = device.upload(&[0.0f32; 64]).unwrap();
     let level = device.upload(&[0.0f32]).unwrap();

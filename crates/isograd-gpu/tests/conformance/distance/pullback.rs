@@ -7,7 +7,13 @@ use isograd_gpu::distance::lattice;
 use isograd_gpu::{Device, Scalar};
 
 use super::{grid, meshes, signs, solve};
-use crate::devices::{Numbers, in_each_number, on_each_device, tolerance};
+use crate::devices::{Numbers, tests, tolerance};
+
+tests! {
+    in_each_number: cotangents_are_those_of_the_cpu;
+    on_each_device:
+        cotangent_at_distance_zero_is_along_the_normal, cotangents_have_the_same_bits_again;
+}
 
 /// A cotangent at random, a quarter of it zero.
 fn cotangent<T: Real>(cells: usize) -> Vec<T> {
@@ -86,16 +92,7 @@ fn relative(found: &[f64], expected: &[f64]) -> f64 {
     worst / largest
 }
 
-#[test]
-fn cotangents_are_those_of_the_cpu() {
-    on_each_device!(check_meshes);
-}
-
-fn check_meshes<R: Runtime>(device: &Device<R>) {
-    in_each_number!(device, check_meshes_in);
-}
-
-fn check_meshes_in<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn cotangents_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
     let coarse = grid::<T>([-1.3, -1.2, -1.1], 0.1, [26, 23, 19]);
     let wide = grid::<T>([-1.0, -0.9, -0.8], 0.05, [41, 43, 40]);
     let far = grid::<T>([2.0, 3.0, 2.0], 0.05, [41, 43, 40]);
@@ -123,13 +120,8 @@ fn check_meshes_in<R: Runtime, T: Scalar>(device: &Device<R>) {
     }
 }
 
-#[test]
-fn cotangent_at_distance_zero_is_along_the_normal() {
-    on_each_device!(check_on_surface);
-}
-
 /// The plane of the triangle goes through centers of cells.
-fn check_on_surface<R: Runtime>(device: &Device<R>) {
+fn cotangent_at_distance_zero_is_along_the_normal<R: Runtime>(device: &Device<R>) {
     let grid = grid::<f32>([-1.0; 3], 0.5, [4, 4, 5]);
     let vertices = vec![[-9.0, -9.0, -0.25], [9.0, -9.0, -0.25], [0.0, 9.0, -0.25]];
     let mesh = Mesh::new(vertices, vec![[0, 1, 2]]).unwrap();
@@ -144,12 +136,7 @@ fn check_on_surface<R: Runtime>(device: &Device<R>) {
     assert_eq!(sum.map(|x| (x * 1e5).round() / 1e5), [0.0, 0.0, -2.0]);
 }
 
-#[test]
-fn cotangents_have_the_same_bits_again() {
-    on_each_device!(check_bits);
-}
-
-fn check_bits<R: Runtime>(device: &Device<R>) {
+fn cotangents_have_the_same_bits_again<R: Runtime>(device: &Device<R>) {
     let grid = grid::<f32>([-1.3, -1.2, -1.1], 0.1, [26, 23, 19]);
     let phi_bar = device.upload(&cotangent::<f32>(grid.cells())).unwrap();
     let run = || {

@@ -3,6 +3,10 @@
 use super::*;
 use crate::samples::report;
 
+tests! {
+    in_each_number: cotangents_are_those_of_the_cpu, the_attribute_gets_the_transpose_of_the_map;
+}
+
 /// Cotangents of an extension.
 struct Bars<T> {
     vertices: Option<Vec<T>>,
@@ -111,16 +115,8 @@ fn largest<T: Scalar>(numbers: &[T]) -> f64 {
     sizes.fold(0.0, |a, b| if b > a || b.is_nan() { b } else { a })
 }
 
-#[test]
-fn cotangents_are_those_of_the_cpu() {
-    on_each_device!(check_cotangents);
-}
-
-fn check_cotangents<R: Runtime>(device: &Device<R>) {
-    in_both_numbers!(device, check_cotangents_in);
-}
-
-fn check_cotangents_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
+fn cotangents_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
+    let tolerance = tolerance::<T>();
     for scene in Scene::<T>::all() {
         // Across a line or a plane of samples, slopes are bounded by the ridge alone: 1e-5 of their spread, by which the
         // rounding of both sides is divided, and that of `g·s` twice.
@@ -157,17 +153,9 @@ fn check_cotangents_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64
     }
 }
 
-#[test]
-fn the_attribute_gets_the_transpose_of_the_map() {
-    on_each_device!(check_transpose);
-}
-
-fn check_transpose<R: Runtime>(device: &Device<R>) {
-    in_both_numbers!(device, check_transpose_in);
-}
-
 /// `⟨v̄, v⟩ = ⟨ū, u⟩`, for noise.
-fn check_transpose_in<R: Runtime, T: Scalar>(device: &Device<R>, tolerance: f64) {
+fn the_attribute_gets_the_transpose_of_the_map<R: Runtime, T: Scalar>(device: &Device<R>) {
+    let tolerance = tolerance::<T>();
     for scene in Scene::<T>::all() {
         let components = 5;
         let attribute = Attribute {

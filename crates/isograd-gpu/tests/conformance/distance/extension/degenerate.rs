@@ -3,6 +3,12 @@
 use super::*;
 use isograd::distance::NO_TRIANGLE;
 
+tests! {
+    in_each_number:
+        few_samples_or_equal_ones_give_their_mean, no_cells_and_no_vertices_give_nothing;
+    on_each_device: bad_input_is_refused_as_on_the_cpu, what_does_not_fit_is_not_pulled_back;
+}
+
 /// Samples on a device without neighborhoods of the CPU, and the torus.
 fn of_samples<R: Runtime, T: Scalar>(
     device: &Device<R>,
@@ -54,13 +60,8 @@ fn all<R: Runtime, T: Scalar>(device: &Device<R>, buffer: &Buffer<T>) -> Vec<f64
     numbers.into_iter().map(|x| Real::f64(x)).collect()
 }
 
-#[test]
-fn few_samples_or_equal_ones_give_their_mean() {
-    in_each_number!(check_few);
-}
-
 /// One sample, two, and equal ones that differ in what they say.
-fn check_few<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn few_samples_or_equal_ones_give_their_mean<R: Runtime, T: Scalar>(device: &Device<R>) {
     let one = [[0.5, 0.1, 0.2]];
     for (points, values) in [
         (one.to_vec(), vec![7.0]),
@@ -98,12 +99,7 @@ fn check_few<R: Runtime, T: Scalar>(device: &Device<R>) {
     assert!((total / expected - 1.0).abs() < 1e-4, "{total} {expected}");
 }
 
-#[test]
-fn no_cells_and_no_vertices_give_nothing() {
-    in_each_number!(check_nothing);
-}
-
-fn check_nothing<R: Runtime, T: Scalar>(device: &Device<R>) {
+fn no_cells_and_no_vertices_give_nothing<R: Runtime, T: Scalar>(device: &Device<R>) {
     let scene = Scene::<T>::even();
     let attribute = scene.attribute(2);
     let on_device = OnDevice {
@@ -144,12 +140,7 @@ fn check_nothing<R: Runtime, T: Scalar>(device: &Device<R>) {
     assert_eq!(device.download(&found.guarded).unwrap(), [0]);
 }
 
-#[test]
-fn bad_input_is_refused_as_on_the_cpu() {
-    on_each_device!(check_refused);
-}
-
-fn check_refused<R: Runtime>(device: &Device<R>) {
+fn bad_input_is_refused_as_on_the_cpu<R: Runtime>(device: &Device<R>) {
     let good = Scene::<f32>::even();
     let attribute = good.attribute(2);
     let both = |scene: &Scene<f32>, attribute: &Attribute<f32>, band: f64| {
@@ -191,12 +182,7 @@ fn check_refused<R: Runtime>(device: &Device<R>) {
     both(&broken, &attribute, 3.0);
 }
 
-#[test]
-fn what_does_not_fit_is_not_pulled_back() {
-    on_each_device!(check_not_pulled_back);
-}
-
-fn check_not_pulled_back<R: Runtime>(device: &Device<R>) {
+fn what_does_not_fit_is_not_pulled_back<R: Runtime>(device: &Device<R>) {
     let scene = Scene::<f32>::even();
     let on_device = scene.upload(device, &scene.attribute(2));
     let (extension, residual) = on_device.extend(device, 3.0).unwrap();
