@@ -3,9 +3,7 @@
 use crate::sandbox::Sandbox;
 
 fn sphere() -> Sandbox {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample sphere -n 2000 -o cloud.ply");
-    sandbox
+    Sandbox::with("sample sphere -n 2000 -o cloud.ply")
 }
 
 #[test]
@@ -94,7 +92,7 @@ mod vulkan {
     }
 
     fn numbers(sandbox: &Sandbox, name: &str) -> Vec<f64> {
-        let field = isograd_io::read_field(&sandbox.path(name)).expect("reads");
+        let field = sandbox.field(name);
         field.field.values().to_vec()
     }
 
@@ -124,9 +122,9 @@ mod vulkan {
         let pairs = cpu.iter().zip(&gpu);
         let difference = pairs.fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
         assert!(difference < 2e-4 * largest, "{difference:e}");
-        let mesh = |name: &str| isograd_io::read_mesh(&sandbox.path(name)).expect("reads");
+        let mesh = |name: &str| sandbox.mesh(name);
         assert_eq!(mesh("gpu/mesh.ply").faces, mesh("cpu/mesh.ply").faces);
-        let points = |name: &str| isograd_io::read_geometry(&sandbox.path(name)).expect("reads");
+        let points = |name: &str| sandbox.geometry(name);
         let (cpu, gpu) = (points("cpu/points.ply"), points("gpu/points.ply"));
         assert_eq!((gpu.points, gpu.attributes), (cpu.points, cpu.attributes));
         assert!(gpu.normals.is_some());

@@ -63,22 +63,17 @@ fn clouds_that_no_surface_goes_through_end_with_1() {
 
 #[test]
 fn zero_normals_that_were_given_are_refused() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample sphere -n 500 -o a.npz");
-    let geometry = isograd_io::read_geometry(&sandbox.path("a.npz")).expect("reads");
+    let sandbox = Sandbox::with("sample sphere -n 500 -o a.npz");
+    let geometry = sandbox.geometry("a.npz");
     let text: String = geometry
         .points
         .iter()
         .map(|[x, y, z]| format!("{x} {y} {z} 0 0 0\n"))
         .collect();
     sandbox.write("zero.xyz", text);
-    sandbox
-        .run("reconstruct zero.xyz -o out --orient given")
-        .says(1, &["zero.xyz", "normal"]);
+    sandbox.says("1 reconstruct zero.xyz -o out --orient given | zero.xyz | normal");
     sandbox.write("bare.xyz", "0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n");
-    sandbox
-        .run("reconstruct bare.xyz -o out --orient given")
-        .says(1, &["bare.xyz", "normal"]);
+    sandbox.says("1 reconstruct bare.xyz -o out --orient given | bare.xyz | normal");
     assert!(!sandbox.path("out").exists());
 }
 
@@ -102,38 +97,24 @@ fn a_flat_cloud_is_no_panic() {
 fn folders_and_missing_files_are_named() {
     let sandbox = Sandbox::new();
     std::fs::create_dir(sandbox.path("folder.ply")).expect("creates");
-    sandbox
-        .run("reconstruct folder.ply")
-        .says(1, &["folder.ply is a folder"]);
-    sandbox
-        .run("reconstruct none.ply")
-        .says(1, &["none.ply", "check the path"]);
-    sandbox.run("info none.ply").says(1, &["none.ply"]);
-    sandbox
-        .run("query none.ply --at none.xyz -o a.ply")
-        .says(1, &["none.ply"]);
+    sandbox.says("1 reconstruct folder.ply | folder.ply is a folder");
+    sandbox.says("1 reconstruct none.ply | none.ply | check the path");
+    sandbox.says("1 info none.ply | none.ply");
+    sandbox.says("1 query none.ply --at none.xyz -o a.ply | none.ply");
 }
 
 #[test]
 fn outputs_that_can_not_be_written_fail_before_the_work() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample sphere -n 500 -o a.ply");
-    sandbox
-        .run("reconstruct a.ply --mesh no/m.ply")
-        .says(1, &["no/m.ply", "create its folder"]);
-    sandbox
-        .run("sample sphere -n 5 -o no/a.ply")
-        .says(1, &["no/a.ply", "create its folder"]);
-    sandbox
-        .run("reconstruct a.ply -o a.ply")
-        .says(2, &["a.ply is a file"]);
+    let sandbox = Sandbox::with("sample sphere -n 500 -o a.ply");
+    sandbox.says("1 reconstruct a.ply --mesh no/m.ply | no/m.ply | create its folder");
+    sandbox.says("1 sample sphere -n 5 -o no/a.ply | no/a.ply | create its folder");
+    sandbox.says("2 reconstruct a.ply -o a.ply | a.ply is a file");
     assert_eq!(sandbox.files(), ["a.ply"]);
 }
 
 #[test]
 fn wrong_command_lines_end_with_2() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample sphere -n 500 -o a.ply");
+    let sandbox = Sandbox::with("sample sphere -n 500 -o a.ply");
     for (line, part) in [
         ("", "Usage"),
         ("reconstruct", "CLOUD"),
@@ -176,33 +157,21 @@ fn help_and_version_end_with_0() {
 
 #[test]
 fn grids_that_no_memory_holds_are_refused() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample sphere -n 500 -o a.ply");
-    sandbox
-        .run("reconstruct a.ply --resolution 65535")
-        .says(1, &["coarser"]);
+    let sandbox = Sandbox::with("sample sphere -n 500 -o a.ply");
+    sandbox.says("1 reconstruct a.ply --resolution 65535 | coarser");
     // 69 GiB.
     if isograd::available_memory().is_some_and(|free| free < 64e9) {
-        sandbox
-            .run("reconstruct a.ply --resolution 1600")
-            .says(1, &["a.ply", "iB are free (", "use a lower resolution"]);
+        sandbox.says("1 reconstruct a.ply --resolution 1600 | a.ply | iB are free ( | use a lower resolution");
     }
-    sandbox
-        .run("reconstruct a.ply --spacing 1e-30")
-        .says(1, &["a.ply"]);
-    sandbox
-        .run("reconstruct a.ply --bounds 0 0 0 0 1 1")
-        .says(1, &["enclose no volume"]);
+    sandbox.says("1 reconstruct a.ply --spacing 1e-30 | a.ply");
+    sandbox.says("1 reconstruct a.ply --bounds 0 0 0 0 1 1 | enclose no volume");
 }
 
 #[test]
 fn an_input_is_not_overwritten_by_the_folder() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample sphere -n 500 -o points.ply");
+    let sandbox = Sandbox::with("sample sphere -n 500 -o points.ply");
     let before = sandbox.read("points.ply");
-    sandbox
-        .run("reconstruct points.ply -o .")
-        .says(2, &["points.ply is the input"]);
+    sandbox.says("2 reconstruct points.ply -o . | points.ply is the input");
     assert_eq!(sandbox.read("points.ply"), before);
     assert_eq!(sandbox.files(), ["points.ply"]);
 }
@@ -217,19 +186,15 @@ mod on_linux {
 
     #[test]
     fn a_full_disk_ends_with_1() {
-        let sandbox = Sandbox::new();
-        sandbox.done("sample sphere -n 500 -o a.ply");
+        let sandbox = Sandbox::with("sample sphere -n 500 -o a.ply");
         std::os::unix::fs::symlink("/dev/full", sandbox.path("m.ply")).expect("links");
-        sandbox
-            .run("reconstruct a.ply --mesh m.ply --resolution 24")
-            .says(1, &["m.ply", "free some space"]);
+        sandbox.says("1 reconstruct a.ply --mesh m.ply --resolution 24 | m.ply | free some space");
     }
 
     /// A limit on the size of files stands in for a disk that fills up in the middle of one.
     #[test]
     fn a_disk_that_fills_up_leaves_no_half_written_file() {
-        let sandbox = Sandbox::new();
-        sandbox.done("sample sphere -n 500 -o a.ply");
+        let sandbox = Sandbox::with("sample sphere -n 500 -o a.ply");
         sandbox.done("reconstruct a.ply --sdf s.npz --resolution 24 -q");
         let before = sandbox.read("s.npz");
         let script =
@@ -251,8 +216,7 @@ mod on_linux {
 
     #[test]
     fn an_interrupt_leaves_whole_files_or_none() {
-        let sandbox = Sandbox::new();
-        sandbox.done("sample sphere -n 20000 -o a.npz --layout random");
+        let sandbox = Sandbox::with("sample sphere -n 20000 -o a.npz --layout random");
         for milliseconds in [5, 40, 120, 250, 400, 600] {
             let mut command = sandbox.command("reconstruct a.npz -o out --resolution 96");
             command.stdout(Stdio::null()).stderr(Stdio::piped());

@@ -5,9 +5,7 @@ use serde_json::Value;
 
 /// A sandbox with a cloud of a sphere of radius 0.5, and one of a smaller, dented one.
 fn sandbox() -> Sandbox {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample sphere -n 2500 -o sphere.ply --precision f64 --seed 9");
-    sandbox
+    Sandbox::with("sample sphere -n 2500 -o sphere.ply --precision f64 --seed 9")
 }
 
 fn number(value: &Value) -> f64 {
@@ -102,14 +100,13 @@ fn the_folder_gets_its_files_and_the_history_its_fields() {
     }
     assert_eq!(epochs[0]["parameters"][0], 0.4);
     assert!(number(&epochs[3]["loss"]) < number(&epochs[0]["loss"]));
-    let cloud = isograd_io::read_geometry(&sandbox.path("out/cloud.ply")).expect("reads");
+    let cloud = sandbox.geometry("out/cloud.ply");
     assert_eq!(cloud.points.len(), 2000);
 }
 
 #[test]
 fn both_radii_of_a_torus_are_found_and_others_can_be_held() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample torus -n 3000 -o torus.ply --precision f64");
+    let sandbox = Sandbox::with("sample torus -n 3000 -o torus.ply --precision f64");
     let start = "--param major=0.9 --param minor=0.3";
     let fit = |more: &str| {
         sandbox.done(&format!(
@@ -182,81 +179,45 @@ fn a_run_that_is_resumed_ends_in_the_same_bits() {
 #[test]
 fn what_can_not_be_fitted_is_refused_with_a_remedy() {
     let sandbox = sandbox();
-    let says = |line: &str, status: i32, parts: &[&str]| {
-        sandbox.run(&format!("fit {line}")).says(status, parts);
-    };
-    says("--target sphere.ply -o out", 2, &["--shape"]);
-    says(
-        "--shape dodo --target sphere.ply -o out",
-        2,
-        &["dodo", "torus"],
-    );
+    sandbox.says("2 fit --target sphere.ply -o out | --shape");
+    sandbox.says("2 fit --shape dodo --target sphere.ply -o out | dodo | torus");
     let sphere = "--shape sphere --target sphere.ply -n 500 --resolution 16";
-    says(
-        &format!("{sphere} -o out --only width"),
-        2,
-        &["width", "radius"],
-    );
-    says(
-        &format!("{sphere} -o out --only w*"),
-        2,
-        &["begins with 'w'"],
-    );
-    says(&format!("{sphere} -o sphere.ply"), 2, &["is a file"]);
-    says(&format!("{sphere} -o out --band 0"), 2, &["above 0"]);
-    says(
-        &format!("{sphere} -o out --smoothness 1"),
-        2,
-        &["--smoothness", "cannot be used"],
-    );
-    says(
-        "--shape vessels --only generations --target sphere.ply -o out",
-        2,
-        &["whole"],
-    );
-    says("--shape sphere --target none.ply -o out", 1, &["none.ply"]);
+    sandbox.says(&format!(
+        "2 fit {sphere} -o out --only width | width | radius"
+    ));
+    sandbox.says(&format!(
+        "2 fit {sphere} -o out --only w* | begins with 'w'"
+    ));
+    sandbox.says(&format!("2 fit {sphere} -o sphere.ply | is a file"));
+    sandbox.says(&format!("2 fit {sphere} -o out --band 0 | above 0"));
+    sandbox.says(&format!(
+        "2 fit {sphere} -o out --smoothness 1 | --smoothness | cannot be used"
+    ));
+    sandbox.says("2 fit --shape vessels --only generations --target sphere.ply -o out | whole");
+    sandbox.says("1 fit --shape sphere --target none.ply -o out | none.ply");
     sandbox.write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-    says(
-        "--shape sphere --target open.obj -o out",
-        1,
-        &["open.obj", "not closed", "as a cloud"],
-    );
+    sandbox
+        .says("1 fit --shape sphere --target open.obj -o out | open.obj | not closed | as a cloud");
     let far = "--bounds 9 9 9 10 10 10";
-    says(
-        &format!("--shape sphere --target sphere.ply {far} -o out"),
-        1,
-        &["sphere.ply"],
-    );
+    sandbox.says(&format!(
+        "1 fit --shape sphere --target sphere.ply {far} -o out | sphere.ply"
+    ));
     sandbox.done("reconstruct sphere.ply --sdf sdf.vti --resolution 20 -q");
-    says(
-        "--shape sphere --target sdf.vti --resolution 30 -o out",
-        2,
-        &["brings its grid", "20 × 20 × 20"],
-    );
-    says(
-        "--shape sphere --param radius=3 --target sdf.vti -o out",
-        1,
-        &["the start can't be used", "larger grid"],
-    );
+    sandbox.says("2 fit --shape sphere --target sdf.vti --resolution 30 -o out | brings its grid | 20 × 20 × 20");
+    sandbox.says("1 fit --shape sphere --param radius=3 --target sdf.vti -o out | the start can't be used | larger grid");
     sandbox.write("bad.json", "{\"state\": 1}");
-    says(
-        &format!("{sphere} -o out --resume bad.json"),
-        1,
-        &["bad.json", "begin anew"],
-    );
-    says(
-        &format!("{sphere} -o out --resume none.json"),
-        1,
-        &["none.json"],
-    );
+    sandbox.says(&format!(
+        "1 fit {sphere} -o out --resume bad.json | bad.json | begin anew"
+    ));
+    sandbox.says(&format!(
+        "1 fit {sphere} -o out --resume none.json | none.json"
+    ));
     sandbox.done(&format!(
         "fit {sphere} -o other --epochs 1 --checkpoint state.json -q --pictures-at 9"
     ));
-    says(
-        &format!("{sphere} -o out --seed 2 --resume state.json"),
-        1,
-        &["state.json", "another fit"],
-    );
+    sandbox.says(&format!(
+        "1 fit {sphere} -o out --seed 2 --resume state.json | state.json | another fit"
+    ));
     assert!(
         !sandbox.path("out").exists(),
         "nothing is left of what failed"

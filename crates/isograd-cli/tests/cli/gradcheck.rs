@@ -4,8 +4,7 @@ use crate::sandbox::Sandbox;
 
 #[test]
 fn the_pullback_of_a_torus_agrees_with_small_steps() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample torus -n 6000 -o torus.ply");
+    let sandbox = Sandbox::with("sample torus -n 6000 -o torus.ply");
     let run = sandbox
         .run("gradcheck torus.ply --resolution 48 --tolerance 1e-6 --report check.json --seed 2");
     run.says(0, &[]);
@@ -49,8 +48,7 @@ fn the_pullback_of_a_torus_agrees_with_small_steps() {
 
 #[test]
 fn a_gradient_that_is_off_fails_where_a_tolerance_is_given() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample torus -n 3000 -o torus.ply --seed 4");
+    let sandbox = Sandbox::with("sample torus -n 3000 -o torus.ply --seed 4");
     // No rounding is as small as this.
     let run = sandbox.run("gradcheck torus.ply --resolution 32 --tolerance 1e-30 -q");
     run.says(1, &["torus.ply: the pullback differs", "more than 1.0e-30"]);
@@ -59,25 +57,14 @@ fn a_gradient_that_is_off_fails_where_a_tolerance_is_given() {
 
 #[test]
 fn bad_input_is_refused_with_a_reason() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample torus -n 3000 -o torus.ply");
+    let sandbox = Sandbox::with("sample torus -n 3000 -o torus.ply");
     sandbox.write("one.xyz", "1 2 3\n");
-    sandbox.run("gradcheck none.ply").says(1, &["none.ply"]);
-    sandbox
-        .run("gradcheck one.xyz")
-        .says(1, &["one.xyz", "can't be fitted"]);
-    let run = sandbox.run("gradcheck torus.ply --resolution 32 --step 9");
-    run.says(
-        1,
-        &["torus.ply: the cloud moved by 9 cells", "2 cells inside"],
+    sandbox.says("1 gradcheck none.ply | none.ply");
+    sandbox.says("1 gradcheck one.xyz | one.xyz | can't be fitted");
+    sandbox.says("1 gradcheck torus.ply --resolution 32 --step 9 | torus.ply: the cloud moved by 9 cells | 2 cells inside");
+    sandbox.says("2 gradcheck torus.ply --step -1 | --step");
+    sandbox.says("2 gradcheck torus.ply --report a.txt | a.txt | .json");
+    sandbox.says(
+        "1 gradcheck torus.ply --resolution 32 --orient given --report no/such/a.json | no/such",
     );
-    sandbox
-        .run("gradcheck torus.ply --step -1")
-        .says(2, &["--step"]);
-    sandbox
-        .run("gradcheck torus.ply --report a.txt")
-        .says(2, &["a.txt", ".json"]);
-    sandbox
-        .run("gradcheck torus.ply --resolution 32 --orient given --report no/such/a.json")
-        .says(1, &["no/such"]);
 }

@@ -26,8 +26,7 @@ fn least(sandbox: &Sandbox) -> u64 {
 
 #[test]
 fn too_little_address_space_is_an_error_of_every_command() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample sphere -n 20000 -o a.ply -q");
+    let sandbox = Sandbox::with("sample sphere -n 20000 -o a.ply -q");
     sandbox.done("reconstruct a.ply -q --mesh m.ply --sdf s.vti --resolution 96");
     let least = least(&sandbox);
     let files = sandbox.files();
@@ -67,8 +66,7 @@ fn too_little_address_space_is_an_error_of_every_command() {
 
 #[test]
 fn the_limit_that_is_too_small_is_named() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample sphere -n 500 -o a.ply -q");
+    let sandbox = Sandbox::with("sample sphere -n 500 -o a.ply -q");
     let (_, run) = limited(&sandbox, "reconstruct a.ply --resolution 500", 1000);
     run.says(
         1,

@@ -6,7 +6,7 @@ use isograd_io::{Dtype, Geometry};
 use serde_json::Value;
 
 fn read(sandbox: &Sandbox, name: &str) -> Geometry {
-    isograd_io::read_geometry(&sandbox.path(name)).expect("reads")
+    sandbox.geometry(name)
 }
 
 fn names(geometry: &Geometry) -> Vec<&str> {
@@ -16,8 +16,7 @@ fn names(geometry: &Geometry) -> Vec<&str> {
 
 #[test]
 fn points_come_out_with_outward_normals_confidence_and_all_that_they_had() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample fish -n 3000 -o cloud.npz --param amplitude=0.1");
+    let sandbox = Sandbox::with("sample fish -n 3000 -o cloud.npz --param amplitude=0.1");
     let before = read(&sandbox, "cloud.npz");
     for out in ["out.npz", "out.ply"] {
         let run = sandbox.done(&format!("orient cloud.npz -o {out}"));
@@ -46,8 +45,7 @@ fn points_come_out_with_outward_normals_confidence_and_all_that_they_had() {
 
 #[test]
 fn numbers_keep_the_type_that_holds_them() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample sphere -n 500 -o double.ply --precision f64");
+    let sandbox = Sandbox::with("sample sphere -n 500 -o double.ply --precision f64");
     sandbox.done("orient double.ply -o out.ply");
     assert_eq!(read(&sandbox, "out.ply").dtype, Dtype::F64);
     // Coordinates in single precision, but a time that is not.
@@ -73,8 +71,7 @@ fn numbers_keep_the_type_that_holds_them() {
 
 #[test]
 fn the_report_has_the_names_of_a_reconstruction() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample torus -n 2000 -o cloud.ply");
+    let sandbox = Sandbox::with("sample torus -n 2000 -o cloud.ply");
     sandbox.done("orient cloud.ply -o o.ply --report o.json --orient parity --parity-gamma 3");
     sandbox.done("reconstruct cloud.ply --resolution 24 --report r.json --orient parity");
     let [orient, whole] = ["o.json", "r.json"].map(|name| sandbox.json(name));
@@ -122,25 +119,20 @@ fn sensors_come_from_the_command_line_or_from_columns() {
         }),
         ["confidence", "sensor_x", "sensor_y", "sensor_z"]
     );
-    sandbox
-        .run("orient bare.xyz -o out.ply --orient sensors")
-        .says(1, &["bare.xyz", "no sensor positions"]);
-    sandbox
-        .run("orient bare.xyz -o out.ply --orient sensors --sensor 3,0,0")
-        .says(1, &["point 3 lies exactly at a sensor"]);
+    sandbox.says("1 orient bare.xyz -o out.ply --orient sensors | bare.xyz | no sensor positions");
+    sandbox.says("1 orient bare.xyz -o out.ply --orient sensors --sensor 3,0,0 | point 3 lies exactly at a sensor");
     sandbox.write(
         "nan.csv",
         "x,y,z,sensor_x,sensor_y,sensor_z\n1,2,3,nan,0,0\n",
     );
-    sandbox
-        .run("orient nan.csv -o out.ply --orient sensors")
-        .says(1, &["nan.csv", "sensor position 0 is not finite"]);
+    sandbox.says(
+        "1 orient nan.csv -o out.ply --orient sensors | nan.csv | sensor position 0 is not finite",
+    );
 }
 
 #[test]
 fn a_wrong_command_line_is_refused_before_the_work() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample torus -n 400 -o cloud.ply");
+    let sandbox = Sandbox::with("sample torus -n 400 -o cloud.ply");
     for (line, says) in [
         ("orient cloud.ply -o cloud.ply", "is the input"),
         ("orient cloud.ply -o out.obj", "must end in .ply or"),
@@ -161,22 +153,17 @@ fn a_wrong_command_line_is_refused_before_the_work() {
         sandbox.run(line).says(2, &[says]);
     }
     assert_eq!(sandbox.files(), ["cloud.ply"]);
-    sandbox
-        .run("orient missing.ply -o out.ply")
-        .says(1, &["missing.ply"]);
+    sandbox.says("1 orient missing.ply -o out.ply | missing.ply");
     sandbox.write(
         "line.xyz",
         (0..50).map(|i| format!("{i} 0 0\n")).collect::<String>(),
     );
-    sandbox
-        .run("orient line.xyz -o out.ply")
-        .says(1, &["line.xyz", "so there is no surface"]);
+    sandbox.says("1 orient line.xyz -o out.ply | line.xyz | so there is no surface");
 }
 
 #[test]
 fn a_reconstruction_takes_sensors_too() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample sphere -n 2000 -o cloud.ply");
+    let sandbox = Sandbox::with("sample sphere -n 2000 -o cloud.ply");
     sandbox.done(
         "reconstruct cloud.ply --resolution 24 --orient sensors --sensor 0,0,5 --report r.json",
     );

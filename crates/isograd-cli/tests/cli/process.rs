@@ -8,9 +8,7 @@ use crate::sandbox::{Run, Sandbox};
 
 /// A sandbox with a small cloud.
 fn sandbox() -> Sandbox {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample sphere -n 300 -o a.ply -q");
-    sandbox
+    Sandbox::with("sample sphere -n 300 -o a.ply -q")
 }
 
 /// A line of `/proc/PID/status`, as a number.

@@ -4,8 +4,7 @@ use crate::sandbox::Sandbox;
 
 #[test]
 fn the_points_of_a_table_with_normals_first_are_its_points() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample ellipsoid -n 200 -o a.csv");
+    let sandbox = Sandbox::with("sample ellipsoid -n 200 -o a.csv");
     let text = String::from_utf8(sandbox.read("a.csv")).expect("text");
     let mut lines = text.lines();
     assert_eq!(lines.next(), Some("x,y,z,nx,ny,nz"));
@@ -45,14 +44,12 @@ fn columns_without_known_names_are_chosen_on_the_command_line() {
     let run = sandbox.done("info a.csv --columns 2,3,4 --normal-columns t,a,b");
     assert!(run.stdout.contains("normals      yes"), "{}", run.stdout);
     sandbox.done("sample sphere -n 10 -o a.ply");
-    let run = sandbox.run("info a.ply --columns x,y,z");
-    run.says(1, &["a.ply", "this is PLY"]);
+    sandbox.says("1 info a.ply --columns x,y,z | a.ply | this is PLY");
 }
 
 #[test]
 fn every_command_keeps_within_max_memory() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample sphere -n 200 -o a.ply");
+    let sandbox = Sandbox::with("sample sphere -n 200 -o a.ply");
     for line in [
         "reconstruct a.ply -o out",
         "orient a.ply -o out.ply",

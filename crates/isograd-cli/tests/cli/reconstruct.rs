@@ -6,9 +6,7 @@ use serde_json::Value;
 
 /// A sandbox with a cloud of a sphere of radius 0.5.
 fn sphere() -> Sandbox {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample sphere -n 3000 -o cloud.ply");
-    sandbox
+    Sandbox::with("sample sphere -n 3000 -o cloud.ply")
 }
 
 fn keys(value: &Value) -> Vec<String> {
@@ -99,18 +97,17 @@ fn a_sparse_solve_gives_the_same_volume_from_fewer_cells() {
     // The indicator is right to 1e-4 of its jump, which takes about ten cells; the radius has 100.
     let off = sparse.1 / dense.1 - 1.0;
     assert!(off.abs() < 1e-4, "{off}");
-    sandbox
-        .run("reconstruct cloud.ply --solve sparse --screening 4 --mesh m.ply")
-        .says(1, &["needs the dense solve"]);
+    sandbox.says(
+        "1 reconstruct cloud.ply --solve sparse --screening 4 --mesh m.ply | needs the dense solve",
+    );
 }
 
 #[test]
 fn the_points_keep_their_order_and_their_attributes() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample fish -n 1500 -o cloud.npz --param amplitude=0.1");
+    let sandbox = Sandbox::with("sample fish -n 1500 -o cloud.npz --param amplitude=0.1");
     sandbox.done("reconstruct cloud.npz --points p.npz --resolution 32 -q");
-    let before = isograd_io::read_geometry(&sandbox.path("cloud.npz")).expect("reads");
-    let after = isograd_io::read_geometry(&sandbox.path("p.npz")).expect("reads");
+    let before = sandbox.geometry("cloud.npz");
+    let after = sandbox.geometry("p.npz");
     assert_eq!(after.points, before.points);
     let names: Vec<&str> = after.attributes.iter().map(|a| a.name.as_str()).collect();
     assert_eq!(names, ["confidence", "velocity"]);
@@ -134,18 +131,12 @@ fn every_format_of_every_output_is_written() {
     ] {
         sandbox.done(&format!("reconstruct cloud.ply --resolution 24 -q {line}"));
     }
-    let faces = |name: &str| {
-        isograd_io::read_mesh(&sandbox.path(name))
-            .expect("reads")
-            .faces
-            .len()
-    };
+    let faces = |name: &str| sandbox.mesh(name).faces.len();
     assert!(faces("m.ply") > 100);
     assert_eq!(faces("m.ply"), faces("m.obj"));
     assert_eq!(faces("m.obj"), faces("m.vtp"));
     assert!(faces("m.stl") > 100);
-    let [vti, npz] =
-        ["s.vti", "s.npz"].map(|s| isograd_io::read_field(&sandbox.path(s)).expect("reads"));
+    let [vti, npz] = ["s.vti", "s.npz"].map(|s| sandbox.field(s));
     assert_eq!(vti.field.values(), npz.field.values());
     for name in ["a.png", "b.png"] {
         assert!(sandbox.read(name).starts_with(b"\x89PNG"), "{name}");
@@ -159,16 +150,9 @@ fn a_cloud_can_come_through_a_pipe() {
     let line = "reconstruct - --mesh m.ply --report r.json --resolution 24";
     assert_eq!(sandbox.run_with_input(line, &ply).status, Some(0));
     let from_ply = sandbox.read("m.ply");
-    let geometry = isograd_io::read_geometry(&sandbox.path("cloud.ply")).expect("reads");
-    let text: String = geometry
-        .points
-        .iter()
-        .map(|[x, y, z]| format!("{x:?} {y:?} {z:?}\n"))
-        .collect();
-    assert_eq!(
-        sandbox.run_with_input(line, text.as_bytes()).status,
-        Some(0)
-    );
+    let text = sandbox.rows("cloud.ply", |_| true);
+    let run = sandbox.run_with_input(line, text.as_bytes());
+    assert_eq!(run.status, Some(0));
     assert_eq!(sandbox.read("m.ply"), from_ply);
     sandbox
         .run_with_input(line, b"")
@@ -199,10 +183,7 @@ fn the_grid_is_the_one_that_was_asked_for() {
     let sandbox = sphere();
     let grid = |line: &str| {
         sandbox.done(&format!("reconstruct cloud.ply -q --sdf s.npz {line}"));
-        *isograd_io::read_field(&sandbox.path("s.npz"))
-            .expect("reads")
-            .field
-            .grid()
+        *sandbox.field("s.npz").field.grid()
     };
     let fitted = grid("--spacing 0.04 --padding 0.2");
     assert!((fitted.spacing() - 0.04).abs() < 1e-8);
@@ -215,9 +196,7 @@ fn the_grid_is_the_one_that_was_asked_for() {
     assert!((given.lower()[1] + 0.9).abs() < 1e-6);
     let banded = sandbox.done("reconstruct cloud.ply -q --sdf b.npz --resolution 32 --band 0.1");
     assert_eq!(banded.status, Some(0));
-    let field = isograd_io::read_field(&sandbox.path("b.npz"))
-        .expect("reads")
-        .field;
+    let field = sandbox.field("b.npz").field;
     let greatest = field.values().iter().fold(0.0f64, |m, v| m.max(*v));
     assert!(greatest < 0.1 + 1e-6, "{greatest}");
 }
@@ -225,14 +204,8 @@ fn the_grid_is_the_one_that_was_asked_for() {
 #[test]
 fn outliers_are_left_out_with_a_warning_unless_they_are_to_be_kept() {
     let sandbox = sphere();
-    let near = isograd_io::read_geometry(&sandbox.path("cloud.ply")).expect("reads");
-    let mut text: String = near
-        .points
-        .iter()
-        .map(|[x, y, z]| format!("{x:?} {y:?} {z:?}\n"))
-        .collect();
-    text.push_str("60 1 1\n");
-    sandbox.write("far.xyz", text);
+    let text = sandbox.rows("cloud.ply", |_| true);
+    sandbox.write("far.xyz", format!("{text}60 1 1\n"));
     let line = "reconstruct far.xyz --resolution 32 --report r.json --points p.ply --mesh m.ply";
     let ran = sandbox.done(line);
     assert!(
@@ -241,12 +214,12 @@ fn outliers_are_left_out_with_a_warning_unless_they_are_to_be_kept() {
         ran.stderr
     );
     let report = sandbox.json("r.json");
-    let last = near.points.len();
+    let last = text.lines().count();
     assert_eq!(report["outliers"]["count"], 1);
     assert_eq!(report["outliers"]["indices"][0], last);
     assert_eq!(report["input"]["points"], last + 1);
     assert!(report["surface"]["faces"].as_u64() > Some(1000));
-    let points = isograd_io::read_geometry(&sandbox.path("p.ply")).expect("reads");
+    let points = sandbox.geometry("p.ply");
     assert_eq!(points.points.len(), last + 1);
     sandbox.done(&format!("{line} --outliers keep"));
     let report = sandbox.json("r.json");
@@ -257,12 +230,8 @@ fn outliers_are_left_out_with_a_warning_unless_they_are_to_be_kept() {
 #[test]
 fn trim_opens_the_mesh_and_a_sheet_has_a_closed_shell() {
     let sandbox = sphere();
-    let whole = isograd_io::read_geometry(&sandbox.path("cloud.ply")).expect("reads");
-    let above = whole.points.iter().filter(|p| p[2] > 0.0);
-    let text: String = above
-        .map(|[x, y, z]| format!("{x:?} {y:?} {z:?}\n"))
-        .collect();
-    sandbox.write("bowl.xyz", text);
+    let above = sandbox.rows("cloud.ply", |p| p[2] > 0.0);
+    sandbox.write("bowl.xyz", above);
     let line = "reconstruct bowl.xyz -q --padding 0.3 --walls closed --report r.json --mesh m.ply";
     let closed = |more: &str| {
         sandbox.done(&format!("{line} {more}"));
@@ -293,21 +262,19 @@ fn trim_opens_the_mesh_and_a_sheet_has_a_closed_shell() {
 #[test]
 fn coordinates_far_from_the_origin_are_computed_in_double_and_it_says_so() {
     let sandbox = sphere();
-    let near = isograd_io::read_geometry(&sandbox.path("cloud.ply")).expect("reads");
+    let near = sandbox.geometry("cloud.ply");
     let far: String = near
         .points
         .iter()
         .map(|[x, y, z]| format!("{:?} {:?} {:?}\n", x + 1e6, y - 1e6, z + 1e6))
         .collect();
     sandbox.write("far.xyz", far);
-    let run =
-        sandbox.run("reconstruct far.xyz --mesh m.ply --sdf s.npz --report r.json --resolution 32");
-    run.says(0, &["computed in f64", "1.000e6"]);
-    let field = isograd_io::read_field(&sandbox.path("s.npz")).expect("reads");
+    sandbox.says("0 reconstruct far.xyz --mesh m.ply --sdf s.npz --report r.json --resolution 32 | computed in f64 | 1.000e6");
+    let field = sandbox.field("s.npz");
     assert_eq!(field.dtype, Dtype::F64);
     let report = String::from_utf8(sandbox.read("r.json")).expect("text");
     assert!(report.contains("computed in f64"));
-    let mesh = isograd_io::read_mesh(&sandbox.path("m.ply")).expect("reads");
+    let mesh = sandbox.mesh("m.ply");
     let radius = |v: &[f64; 3]| isograd_element::vector::norm([v[0] - 1e6, v[1] + 1e6, v[2] - 1e6]);
     // A tenth of a cell, which is 1.25/32.
     assert!(mesh.points.iter().all(|v| (radius(v) - 0.5).abs() < 4e-3));
@@ -319,13 +286,9 @@ fn a_mesh_can_be_sampled_instead_of_its_vertices() {
     sandbox.done("reconstruct cloud.ply --mesh m.obj --resolution 24 -q");
     sandbox
         .done("reconstruct m.obj --sample 4000 --points p.npz --resolution 24 -q --orient given");
-    let points = isograd_io::read_geometry(&sandbox.path("p.npz"))
-        .expect("reads")
-        .points;
+    let points = sandbox.geometry("p.npz").points;
     assert_eq!(points.len(), 4000);
-    sandbox
-        .run("reconstruct cloud.ply --sample 10")
-        .says(1, &["cloud.ply", "no faces"]);
+    sandbox.says("1 reconstruct cloud.ply --sample 10 | cloud.ply | no faces");
 }
 
 #[test]
@@ -355,8 +318,7 @@ fn quiet_says_nothing_and_verbose_says_each_stage() {
 
 #[test]
 fn warnings_are_on_standard_error_and_in_the_report() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample sphere -n 3000 -o a.xyz");
+    let sandbox = Sandbox::with("sample sphere -n 3000 -o a.xyz");
     let text = String::from_utf8(sandbox.read("a.xyz")).expect("text");
     // The upper half alone: open.
     let half: String = text

@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
+use isograd_io::{FieldFile, Geometry};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -27,6 +28,13 @@ impl Sandbox {
         }
     }
 
+    /// A folder in which `isograd LINE` was run.
+    pub fn with(line: &str) -> Self {
+        let sandbox = Self::new();
+        sandbox.done(line);
+        sandbox
+    }
+
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
@@ -37,6 +45,26 @@ impl Sandbox {
 
     pub fn read(&self, name: &str) -> Vec<u8> {
         std::fs::read(self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+
+    /// Points of a file, a line each.
+    pub fn rows(&self, name: &str, keep: impl Fn(&[f64; 3]) -> bool) -> String {
+        let points = self.geometry(name).points.into_iter().filter(keep);
+        points
+            .map(|[x, y, z]| format!("{x:?} {y:?} {z:?}\n"))
+            .collect()
+    }
+
+    pub fn geometry(&self, name: &str) -> Geometry {
+        isograd_io::read_geometry(&self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+
+    pub fn mesh(&self, name: &str) -> Geometry {
+        isograd_io::read_mesh(&self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+
+    pub fn field(&self, name: &str) -> FieldFile {
+        isograd_io::read_field(&self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
     }
 
     pub fn json(&self, name: &str) -> Value {
@@ -55,6 +83,18 @@ impl Sandbox {
     /// Runs `isograd LINE`.
     pub fn run(&self, line: &str) -> Run {
         Run::new(self.command(line).output().expect("the binary starts"))
+    }
+
+    /// Runs a row `STATUS LINE | PART | …`: checks the status of `isograd LINE`, and that standard error has every part.
+    pub fn says(&self, row: &str) {
+        let mut parts = row.split(" | ");
+        let (status, line) = parts
+            .next()
+            .and_then(|start| start.split_once(' '))
+            .expect("a row");
+        let parts: Vec<&str> = parts.collect();
+        self.run(line)
+            .says(status.parse().expect("a status"), &parts);
     }
 
     /// Runs `isograd LINE` with `input` on standard input.

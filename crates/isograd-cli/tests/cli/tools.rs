@@ -11,7 +11,7 @@ fn samples_depend_on_the_seed_alone() {
     assert_eq!(sandbox.read("a.ply"), sandbox.read("b.ply"));
     assert_ne!(sandbox.read("a.ply"), sandbox.read("c.ply"));
     sandbox.done("sample torus -n 400 -o d.csv --param major=2 --param minor=0.5 --precision f64");
-    let file = isograd_io::read_geometry(&sandbox.path("d.csv")).expect("reads");
+    let file = sandbox.geometry("d.csv");
     for [x, y, z] in &file.points {
         // Seventeen digits stand in the file.
         assert!(((x.hypot(*y) - 2.0).hypot(*z) - 0.5).abs() < 1e-12);
@@ -32,27 +32,23 @@ fn the_list_names_every_shape_and_its_parameters() {
 
 #[test]
 fn density_grows_along_the_axis_that_was_named() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample sphere -n 2000 -o a.npz --density z:10 --layout random");
-    let points = isograd_io::read_geometry(&sandbox.path("a.npz"))
-        .expect("reads")
-        .points;
+    let sandbox = Sandbox::with("sample sphere -n 2000 -o a.npz --density z:10 --layout random");
+    let points = sandbox.geometry("a.npz").points;
     let upper = points.iter().filter(|p| p[2] > 0.0).count();
     assert!(upper > 1300, "{upper}");
 }
 
 #[test]
 fn queries_of_a_mesh_and_of_its_field_agree_with_the_sphere() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample sphere -n 3000 -o cloud.ply");
+    let sandbox = Sandbox::with("sample sphere -n 3000 -o cloud.ply");
     sandbox
         .done("reconstruct cloud.ply -q --mesh m.ply --sdf s.vti --resolution 48 --precision f64");
     sandbox.write("at.xyz", "0 0 0\n0.4 0 0\n0.55 0 0\n0 0.2 -0.3\n5 0 0\n");
     sandbox.done("query m.ply --at at.xyz -o mesh.npz");
-    let run = sandbox.run("query s.vti --at at.xyz -o field.npz");
-    run.says(0, &["warning: 1 of 5 points lie outside the grid"]);
-    let [mesh, field] = ["mesh.npz", "field.npz"]
-        .map(|name| isograd_io::read_geometry(&sandbox.path(name)).expect("reads"));
+    sandbox.says(
+        "0 query s.vti --at at.xyz -o field.npz | warning: 1 of 5 points lie outside the grid",
+    );
+    let [mesh, field] = ["mesh.npz", "field.npz"].map(|name| sandbox.geometry(name));
     let names = |of: &isograd_io::Geometry| -> Vec<String> {
         of.attributes.iter().map(|a| a.name.clone()).collect()
     };
@@ -76,18 +72,13 @@ fn queries_of_a_mesh_and_of_its_field_agree_with_the_sphere() {
         }
     }
     sandbox.write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-    sandbox
-        .run("query open.obj --at at.xyz -o open.ply")
-        .says(0, &["not closed"]);
-    sandbox
-        .run("query at.xyz --at at.xyz -o bad.ply")
-        .says(1, &["at.xyz"]);
+    sandbox.says("0 query open.obj --at at.xyz -o open.ply | not closed");
+    sandbox.says("1 query at.xyz --at at.xyz -o bad.ply | at.xyz");
 }
 
 #[test]
 fn info_says_what_a_file_holds() {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample sphere -n 1000 -o cloud.ply");
+    let sandbox = Sandbox::with("sample sphere -n 1000 -o cloud.ply");
     sandbox.done("reconstruct cloud.ply -q --mesh m.obj --sdf s.npz --resolution 24");
     let says = |file: &str, parts: &[&str]| {
         let text = sandbox.done(&format!("info {file}")).stdout;

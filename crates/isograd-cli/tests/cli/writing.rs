@@ -8,9 +8,7 @@ use crate::sandbox::{Run, Sandbox};
 
 /// A sandbox with a small cloud.
 fn sandbox() -> Sandbox {
-    let sandbox = Sandbox::new();
-    sandbox.done("sample sphere -n 300 -o a.ply -q");
-    sandbox
+    Sandbox::with("sample sphere -n 300 -o a.ply -q")
 }
 
 #[test]
@@ -49,15 +47,11 @@ fn a_link_to_a_missing_file_stays_a_link() {
     sandbox.done("reconstruct a.ply --mesh m.ply --resolution 16 -q");
     let link = fs::symlink_metadata(sandbox.path("m.ply")).expect("there");
     assert!(link.is_symlink());
-    isograd_io::read_mesh(&sandbox.path("inner/real.ply")).expect("whole");
+    sandbox.mesh("inner/real.ply");
     symlink("none/real.ply", sandbox.path("n.ply")).expect("links");
-    sandbox
-        .run("reconstruct a.ply --mesh n.ply --resolution 16")
-        .says(1, &["n.ply", "create its folder"]);
+    sandbox.says("1 reconstruct a.ply --mesh n.ply --resolution 16 | n.ply | create its folder");
     symlink("inner/new.ply", sandbox.path("p.ply")).expect("links");
-    sandbox
-        .run("reconstruct a.ply --mesh p.ply --points inner/new.ply")
-        .says(2, &["name of two outputs"]);
+    sandbox.says("2 reconstruct a.ply --mesh p.ply --points inner/new.ply | name of two outputs");
 }
 
 #[test]
@@ -67,7 +61,7 @@ fn a_name_may_be_as_long_as_the_file_system_permits() {
     sandbox.done(&format!(
         "reconstruct a.ply --mesh {name} --resolution 16 -q"
     ));
-    isograd_io::read_mesh(&sandbox.path(&name)).expect("whole");
+    sandbox.mesh(&name);
 }
 
 /// A library that stands before that of C: it writes the names of files that are synchronized or renamed, and lets
