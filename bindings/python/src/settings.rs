@@ -35,9 +35,6 @@ impl Settings {
     }
 
     /// The grid.
-    ///
-    /// # Errors
-    /// See [`GridError`].
     pub fn grid<T: Real>(&self) -> Result<Grid<T>, GridError> {
         let GridSettings {
             lower,

@@ -87,9 +87,6 @@ impl<T: Number> Plan<T> {
     }
 
     /// The same, with a result to keep: on the CPU a copy.
-    ///
-    /// # Errors
-    /// As [`Self::reconstruct_observed`].
     pub fn make(
         &mut self,
         cloud: &PointCloud<T>,

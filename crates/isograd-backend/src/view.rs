@@ -44,9 +44,6 @@ impl<T: Number> Made<T> {
 macro_rules! results {
     ($($(#[$doc:meta])+ $name:ident: $kind:ty;)*) => {$(
         $(#[$doc])+
-        ///
-        /// # Errors
-        /// Errors of the device.
         pub fn $name(self) -> Result<$kind, Error> {
             match self.0 {
                 Of::Cpu(of) => Ok(of.$name()),
@@ -81,9 +78,6 @@ impl<'a, T: Number> View<'a, T> {
     }
 
     /// The mesh whose faces [`closest`](Self::closest) names: see [`Reconstruction::closest_mesh`].
-    ///
-    /// # Errors
-    /// Errors of the device.
     pub fn closest_mesh(self) -> Result<&'a Mesh<T>, Error> {
         match self.0 {
             Of::Cpu(of) => Ok(of.closest_mesh()),
@@ -129,9 +123,6 @@ impl<'a, T: Number> View<'a, T> {
     }
 
     /// Numbers, times and warnings.
-    ///
-    /// # Errors
-    /// Errors of the device.
     pub fn report(self) -> Result<&'a Report, Error> {
         match self.0 {
             Of::Cpu(of) => Ok(of.report()),
@@ -167,9 +158,6 @@ impl<'a, T: Number> View<'a, T> {
     }
 
     /// Like [`Self::pullback`], writing into `out`; on the CPU the scratch buffers are those of the plan.
-    ///
-    /// # Errors
-    /// As [`Self::pullback`].
     pub fn pullback_into(
         self,
         cotangent: &Cotangent<'_, T>,

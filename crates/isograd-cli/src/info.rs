@@ -9,9 +9,6 @@ use crate::error::Error;
 use crate::streams::to_stdout;
 
 /// Runs the command.
-///
-/// # Errors
-/// See [`Error`].
 pub fn run(args: &args::Info) -> Result<(), Error> {
     match args.reading.options(Attributes::All).read(&args.file)? {
         Content::Geometry(geometry) => describe_geometry(args, &geometry),

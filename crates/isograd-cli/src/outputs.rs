@@ -108,9 +108,6 @@ impl Outputs {
     }
 
     /// Creates the folder of `-o`.
-    ///
-    /// # Errors
-    /// Errors of the operating system.
     pub fn create_folder(&self) -> Result<(), Error> {
         let Some(folder) = &self.folder else {
             return Ok(());
@@ -138,9 +135,6 @@ pub fn check_extension(path: &Path, endings: &[&str]) -> Result<(), Error> {
 }
 
 /// Checks that an output is not the input, under whatever name.
-///
-/// # Errors
-/// [`Error::Usage`].
 pub fn check_not_input(path: &Path, input: &Path) -> Result<(), Error> {
     if canonical(path) != canonical(input) && !is_same_file(path, input) {
         return Ok(());
@@ -171,9 +165,6 @@ fn is_same_file(_: &Path, _: &Path) -> bool {
 }
 
 /// Writes a report as indented JSON, atomically.
-///
-/// # Errors
-/// Errors of the operating system.
 pub fn write_report(path: &Path, report: &impl Serialize) -> Result<(), Error> {
     isograd_io::atomic::write(path, |out| {
         serde_json::to_writer_pretty(&mut *out, report)?;

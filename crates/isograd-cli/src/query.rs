@@ -11,9 +11,6 @@ use crate::outputs::{check_extension, check_not_input};
 use crate::streams::{to_stderr, to_stdout};
 
 /// Runs the command. Everything is computed and written in double precision.
-///
-/// # Errors
-/// See [`Error`].
 pub fn run(args: &args::Query) -> Result<(), Error> {
     check_extension(&args.output, CLOUD_EXTENSIONS)?;
     isograd_io::check_output(&args.output, CLOUD_EXTENSIONS)?;

@@ -10,9 +10,6 @@ use crate::outputs::check_extension;
 use crate::streams::to_stdout;
 
 /// Runs the command.
-///
-/// # Errors
-/// See [`Error`].
 pub fn run(args: &args::Sample) -> Result<(), Error> {
     if args.list {
         list();

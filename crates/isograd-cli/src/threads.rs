@@ -13,9 +13,6 @@ pub const MOST: usize = 16;
 /// Starts the threads: as many as `--threads` says, otherwise one per core.
 ///
 /// Rayon would start them at their first use, and panic if it can't.
-///
-/// # Errors
-/// [`Error::Threads`].
 pub fn start(requested: Option<u32>) -> Result<(), Error> {
     let cores = available_parallelism().map_or(1, NonZero::get);
     // 0 is rayon's default: RAYON_NUM_THREADS or one per core.

@@ -220,9 +220,6 @@ impl Fit {
     }
 
     /// Runs epochs until the fit is finished or `observer`, called after each one, breaks.
-    ///
-    /// # Errors
-    /// As [`step`](Self::step).
     pub fn run(
         &mut self,
         observer: &mut dyn FnMut(&mut Self) -> ControlFlow<()>,

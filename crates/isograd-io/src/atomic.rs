@@ -64,9 +64,6 @@ pub fn remove_unfinished() {
 ///
 /// Devices and pipes (`/dev/stdout`) are written to directly; a symbolic link is followed, also where its target does
 /// not exist yet.
-///
-/// # Errors
-/// [`Error::Write`].
 pub fn write(
     path: &Path,
     content: impl FnOnce(&mut Output) -> io::Result<()>,

@@ -27,9 +27,6 @@ impl ReadOptions {
     }
 
     /// Reads a file of points or of a mesh; `-` is standard input (PLY or text).
-    ///
-    /// # Errors
-    /// See [`Error`].
     pub fn read_geometry(&self, path: &Path) -> Result<Geometry, Error> {
         let (source, format) = self.open(path)?;
         self.parse_geometry(&source, format)
@@ -51,9 +48,6 @@ impl ReadOptions {
     }
 
     /// Reads a field from `.vti` or `.npz`.
-    ///
-    /// # Errors
-    /// See [`Error`].
     pub fn read_field(&self, path: &Path) -> Result<FieldFile, Error> {
         let (source, format) = self.open(path)?;
         self.parse_field(&source, format)
@@ -61,9 +55,6 @@ impl ReadOptions {
 
     /// Reads a file of any kind: a field from `.vti`, or from `.npz` with an array `sdf` of three axes; otherwise
     /// points or a mesh.
-    ///
-    /// # Errors
-    /// See [`Error`].
     pub fn read(&self, path: &Path) -> Result<Content, Error> {
         let (source, format) = self.open(path)?;
         let is_field = match format {
@@ -79,9 +70,6 @@ impl ReadOptions {
     }
 
     /// Reads points or a mesh from bytes in a known format.
-    ///
-    /// # Errors
-    /// See [`Error`].
     pub fn parse_geometry(&self, source: &Source, format: Format) -> Result<Geometry, Error> {
         self.check_columns(&source.name, format)?;
         let input = &Input::new(source, self);
@@ -101,9 +89,6 @@ impl ReadOptions {
     }
 
     /// Reads a field from bytes in a known format.
-    ///
-    /// # Errors
-    /// See [`Error`].
     pub fn parse_field(&self, source: &Source, format: Format) -> Result<FieldFile, Error> {
         self.check_columns(&source.name, format)?;
         let input = &Input::new(source, self);
@@ -122,9 +107,6 @@ impl ReadOptions {
 }
 
 /// [`ReadOptions::read_geometry`] with default options.
-///
-/// # Errors
-/// See [`Error`].
 pub fn read_geometry(path: &Path) -> Result<Geometry, Error> {
     ReadOptions::default().read_geometry(path)
 }
@@ -138,33 +120,21 @@ pub fn read_mesh(path: &Path) -> Result<Geometry, Error> {
 }
 
 /// [`ReadOptions::read_field`] with default options.
-///
-/// # Errors
-/// See [`Error`].
 pub fn read_field(path: &Path) -> Result<FieldFile, Error> {
     ReadOptions::default().read_field(path)
 }
 
 /// [`ReadOptions::read`] with default options.
-///
-/// # Errors
-/// See [`Error`].
 pub fn read(path: &Path) -> Result<Content, Error> {
     ReadOptions::default().read(path)
 }
 
 /// [`ReadOptions::parse_geometry`] with default options.
-///
-/// # Errors
-/// See [`Error`].
 pub fn parse_geometry(source: &Source, format: Format) -> Result<Geometry, Error> {
     ReadOptions::default().parse_geometry(source, format)
 }
 
 /// [`ReadOptions::parse_field`] with default options.
-///
-/// # Errors
-/// See [`Error`].
 pub fn parse_field(source: &Source, format: Format) -> Result<FieldFile, Error> {
     ReadOptions::default().parse_field(source, format)
 }

@@ -31,9 +31,6 @@ pub fn write_mesh<T: Real>(path: &Path, mesh: &Mesh<T>) -> Result<(), Error> {
 }
 
 /// Writes a field in the format of the extension ([`FIELD_EXTENSIONS`]) and in type `T`.
-///
-/// # Errors
-/// As [`write_mesh`].
 pub fn write_field<T: Real>(path: &Path, field: &Field<T>) -> Result<(), Error> {
     match Format::from_path(path) {
         Some(Format::Vti) => atomic::write(path, |out| vtk::write_field(out, field)),
@@ -44,9 +41,6 @@ pub fn write_field<T: Real>(path: &Path, field: &Field<T>) -> Result<(), Error> 
 
 /// Writes a cloud with its normals and attributes in the format of the extension ([`CLOUD_EXTENSIONS`]),
 /// in its own order and in type `T`.
-///
-/// # Errors
-/// As [`write_mesh`].
 pub fn write_cloud<T: Real>(path: &Path, cloud: &PointCloud<T>) -> Result<(), Error> {
     match Format::from_path(path) {
         Some(Format::Ply) => atomic::write(path, |out| ply::write_cloud(out, cloud)),

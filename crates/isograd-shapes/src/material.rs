@@ -30,9 +30,6 @@ impl Shape {
 
     /// `(N, 3)` outward unit normals at `(N,)` surface coordinates; zero where the map from the square to the
     /// surface is degenerate, which it is not at [sampled](Shape::sample) coordinates.
-    ///
-    /// # Errors
-    /// As [`Shape::points_at`].
     pub fn normals_at<T: Real>(
         &self,
         coordinates: &[SurfaceCoordinate],

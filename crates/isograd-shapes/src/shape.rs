@@ -140,9 +140,6 @@ impl Shape {
 
     /// Sets several parameters at once; only the final values have to form a body. On an error nothing
     /// changes.
-    ///
-    /// # Errors
-    /// As [`Shape::set`].
     pub fn set_all<'a>(
         &mut self,
         changes: impl IntoIterator<Item = (&'a str, f64)>,

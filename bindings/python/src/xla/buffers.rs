@@ -186,9 +186,6 @@ impl<'a> Call<'a> {
     }
 
     /// The next output, of `rank` dimensions.
-    ///
-    /// # Errors
-    /// As [`Self::input`].
     pub fn output<E: Element>(&mut self, name: &str, rank: usize) -> Result<&'a mut [E], String> {
         let output = self.outputs.next().ok_or_else(|| missing(name))?;
         check_rank(name, &output.dims, rank)?;
@@ -205,18 +202,12 @@ impl<'a> Call<'a> {
     }
 
     /// The next output as `(N, 3)` vectors.
-    ///
-    /// # Errors
-    /// As [`Self::vectors`].
     pub fn vectors_out<E: Element>(&mut self, name: &str) -> Result<&'a mut [[E; 3]], String> {
         check_three(name, self.outputs.as_slice().first())?;
         Ok(self.output::<E>(name, 2)?.as_chunks_mut().0)
     }
 
     /// The normals of the cloud: the last input, where one is left.
-    ///
-    /// # Errors
-    /// As [`Self::vectors`].
     pub fn normals<E: Element>(&mut self) -> Result<Option<&'a [[E; 3]]>, String> {
         match self.inputs.len() {
             0 => Ok(None),

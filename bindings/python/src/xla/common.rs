@@ -15,9 +15,6 @@ impl Float for f32 {}
 impl Float for f64 {}
 
 /// A copy of `(N, 3)` points and, where the caller passes them, normals.
-///
-/// # Errors
-/// See [`isograd::PointCloudError`].
 pub fn cloud<T: Real>(
     points: &[[T; 3]],
     normals: Option<&[[T; 3]]>,
@@ -95,9 +92,6 @@ pub struct Restored<'a, T: Number> {
 
 impl<'a, T: Number> Restored<'a, T> {
     /// The cotangents of the cloud.
-    ///
-    /// # Errors
-    /// See [`isograd::PullbackError`].
     pub fn pullback(self, cotangent: &Cotangent<'_, T>) -> Result<&'a CloudCotangent<T>, Failure> {
         self.result.pullback_into(cotangent, self.bar)?;
         Ok(self.bar)
@@ -106,9 +100,6 @@ impl<'a, T: Number> Restored<'a, T> {
 
 impl<'a> Call<'a> {
     /// The next three outputs.
-    ///
-    /// # Errors
-    /// See [`Call::output`].
     pub fn saved_outputs<T: Float>(&mut self) -> Result<SavedOutputs<'a, T>, Failure> {
         Ok(SavedOutputs {
             sdf: self.output("φ", 3)?,
@@ -118,9 +109,6 @@ impl<'a> Call<'a> {
     }
 
     /// The next three inputs, as [`SavedOutputs::fill`] wrote them.
-    ///
-    /// # Errors
-    /// See [`Call::input`].
     pub fn saved<T: Float>(&mut self) -> Result<Saved<'a, T>, Failure> {
         Ok(Saved {
             sdf: self.input("φ", 3)?,
@@ -130,9 +118,6 @@ impl<'a> Call<'a> {
     }
 
     /// The next output, for the points, and one more for the normals where they are inputs.
-    ///
-    /// # Errors
-    /// See [`Call::output`].
     pub fn cloud_outputs<T: Float>(
         &mut self,
         has_normals: bool,

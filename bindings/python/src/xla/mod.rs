@@ -33,9 +33,6 @@ trait Target {
     fn run<T: Float>(call: Call<'_>) -> Result<(), Failure>;
 
     /// The function of a batch, in the number type of its first input.
-    ///
-    /// # Errors
-    /// As [`Self::run`].
     fn run_batch(batch: Batch<'_>) -> Result<(), Failure> {
         match batch.is_double() {
             true => batch.for_each(Self::run::<f64>),

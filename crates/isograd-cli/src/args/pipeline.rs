@@ -92,17 +92,11 @@ pub struct MethodArgs {
 
 impl GridArgs {
     /// The grid: between `--bounds`, or around `cloud`.
-    ///
-    /// # Errors
-    /// See [`GridError`].
     pub fn grid<T: Real>(&self, cloud: &PointCloud<T>) -> Result<Grid<T>, GridError> {
         self.grid_with(cloud, self.outliers)
     }
 
     /// Like [`Self::grid`], with another use of outliers.
-    ///
-    /// # Errors
-    /// See [`GridError`].
     pub fn grid_with<T: Real>(
         &self,
         cloud: &PointCloud<T>,

@@ -153,18 +153,12 @@ impl<R: Runtime> Device<R> {
     }
 
     /// An array of `len` elements that hold anything.
-    ///
-    /// # Errors
-    /// [`Error::TooLarge`].
     pub fn empty<E: CubeElement>(&self, len: usize) -> Result<Buffer<E>, Error> {
         let bytes = self.check_size::<E>(len)?;
         Ok(Buffer::from_handle(self.client.empty(bytes), len))
     }
 
     /// A copy of `values` on the device.
-    ///
-    /// # Errors
-    /// [`Error::TooLarge`].
     pub fn upload<E: CubeElement>(&self, values: &[E]) -> Result<Buffer<E>, Error> {
         if values.is_empty() {
             return self.empty(0);
@@ -175,9 +169,6 @@ impl<R: Runtime> Device<R> {
     }
 
     /// A copy of an array in the host's memory. Waits for the work that makes it.
-    ///
-    /// # Errors
-    /// [`Error::Failed`].
     pub fn download<E: CubeElement>(&self, buffer: &Buffer<E>) -> Result<Vec<E>, Error> {
         if buffer.is_empty() {
             return Ok(Vec::new());
@@ -192,9 +183,6 @@ impl<R: Runtime> Device<R> {
     }
 
     /// Waits until all that was queued is done.
-    ///
-    /// # Errors
-    /// [`Error::Failed`].
     pub fn wait(&self) -> Result<(), Error> {
         self.counts.wait();
         cubecl::future::block_on(self.client.sync()).map_err(|e| self.failed(&e))
@@ -211,9 +199,6 @@ impl<R: Runtime> Device<R> {
     }
 
     /// Device memory held by this program.
-    ///
-    /// # Errors
-    /// [`Error::Failed`].
     pub fn memory(&self) -> Result<Memory, Error> {
         let usage = self.client.memory_usage().map_err(|e| self.failed(&e))?;
         Ok(Memory {
@@ -223,9 +208,6 @@ impl<R: Runtime> Device<R> {
     }
 
     /// Gives memory that no array uses back to the driver, as far as it takes it. Waits for all that was queued.
-    ///
-    /// # Errors
-    /// [`Error::Failed`].
     pub fn release(&self) -> Result<(), Error> {
         self.wait()?;
         self.client.memory_cleanup();

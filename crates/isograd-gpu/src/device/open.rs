@@ -29,9 +29,6 @@ mod vulkan {
 
     impl Device<Vulkan> {
         /// The fastest Vulkan device.
-        ///
-        /// # Errors
-        /// [`Error::NoDevice`].
         pub fn vulkan() -> Result<Self, Error> {
             let name = opened()?.name.clone();
             let client = WgpuRuntime::client(&WgpuDevice::DefaultDevice);
@@ -39,9 +36,6 @@ mod vulkan {
         }
 
         /// [`Self::vulkan`], but only on a GPU: a driver that computes on the CPU is slower than the CPU's own code.
-        ///
-        /// # Errors
-        /// [`Error::NoDevice`].
         pub fn vulkan_gpu() -> Result<Self, Error> {
             let opened = opened()?;
             if opened.is_software {
@@ -105,9 +99,6 @@ mod cuda {
 
     impl Device<Cuda> {
         /// The CUDA device of this number. The CUDA libraries are loaded here, and nowhere before.
-        ///
-        /// # Errors
-        /// [`Error::NoDevice`].
         pub fn cuda(index: usize) -> Result<Self, Error> {
             let name = name(index).map_err(|reason| Error::NoDevice {
                 backend: "CUDA",

@@ -11,9 +11,6 @@ use crate::pipeline::{self, Reconstruction, Reconstructor};
 use crate::{Buffer, Device, Scalar};
 
 /// [`Reconstructor::extend`] for arrays in the host's memory.
-///
-/// # Errors
-/// Errors of the pipeline.
 pub fn forward<R: Runtime, T: Scalar>(
     plan: &Reconstructor<R, T>,
     result: &Reconstruction<T>,

@@ -74,9 +74,6 @@ impl<T: Number> Plan<T> {
     }
 
     /// Runs all stages on a cloud. The results stay on the device.
-    ///
-    /// # Errors
-    /// As [`Error`] lists.
     pub fn reconstruct(&mut self, cloud: &PointCloud<T>) -> Result<Reconstruction<T>, Error> {
         self.reconstruct_observed(cloud, &mut |_| ControlFlow::Continue(()))
     }

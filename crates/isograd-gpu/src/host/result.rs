@@ -53,9 +53,6 @@ macro_rules! results {
         impl<T: Number> Reconstruction<T> {
             $(
                 $(#[$doc])+
-                ///
-                /// # Errors
-                /// Errors of the device.
                 pub fn $name(&self) -> Result<&$view, Error> {
                     let $of = self;
                     let copy = once(&self.copies.$name, || $copy)?;
@@ -138,9 +135,6 @@ impl<T: Number> Reconstruction<T> {
     }
 
     /// The level `c` of the surface `χ = c`.
-    ///
-    /// # Errors
-    /// Errors of the device.
     pub fn iso_value(&self) -> Result<T, Error> {
         Ok(self.level()?[0])
     }
@@ -184,9 +178,6 @@ impl<T: Number> Reconstruction<T> {
     }
 
     /// Numbers, times and warnings. With [`Options::checks`] points, φ, the surface and the normals are copied for them.
-    ///
-    /// # Errors
-    /// Errors of the device.
     pub fn report(&self) -> Result<&Report, Error> {
         once(&self.copies.report, || self.make_report())
     }
@@ -244,9 +235,6 @@ impl<T: Number> Reconstruction<T> {
     }
 
     /// [`Self::extend`] for any attribute of the samples, with the residual of its pullback.
-    ///
-    /// # Errors
-    /// As [`Self::extend`].
     pub fn extend_with_residual(
         &self,
         attribute: &Attribute<T>,

@@ -25,9 +25,6 @@ pub trait Work<T: Scalar>: Send + Sync {
     fn name(&self) -> &str;
 
     /// `(N, 3)` vectors, there.
-    ///
-    /// # Errors
-    /// Errors of the device.
     fn upload(&self, vectors: &[[T; 3]]) -> Result<Buffer<T>, Error>;
 
     /// The radii of a cloud, whose `points` are there, and the signs of its axes; `begin` is called before the signs are
@@ -46,9 +43,6 @@ pub trait Work<T: Scalar>: Send + Sync {
     ) -> Result<CallStart<T>, Error>;
 
     /// All stages, with given normals or without; `observer` is called before each, when those before it are done.
-    ///
-    /// # Errors
-    /// Errors of the pipeline.
     fn reconstruct(
         &self,
         points: &Buffer<T>,
@@ -58,9 +52,6 @@ pub trait Work<T: Scalar>: Send + Sync {
     ) -> Result<Reconstruction<T>, Error>;
 
     /// Cotangents in the host's memory to such cotangents.
-    ///
-    /// # Errors
-    /// Errors of the pipeline.
     fn pullback(
         &self,
         result: &Reconstruction<T>,
@@ -68,9 +59,6 @@ pub trait Work<T: Scalar>: Send + Sync {
     ) -> Result<CloudCotangent<T>, Error>;
 
     /// An attribute on the surface and round it.
-    ///
-    /// # Errors
-    /// Errors of the pipeline.
     fn extend(
         &self,
         result: &Reconstruction<T>,
@@ -79,15 +67,9 @@ pub trait Work<T: Scalar>: Send + Sync {
     ) -> Result<(Extension<T>, Residual<T>), Error>;
 
     /// A copy of numbers.
-    ///
-    /// # Errors
-    /// Errors of the device.
     fn numbers(&self, buffer: &Buffer<T>) -> Result<Vec<T>, Error>;
 
     /// A copy of indices.
-    ///
-    /// # Errors
-    /// Errors of the device.
     fn indices(&self, buffer: &Buffer<u32>) -> Result<Vec<u32>, Error>;
 }
 
@@ -325,9 +307,6 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
 }
 
 /// A copy on the device of what is there.
-///
-/// # Errors
-/// Errors of the device.
 pub fn upload<R: Runtime, E: CubeElement>(
     device: &Device<R>,
     given: Option<&[E]>,

@@ -67,9 +67,6 @@ pub fn forward<R: Runtime, T: Scalar>(
 }
 
 /// [`forward`] at a level that the host knows.
-///
-/// # Errors
-/// As [`forward`].
 pub fn forward_at<R: Runtime, T: Scalar>(
     device: &Device<R>,
     plan: &Plan,

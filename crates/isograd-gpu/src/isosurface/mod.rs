@@ -45,9 +45,6 @@ pub struct Plan {
 
 impl Plan {
     /// A plan for a device.
-    ///
-    /// # Errors
-    /// [`TooLarge`](crate::Error::TooLarge).
     pub fn new<R: Runtime>(device: &Device<R>) -> Result<Self, crate::Error> {
         let mut starts = vec![0];
         let mut packed = Vec::new();

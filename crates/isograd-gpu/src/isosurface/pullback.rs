@@ -30,9 +30,6 @@ pub struct Cotangent<T> {
 
 /// Cotangents of the inputs of [`forward`](super::forward) from those of the vertices, `(V, 3)`:
 /// [`isograd::isosurface::pullback`], whose guard is used, with sums in `T`.
-///
-/// # Errors
-/// [`Error::Length`], [`Error::TooLarge`].
 pub fn pullback<R: Runtime, T: Scalar>(
     device: &Device<R>,
     residual: &Residual<T>,

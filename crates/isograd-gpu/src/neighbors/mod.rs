@@ -101,9 +101,6 @@ impl<T> Neighborhoods<T> {
 
 /// Sorts the `(N, 3)` points and builds the tree; `radii` `(N,)` are the `R_i`, in the unit of the points. Both
 /// finite and in input order.
-///
-/// # Errors
-/// [`Error::Length`], [`Error::TooLarge`].
 pub fn forward<R: Runtime, T: Scalar>(
     device: &Device<R>,
     points: &Buffer<T>,
@@ -116,9 +113,6 @@ pub fn forward<R: Runtime, T: Scalar>(
 }
 
 /// Neighborhoods of the same points with other radii `(N,)`, in input order.
-///
-/// # Errors
-/// [`Error::Length`], [`Error::TooLarge`].
 pub fn with_radii<R: Runtime, T: Scalar>(
     device: &Device<R>,
     neighborhoods: &Neighborhoods<T>,

@@ -91,9 +91,6 @@ pub fn forward<R: Runtime, T: Scalar>(
 }
 
 /// Counts the samples of the neighborhoods, and finds those that are isolated; `common` is [`Radii::common`].
-///
-/// # Errors
-/// [`crate::Error::TooLarge`].
 pub fn census<R: Runtime, T: Scalar>(
     device: &Device<R>,
     neighborhoods: &Neighborhoods<T>,

@@ -20,9 +20,6 @@ pub(crate) const MOMENTS: usize = 10;
 ///
 /// Where the points of a neighborhood lie on a line or in one place, the axis is some unit vector at a right
 /// angle to the line, or any, and counts as guarded.
-///
-/// # Errors
-/// [`Error::TooLarge`].
 pub fn forward<R: Runtime, T: Scalar>(
     device: &Device<R>,
     neighborhoods: &Neighborhoods<T>,

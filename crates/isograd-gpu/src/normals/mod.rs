@@ -60,9 +60,6 @@ pub type Planes<T> = Vec<isograd::normals::Plane<T>>;
 
 impl<T: Scalar> Residual<T> {
     /// Number of points whose normal is ill defined. Waits for the device.
-    ///
-    /// # Errors
-    /// [`Error::TooLarge`], [`Error::Failed`].
     pub fn guarded<R: Runtime>(&self, device: &Device<R>) -> Result<usize, Error> {
         let n = self.neighborhoods.len();
         if n == 0 {
@@ -75,9 +72,6 @@ impl<T: Scalar> Residual<T> {
     }
 
     /// A copy of the planes on the host.
-    ///
-    /// # Errors
-    /// [`Error::Failed`].
     pub fn planes<R: Runtime>(&self, device: &Device<R>) -> Result<Planes<T>, Error> {
         let n = self.neighborhoods.len();
         let places = device.download(&self.neighborhoods.places)?;

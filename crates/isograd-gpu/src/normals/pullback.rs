@@ -15,9 +15,6 @@ use crate::{Buffer, Device, Error, Scalar};
 
 /// Cotangents `(N, 3)` of the points for the cotangents `normals_bar` `(N, 3)` of the axes, with the sign that
 /// [`forward`](super::forward) gave them; their part along the axis drops out. Both in input order.
-///
-/// # Errors
-/// [`Error::Length`], [`Error::TooLarge`].
 pub fn pullback<R: Runtime, T: Scalar>(
     device: &Device<R>,
     residual: &Residual<T>,

@@ -16,9 +16,6 @@ use crate::{Buffer, Device, Error, Scalar};
 /// neighborhoods are rough and wider ones far less so. For automatic radii; one that the user gave stays.
 ///
 /// Only points that are still rough are tried again: their list stays on the device.
-///
-/// # Errors
-/// [`Error::TooLarge`].
 pub fn widen<R: Runtime, T: Scalar>(
     device: &Device<R>,
     residual: &Residual<T>,

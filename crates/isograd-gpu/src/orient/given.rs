@@ -43,9 +43,6 @@ pub fn forward<R: Runtime, T: Scalar>(
 
 /// Cotangents `(N, 3)` of the `given` vectors from those of the normals, `normals_bar` `(N, 3)`; finite for every
 /// vector that [`forward`] takes.
-///
-/// # Errors
-/// [`crate::Error::Length`], [`crate::Error::TooLarge`].
 pub fn pullback<R: Runtime, T: Scalar>(
     device: &Device<R>,
     given: &Buffer<T>,

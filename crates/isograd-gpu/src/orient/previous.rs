@@ -37,9 +37,6 @@ pub struct Followed<T> {
 
 /// Turns each of the `(N, 3)` axes, which are of unit length and in input order, to the side of the step before.
 /// `radii` `(N,)`, in input order, are those of the neighbors that far turned axes follow. Nothing waits.
-///
-/// # Errors
-/// [`crate::Error::Length`], [`crate::Error::TooLarge`].
 pub fn forward<R: Runtime, T: Scalar>(
     device: &Device<R>,
     neighborhoods: &Neighborhoods<T>,

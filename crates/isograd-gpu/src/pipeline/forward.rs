@@ -55,9 +55,6 @@ struct Solved<T> {
 
 impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
     /// The reconstruction of `points` `(N, 3)`, finite, in the user's unit.
-    ///
-    /// # Errors
-    /// As [`Error`] lists.
     pub fn reconstruct(
         &self,
         points: &Buffer<T>,
@@ -67,9 +64,6 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
     }
 
     /// [`Self::reconstruct`] with `given` outward normals: `(N, 3)` of any length but 0. Of `held`, the areas' radii are used.
-    ///
-    /// # Errors
-    /// As [`Error`] lists.
     pub fn reconstruct_given(
         &self,
         points: &Buffer<T>,

@@ -108,9 +108,6 @@ impl<T: Scalar> RadiiAndSigns<T> {
     }
 
     /// Radii and signs of the CPU's stages or of [`isograd::Orienter`].
-    ///
-    /// # Errors
-    /// [`crate::Error::TooLarge`].
     pub fn of<R: Runtime>(
         device: &Device<R>,
         near: &Neighborhoods<T>,
@@ -215,9 +212,6 @@ impl<T: Scalar> RadiiAndSigns<T> {
 
     /// These radii, with the signs of other `(N, 3)` vectors of any length, roughly outward. Axes that are more
     /// than 60° off follow their neighbors.
-    ///
-    /// # Errors
-    /// [`crate::Error::Length`].
     pub fn facing(self, outward: Buffer<T>) -> Result<Self, crate::Error> {
         check_length("the outward vectors", &outward, self.outward.len())?;
         Ok(Self {

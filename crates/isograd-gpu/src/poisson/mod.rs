@@ -86,9 +86,6 @@ pub fn forward<R: Runtime, T: Scalar>(
 }
 
 /// From `χ̄` to `b̄` and `σ̄`.
-///
-/// # Errors
-/// Like [`forward`].
 pub fn pullback<R: Runtime, T: Scalar>(
     device: &Device<R>,
     solver: &Solver<T>,
@@ -113,9 +110,6 @@ impl<T: Scalar> Solver<T> {
     }
 
     /// Like [`Self::new`], with the sums that define the transforms, `O(n⁴)` for `n³` cells: an oracle.
-    ///
-    /// # Errors
-    /// Like [`Self::new`].
     pub fn by_definition<R: Runtime>(device: &Device<R>, shape: [usize; 3]) -> Result<Self, Error> {
         Self::of_axes(device, shape, Axis::by_definition)
     }
@@ -159,9 +153,6 @@ impl<T: Scalar> Solver<T> {
     }
 
     /// `χ` for the right-hand side `b`: [`forward`] without its residual. Its own transpose.
-    ///
-    /// # Errors
-    /// Like [`forward`].
     pub fn solve<R: Runtime>(
         &self,
         device: &Device<R>,

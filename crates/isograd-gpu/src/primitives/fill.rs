@@ -8,9 +8,6 @@ use crate::{Buffer, Device, Error, Scalar};
 const BLOCK: u32 = 256;
 
 /// `len` zeros.
-///
-/// # Errors
-/// [`Error::TooLarge`].
 pub fn zeros<R: Runtime, T: Scalar>(device: &Device<R>, len: usize) -> Result<Buffer<T>, Error> {
     let out = device.empty(len)?;
     launch!(device, len, BLOCK => fill_zeros<T>(out));

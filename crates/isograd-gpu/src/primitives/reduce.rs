@@ -20,9 +20,6 @@ pub(crate) fn groups_for(count: usize) -> usize {
 }
 
 /// The sum of `values`, an array of one number. Of no values, it is 0.
-///
-/// # Errors
-/// [`Error::TooLarge`].
 pub fn sum<R: Runtime, T: Scalar>(
     device: &Device<R>,
     values: &Buffer<T>,

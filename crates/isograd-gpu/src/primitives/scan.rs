@@ -10,9 +10,6 @@ const BLOCK: usize = 256;
 
 /// The exclusive sum of `values`: element `i` of the result is the sum of the first `i`, and the last
 /// element, one more than there are values, is the sum of all. Sums must fit in 32 bits.
-///
-/// # Errors
-/// [`Error::TooLarge`].
 pub fn exclusive_sum<R: Runtime>(
     device: &Device<R>,
     values: &Buffer<u32>,

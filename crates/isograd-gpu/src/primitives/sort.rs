@@ -22,9 +22,6 @@ pub struct Order {
 
 /// Orders `keys`, all below `limit`; equal ones stay in the order of the input (radix sort, from the lowest
 /// digit).
-///
-/// # Errors
-/// [`Error::TooLarge`].
 pub fn order<R: Runtime>(
     device: &Device<R>,
     keys: &Buffer<u32>,
@@ -55,9 +52,6 @@ pub(crate) fn as_they_are<R: Runtime>(
 
 /// Where each key below `limit` begins among ascending `keys`: `limit + 1` places, the last of them the
 /// number of keys.
-///
-/// # Errors
-/// [`Error::TooLarge`].
 pub fn starts<R: Runtime>(
     device: &Device<R>,
     keys: &Buffer<u32>,

@@ -32,9 +32,6 @@ pub struct Residual<T> {
 
 /// The `(N,)` areas `a_i`, in input order and the unit of the points squared; positive, and 0 for isolated
 /// samples. A radius above `common_radius` has grown ([`isograd::neighbors::Neighborhoods::common_radius`]).
-///
-/// # Errors
-/// [`Error::TooLarge`].
 pub fn forward<R: Runtime, T: Scalar>(
     device: &Device<R>,
     neighborhoods: &Neighborhoods<T>,
@@ -56,9 +53,6 @@ pub fn forward<R: Runtime, T: Scalar>(
 }
 
 /// Cotangents `(N, 3)` of the points from those of the areas, `areas_bar` `(N,)`. Both in input order.
-///
-/// # Errors
-/// [`Error::Length`], [`Error::TooLarge`].
 pub fn pullback<R: Runtime, T: Scalar>(
     device: &Device<R>,
     residual: &Residual<T>,
@@ -83,9 +77,6 @@ pub fn pullback<R: Runtime, T: Scalar>(
 
 /// The mean of areas `(N,)` that are not 0, and how many those are: [`isograd::splat::area::mean`]. Waits for the
 /// device.
-///
-/// # Errors
-/// Errors of the device.
 pub fn mean<R: Runtime, T: Scalar>(
     device: &Device<R>,
     areas: &Buffer<T>,

@@ -38,9 +38,6 @@ impl<R: Runtime, T: Scalar> Argument<R> for SampleCotangent<T> {
 
 impl<T: Scalar> SampleCotangent<T> {
     /// Zeros for `count` samples.
-    ///
-    /// # Errors
-    /// [`Error::TooLarge`].
     pub fn zeros<R: Runtime>(device: &Device<R>, count: usize) -> Result<Self, Error> {
         Ok(Self {
             points: zeros(device, 3 * count)?,

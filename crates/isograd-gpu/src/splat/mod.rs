@@ -106,9 +106,6 @@ pub struct Residual<T> {
 
 impl<T: Scalar> Residual<T> {
     /// The samples that were left out, if any. Waits for the device.
-    ///
-    /// # Errors
-    /// [`Error::Failed`].
     pub fn refused<R: Runtime>(&self, device: &Device<R>) -> Result<Option<Refused>, Error> {
         self.order.refused(device)
     }

@@ -19,9 +19,6 @@ use crate::{Buffer, Device, Scalar};
 ///
 /// In `f32` the error is a few `ε` times the distance and the extent of the grid, wherever the grid is: places
 /// are computed from its low corner. [`isograd::distance::lattice`] computes in `f64` whatever the number type.
-///
-/// # Errors
-/// [`Error::Empty`], [`Error::Band`], [`Error::Triples`], and those of the device.
 pub fn forward<T: Scalar, R: Runtime>(
     device: &Device<R>,
     mesh: &Mesh<T>,

@@ -17,9 +17,6 @@ use crate::{Buffer, Device, Scalar};
 
 /// Pulls the cotangents `phi_bar` of the distances, in memory order, back to the vertices and the grid. Cells
 /// beyond the band count for nothing: there `φ` is constant.
-///
-/// # Errors
-/// Errors of the device.
 pub fn pullback<T: Scalar, R: Runtime>(
     device: &Device<R>,
     residual: &Residual<T>,
