@@ -2,7 +2,7 @@
 
 use super::cloud::{PointCloud, bounds};
 use super::grid::{Grid, GridCotangent, GridError, Resolution};
-use super::outliers::Outliers;
+use super::outliers::{Outliers, Selection};
 use crate::Real;
 
 impl<T: Real> Grid<T> {
@@ -31,6 +31,16 @@ impl<T: Real> Grid<T> {
         padding: T,
         outliers: Outliers,
     ) -> Result<Self, GridError> {
+        Self::fit_used(cloud, resolution, padding, &outliers.select(cloud.points()))
+    }
+
+    /// The grid round the samples that are used.
+    fn fit_used(
+        cloud: &PointCloud<T>,
+        resolution: Resolution<T>,
+        padding: T,
+        selection: &Selection,
+    ) -> Result<Self, GridError> {
         if !(padding >= T::zero()) || !padding.is_finite() {
             return Err(GridError::Padding {
                 padding: padding.f64(),
@@ -39,7 +49,6 @@ impl<T: Real> Grid<T> {
         let none = GridError::NoExtent {
             points: cloud.len(),
         };
-        let selection = outliers.select(cloud.points());
         let used = match selection.is_all() {
             true => cloud.bounds(),
             false => bounds(&selection.gather(cloud.points(), 1)),
@@ -107,8 +116,8 @@ impl<T: Real> Grid<T> {
                 points,
             });
         }
-        let shape = Self::fit_with(cloud, resolution, padding, outliers)?.shape();
         let selection = outliers.select(cloud.points());
+        let shape = Self::fit_used(cloud, resolution, padding, &selection)?.shape();
         let Some(ends) = ends(cloud.points(), selection.left_out()) else {
             return Err(GridError::NoExtent { points });
         };

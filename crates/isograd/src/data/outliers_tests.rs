@@ -1,4 +1,4 @@
-//! What is left out, and what never is.
+//! Detection of outliers: which samples it leaves out, and which it keeps.
 
 use super::outliers::Outliers;
 use crate::testing::noise;
