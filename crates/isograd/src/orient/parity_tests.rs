@@ -1,9 +1,8 @@
 //! The paper's method against a plain transcription of it.
 
 use super::parity::{Pattern, detection_radius, flip};
-use super::shapes::{Random, sphere, torus};
+use super::shapes::{Random, neighborhoods, oriented, sphere, torus};
 use super::*;
-use crate::neighbors::{self, Radius};
 use crate::vector::{add, norm, norm_squared, scale, sub};
 
 /// The detection array of one ray, entry by entry, over all points.
@@ -67,8 +66,7 @@ fn signs_are_those_of_the_plain_transcription() {
     for points in [torus(500, 4).0, noisy_torus(500), far] {
         let mut random = Random(6);
         let axes: Vec<_> = points.iter().map(|_| random.direction()).collect();
-        let mut neighborhoods = Neighborhoods::default();
-        neighbors::forward(&points, Radius::Auto, &mut neighborhoods).unwrap();
+        let neighborhoods = neighborhoods(&points);
         for options in [
             ParityOptions::default(),
             ParityOptions {
@@ -78,18 +76,8 @@ fn signs_are_those_of_the_plain_transcription() {
             },
         ] {
             let r_d = detection_radius(&neighborhoods, &options);
-            let (mut scratch, mut out) = (Scratch::default(), Orientation::default());
             let method = Method::Parity(options);
-            forward(
-                &points,
-                &axes,
-                &neighborhoods,
-                None,
-                &method,
-                &mut scratch,
-                &mut out,
-            )
-            .unwrap();
+            let out = oriented(&points, &axes, &neighborhoods, None, &method).unwrap();
             for (i, &axis) in axes.iter().enumerate() {
                 assert_eq!(
                     out.normals[i],
@@ -109,8 +97,7 @@ fn the_detection_radius_is_that_of_the_most_lonely_point() {
         [1.0, 2.0, 0.0],
         [1.5, 0.0, 0.0],
     ];
-    let mut neighborhoods = Neighborhoods::default();
-    neighbors::forward(&points, Radius::Auto, &mut neighborhoods).unwrap();
+    let neighborhoods = neighborhoods(&points);
     let options = ParityOptions::default();
     assert_eq!(detection_radius(&neighborhoods, &options), 2.5 * 0.5 * 2.0);
 }
@@ -137,28 +124,16 @@ fn spheres_are_oriented() {
         .iter()
         .map(|n| if n[0] > 0.0 { *n } else { n.map(|x| -x) })
         .collect();
-    let mut neighborhoods = Neighborhoods::default();
-    neighbors::forward(&points, Radius::Auto, &mut neighborhoods).unwrap();
-    let (mut scratch, mut out) = (Scratch::default(), Orientation::default());
+    let neighborhoods = neighborhoods(&points);
     let method = Method::Parity(ParityOptions::default());
-    forward(
-        &points,
-        &axes,
-        &neighborhoods,
-        None,
-        &method,
-        &mut scratch,
-        &mut out,
-    )
-    .unwrap();
+    let out = oriented(&points, &axes, &neighborhoods, None, &method).unwrap();
     assert_eq!(out.normals, truth);
 }
 
 #[test]
 fn options_out_of_range_are_refused() {
     let (points, axes) = sphere(50, [0.0; 3], 1.0, 11);
-    let mut neighborhoods = Neighborhoods::default();
-    neighbors::forward(&points, Radius::Auto, &mut neighborhoods).unwrap();
+    let neighborhoods = neighborhoods(&points);
     for (gamma, step) in [
         (0.5, 1.0),
         (f64::NAN, 1.0),
@@ -170,16 +145,7 @@ fn options_out_of_range_are_refused() {
             tolerance: 2,
             step,
         });
-        let (mut scratch, mut out) = (Scratch::default(), Orientation::default());
-        let outcome = forward(
-            &points,
-            &axes,
-            &neighborhoods,
-            None,
-            &method,
-            &mut scratch,
-            &mut out,
-        );
+        let outcome = oriented(&points, &axes, &neighborhoods, None, &method);
         assert!(matches!(outcome, Err(Error::Option { .. })));
     }
 }
@@ -191,20 +157,10 @@ fn clouds_of_equal_pairs_are_refused_by_name() {
         [points.clone(), points].concat(),
         [axes.clone(), axes].concat(),
     );
-    let mut neighborhoods = Neighborhoods::default();
-    neighbors::forward(&points, Radius::Auto, &mut neighborhoods).unwrap();
+    let neighborhoods = neighborhoods(&points);
     let method = Method::Parity(ParityOptions::default());
-    let (mut scratch, mut out) = (Scratch::default(), Orientation::default());
-    let outcome = forward(
-        &points,
-        &axes,
-        &neighborhoods,
-        None,
-        &method,
-        &mut scratch,
-        &mut out,
-    );
-    assert_eq!(outcome, Err(Error::DetectionRadius { radius: 0.0 }));
+    let outcome = oriented(&points, &axes, &neighborhoods, None, &method);
+    assert_eq!(outcome.unwrap_err(), Error::DetectionRadius { radius: 0.0 });
 }
 
 #[test]
@@ -223,21 +179,10 @@ fn rays_end_whatever_the_options() {
                 .collect::<Vec<_>>()
         };
         let (points, normals) = (of(&points), of(&normals));
-        let mut neighborhoods = Neighborhoods::default();
-        neighbors::forward(&points, Radius::Auto, &mut neighborhoods).expect("valid");
-        let mut out = Orientation::default();
+        let neighborhoods = neighborhoods(&points);
         let method = Method::Parity(options);
-        let scratch = &mut Scratch::default();
-        forward(
-            &points,
-            &normals,
-            &neighborhoods,
-            None,
-            &method,
-            scratch,
-            &mut out,
-        )
-        .expect("options in range");
+        let out = oriented(&points, &normals, &neighborhoods, None, &method);
+        let out = out.expect("options in range");
         assert!(out.normals.iter().all(|&n| vector::is_finite(n)));
         let MethodUsed::Parity { detection_radius } = out.method else {
             panic!("{:?}", out.method);

@@ -1,6 +1,28 @@
 //! Sampled bodies with known outward normals, for the tests.
 
-use crate::vector;
+use super::{Error, Method, Orientation, Scratch, forward};
+use crate::neighbors::{self, Neighborhoods, Radius};
+use crate::{Real, vector};
+
+/// Neighborhoods with automatic radii.
+pub(super) fn neighborhoods<T: Real>(points: &[[T; 3]]) -> Neighborhoods<T> {
+    let mut out = Neighborhoods::default();
+    neighbors::forward(points, Radius::Auto, &mut out).unwrap();
+    out
+}
+
+/// The orientation of axes, with given normals or without.
+pub(super) fn oriented<T: Real>(
+    points: &[[T; 3]],
+    axes: &Vec<[T; 3]>,
+    near: &Neighborhoods<T>,
+    given: Option<&[[T; 3]]>,
+    method: &Method,
+) -> Result<Orientation<T>, Error> {
+    let (scratch, mut out) = (&mut Scratch::default(), Orientation::default());
+    forward(points, axes, near, given, method, scratch, &mut out)?;
+    Ok(out)
+}
 
 /// Points and their outward normals.
 pub(super) type Sampled = (Vec<[f64; 3]>, Vec<[f64; 3]>);

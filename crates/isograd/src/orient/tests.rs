@@ -1,8 +1,9 @@
 //! Signs against the bodies that the samples were taken from.
 
-use super::shapes::{Random, Sampled, cuboid, cut, inside_out, join, sphere, torus};
+use super::shapes::{
+    Random, Sampled, cuboid, cut, inside_out, join, neighborhoods, oriented, sphere, torus,
+};
 use super::*;
-use crate::neighbors::{self, Radius};
 use crate::normals;
 use crate::vector::{add, dot, scale};
 
@@ -13,12 +14,6 @@ struct Outcome {
     /// Signs that are wrong, among axes within 60 degrees of the truth, and how many those are.
     wrong: usize,
     judged: usize,
-}
-
-fn neighborhoods<T: Real>(points: &[[T; 3]]) -> Neighborhoods<T> {
-    let mut out = Neighborhoods::default();
-    neighbors::forward(points, Radius::Auto, &mut out).unwrap();
-    out
 }
 
 /// Axes by D-PCA, with signs that say nothing.
@@ -39,17 +34,7 @@ fn axes<T: Real>(neighborhoods: &Neighborhoods<T>) -> Vec<[T; 3]> {
 fn run<T: Real>(points: &[[T; 3]], method: &Method) -> (Vec<[T; 3]>, Orientation<T>) {
     let neighborhoods = neighborhoods(points);
     let axes = axes(&neighborhoods);
-    let (mut scratch, mut out) = (Scratch::default(), Orientation::default());
-    forward(
-        points,
-        &axes,
-        &neighborhoods,
-        None,
-        method,
-        &mut scratch,
-        &mut out,
-    )
-    .unwrap();
+    let out = oriented(points, &axes, &neighborhoods, None, method).unwrap();
     (axes, out)
 }
 
@@ -231,20 +216,11 @@ fn whatever_the_points_are_there_is_an_answer() {
         for method in [Method::Auto, Method::Parity(ParityOptions::default())] {
             let neighborhoods = neighborhoods(&points);
             let axes = axes(&neighborhoods);
-            let (mut scratch, mut out) = (Scratch::default(), Orientation::default());
-            let outcome = forward(
-                &points,
-                &axes,
-                &neighborhoods,
-                None,
-                &method,
-                &mut scratch,
-                &mut out,
-            );
-            if let Err(error) = outcome {
-                assert!(matches!(error, Error::DetectionRadius { .. }), "{error}");
-                continue;
-            }
+            let out = match oriented(&points, &axes, &neighborhoods, None, &method) {
+                Ok(out) => out,
+                Err(Error::DetectionRadius { .. }) => continue,
+                Err(error) => panic!("{error}"),
+            };
             assert!(out.confidence.iter().all(|c| (0.0..=1.0).contains(c)));
             for (n, a) in out.normals.iter().zip(&axes) {
                 assert!(n == a || *n == a.map(|x| -x));
@@ -283,18 +259,9 @@ fn the_sign_of_the_axes_does_not_matter() {
     let mut outputs = Vec::new();
     let mut scratch = Scratch::default();
     for _ in 0..2 {
-        let mut out = Orientation::default();
+        let (mut out, near) = (Orientation::default(), &neighborhoods);
         let method = &Method::Auto;
-        forward(
-            &points,
-            &axes,
-            &neighborhoods,
-            None,
-            method,
-            &mut scratch,
-            &mut out,
-        )
-        .unwrap();
+        forward(&points, &axes, near, None, method, &mut scratch, &mut out).unwrap();
         outputs.push(out);
         axes.iter_mut().step_by(3).for_each(|a| *a = a.map(|x| -x));
     }
@@ -333,18 +300,9 @@ fn any_number_of_threads_and_a_used_scratch_give_the_same_bits() {
         let mut results = Vec::new();
         for points in &clouds {
             pool.install(|| {
-                let neighborhoods = neighborhoods(points);
-                let axes = axes(&neighborhoods);
-                let method = &Method::Auto;
-                forward(
-                    points,
-                    &axes,
-                    &neighborhoods,
-                    None,
-                    method,
-                    &mut scratch,
-                    &mut out,
-                )
+                let near = &neighborhoods(points);
+                let (axes, method) = (axes(near), &Method::Auto);
+                forward(points, &axes, near, None, method, &mut scratch, &mut out)
             })
             .unwrap();
             results.push((out.normals.clone(), out.confidence.clone(), out.flipped));
@@ -363,19 +321,8 @@ fn given_normals_are_made_unit_and_trusted() {
     let (points, normals) = sphere(200, ORIGIN, 1.0, 7);
     let inward: Vec<_> = normals.iter().map(|&n| scale(n, -3e-200)).collect();
     let neighborhoods = neighborhoods(&points);
-    let (mut scratch, mut out) = (Scratch::default(), Orientation::default());
-    let mut take = |given: Option<&[[f64; 3]]>| {
-        let method = &Method::Given;
-        forward(
-            &points,
-            &Vec::new(),
-            &neighborhoods,
-            given,
-            method,
-            &mut scratch,
-            &mut out,
-        )
-        .map(|()| out.clone())
+    let take = |given: Option<&[[f64; 3]]>| {
+        oriented(&points, &Vec::new(), &neighborhoods, given, &Method::Given)
     };
     let taken = take(Some(&inward)).unwrap();
     for (n, t) in taken.normals.iter().zip(&normals) {
@@ -414,19 +361,8 @@ fn axes_turn_to_the_side_of_given_normals_and_keep_their_direction() {
             scale(off, -((i + 1) as f64))
         })
         .collect();
-    let (mut scratch, mut out) = (Scratch::default(), Orientation::default());
-    let mut turn = |given: Option<&[[f64; 3]]>| {
-        let method = &Method::Signs;
-        forward(
-            &points,
-            &axes,
-            &neighborhoods,
-            given,
-            method,
-            &mut scratch,
-            &mut out,
-        )
-        .map(|()| out.clone())
+    let turn = |given: Option<&[[f64; 3]]>| {
+        oriented(&points, &axes, &neighborhoods, given, &Method::Signs)
     };
     let turned = turn(Some(&given)).unwrap();
     let mut flipped = 0;
@@ -459,22 +395,7 @@ fn axes_without_a_direction_are_refused() {
     let (points, mut axes) = sphere(50, ORIGIN, 1.0, 7);
     axes[3] = [0.0; 3];
     let neighborhoods = neighborhoods(&points);
-    let (mut scratch, mut out) = (Scratch::default(), Orientation::default());
-    let method = &Method::Auto;
-    let outcome = forward(
-        &points,
-        &axes,
-        &neighborhoods,
-        None,
-        method,
-        &mut scratch,
-        &mut out,
-    );
-    assert_eq!(
-        outcome,
-        Err(Error::NoDirection {
-            index: 3,
-            kind: "the axis"
-        })
-    );
+    let outcome = oriented(&points, &axes, &neighborhoods, None, &Method::Auto);
+    let kind = "the axis";
+    assert_eq!(outcome.unwrap_err(), Error::NoDirection { index: 3, kind });
 }

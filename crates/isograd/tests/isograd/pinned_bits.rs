@@ -42,6 +42,20 @@ fn of_reals<'a, T: Pipeline>(values: impl IntoIterator<Item = &'a T>) -> u64 {
     hash.0
 }
 
+/// Functions of the C library.
+fn functions<T: Pipeline>(x: T) -> [T; 6] {
+    let size = x.abs();
+    let power = size.powf(T::of(0.3));
+    [
+        x.sin(),
+        x.cos(),
+        x.exp(),
+        size.ln(),
+        power,
+        x.atan2(T::of(1.5)),
+    ]
+}
+
 /// Hash of functions of the C library, which may differ in the last bit from machine to machine, and of the width of
 /// vectors.
 fn library_functions() -> u64 {
@@ -50,27 +64,8 @@ fn library_functions() -> u64 {
     hash.word(u64::from(has_wide_vectors()));
     for _ in 0..2000 {
         let x = 8.0 * random.next() - 4.0;
-        for y in [
-            x.sin(),
-            x.cos(),
-            x.exp(),
-            x.abs().ln(),
-            x.abs().powf(0.3),
-            x.atan2(1.5),
-        ] {
-            hash.real(y);
-        }
-        let x = x as f32;
-        for y in [
-            x.sin(),
-            x.cos(),
-            x.exp(),
-            x.abs().ln(),
-            x.abs().powf(0.3),
-            x.atan2(1.5),
-        ] {
-            hash.real(y);
-        }
+        functions(x).into_iter().for_each(|y| hash.real(y));
+        functions(x as f32).into_iter().for_each(|y| hash.real(y));
     }
     hash.0
 }
