@@ -7,7 +7,6 @@ use isograd::Grid;
 
 use super::{Buffer, Device, Scalar};
 use crate::grid::LatticeLaunch;
-use crate::neighbors::{NeighborhoodArraysLaunch, Neighborhoods};
 
 /// Units of a group where a kernel does not depend on it.
 pub(crate) const BLOCK: usize = 64;
@@ -70,13 +69,20 @@ impl<R: Runtime, T: Scalar> Argument<R> for Grid<T> {
     }
 }
 
-impl<R: Runtime, T: Scalar> Argument<R> for Neighborhoods<T> {
-    type Parameter = NeighborhoodArraysLaunch<T, R>;
+/// The parameter that stands for a value in kernels: `argument!(Mesh<T> => MeshLaunch<T, R>: |of| of.vertices.arg())`.
+macro_rules! argument {
+    ($type:ty => $launch:ident<$($parameter:ident),+>: |$of:ident| $($part:expr),+) => {
+        impl<R: Runtime, T: $crate::Scalar> $crate::device::Argument<R> for $type {
+            type Parameter = $launch<$($parameter),+>;
 
-    fn argument(&self, _: &Device<R>) -> Self::Parameter {
-        self.arg()
-    }
+            fn argument(&self, _: &$crate::Device<R>) -> Self::Parameter {
+                let $of = self;
+                $launch::new($($part),+)
+            }
+        }
+    };
 }
+pub(crate) use argument;
 
 macro_rules! numbers {
     ($($number:ty),*) => {$(

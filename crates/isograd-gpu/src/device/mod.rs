@@ -10,7 +10,7 @@ mod open;
 use cubecl::prelude::*;
 
 use effort::Counts;
-pub(crate) use launch::launch;
+pub(crate) use launch::{argument, launch};
 
 pub use buffer::Buffer;
 pub use effort::Effort;

@@ -34,8 +34,8 @@ pub use isograd::distance::{Band, NO_TRIANGLE};
 
 use cubecl::prelude::*;
 
-use crate::device::Argument;
-use crate::{Buffer, Device, Scalar};
+use crate::Buffer;
+use crate::device::argument;
 
 /// A distance that no mesh has, squared.
 const FAR: f64 = 3e38;
@@ -57,13 +57,7 @@ pub(crate) struct MeshArrays<F: Float + CubeElement> {
     pub faces: Array<u32>,
 }
 
-impl<R: Runtime, T: Scalar> Argument<R> for Mesh<T> {
-    type Parameter = MeshArraysLaunch<T, R>;
-
-    fn argument(&self, _: &Device<R>) -> Self::Parameter {
-        MeshArraysLaunch::new(self.vertices.arg(), self.faces.arg())
-    }
-}
+argument!(Mesh<T> => MeshArraysLaunch<T, R>: |of| of.vertices.arg(), of.faces.arg());
 
 impl<T> Mesh<T> {
     /// The number of faces.

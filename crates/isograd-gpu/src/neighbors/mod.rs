@@ -34,7 +34,7 @@ pub(crate) use walk::{end_of_leaf, first_of_leaf, is_isolated, next_leaf};
 
 use cubecl::prelude::*;
 
-use crate::device::check_length;
+use crate::device::{argument, check_length};
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Units of a group.
@@ -59,28 +59,33 @@ pub struct Neighborhoods<T> {
     pub(crate) links: Buffer<u32>,
 }
 
-/// [`Neighborhoods`] in kernels.
+/// Sorted points and their tree in kernels.
 #[derive(CubeLaunch, CubeType)]
-pub(crate) struct NeighborhoodArrays<F: Float + CubeElement> {
+pub(crate) struct PointTree<F: Float + CubeElement> {
     pub points: Array<F>,
-    pub radii: Array<F>,
-    pub places: Array<u32>,
     pub nodes: Array<F>,
     pub links: Array<u32>,
 }
 
+/// [`Neighborhoods`] in kernels.
+#[derive(CubeLaunch, CubeType)]
+pub(crate) struct NeighborhoodArrays<F: Float + CubeElement> {
+    pub tree: PointTree<F>,
+    pub radii: Array<F>,
+    pub places: Array<u32>,
+}
+
 impl<T: Scalar> Neighborhoods<T> {
-    /// The neighborhoods as an argument of a kernel.
-    pub(crate) fn arg<R: Runtime>(&self) -> NeighborhoodArraysLaunch<T, R> {
-        NeighborhoodArraysLaunch::new(
-            self.points.arg(),
-            self.radii.arg(),
-            self.places.arg(),
-            self.nodes.arg(),
-            self.links.arg(),
-        )
+    /// The points and their tree as an argument of a kernel.
+    pub(crate) fn tree<R: Runtime>(&self) -> PointTreeLaunch<T, R> {
+        PointTreeLaunch::new(self.points.arg(), self.nodes.arg(), self.links.arg())
     }
 }
+
+argument!(
+    Neighborhoods<T> => NeighborhoodArraysLaunch<T, R>:
+    |of| of.tree(), of.radii.arg(), of.places.arg()
+);
 
 impl<T> Neighborhoods<T> {
     /// `N`.

@@ -4,8 +4,8 @@ use cubecl::prelude::*;
 
 use super::tree::{IS_LEAF, NODE};
 use super::walk::{end_of_leaf, first_of_leaf};
-use super::{BLOCK, LEAF, Neighborhoods};
-use crate::device::launch;
+use super::{BLOCK, LEAF, Neighborhoods, PointTree};
+use crate::device::{Ready, launch};
 use crate::primitives::smallest::insert;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
@@ -25,35 +25,32 @@ pub(crate) fn reaches<R: Runtime, T: Scalar>(
     debug_assert!(k > 0 && k <= neighborhoods.len());
     let squares = device.empty(places.len() / 3)?;
     launch!(device, squares.len(), BLOCK => find_reaches<T>(
-        neighborhoods.points, neighborhoods.nodes, neighborhoods.links, places, squares, k,
+        Ready::new(neighborhoods.tree()), places, squares, k,
     ));
     Ok(squares)
 }
 
 #[cube(launch)]
-fn find_reaches<F: Float>(
-    points: &Array<F>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
+fn find_reaches<F: Float + CubeElement>(
+    tree: &PointTree<F>,
     places: &Array<F>,
     squares: &mut Array<F>,
     #[comptime] k: usize,
 ) {
     if ABSOLUTE_POS < squares.len() {
         let x = Vector3::<F>::at(places, ABSOLUTE_POS);
-        squares[ABSOLUTE_POS] = reach_squared::<F>(points, nodes, links, x, k);
+        squares[ABSOLUTE_POS] = reach_squared::<F>(tree, x, k);
     }
 }
 
 /// The squared distance of `x` to its `k`-th nearest point; there must be as many.
 #[cube]
-pub(crate) fn reach_squared<F: Float>(
-    points: &Array<F>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
+pub(crate) fn reach_squared<F: Float + CubeElement>(
+    tree: &PointTree<F>,
     x: Vector3<F>,
     #[comptime] k: usize,
 ) -> F {
+    let (points, nodes, links) = (&tree.points, &tree.nodes, &tree.links);
     let window = comptime!(if k > WINDOW { k } else { WINDOW });
     let margin = comptime!((window - LEAF) / 2);
     let mut nearest = Array::<F>::new(k);
@@ -148,13 +145,12 @@ pub(crate) const SURE_SHARE: f32 = 0.7;
 /// most of the points where they are about equally far, as at the center of a sphere; to know it to a third takes a
 /// few.
 #[cube]
-pub(crate) fn about_nearest<F: Float>(
-    points: &Array<F>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
+pub(crate) fn about_nearest<F: Float + CubeElement>(
+    tree: &PointTree<F>,
     x: Vector3<F>,
     guess: u32,
 ) -> Near<F> {
+    let (points, nodes, links) = (&tree.points, &tree.nodes, &tree.links);
     let n = points.len() / 3;
     let share = F::new(SURE_SHARE) * F::new(SURE_SHARE);
     let mut point = guess;
@@ -179,13 +175,12 @@ pub(crate) fn about_nearest<F: Float>(
 
 /// Whether any point is within the distance of `x` whose square is `limit`.
 #[cube]
-pub(crate) fn any_within<F: Float>(
-    points: &Array<F>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
+pub(crate) fn any_within<F: Float + CubeElement>(
+    tree: &PointTree<F>,
     x: Vector3<F>,
     limit: F,
 ) -> bool {
+    let (points, nodes, links) = (&tree.points, &tree.nodes, &tree.links);
     let n = points.len() / 3;
     let mut found = 0u32.runtime();
     let mut node = 0usize.runtime();

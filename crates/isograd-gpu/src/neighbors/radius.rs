@@ -16,8 +16,8 @@ use isograd_element::vector;
 
 use super::nearest::reaches;
 use super::{
-    BLOCK, Neighborhoods, end_of_leaf, first_of_leaf, forward as sort_points, is_isolated, median,
-    next_leaf, with_radii,
+    BLOCK, NeighborhoodArrays, Neighborhoods, end_of_leaf, first_of_leaf, forward as sort_points,
+    is_isolated, median, next_leaf, with_radii,
 };
 use crate::device::{check_length, launch};
 use crate::primitives::ends::ends;
@@ -103,8 +103,7 @@ pub fn census<R: Runtime, T: Scalar>(
     };
     if n > 0 {
         launch!(device, n, BLOCK => count_neighbors<T>(
-            neighborhoods.points, neighborhoods.radii, neighborhoods.places, neighborhoods.nodes,
-            neighborhoods.links, census.count, census.isolated, common,
+            neighborhoods, census.count, census.isolated, common,
         ));
     }
     Ok(census)
@@ -197,36 +196,32 @@ fn grow_radii<F: Float + CubeElement>(
 
 #[cube(launch)]
 fn count_neighbors<F: Float + CubeElement>(
-    points: &Array<F>,
-    radii: &Array<F>,
-    places: &Array<u32>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
+    near: &NeighborhoodArrays<F>,
     counts: &mut Array<u32>,
     isolated: &mut Array<u32>,
     common: F,
 ) {
-    let n = radii.len();
+    let n = near.radii.len();
     if ABSOLUTE_POS < n {
-        let center = Vector3::<F>::at(points, ABSOLUTE_POS);
-        let radius = radii[ABSOLUTE_POS];
+        let center = Vector3::<F>::at(&near.tree.points, ABSOLUTE_POS);
+        let radius = near.radii[ABSOLUTE_POS];
         let mut count = 0u32.runtime();
         let mut mutual = 0u32.runtime();
-        let mut node = next_leaf::<F>(nodes, links, center, radius, 0usize, false);
-        while node < links.len() {
-            let first = first_of_leaf(links, node);
+        let mut node = next_leaf::<F>(&near.tree, center, radius, 0usize, false);
+        while node < near.tree.links.len() {
+            let first = first_of_leaf(&near.tree.links, node);
             for j in first..end_of_leaf(first, n) {
-                let offset = Vector3::<F>::at(points, j).sub(center);
+                let offset = Vector3::<F>::at(&near.tree.points, j).sub(center);
                 let square = offset.dot(offset);
                 if square <= radius * radius {
                     count += 1u32;
-                    let is_mutual = j != ABSOLUTE_POS && square <= radii[j] * radii[j];
+                    let is_mutual = j != ABSOLUTE_POS && square <= near.radii[j] * near.radii[j];
                     mutual += select(is_mutual, 1u32, 0u32);
                 }
             }
-            node = next_leaf::<F>(nodes, links, center, radius, node + 1, false);
+            node = next_leaf::<F>(&near.tree, center, radius, node + 1, false);
         }
-        let place = places[ABSOLUTE_POS] as usize;
+        let place = near.places[ABSOLUTE_POS] as usize;
         let alone = is_isolated::<F>(radius, common, max(count, 1u32) - 1u32, mutual);
         counts[place] = count;
         isolated[place] = select(alone, 1u32, 0u32);

@@ -2,21 +2,21 @@
 
 use cubecl::prelude::*;
 
-use super::LEAF;
 use super::tree::{IS_LEAF, NODE};
+use super::{LEAF, PointTree};
 use crate::vector::Vector3;
 
 /// The first leaf at or after node `from` that may hold points within `radius` of `x`, or, if `mutual`, points
 /// whose own radius reaches `x`; the number of nodes where there is none.
 #[cube]
-pub(crate) fn next_leaf<F: Float>(
-    nodes: &Array<F>,
-    links: &Array<u32>,
+pub(crate) fn next_leaf<F: Float + CubeElement>(
+    tree: &PointTree<F>,
     x: Vector3<F>,
     radius: F,
     from: usize,
     #[comptime] mutual: bool,
 ) -> usize {
+    let (nodes, links) = (&tree.nodes, &tree.links);
     let mut node = from;
     let mut end = links.len();
     while node < end {

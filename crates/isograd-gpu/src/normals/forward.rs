@@ -58,7 +58,7 @@ fn sum_moments<F: Float + CubeElement>(
 ) {
     let n = near.radii.len();
     if ABSOLUTE_POS < n {
-        let center = Vector3::<F>::at(&near.points, ABSOLUTE_POS);
+        let center = Vector3::<F>::at(&near.tree.points, ABSOLUTE_POS);
         let mut sums = Array::<F>::new(MOMENTS);
         let radius = near.radii[ABSOLUTE_POS];
         let count = moments_within::<F>(near, center, radius, &mut sums);
@@ -86,15 +86,15 @@ pub(super) fn moments_within<F: Float + CubeElement>(
     for k in 0..MOMENTS {
         sums[k] = F::new(0.0);
     }
-    let mut node = next_leaf::<F>(&near.nodes, &near.links, center, radius, 0usize, false);
-    while node < near.links.len() {
+    let mut node = next_leaf::<F>(&near.tree, center, radius, 0usize, false);
+    while node < near.tree.links.len() {
         #[unroll]
         for k in 0..MOMENTS {
             of_leaf[k] = F::new(0.0);
         }
-        let first = first_of_leaf(&near.links, node);
+        let first = first_of_leaf(&near.tree.links, node);
         for j in first..end_of_leaf(first, n) {
-            let offset = Vector3::<F>::at(&near.points, j).sub(center);
+            let offset = Vector3::<F>::at(&near.tree.points, j).sub(center);
             if offset.dot(offset) <= radius * radius {
                 let d = offset.scale(F::new(1.0) / radius);
                 let w = weight::<F>(F::sqrt(d.dot(d)), epsilon::<F>());
@@ -106,7 +106,7 @@ pub(super) fn moments_within<F: Float + CubeElement>(
         for k in 0..MOMENTS {
             sums[k] += of_leaf[k];
         }
-        node = next_leaf::<F>(&near.nodes, &near.links, center, radius, node + 1, false);
+        node = next_leaf::<F>(&near.tree, center, radius, node + 1, false);
     }
     count
 }

@@ -124,18 +124,18 @@ fn gather<F: Float + CubeElement>(
 ) {
     let n = near.radii.len();
     if ABSOLUTE_POS < n {
-        let point = Vector3::<F>::at(&near.points, ABSOLUTE_POS);
+        let point = Vector3::<F>::at(&near.tree.points, ABSOLUTE_POS);
         let radius = near.radii[ABSOLUTE_POS];
         let inverse = F::new(1.0) / radius;
         let own = Center::<F>::at(centers, ABSOLUTE_POS);
         let mut x = F::new(0.0);
         let mut y = F::new(0.0);
         let mut z = F::new(0.0);
-        let mut node = next_leaf::<F>(&near.nodes, &near.links, point, radius, 0usize, true);
-        while node < near.links.len() {
-            let first = first_of_leaf(&near.links, node);
+        let mut node = next_leaf::<F>(&near.tree, point, radius, 0usize, true);
+        while node < near.tree.links.len() {
+            let first = first_of_leaf(&near.tree.links, node);
             for j in first..end_of_leaf(first, n) {
-                let offset = Vector3::<F>::at(&near.points, j).sub(point);
+                let offset = Vector3::<F>::at(&near.tree.points, j).sub(point);
                 let square = offset.dot(offset);
                 if square <= radius * radius {
                     let out = own.offset_bar(offset.scale(inverse));
@@ -152,7 +152,7 @@ fn gather<F: Float + CubeElement>(
                     z += into.z * unit;
                 }
             }
-            node = next_leaf::<F>(&near.nodes, &near.links, point, radius, node + 1, true);
+            node = next_leaf::<F>(&near.tree, point, radius, node + 1, true);
         }
         let sum = Vector3::<F> { x, y, z };
         sum.write(points_bar, near.places[ABSOLUTE_POS] as usize);

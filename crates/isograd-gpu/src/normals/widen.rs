@@ -103,7 +103,7 @@ fn try_wider<F: Float + CubeElement>(
     let count = sums[sums.len() - 1];
     if ABSOLUTE_POS < count as usize {
         let at = listed[ABSOLUTE_POS] as usize;
-        let center = Vector3::<F>::at(&near.points, at);
+        let center = Vector3::<F>::at(&near.tree.points, at);
         let radius = step * near.radii[at];
         let mut sums = Array::<F>::new(MOMENTS);
         moments_within::<F>(near, center, radius, &mut sums);

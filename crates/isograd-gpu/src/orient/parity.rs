@@ -12,7 +12,9 @@ use isograd_element::vector;
 use super::Error;
 use crate::device::{Ready, launch};
 use crate::neighbors::radius::bounds;
-use crate::neighbors::{Neighborhoods, SURE_SHARE, about_nearest, any_within, reaches};
+use crate::neighbors::{
+    NeighborhoodArrays, Neighborhoods, SURE_SHARE, about_nearest, any_within, reaches,
+};
 use crate::primitives::ends::ends;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
@@ -54,8 +56,7 @@ pub(super) fn forward<R: Runtime, T: Scalar>(
     let (crossings, leading): (Buffer<u32>, Buffer<u32>) =
         (device.empty(2 * n)?, device.empty(2 * n)?);
     launch!(device, 2 * n => look_both_ways<T>(
-        neighborhoods.points, neighborhoods.places, neighborhoods.nodes, neighborhoods.links, axes,
-        crossings, leading, Ready::new(ray),
+        neighborhoods, axes, crossings, leading, Ready::new(ray),
     ));
     launch!(device, n => choose_sides<T>(
         crossings, leading, neighborhoods.places, axes, normals, confidence,
@@ -81,33 +82,34 @@ fn detection_radius<R: Runtime, T: Scalar>(
 /// the first block, and of entries at the beginning that are not zero.
 #[cube(launch)]
 fn look_both_ways<F: Float + CubeElement>(
-    points: &Array<F>,
-    places: &Array<u32>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
+    near: &NeighborhoodArrays<F>,
     axes: &Array<F>,
     crossings: &mut Array<u32>,
     leading: &mut Array<u32>,
     ray: Ray<F>,
 ) {
-    let n = places.len();
+    let n = near.places.len();
     if ABSOLUTE_POS < crossings.len() {
         let position = ABSOLUTE_POS % n;
         let sign = select(ABSOLUTE_POS < n, F::new(1.0), F::new(-1.0));
-        let start = Vector3::<F>::at(points, position);
-        let direction = Vector3::<F>::at(axes, places[position] as usize).scale(sign);
+        let start = Vector3::<F>::at(&near.tree.points, position);
+        let direction = Vector3::<F>::at(axes, near.places[position] as usize).scale(sign);
         let mut m = 0u32.runtime();
         let mut inside = 1u32.runtime();
         let mut blocks = 0u32.runtime();
         let mut first = 0u32.runtime();
         let mut guess = position as u32;
         while m <= ray.probes
-            && in_reach_of_box::<F>(nodes, probe::<F>(start, direction, m, ray.step), ray.radius)
+            && in_reach_of_box::<F>(
+                &near.tree.nodes,
+                probe::<F>(start, direction, m, ray.step),
+                ray.radius,
+            )
         {
             let at = probe::<F>(start, direction, m, ray.step);
-            let near = about_nearest::<F>(points, nodes, links, at, guess);
-            guess = near.point;
-            let distance = F::sqrt(near.square);
+            let sample = about_nearest::<F>(&near.tree, at, guess);
+            guess = sample.point;
+            let distance = F::sqrt(sample.square);
             let mut detected = select(m <= ray.own, 1u32, 0u32);
             // Distance along which the result stays the same.
             let mut same = F::new(0.0);
@@ -118,7 +120,7 @@ fn look_both_ways<F: Float + CubeElement>(
                 let sure = F::new(SURE_SHARE) * distance;
                 if sure > ray.radius {
                     same = sure - ray.radius;
-                } else if any_within::<F>(points, nodes, links, at, ray.radius * ray.radius) {
+                } else if any_within::<F>(&near.tree, at, ray.radius * ray.radius) {
                     detected = 1u32;
                 }
             }

@@ -136,18 +136,18 @@ fn side_among_neighbors<F: Float + CubeElement>(
     own: usize,
 ) -> F {
     let zero = F::new(0.0);
-    let x = Vector3::<F>::at(&near.points, own);
+    let x = Vector3::<F>::at(&near.tree.points, own);
     let i = near.places[own] as usize;
     let axis = Vector3::<F>::at(axes, i);
     let radius = before.radii[i];
     let blunt = turned::blunt::<F>(radius);
     let mut sum = F::new(0.0);
     let mut weight = F::new(0.0);
-    let mut node = next_leaf::<F>(&near.nodes, &near.links, x, radius, 0usize.runtime(), false);
-    while node < near.links.len() {
-        let first = first_of_leaf(&near.links, node);
+    let mut node = next_leaf::<F>(&near.tree, x, radius, 0usize.runtime(), false);
+    while node < near.tree.links.len() {
+        let first = first_of_leaf(&near.tree.links, node);
         for position in first..end_of_leaf(first, near.places.len()) {
-            let offset = Vector3::<F>::at(&near.points, position).sub(x);
+            let offset = Vector3::<F>::at(&near.tree.points, position).sub(x);
             let square = offset.dot(offset);
             let j = near.places[position] as usize;
             if square <= radius * radius && is_near::<F>(before.cosines[j]) {
@@ -164,7 +164,7 @@ fn side_among_neighbors<F: Float + CubeElement>(
                 weight += weighted;
             }
         }
-        node = next_leaf::<F>(&near.nodes, &near.links, x, radius, node + 1, false);
+        node = next_leaf::<F>(&near.tree, x, radius, node + 1, false);
     }
     select(
         weight > zero,

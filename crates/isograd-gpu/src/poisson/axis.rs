@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use cubecl::prelude::*;
 
 use super::lines;
+use crate::device::Argument;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// The largest prime factor that has a pass of its own where the chirp transform fits: the time of a pass grows with
@@ -30,9 +31,12 @@ impl Lines {
             count: shape.iter().product::<usize>() / shape[axis],
         }
     }
+}
 
-    /// The lines as an argument of a kernel.
-    pub(super) fn arg<R: Runtime>(self) -> LinesLaunch<R> {
+impl<R: Runtime> Argument<R> for Lines {
+    type Parameter = LinesLaunch<R>;
+
+    fn argument(&self, _: &Device<R>) -> Self::Parameter {
         LinesLaunch::new(self.n, self.step, self.count)
     }
 }

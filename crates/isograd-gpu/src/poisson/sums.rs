@@ -21,7 +21,7 @@ impl<T: Scalar> Sums<T> {
         inverse: bool,
     ) {
         launch!(device, from.len(), BLOCK => sum_cosines<T>(
-            from, to, self.cosines, Ready::new(lines.arg()), inverse,
+            from, to, self.cosines, lines, inverse,
         ));
     }
 }

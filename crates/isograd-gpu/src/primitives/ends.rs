@@ -3,6 +3,7 @@
 use cubecl::prelude::*;
 
 use super::reduce::{BLOCK, groups_for};
+use crate::device::launch;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// The least of each component of `(N, width)` finite values, then the greatest of each; N is not 0.
@@ -16,18 +17,9 @@ pub(crate) fn ends<R: Runtime, T: Scalar>(
     let partial = device.empty(2 * shares * width)?;
     let ends = device.empty(2 * width)?;
     let pass = |from: &Buffer<T>, items: usize, high: usize, to: &Buffer<T>, shares: usize| {
-        find_ends::launch::<T, R>(
-            device.client(),
-            CubeCount::Static((shares * width) as u32, 1, 1),
-            CubeDim::new_1d(BLOCK as u32),
-            from.arg(),
-            to.arg(),
-            items as u32,
-            high as u32,
-            shares as u32,
-            width,
-            BLOCK,
-        );
+        launch!(device, [shares * width; BLOCK] => find_ends<T>(
+            from, to, items as u32, high as u32, shares as u32, width, BLOCK,
+        ));
     };
     pass(values, items, 0, &partial, shares);
     pass(&partial, shares, shares * width, &ends, 1);

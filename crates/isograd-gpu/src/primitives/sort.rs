@@ -3,7 +3,7 @@
 use cubecl::prelude::*;
 
 use super::scan::exclusive_sum;
-use crate::device::{Ready, launch};
+use crate::device::{Argument, launch};
 use crate::{Buffer, Device, Error};
 
 /// Bits of a key that one pass orders by.
@@ -76,7 +76,7 @@ impl Order {
             shift,
         };
         launch!(device, count, BLOCK => rank_digits(
-            self.keys, ranks, counts, Ready::new(digit.arg()), BLOCK,
+            self.keys, ranks, counts, digit, BLOCK,
         ));
         let before = exclusive_sum(device, &counts)?;
         let next = Self {
@@ -84,7 +84,7 @@ impl Order {
             places: device.empty(count)?,
         };
         launch!(device, count, BLOCK => move_to_ranks(
-            self.keys, self.places, ranks, before, next.keys, next.places, Ready::new(digit.arg()),
+            self.keys, self.places, ranks, before, next.keys, next.places, digit,
             BLOCK,
         ));
         Ok(next)
@@ -101,8 +101,10 @@ struct Digit {
     shift: u32,
 }
 
-impl Digit {
-    fn arg<R: Runtime>(self) -> DigitLaunch<R> {
+impl<R: Runtime> Argument<R> for Digit {
+    type Parameter = DigitLaunch<R>;
+
+    fn argument(&self, _: &Device<R>) -> Self::Parameter {
         DigitLaunch::new(self.count, self.blocks, self.shift)
     }
 }

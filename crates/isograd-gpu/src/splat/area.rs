@@ -17,7 +17,9 @@ use cubecl::prelude::*;
 
 use crate::device::{check_length, launch};
 use crate::element::plane;
-use crate::neighbors::{Neighborhoods, end_of_leaf, first_of_leaf, is_isolated, next_leaf};
+use crate::neighbors::{
+    NeighborhoodArrays, Neighborhoods, end_of_leaf, first_of_leaf, is_isolated, next_leaf,
+};
 use crate::primitives::reduce::{self, sum_of_group};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
@@ -41,8 +43,7 @@ pub fn forward<R: Runtime, T: Scalar>(
     let areas = device.empty(n)?;
     if n > 0 {
         launch!(device, n => find_areas<T>(
-            neighborhoods.points, neighborhoods.radii, neighborhoods.places, neighborhoods.nodes,
-            neighborhoods.links, areas, common_radius, T::PI(),
+            neighborhoods, areas, common_radius, T::PI(),
         ));
     }
     let residual = Residual {
@@ -70,7 +71,7 @@ pub fn pullback<R: Runtime, T: Scalar>(
         residual.areas, near.radii, near.places, areas_bar, factors, T::FRAC_1_PI(),
     ));
     launch!(device, n => gather<T>(
-        near.points, near.radii, near.places, near.nodes, near.links, factors, points_bar,
+        near, factors, points_bar,
     ));
     Ok(points_bar)
 }
@@ -109,45 +110,41 @@ fn sum_areas<F: Float>(areas: &Array<F>, sums: &mut Array<F>) {
 
 #[cube(launch)]
 fn find_areas<F: Float + CubeElement>(
-    points: &Array<F>,
-    radii: &Array<F>,
-    places: &Array<u32>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
+    near: &NeighborhoodArrays<F>,
     areas: &mut Array<F>,
     common_radius: F,
     pi: F,
 ) {
-    let n = radii.len();
+    let n = near.radii.len();
     if ABSOLUTE_POS < n {
-        let center = Vector3::<F>::at(points, ABSOLUTE_POS);
-        let radius = radii[ABSOLUTE_POS];
+        let center = Vector3::<F>::at(&near.tree.points, ABSOLUTE_POS);
+        let radius = near.radii[ABSOLUTE_POS];
         let scale = F::new(1.0) / (radius * radius);
         let mut crowd = F::new(0.0);
         // Both without the point itself.
         let mut count = 0u32;
         let mut mutual = 0u32;
-        let mut node = next_leaf::<F>(nodes, links, center, radius, 0usize, false);
-        while node < links.len() {
-            let first = first_of_leaf(links, node);
+        let mut node = next_leaf::<F>(&near.tree, center, radius, 0usize, false);
+        while node < near.tree.links.len() {
+            let first = first_of_leaf(&near.tree.links, node);
             let mut of_leaf = F::new(0.0);
             for j in first..end_of_leaf(first, n) {
-                let offset = Vector3::<F>::at(points, j).sub(center);
+                let offset = Vector3::<F>::at(&near.tree.points, j).sub(center);
                 let square = offset.dot(offset);
                 if square <= radius * radius {
                     of_leaf += plane::crowd::<F>(square * scale);
                     if j != ABSOLUTE_POS {
                         count += 1u32;
-                        mutual += select(square <= radii[j] * radii[j], 1u32, 0u32);
+                        mutual += select(square <= near.radii[j] * near.radii[j], 1u32, 0u32);
                     }
                 }
             }
             crowd += of_leaf;
-            node = next_leaf::<F>(nodes, links, center, radius, node + 1, false);
+            node = next_leaf::<F>(&near.tree, center, radius, node + 1, false);
         }
         let isolated = is_isolated::<F>(radius, common_radius, count, mutual);
         let area = plane::area::<F>(pi, radius, crowd);
-        let place = places[ABSOLUTE_POS] as usize;
+        let place = near.places[ABSOLUTE_POS] as usize;
         areas[place] = select(isolated, F::new(0.0), area);
     }
 }
@@ -172,39 +169,35 @@ fn fill_factors<F: Float + CubeElement>(
 /// `−Σ_c [f_k (1 − r²/R_k²) + f_c (1 − r²/R_c²)] d_c`, each where the radius reaches: what point `k` gets as a
 /// center, and as a neighbor of the others.
 #[cube(launch)]
-fn gather<F: Float>(
-    points: &Array<F>,
-    radii: &Array<F>,
-    places: &Array<u32>,
-    nodes: &Array<F>,
-    links: &Array<u32>,
+fn gather<F: Float + CubeElement>(
+    near: &NeighborhoodArrays<F>,
     factors: &Array<F>,
     points_bar: &mut Array<F>,
 ) {
-    let n = radii.len();
+    let n = near.radii.len();
     if ABSOLUTE_POS < n {
-        let point = Vector3::<F>::at(points, ABSOLUTE_POS);
-        let radius = radii[ABSOLUTE_POS];
+        let point = Vector3::<F>::at(&near.tree.points, ABSOLUTE_POS);
+        let radius = near.radii[ABSOLUTE_POS];
         let own = factors[ABSOLUTE_POS];
         let mut x = F::new(0.0);
         let mut y = F::new(0.0);
         let mut z = F::new(0.0);
-        let mut node = next_leaf::<F>(nodes, links, point, radius, 0usize, true);
-        while node < links.len() {
-            let first = first_of_leaf(links, node);
+        let mut node = next_leaf::<F>(&near.tree, point, radius, 0usize, true);
+        while node < near.tree.links.len() {
+            let first = first_of_leaf(&near.tree.links, node);
             for j in first..end_of_leaf(first, n) {
-                let offset = Vector3::<F>::at(points, j).sub(point);
+                let offset = Vector3::<F>::at(&near.tree.points, j).sub(point);
                 let square = offset.dot(offset);
                 let factor =
-                    own * rise::<F>(square, radius) + factors[j] * rise::<F>(square, radii[j]);
+                    own * rise::<F>(square, radius) + factors[j] * rise::<F>(square, near.radii[j]);
                 x -= factor * offset.x;
                 y -= factor * offset.y;
                 z -= factor * offset.z;
             }
-            node = next_leaf::<F>(nodes, links, point, radius, node + 1, true);
+            node = next_leaf::<F>(&near.tree, point, radius, node + 1, true);
         }
         let sum = Vector3::<F> { x, y, z };
-        sum.write(points_bar, places[ABSOLUTE_POS] as usize);
+        sum.write(points_bar, near.places[ABSOLUTE_POS] as usize);
     }
 }
 

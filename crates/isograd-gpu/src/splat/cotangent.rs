@@ -2,7 +2,7 @@
 
 use cubecl::prelude::*;
 
-use crate::device::{Argument, check_length};
+use crate::device::{argument, check_length};
 use crate::primitives::fill::zeros;
 use crate::primitives::reduce::{BLOCK, sum_of_group};
 use crate::{Buffer, Device, Error, Scalar};
@@ -28,13 +28,10 @@ pub(crate) struct CotangentArrays<F: Float + CubeElement> {
     pub areas: Array<F>,
 }
 
-impl<R: Runtime, T: Scalar> Argument<R> for SampleCotangent<T> {
-    type Parameter = CotangentArraysLaunch<T, R>;
-
-    fn argument(&self, _: &Device<R>) -> Self::Parameter {
-        CotangentArraysLaunch::new(self.points.arg(), self.normals.arg(), self.areas.arg())
-    }
-}
+argument!(
+    SampleCotangent<T> => CotangentArraysLaunch<T, R>:
+    |of| of.points.arg(), of.normals.arg(), of.areas.arg()
+);
 
 impl<T: Scalar> SampleCotangent<T> {
     /// Zeros for `count` samples.

@@ -38,7 +38,7 @@ pub use order::{Refused, SampleOrder};
 pub use pullback::pullback;
 pub(crate) use stencil::pick;
 
-use crate::device::{Argument, check_length};
+use crate::device::{argument, check_length};
 use crate::{Buffer, Device, Error, Scalar};
 use cubecl::prelude::*;
 
@@ -80,18 +80,10 @@ pub(crate) struct SampleArrays<F: Float + CubeElement> {
     pub count: u32,
 }
 
-impl<R: Runtime, T: Scalar> Argument<R> for Samples<'_, T> {
-    type Parameter = SampleArraysLaunch<T, R>;
-
-    fn argument(&self, _: &Device<R>) -> Self::Parameter {
-        SampleArraysLaunch::new(
-            self.points.arg(),
-            self.normals.arg(),
-            self.areas.arg(),
-            self.len() as u32,
-        )
-    }
-}
+argument!(
+    Samples<'_, T> => SampleArraysLaunch<T, R>:
+    |of| of.points.arg(), of.normals.arg(), of.areas.arg(), of.len() as u32
+);
 
 /// Residual of [`forward`]; the pullback takes the inputs again.
 #[derive(Clone, Debug)]

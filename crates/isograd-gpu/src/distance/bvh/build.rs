@@ -12,7 +12,7 @@ use isograd::Grid;
 use super::super::triangle::{FRAME, corners, frame, store_frame};
 use super::super::{Error, Mesh, MeshArrays};
 use super::morton::face_order;
-use crate::device::{Argument, launch};
+use crate::device::{argument, launch};
 use crate::grid::{Lattice, low_corner};
 use crate::primitives::ends::ends;
 use crate::{Buffer, Device, Scalar};
@@ -51,19 +51,10 @@ pub(crate) struct TreeArrays<F: Float + CubeElement> {
     pub pyramid: Array<F>,
 }
 
-impl<R: Runtime, T: Scalar> Argument<R> for Tree<T> {
-    type Parameter = TreeArraysLaunch<T, R>;
-
-    fn argument(&self, _: &Device<R>) -> Self::Parameter {
-        TreeArraysLaunch::new(
-            self.boxes.arg(),
-            self.children.arg(),
-            self.frames.arg(),
-            self.faces.arg(),
-            self.pyramid.arg(),
-        )
-    }
-}
+argument!(
+    Tree<T> => TreeArraysLaunch<T, R>:
+    |of| of.boxes.arg(), of.children.arg(), of.frames.arg(), of.faces.arg(), of.pyramid.arg()
+);
 
 impl<T: Scalar> Tree<T> {
     /// The hierarchy over the faces of a mesh.

@@ -6,7 +6,7 @@ use super::FIT;
 use super::checks::Given;
 use super::fits::{covariance, in_frame, ridge, solve};
 use super::neighbor::{Fitted, Neighbor, SampleArrays, Sorted, contract, neighbor, sum_moments};
-use crate::device::{Argument, launch};
+use crate::device::{argument, launch};
 use crate::element::fit;
 use crate::neighbors::{
     self, NeighborhoodArrays, Neighborhoods, end_of_leaf, first_of_leaf, next_leaf,
@@ -37,13 +37,7 @@ pub(crate) struct AdjointArrays<F: Float + CubeElement> {
     pub bars: Array<F>,
 }
 
-impl<R: Runtime, T: Scalar> Argument<R> for Adjoints<T> {
-    type Parameter = AdjointArraysLaunch<T, R>;
-
-    fn argument(&self, _: &Device<R>) -> Self::Parameter {
-        AdjointArraysLaunch::new(self.records.arg(), self.bars.arg())
-    }
-}
+argument!(Adjoints<T> => AdjointArraysLaunch<T, R>: |of| of.records.arg(), of.bars.arg());
 
 /// Pulls `bars` `(V, components)` of the values at the vertices back to the vertices themselves: adds to
 /// `vertices_bar` `(V, 3)`, and bounds that. There is at least one vertex.
@@ -235,7 +229,7 @@ fn pull_fits<F: Float + CubeElement>(
         through_surface.store(&mut sums, 0usize);
         let mut bounded = 0u32.runtime();
         if near.radii[k] > F::new(0.0) {
-            let y = Vector3::<F>::at(&near.points, k);
+            let y = Vector3::<F>::at(&near.tree.points, k);
             let of = Fitted::<F>::at(fits, vertex);
             let mut moments = Array::<F>::new(MOMENTS);
             sum_moments::<F>(samples, y, of.radius, &mut moments);
@@ -249,12 +243,11 @@ fn pull_fits<F: Float + CubeElement>(
             for i in 0..9usize {
                 found[i] = F::new(0.0);
             }
-            let mut node =
-                next_leaf::<F>(&samples.nodes, &samples.links, y, of.radius, 0usize, false);
-            while node < samples.links.len() {
-                let first = first_of_leaf(&samples.links, node);
+            let mut node = next_leaf::<F>(&samples.tree, y, of.radius, 0usize, false);
+            while node < samples.tree.links.len() {
+                let first = first_of_leaf(&samples.tree.links, node);
                 for j in first..end_of_leaf(first, samples.areas.len()) {
-                    let d = Vector3::<F>::at(&samples.points, j).sub(y);
+                    let d = Vector3::<F>::at(&samples.tree.points, j).sub(y);
                     let n = neighbor::<F>(d, of.unit, samples.areas[j]);
                     if n.weight > F::new(0.0) {
                         let p = n.weight / of.weight;
@@ -268,14 +261,7 @@ fn pull_fits<F: Float + CubeElement>(
                         e.scale(q).add_to(&mut found, 5usize);
                     }
                 }
-                node = next_leaf::<F>(
-                    &samples.nodes,
-                    &samples.links,
-                    y,
-                    of.radius,
-                    node + 1,
-                    false,
-                );
+                node = next_leaf::<F>(&samples.tree, y, of.radius, node + 1, false);
             }
             let middle = found[1] / found[0];
             let drift = Vector3::<F>::load(&found, 2usize).scale(middle);
@@ -303,12 +289,11 @@ fn pull_fits<F: Float + CubeElement>(
             for i in 0..7usize {
                 shares[i] = F::new(0.0);
             }
-            let mut node =
-                next_leaf::<F>(&samples.nodes, &samples.links, y, of.radius, 0usize, false);
-            while node < samples.links.len() {
-                let first = first_of_leaf(&samples.links, node);
+            let mut node = next_leaf::<F>(&samples.tree, y, of.radius, 0usize, false);
+            while node < samples.tree.links.len() {
+                let first = first_of_leaf(&samples.tree.links, node);
                 for j in first..end_of_leaf(first, samples.areas.len()) {
-                    let d = Vector3::<F>::at(&samples.points, j).sub(y);
+                    let d = Vector3::<F>::at(&samples.tree.points, j).sub(y);
                     let n = neighbor::<F>(d, of.unit, samples.areas[j]);
                     if n.weight > F::new(0.0) {
                         let q = contract::<F>(bars, k, samples, j);
@@ -322,14 +307,7 @@ fn pull_fits<F: Float + CubeElement>(
                         n.offset.scale(radial).add_to(&mut shares, 4usize);
                     }
                 }
-                node = next_leaf::<F>(
-                    &samples.nodes,
-                    &samples.links,
-                    y,
-                    of.radius,
-                    node + 1,
-                    false,
-                );
+                node = next_leaf::<F>(&samples.tree, y, of.radius, node + 1, false);
             }
             without_mean.write(records, k, shares[0]);
             let of_mean = Vector3::<F>::load(&shares, 4usize).scale(shares[0]);

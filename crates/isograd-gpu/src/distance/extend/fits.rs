@@ -83,24 +83,10 @@ fn find_radii<F: Float + CubeElement>(
 ) {
     if 3 * ABSOLUTE_POS < vertices.len() {
         let y = Vector3::<F>::at(vertices, ABSOLUTE_POS);
-        let grown = reach
-            * F::sqrt(reach_squared::<F>(
-                &near.points,
-                &near.nodes,
-                &near.links,
-                y,
-                enough,
-            ));
+        let grown = reach * F::sqrt(reach_squared::<F>(&near.tree, y, enough));
         let mut radius = common;
         if grown > common {
-            let last = margin
-                * F::sqrt(reach_squared::<F>(
-                    &near.points,
-                    &near.nodes,
-                    &near.links,
-                    y,
-                    most,
-                ));
+            let last = margin * F::sqrt(reach_squared::<F>(&near.tree, y, most));
             radius = max(common, min(grown, last));
         }
         fits[FIT * ABSOLUTE_POS] = radius;
@@ -122,11 +108,11 @@ pub(super) fn covariance<F: Float + CubeElement>(
     let mut yy = zero;
     let mut yz = zero;
     let mut zz = zero;
-    let mut node = next_leaf::<F>(&samples.nodes, &samples.links, y, of.radius, 0usize, false);
-    while node < samples.links.len() {
-        let first = first_of_leaf(&samples.links, node);
+    let mut node = next_leaf::<F>(&samples.tree, y, of.radius, 0usize, false);
+    while node < samples.tree.links.len() {
+        let first = first_of_leaf(&samples.tree.links, node);
         for j in first..end_of_leaf(first, samples.areas.len()) {
-            let d = Vector3::<F>::at(&samples.points, j).sub(y);
+            let d = Vector3::<F>::at(&samples.tree.points, j).sub(y);
             let n = neighbor::<F>(d, of.unit, samples.areas[j]);
             let e = in_frame::<F>(axes, n.offset.sub(of.mean));
             let p = n.weight / of.weight;
@@ -137,14 +123,7 @@ pub(super) fn covariance<F: Float + CubeElement>(
             yz += p * e.y * e.z;
             zz += p * e.z * e.z;
         }
-        node = next_leaf::<F>(
-            &samples.nodes,
-            &samples.links,
-            y,
-            of.radius,
-            node + 1,
-            false,
-        );
+        node = next_leaf::<F>(&samples.tree, y, of.radius, node + 1, false);
     }
     Symmetric::<F> {
         xx,
@@ -278,11 +257,11 @@ fn evaluate_columns<F: Float + CubeElement>(
         }
         let mut total = F::new(0.0);
         let mut drift = F::new(0.0);
-        let mut node = next_leaf::<F>(&samples.nodes, &samples.links, y, of.radius, 0usize, false);
-        while node < samples.links.len() {
-            let first = first_of_leaf(&samples.links, node);
+        let mut node = next_leaf::<F>(&samples.tree, y, of.radius, 0usize, false);
+        while node < samples.tree.links.len() {
+            let first = first_of_leaf(&samples.tree.links, node);
             for j in first..end_of_leaf(first, samples.areas.len()) {
-                let d = Vector3::<F>::at(&samples.points, j).sub(y);
+                let d = Vector3::<F>::at(&samples.tree.points, j).sub(y);
                 let n = neighbor::<F>(d, of.unit, samples.areas[j]);
                 if n.weight > F::new(0.0) {
                     let p = n.weight / of.weight;
@@ -303,14 +282,7 @@ fn evaluate_columns<F: Float + CubeElement>(
                     }
                 }
             }
-            node = next_leaf::<F>(
-                &samples.nodes,
-                &samples.links,
-                y,
-                of.radius,
-                node + 1,
-                false,
-            );
+            node = next_leaf::<F>(&samples.tree, y, of.radius, node + 1, false);
         }
         #[unroll]
         for c in 0..width {

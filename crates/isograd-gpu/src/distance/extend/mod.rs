@@ -40,9 +40,9 @@ use cubecl::prelude::*;
 use isograd::distance::extend as cpu;
 
 use super::Mesh;
-use crate::device::Argument;
+use crate::device::argument;
 use crate::neighbors::Neighborhoods;
-use crate::{Buffer, Device, Scalar};
+use crate::{Buffer, Scalar};
 
 /// Components of an attribute that one kernel takes at a time.
 const WIDTH: usize = 4;
@@ -104,14 +104,10 @@ pub(crate) struct ExtensionArrays<F: Float + CubeElement> {
     pub components: u32,
 }
 
-impl<R: Runtime, T: Scalar> Argument<R> for Extension<T> {
-    type Parameter = ExtensionArraysLaunch<T, R>;
-
-    fn argument(&self, _: &Device<R>) -> Self::Parameter {
-        let components = self.components as u32;
-        ExtensionArraysLaunch::new(self.vertices.arg(), self.cells.arg(), components)
-    }
-}
+argument!(
+    Extension<T> => ExtensionArraysLaunch<T, R>:
+    |of| of.vertices.arg(), of.cells.arg(), of.components as u32
+);
 
 /// Residual of the pullback, besides the inputs and the extension: [`isograd::distance::extend::Residual`].
 #[derive(Clone, Debug)]

@@ -3,9 +3,9 @@
 use cubecl::prelude::*;
 
 use super::{Attribute, FIT, Samples};
-use crate::device::{Argument, launch};
+use crate::device::{argument, launch};
 use crate::element::fit;
-use crate::neighbors::{Neighborhoods, end_of_leaf, first_of_leaf, gather, next_leaf};
+use crate::neighbors::{Neighborhoods, PointTree, end_of_leaf, first_of_leaf, gather, next_leaf};
 use crate::normals::{MOMENTS, add_moments};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
@@ -22,30 +22,17 @@ pub(super) struct Sorted<T> {
 /// [`Sorted`] in kernels.
 #[derive(CubeLaunch, CubeType)]
 pub(crate) struct SampleArrays<F: Float + CubeElement> {
-    pub points: Array<F>,
+    pub tree: PointTree<F>,
     pub places: Array<u32>,
-    pub nodes: Array<F>,
-    pub links: Array<u32>,
     pub areas: Array<F>,
     pub values: Array<F>,
     pub components: u32,
 }
 
-impl<R: Runtime, T: Scalar> Argument<R> for Sorted<T> {
-    type Parameter = SampleArraysLaunch<T, R>;
-
-    fn argument(&self, _: &Device<R>) -> Self::Parameter {
-        SampleArraysLaunch::new(
-            self.tree.points.arg(),
-            self.tree.places.arg(),
-            self.tree.nodes.arg(),
-            self.tree.links.arg(),
-            self.areas.arg(),
-            self.values.arg(),
-            self.components() as u32,
-        )
-    }
-}
+argument!(
+    Sorted<T> => SampleArraysLaunch<T, R>:
+    |of| of.tree.tree(), of.tree.places.arg(), of.areas.arg(), of.values.arg(), of.components() as u32
+);
 
 impl<T: Scalar> Sorted<T> {
     /// Components of a value.
@@ -137,15 +124,15 @@ pub(super) fn sum_moments<F: Float + CubeElement>(
     for k in 0..MOMENTS {
         sums[k] = F::new(0.0);
     }
-    let mut node = next_leaf::<F>(&samples.nodes, &samples.links, y, radius, 0usize, false);
-    while node < samples.links.len() {
-        let first = first_of_leaf(&samples.links, node);
+    let mut node = next_leaf::<F>(&samples.tree, y, radius, 0usize, false);
+    while node < samples.tree.links.len() {
+        let first = first_of_leaf(&samples.tree.links, node);
         for j in first..end_of_leaf(first, samples.areas.len()) {
-            let d = Vector3::<F>::at(&samples.points, j).sub(y);
+            let d = Vector3::<F>::at(&samples.tree.points, j).sub(y);
             let n = neighbor::<F>(d, unit, samples.areas[j]);
             add_moments::<F>(n.offset, n.weight, sums);
         }
-        node = next_leaf::<F>(&samples.nodes, &samples.links, y, radius, node + 1, false);
+        node = next_leaf::<F>(&samples.tree, y, radius, node + 1, false);
     }
 }
 

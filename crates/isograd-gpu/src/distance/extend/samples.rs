@@ -65,20 +65,20 @@ fn gather_points<F: Float + CubeElement>(
 ) {
     let j = ABSOLUTE_POS;
     if j < samples.areas.len() {
-        let x = Vector3::<F>::at(&samples.points, j);
+        let x = Vector3::<F>::at(&samples.tree.points, j);
         let zero = F::new(0.0);
         let mut sum_x = zero;
         let mut sum_y = zero;
         let mut sum_z = zero;
         let mut of_area = zero;
-        let mut node = next_leaf::<F>(&near.nodes, &near.links, x, zero, 0usize, true);
-        while node < near.links.len() {
-            let first = first_of_leaf(&near.links, node);
+        let mut node = next_leaf::<F>(&near.tree, x, zero, 0usize, true);
+        while node < near.tree.links.len() {
+            let first = first_of_leaf(&near.tree.links, node);
             for k in first..end_of_leaf(first, near.radii.len()) {
                 if near.radii[k] > zero {
                     let unit = F::new(1.0) / near.radii[k];
                     let n = neighbor::<F>(
-                        x.sub(Vector3::<F>::at(&near.points, k)),
+                        x.sub(Vector3::<F>::at(&near.tree.points, k)),
                         unit,
                         samples.areas[j],
                     );
@@ -94,7 +94,7 @@ fn gather_points<F: Float + CubeElement>(
                     }
                 }
             }
-            node = next_leaf::<F>(&near.nodes, &near.links, x, zero, node + 1, true);
+            node = next_leaf::<F>(&near.tree, x, zero, node + 1, true);
         }
         let place = samples.places[j] as usize;
         let mut count = write_bounded::<F>(points_bar, 3 * place, sum_x);
@@ -118,7 +118,7 @@ fn gather_columns<F: Float + CubeElement>(
 ) {
     let j = ABSOLUTE_POS;
     if j < samples.areas.len() {
-        let x = Vector3::<F>::at(&samples.points, j);
+        let x = Vector3::<F>::at(&samples.tree.points, j);
         let zero = F::new(0.0);
         let (components, column) = (samples.components as usize, column as usize);
         let mut sums = Array::<F>::new(width);
@@ -126,14 +126,14 @@ fn gather_columns<F: Float + CubeElement>(
         for c in 0..width {
             sums[c] = F::new(0.0);
         }
-        let mut node = next_leaf::<F>(&near.nodes, &near.links, x, zero, 0usize, true);
-        while node < near.links.len() {
-            let first = first_of_leaf(&near.links, node);
+        let mut node = next_leaf::<F>(&near.tree, x, zero, 0usize, true);
+        while node < near.tree.links.len() {
+            let first = first_of_leaf(&near.tree.links, node);
             for k in first..end_of_leaf(first, near.radii.len()) {
                 if near.radii[k] > zero {
                     let unit = F::new(1.0) / near.radii[k];
                     let n = neighbor::<F>(
-                        x.sub(Vector3::<F>::at(&near.points, k)),
+                        x.sub(Vector3::<F>::at(&near.tree.points, k)),
                         unit,
                         samples.areas[j],
                     );
@@ -147,7 +147,7 @@ fn gather_columns<F: Float + CubeElement>(
                     }
                 }
             }
-            node = next_leaf::<F>(&near.nodes, &near.links, x, zero, node + 1, true);
+            node = next_leaf::<F>(&near.tree, x, zero, node + 1, true);
         }
         let row = samples.places[j] as usize * components + column;
         #[unroll]

@@ -14,6 +14,7 @@ use cubecl::prelude::*;
 
 use super::axis::{Fourier, Lines};
 use super::gain::{Gains, Spectrum, gain};
+use crate::device::{Ready, launch};
 use crate::{Buffer, Device, Scalar};
 use fourier::{Complex, transform_tile};
 use tile::{
@@ -64,9 +65,9 @@ pub(super) struct Layout {
 
 /// Arguments of a launch.
 struct Launch<T: Scalar, R: Runtime> {
-    groups: CubeCount,
-    tables: TablesLaunch<T, R>,
-    layout: Layout,
+    units: usize,
+    tables: Ready<TablesLaunch<T, R>>,
+    layout: Ready<Layout>,
 }
 
 impl<T: Scalar> Fourier<T> {
@@ -79,21 +80,21 @@ impl<T: Scalar> Fourier<T> {
         }
         let tiles = lines.count.div_ceil(2 * pairs);
         Launch {
-            groups: device.groups(tiles * BLOCK as usize, BLOCK),
-            tables: TablesLaunch::new(
+            units: tiles * BLOCK as usize,
+            tables: Ready::new(TablesLaunch::new(
                 self.roots.arg(),
                 self.radices.arg(),
                 self.chirp.as_ref().unwrap_or(&self.roots).arg(),
                 self.radices.len(),
                 self.length,
                 pairs,
-            ),
-            layout: Layout {
+            )),
+            layout: Ready::new(Layout {
                 capacity,
                 contiguous: lines.step == 1,
                 chirped: self.chirp.is_some(),
                 inverse,
-            },
+            }),
         }
     }
 
@@ -107,16 +108,9 @@ impl<T: Scalar> Fourier<T> {
         inverse: bool,
     ) {
         let launch = self.launch(device, lines, inverse);
-        transform::launch::<T, R>(
-            device.client(),
-            launch.groups,
-            CubeDim::new_1d(BLOCK),
-            from.arg(),
-            to.arg(),
-            lines.arg(),
-            launch.tables,
-            launch.layout,
-        );
+        launch!(device, launch.units, BLOCK => transform<T>(
+            from, to, lines, launch.tables, launch.layout,
+        ));
     }
 
     /// Lines → cosine transforms times the gains → lines times `2n`.
@@ -129,17 +123,9 @@ impl<T: Scalar> Fourier<T> {
         gains: &Gains<T>,
     ) {
         let launch = self.launch(device, lines, false);
-        filter::launch::<T, R>(
-            device.client(),
-            launch.groups,
-            CubeDim::new_1d(BLOCK),
-            from.arg(),
-            to.arg(),
-            lines.arg(),
-            launch.tables,
-            gains.arg(),
-            launch.layout,
-        );
+        launch!(device, launch.units, BLOCK => filter<T>(
+            from, to, lines, launch.tables, Ready::new(gains.arg()), launch.layout,
+        ));
     }
 }
 
