@@ -69,6 +69,16 @@ pub struct Body {
 }
 
 impl Body {
+    /// The body with twice the cell size, and samples as far apart in cells.
+    #[cfg(test)]
+    pub fn halved(self) -> Self {
+        Self {
+            shape: self.shape.map(|n| n / 2),
+            samples: self.samples / 4,
+            ..self
+        }
+    }
+
     /// The paper's fish.
     pub const FISH: Self = Self {
         name: "fish",

@@ -260,7 +260,7 @@ mod tests {
         let motions = [Motion::Along, Motion::Scaling, Motion::Bending];
         let paper = Choice::new(true, false, false);
         let study = Study::full();
-        for body in [study.torus, study.fish] {
+        for body in [study.torus.halved(), study.fish] {
             let sampled = body.sample(Draw::Random).expect("samples");
             let frame = Frame::of(&sampled.cloud).expect("points");
             let ratios = |choice: Choice, motions: &[Motion]| -> Vec<f64> {

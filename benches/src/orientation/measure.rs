@@ -125,19 +125,48 @@ pub fn measure(body: &Body, method: &Method, runs: usize) -> Measured {
     }
 }
 
+/// Signs of the samples whose true normal is known.
+pub struct Signs {
+    /// Number of known normals.
+    known: usize,
+    /// Indices of the samples whose sign is evaluated.
+    evaluated: Vec<usize>,
+    /// Indices of those whose sign is wrong.
+    wrong: Vec<usize>,
+}
+
+impl Signs {
+    /// Compares normals with the true ones.
+    pub fn new(body: &Body, out: &Orientation<f32>) -> Self {
+        let truth = body.normals.iter().enumerate();
+        let known = truth.filter(|(_, truth)| vector::norm(**truth) > 0.0);
+        let cosine = |(i, &truth): (usize, &[f64; 3])| {
+            (i, vector::dot(vector::to_f64(out.normals[i]), truth))
+        };
+        let cosines: Vec<(usize, f64)> = known.map(cosine).collect();
+        let indices = |keep: &dyn Fn(f64) -> bool| -> Vec<usize> {
+            cosines.iter().filter(|c| keep(c.1)).map(|c| c.0).collect()
+        };
+        Self {
+            known: cosines.len(),
+            evaluated: indices(&|cosine| cosine.abs() > EVALUATED),
+            wrong: indices(&|cosine| cosine < -EVALUATED),
+        }
+    }
+
+    /// Wrong signs, in percent of those evaluated.
+    pub fn percent(&self) -> f64 {
+        percent(self.wrong.len(), self.evaluated.len())
+    }
+}
+
+fn percent(part: usize, whole: usize) -> f64 {
+    100.0 * part as f64 / whole.max(1) as f64
+}
+
 fn evaluate(body: &Body, prepared: &Prepared, out: &Orientation<f32>) -> Errors {
-    let truth = body.normals.iter().enumerate();
-    let known = truth.filter(|(_, truth)| vector::norm(**truth) > 0.0);
-    let cosines: Vec<(usize, f64)> = known
-        .map(|(i, &truth)| (i, vector::dot(vector::to_f64(out.normals[i]), truth)))
-        .collect();
-    let is_evaluated = |cosine: f64| cosine.abs() > EVALUATED;
-    let evaluated = cosines.iter().filter(|c| is_evaluated(c.1)).count();
-    let wrong: Vec<usize> = cosines
-        .iter()
-        .filter(|c| is_evaluated(c.1) && c.1 < 0.0)
-        .map(|c| c.0)
-        .collect();
+    let signs = Signs::new(body, out);
+    let wrong = &signs.wrong;
     let angles_of_narrow = angles(body, &narrow_axes(prepared));
     let mut angles = angles(body, &out.normals);
     angles.sort_by(f64::total_cmp);
@@ -145,14 +174,11 @@ fn evaluate(body: &Body, prepared: &Prepared, out: &Orientation<f32>) -> Errors 
     let is_doubtful = |i: &&usize| why.binary_search_by_key(*i, |f| f.0 as usize).is_ok();
     let caught = wrong.iter().filter(is_doubtful).count();
     let doubt = Doubt::count(body.points.len(), &why);
-    let share = |part: usize, whole: usize| 100.0 * part as f64 / whole.max(1) as f64;
     Errors {
-        wrong: share(wrong.len(), evaluated),
-        lower_bound: body.clean.as_ref().map(|clean| {
-            let evaluated = cosines.iter().filter(|c| is_evaluated(c.1)).map(|c| c.0);
-            100.0 * least_wrong(body, clean, &evaluated.collect::<Vec<_>>())
-        }),
-        evaluated: share(evaluated, cosines.len()),
+        wrong: signs.percent(),
+        lower_bound: (body.clean.as_ref())
+            .map(|clean| 100.0 * least_wrong(body, clean, &signs.evaluated)),
+        evaluated: percent(signs.evaluated.len(), signs.known),
         axis_median: angles.get(angles.len() / 2).copied().unwrap_or(0.0),
         axis_mean: mean(&angles),
         axis_mean_narrow: mean(&angles_of_narrow),
@@ -160,7 +186,7 @@ fn evaluate(body: &Body, prepared: &Prepared, out: &Orientation<f32>) -> Errors 
         reasons: Reason::ALL
             .map(|reason| (reason.name(), 100.0 * doubt.share_of(reason)))
             .to_vec(),
-        caught: (!wrong.is_empty()).then(|| share(caught, wrong.len())),
+        caught: (!wrong.is_empty()).then(|| percent(caught, wrong.len())),
     }
 }
 

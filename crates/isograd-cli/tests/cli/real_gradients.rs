@@ -29,7 +29,7 @@ fn largest<T: Pipeline>(points: &[[f64; 3]]) -> (f64, usize) {
     let points = points.iter().map(|p| p.map(T::of)).collect();
     let cloud = PointCloud::new(points).expect("finite points");
     let grid = Grid::fit(&cloud, Resolution::Cells(CELLS), T::of(0.1)).expect("a grid");
-    let mut plan = Reconstructor::new(grid, Options::default()).expect("options");
+    let mut plan = Reconstructor::new(grid, Options::default().checks(false)).expect("options");
     let result = plan.reconstruct(&cloud).expect("reconstructs");
     let h = grid.spacing();
     let bar: Vec<T> = result
