@@ -12,6 +12,18 @@ pub(crate) fn dispatch<R>(arch: Arch, f: impl FnMut() -> R) -> R {
     arch.dispatch(Inline(f))
 }
 
+/// Evaluates an expression with the widest instruction set that `arch` found: [`dispatch`] of an inlined closure.
+macro_rules! vectorized {
+    ($arch:expr, $body:expr) => {
+        $crate::simd::dispatch(
+            $arch,
+            #[inline(always)]
+            || $body,
+        )
+    };
+}
+pub(crate) use vectorized;
+
 struct Inline<F>(F);
 
 impl<R, F: FnMut() -> R> WithSimd for Inline<F> {

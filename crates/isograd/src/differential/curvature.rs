@@ -52,19 +52,14 @@ pub fn mean_curvature<T: Real>(
         .enumerate()
         .for_each(|(i, plane)| {
             let mut buffers = Buffers::new(nz);
-            crate::simd::dispatch(
-                Arch::new(),
-                #[inline(always)]
-                || {
-                    for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
-                        buffers.fill(&rows, [i, j]);
-                        for k in 0..nz {
-                            out[k] =
-                                per_length * curvature(buffers.gradient(k), buffers.hessian(k));
-                        }
+            crate::simd::vectorized!(Arch::new(), {
+                for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
+                    buffers.fill(&rows, [i, j]);
+                    for k in 0..nz {
+                        out[k] = per_length * curvature(buffers.gradient(k), buffers.hessian(k));
                     }
-                },
-            );
+                }
+            });
         });
 }
 
@@ -151,27 +146,23 @@ fn sweep<T: Real>(values: &[T], out: &mut [T], shape: [usize; 3], axis: usize) {
     out.par_chunks_exact_mut(ny * nz)
         .enumerate()
         .for_each(|(i, plane)| {
-            crate::simd::dispatch(
-                Arch::new(),
-                #[inline(always)]
-                || {
-                    for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
-                        let row = |i: usize, j: usize| &values[(i * ny + j) * nz..][..nz];
-                        let own = row(i, j);
-                        if axis == 2 {
-                            rows::along(Order::Second, own, quarter, out);
-                        } else {
-                            let at = [i, j][axis];
-                            let stencil = Stencil::new(Order::Second, shape[axis], at);
-                            let beside = |p: usize| if axis == 0 { row(p, j) } else { row(i, p) };
-                            let weight = stencil.weight.map(|w: T| w * quarter);
-                            rows::combine(own, stencil.at.map(beside), weight, out);
-                        }
-                        for k in 0..nz {
-                            out[k] += own[k];
-                        }
+            crate::simd::vectorized!(Arch::new(), {
+                for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
+                    let row = |i: usize, j: usize| &values[(i * ny + j) * nz..][..nz];
+                    let own = row(i, j);
+                    if axis == 2 {
+                        rows::along(Order::Second, own, quarter, out);
+                    } else {
+                        let at = [i, j][axis];
+                        let stencil = Stencil::new(Order::Second, shape[axis], at);
+                        let beside = |p: usize| if axis == 0 { row(p, j) } else { row(i, p) };
+                        let weight = stencil.weight.map(|w: T| w * quarter);
+                        rows::combine(own, stencil.at.map(beside), weight, out);
                     }
-                },
-            );
+                    for k in 0..nz {
+                        out[k] += own[k];
+                    }
+                }
+            });
         });
 }

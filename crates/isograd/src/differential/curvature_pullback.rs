@@ -198,23 +198,19 @@ fn within_planes<T: Real>(
             || Plane::new(rows.shape),
             |plane, (i, (((once, twice), rest), bar))| {
                 let mut guarded = 0;
-                crate::simd::dispatch(
-                    Arch::new(),
-                    #[inline(always)]
-                    || {
-                        for j in 0..ny {
-                            let own = j * nz..(j + 1) * nz;
-                            let bar = &bar[own.clone()];
-                            guarded += plane.fill_row(rows, [i, j], per_length, bar);
-                            let (once, twice) = (&mut once[own.clone()], &mut twice[own.clone()]);
-                            plane.spread_row(j, [once, twice, &mut rest[own]]);
-                        }
-                        for j in 0..ny {
-                            let own = j * nz..(j + 1) * nz;
-                            plane.add_row(ny, j, &mut once[own.clone()], &mut rest[own]);
-                        }
-                    },
-                );
+                crate::simd::vectorized!(Arch::new(), {
+                    for j in 0..ny {
+                        let own = j * nz..(j + 1) * nz;
+                        let bar = &bar[own.clone()];
+                        guarded += plane.fill_row(rows, [i, j], per_length, bar);
+                        let (once, twice) = (&mut once[own.clone()], &mut twice[own.clone()]);
+                        plane.spread_row(j, [once, twice, &mut rest[own]]);
+                    }
+                    for j in 0..ny {
+                        let own = j * nz..(j + 1) * nz;
+                        plane.add_row(ny, j, &mut once[own.clone()], &mut rest[own]);
+                    }
+                });
                 guarded
             },
         )
@@ -227,21 +223,17 @@ fn across_planes<T: Real>([nx, ny, nz]: [usize; 3], once: &[T], twice: &[T], res
     rest.par_chunks_exact_mut(plane)
         .enumerate()
         .for_each(|(i, rest)| {
-            crate::simd::dispatch(
-                Arch::new(),
-                #[inline(always)]
-                || {
-                    for (order, from) in [(Order::First, once), (Order::Second, twice)] {
-                        let column = Column::new(order, nx, i);
-                        let rows = Strided {
-                            values: from,
-                            start: 0,
-                            stride: plane,
-                        };
-                        add_across(&column, T::one(), rows, same, rest);
-                    }
-                },
-            );
+            crate::simd::vectorized!(Arch::new(), {
+                for (order, from) in [(Order::First, once), (Order::Second, twice)] {
+                    let column = Column::new(order, nx, i);
+                    let rows = Strided {
+                        values: from,
+                        start: 0,
+                        stride: plane,
+                    };
+                    add_across(&column, T::one(), rows, same, rest);
+                }
+            });
         });
 }
 
@@ -251,15 +243,11 @@ fn sweep_back<T: Real>(values: &[T], out: &mut [T], shape: [usize; 3], axis: usi
     out.par_chunks_exact_mut(ny * nz)
         .enumerate()
         .for_each(|(i, plane)| {
-            crate::simd::dispatch(
-                Arch::new(),
-                #[inline(always)]
-                || {
-                    for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
-                        sweep_row(values, shape, axis, [i, j], out);
-                    }
-                },
-            );
+            crate::simd::vectorized!(Arch::new(), {
+                for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
+                    sweep_row(values, shape, axis, [i, j], out);
+                }
+            });
         });
 }
 

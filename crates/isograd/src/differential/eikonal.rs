@@ -112,24 +112,20 @@ fn for_each_in_plane<T: Real>(phi: &Field<T>, i: usize, near: f64, mut visit: im
     let mut g = rows::buffers::<T, 3>(nz);
     let [mut magnitude] = rows::buffers::<T, 1>(nz);
     let near = T::of(near);
-    crate::simd::dispatch(
-        Arch::new(),
-        #[inline(always)]
-        || {
-            for j in 0..ny {
-                rows.gradient([i, j], &mut g);
-                let [x, y, z] = g.each_ref().map(|g| &g[..nz]);
-                for (k, m) in magnitude.iter_mut().enumerate() {
-                    *m = (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt();
-                }
-                for (&m, &value) in magnitude.iter().zip(rows.row([i, j])) {
-                    if m.is_finite() {
-                        visit(m, value.abs() < near);
-                    }
+    crate::simd::vectorized!(Arch::new(), {
+        for j in 0..ny {
+            rows.gradient([i, j], &mut g);
+            let [x, y, z] = g.each_ref().map(|g| &g[..nz]);
+            for (k, m) in magnitude.iter_mut().enumerate() {
+                *m = (x[k] * x[k] + y[k] * y[k] + z[k] * z[k]).sqrt();
+            }
+            for (&m, &value) in magnitude.iter().zip(rows.row([i, j])) {
+                if m.is_finite() {
+                    visit(m, value.abs() < near);
                 }
             }
-        },
-    );
+        }
+    });
 }
 
 /// Count, sum and histogram of one group of cells.

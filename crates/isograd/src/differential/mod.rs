@@ -103,18 +103,14 @@ fn for_each_gradient<T: Real>(
         .enumerate()
         .for_each(|(i, plane)| {
             let mut g = rows::buffers::<T, 3>(nz);
-            crate::simd::dispatch(
-                Arch::new(),
-                #[inline(always)]
-                || {
-                    for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
-                        rows.gradient([i, j], &mut g);
-                        for k in 0..nz {
-                            out[k] = map([g[0][k], g[1][k], g[2][k]]);
-                        }
+            crate::simd::vectorized!(Arch::new(), {
+                for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
+                    rows.gradient([i, j], &mut g);
+                    for k in 0..nz {
+                        out[k] = map([g[0][k], g[1][k], g[2][k]]);
                     }
-                },
-            );
+                }
+            });
         });
 }
 

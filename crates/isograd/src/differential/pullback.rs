@@ -109,17 +109,13 @@ pub(super) fn add_gradient<T: Real>(grid: &Grid<T>, bar: &[[T; 3]], phi_bar: &mu
             || vec![T::zero(); nz],
             |sum, (i, plane)| {
                 let mut guarded = 0;
-                crate::simd::dispatch(
-                    Arch::new(),
-                    #[inline(always)]
-                    || {
-                        for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
-                            sum.fill(T::zero());
-                            add_row(grid, bar, [i, j], sum);
-                            guarded += add_finite(sum, grid.spacing().recip(), out);
-                        }
-                    },
-                );
+                crate::simd::vectorized!(Arch::new(), {
+                    for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
+                        sum.fill(T::zero());
+                        add_row(grid, bar, [i, j], sum);
+                        guarded += add_finite(sum, grid.spacing().recip(), out);
+                    }
+                });
                 guarded
             },
         )

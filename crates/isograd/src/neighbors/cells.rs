@@ -148,21 +148,17 @@ impl<T: Real, const M: usize, F> Walk<'_, T, M, F> {
         } = buffers;
         let corners = self.node(at).corners();
         candidates.clear();
-        simd::dispatch(
-            self.arch,
-            #[inline(always)]
-            || {
-                for place in &places[near.clone()] {
-                    let cell = place.start..place.end;
-                    let points = self.index.coordinates_of(cell.clone());
-                    let values = self.search.values.map(
-                        #[inline(always)]
-                        |values| &values[cell.clone()],
-                    );
-                    candidates.extend_near(points, values, corners, self.limit);
-                }
-            },
-        );
+        simd::vectorized!(self.arch, {
+            for place in &places[near.clone()] {
+                let cell = place.start..place.end;
+                let points = self.index.coordinates_of(cell.clone());
+                let values = self.search.values.map(
+                    #[inline(always)]
+                    |values| &values[cell.clone()],
+                );
+                candidates.extend_near(points, values, corners, self.limit);
+            }
+        });
         candidates.fill_last_lanes();
     }
 }

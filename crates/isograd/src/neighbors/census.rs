@@ -16,11 +16,7 @@ pub(crate) struct Census<T> {
 impl<T: Real> Census<T> {
     /// Over candidates that hold all samples within the radius.
     pub(crate) fn of(arch: pulp::Arch, center: [T; 3], radius: T, near: &Candidates<T>) -> Self {
-        let (counts, crowds) = crate::simd::dispatch(
-            arch,
-            #[inline(always)]
-            || sum(center, radius, near),
-        );
+        let (counts, crowds) = crate::simd::vectorized!(arch, sum(center, radius, near));
         Self {
             count: counts.into_iter().sum(),
             crowd: sum_lanes(crowds),

@@ -81,26 +81,22 @@ pub(super) fn moments<T: Real>(
     candidates: &Candidates<T>,
 ) -> Moments<T> {
     let epsilon = T::of(EPSILON) * radius;
-    let sums = simd::dispatch(
-        arch,
-        #[inline(always)]
-        || {
-            let mut sums = [[T::zero(); LANES]; 10];
-            candidates.for_each_lanes(
-                radius,
-                #[inline(always)]
-                |lanes| {
-                    let terms = moment_terms(center, epsilon, lanes);
-                    for (sum, term) in sums.iter_mut().zip(&terms) {
-                        for l in 0..LANES {
-                            sum[l] += term[l];
-                        }
+    let sums = simd::vectorized!(arch, {
+        let mut sums = [[T::zero(); LANES]; 10];
+        candidates.for_each_lanes(
+            radius,
+            #[inline(always)]
+            |lanes| {
+                let terms = moment_terms(center, epsilon, lanes);
+                for (sum, term) in sums.iter_mut().zip(&terms) {
+                    for l in 0..LANES {
+                        sum[l] += term[l];
                     }
-                },
-            );
-            sums
-        },
-    );
+                }
+            },
+        );
+        sums
+    });
     sums.map(sum_lanes)
 }
 
@@ -150,11 +146,7 @@ fn find_all_planes<T: Real>(neighborhoods: &Neighborhoods<T>, arch: Arch, out: &
     let positions = neighborhoods.position().par_chunks(CHUNK);
     let chunks = normals.zip(planes).zip(positions);
     chunks.for_each(|((normals, planes), positions)| {
-        simd::dispatch(
-            arch,
-            #[inline(always)]
-            || find_planes(sorted, positions, normals, planes),
-        );
+        simd::vectorized!(arch, find_planes(sorted, positions, normals, planes));
     });
 }
 

@@ -54,11 +54,7 @@ pub fn pullback<T: Real>(
         points_bar,
         &|position, point, candidates| {
             let own = values.map(|v| v[position]);
-            crate::simd::dispatch(
-                arch,
-                #[inline(always)]
-                || gather(point, &own, radius, candidates),
-            )
+            crate::simd::vectorized!(arch, gather(point, &own, radius, candidates))
         },
     );
     let slopes = &*slopes;

@@ -168,11 +168,7 @@ fn find<T: Real>(
     let mut normals = vec![[T::zero(); 3]; sums.len()];
     let mut planes = vec![Plane::default(); sums.len()];
     let all: Vec<u32> = (0..sums.len() as u32).collect();
-    simd::dispatch(
-        arch,
-        #[inline(always)]
-        || find_planes(&sums, &all, &mut normals, &mut planes),
-    );
+    simd::vectorized!(arch, find_planes(&sums, &all, &mut normals, &mut planes));
     let found = positions
         .iter()
         .zip(count)

@@ -4,7 +4,7 @@ use pulp::Arch;
 use rayon::prelude::*;
 
 use crate::neighbors::{Candidates, LANES, Neighborhoods};
-use crate::simd::dispatch;
+use crate::simd::vectorized;
 use crate::{Real, vector};
 
 /// A sample whose neighbors lie this far to one side, in radii, may be at a rim. Half a disc, which is
@@ -31,11 +31,7 @@ pub(crate) fn rims<T: Real>(
     let mut one_sided = vec![false; points.len()];
     let arch = Arch::new();
     neighborhoods.for_each_neighborhood(&mut one_sided, &|center, radius, candidates| {
-        let offset = dispatch(
-            arch,
-            #[inline(always)]
-            || offset(center, radius, candidates),
-        );
+        let offset = vectorized!(arch, offset(center, radius, candidates));
         offset > T::of(RIM_OFFSET)
     });
     let at_rim: Vec<bool> = neighborhoods

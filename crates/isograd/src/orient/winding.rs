@@ -57,13 +57,8 @@ fn numbers(graph: &Graph, place: &impl Place, domains: &Domains<'_>, probes: &[u
     let arch = pulp::Arch::new();
     let at_probe = |&probe: &u32| -> Vec<f64> {
         let at = place.in_spacings(probe as usize);
-        let winding = |blocks: &Vec<Block>| {
-            crate::simd::dispatch(
-                arch,
-                #[inline(always)]
-                || winding_number(blocks, at),
-            )
-        };
+        let winding =
+            |blocks: &Vec<Block>| crate::simd::vectorized!(arch, winding_number(blocks, at));
         blocks.iter().map(winding).collect()
     };
     let rows: Vec<Vec<f64>> = probes.par_iter().map(at_probe).collect();

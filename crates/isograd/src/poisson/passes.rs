@@ -22,17 +22,13 @@ impl<T: Real> Plan<T> {
         let planes = field.par_chunks_mut(y.n * z.n).enumerate();
         planes.for_each(|(i, plane)| {
             scratch.with_lines(|buffers| {
-                simd::dispatch(
-                    self.arch,
-                    #[inline(always)]
-                    || {
-                        if self.closed {
-                            alternate(plane, z.n, i);
-                        }
-                        forward_rows(z, plane, buffers);
-                        forward_columns(y, &mut rows_of(plane, z.n), buffers);
-                    },
-                );
+                simd::vectorized!(self.arch, {
+                    if self.closed {
+                        alternate(plane, z.n, i);
+                    }
+                    forward_rows(z, plane, buffers);
+                    forward_columns(y, &mut rows_of(plane, z.n), buffers);
+                });
             });
         });
     }
@@ -43,17 +39,13 @@ impl<T: Real> Plan<T> {
         let planes = field.par_chunks_mut(y.n * z.n).enumerate();
         planes.for_each(|(i, plane)| {
             scratch.with_lines(|buffers| {
-                simd::dispatch(
-                    self.arch,
-                    #[inline(always)]
-                    || {
-                        inverse_columns(y, &mut rows_of(plane, z.n), buffers);
-                        inverse_rows(z, plane, buffers);
-                        if self.closed {
-                            alternate(plane, z.n, i);
-                        }
-                    },
-                );
+                simd::vectorized!(self.arch, {
+                    inverse_columns(y, &mut rows_of(plane, z.n), buffers);
+                    inverse_rows(z, plane, buffers);
+                    if self.closed {
+                        alternate(plane, z.n, i);
+                    }
+                });
             });
         });
     }
@@ -71,10 +63,9 @@ impl<T: Real> Plan<T> {
         }
         tasks.par_iter_mut().enumerate().for_each(|(task, rows)| {
             scratch.with_lines(|buffers| {
-                simd::dispatch(
+                simd::vectorized!(
                     self.arch,
-                    #[inline(always)]
-                    || self.filter_task(task * COLUMNS, rows, scratch, buffers),
+                    self.filter_task(task * COLUMNS, rows, scratch, buffers)
                 );
             });
         });

@@ -113,22 +113,18 @@ pub(crate) fn laplacian_dot<T: Real>(
     part: &[T],
 ) -> f64 {
     let mut sum = 0.0;
-    simd::dispatch(
-        Arch::new(),
-        #[inline(always)]
-        || {
-            let mut room = [T::zero(); CELLS];
-            for (n, part) in part.chunks(CELLS).enumerate() {
-                let differences = &mut room[..part.len()];
-                laplacian(values, plan.shape, start + n * CELLS, differences);
-                if plan.closed {
-                    reflect_oddly(values, plan.shape, start + n * CELLS, differences);
-                }
-                let products = differences.iter().zip(part);
-                sum += products.map(|(l, p)| (*l * *p).f64()).sum::<f64>();
+    simd::vectorized!(Arch::new(), {
+        let mut room = [T::zero(); CELLS];
+        for (n, part) in part.chunks(CELLS).enumerate() {
+            let differences = &mut room[..part.len()];
+            laplacian(values, plan.shape, start + n * CELLS, differences);
+            if plan.closed {
+                reflect_oddly(values, plan.shape, start + n * CELLS, differences);
             }
-        },
-    );
+            let products = differences.iter().zip(part);
+            sum += products.map(|(l, p)| (*l * *p).f64()).sum::<f64>();
+        }
+    });
     sum
 }
 

@@ -102,11 +102,7 @@ pub fn pullback<T: Real>(
     let (arch, radius) = (pulp::Arch::new(), neighborhoods.common_radius);
     let own = &*sorted_factors;
     neighborhoods.add_gathered([own], sorted, points_bar, &|position, point, candidates| {
-        crate::simd::dispatch(
-            arch,
-            #[inline(always)]
-            || gather(point, own[position], radius, candidates),
-        )
+        crate::simd::vectorized!(arch, gather(point, own[position], radius, candidates))
     });
     let factors = &*factors;
     neighborhoods.add_from_wide(&neighborhoods.radius, points_bar, &|i, _, offset| {

@@ -152,15 +152,11 @@ pub fn forward<T: Real>(
             // Samples up to two planes away reach into the slab.
             let near = scratch.planes(from.saturating_sub(REACH), nx.min(to + REACH), ny);
             let near = &residual.order[near];
-            simd::dispatch(
-                arch,
-                #[inline(always)]
-                || {
-                    for &i in near {
-                        samples.add(i as usize, &grid, weights, from, slab);
-                    }
-                },
-            );
+            simd::vectorized!(arch, {
+                for &i in near {
+                    samples.add(i as usize, &grid, weights, from, slab);
+                }
+            });
         });
     Ok(())
 }

@@ -94,15 +94,11 @@ pub(crate) fn pullback_on<T: Real>(
     tasks
         .zip(residual.order.par_chunks(TASK))
         .for_each(|(gathered, order)| {
-            simd::dispatch(
-                arch,
-                #[inline(always)]
-                || {
-                    for (gathered, &i) in gathered.iter_mut().zip(order) {
-                        *gathered = samples.gather(i as usize, residual, b_bar);
-                    }
-                },
-            );
+            simd::vectorized!(arch, {
+                for (gathered, &i) in gathered.iter_mut().zip(order) {
+                    *gathered = samples.gather(i as usize, residual, b_bar);
+                }
+            });
         });
     let h = grid.spacing();
     let Samples {

@@ -7,7 +7,7 @@ use super::task::{Local, Task};
 use super::workspace::{ChildCandidates, Lists};
 use crate::Real;
 use crate::distance::bvh::{LANES, Points};
-use crate::simd::dispatch;
+use crate::simd::vectorized;
 use crate::vector::{norm, sub};
 
 impl<T: Real> Task<'_, T> {
@@ -30,11 +30,7 @@ impl<T: Real> Task<'_, T> {
                 }
             }
         }
-        dispatch(
-            self.arch,
-            #[inline(always)]
-            || kept.sites.cull(local.sites, lists.sites, &boxes),
-        );
+        vectorized!(self.arch, kept.sites.cull(local.sites, lists.sites, &boxes));
     }
 
     /// A point of the mesh close to the center of each child, where the lists hold one.
@@ -76,11 +72,7 @@ impl<T: Real> Task<'_, T> {
                 in_cells[a][l] = ((points[a][l] - local.center[a]) * per_cell) as f32;
             }
         }
-        dispatch(
-            self.arch,
-            #[inline(always)]
-            || closest(local.sites, lists.sites, &in_cells),
-        )
+        vectorized!(self.arch, closest(local.sites, lists.sites, &in_cells))
     }
 
     fn set_box(&self, boxes: &mut Boxes, l: usize, local: &Local, extent: &Extent, foot: [f64; 3]) {

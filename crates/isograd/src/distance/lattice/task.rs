@@ -15,7 +15,7 @@ use super::sites::{LARGE, Sites};
 use super::workspace::{Candidates, ChildCandidates, Lists, Workspace};
 use crate::distance::bvh::{Bvh, LANES, NOWHERE, NearestTriangles, Region, Stack};
 use crate::distance::triangle;
-use crate::simd::dispatch;
+use crate::simd::vectorized;
 use crate::vector::{scale, sub, to_f64};
 use crate::{Grid, Mesh, Real};
 
@@ -103,10 +103,9 @@ impl<T: Real> Task<'_, T> {
     /// The point of the mesh closest to the center of a block; `None` if the block is beyond the band.
     fn foot(&self, extent: &Extent, stack: &mut Stack) -> Option<[f64; 3]> {
         let reach = self.reach(extent.radius);
-        let place = dispatch(
+        let place = vectorized!(
             self.arch,
-            #[inline(always)]
-            || self.bvh.nearest_to(extent.center, reach * reach, stack),
+            self.bvh.nearest_to(extent.center, reach * reach, stack)
         )?;
         Some(self.bvh.frame(place).nearest(extent.center))
     }
