@@ -137,27 +137,13 @@ mod vulkan {
     fn same_report(cpu: &Value, gpu: &Value) {
         let backend = gpu["backend"].as_str().expect("a text");
         assert!(backend.starts_with("vulkan: "), "{backend}");
-        for part in [
-            "version",
-            "input",
-            "grid",
-            "normals",
-            "orientation",
-            "warnings",
-        ] {
+        for part in "version input grid normals orientation warnings".split(' ') {
             assert_eq!(cpu[part], gpu[part], "{part}");
         }
         for part in ["faces", "components", "euler", "closed"] {
             assert_eq!(cpu["surface"][part], gpu["surface"][part], "{part}");
         }
-        for part in [
-            "normals",
-            "orient",
-            "splat",
-            "poisson",
-            "isosurface",
-            "distance",
-        ] {
+        for part in "normals orient splat poisson isosurface distance".split(' ') {
             assert!(gpu["seconds"][part].as_f64() > Some(0.0), "{part}");
         }
     }

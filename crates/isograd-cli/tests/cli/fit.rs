@@ -163,13 +163,7 @@ fn a_run_that_is_resumed_ends_in_the_same_bits() {
         sandbox.done(&format!(
             "{line} --epochs 7 -o parts --threads 2 --resume a.json"
         ));
-        for file in [
-            "history.json",
-            "cloud.ply",
-            "sdf.vti",
-            "mesh.ply",
-            "loss.png",
-        ] {
+        for file in "history.json cloud.ply sdf.vti mesh.ply loss.png".split(' ') {
             let [whole, parts] = ["whole", "parts"].map(|f| sandbox.read(&format!("{f}/{file}")));
             assert!(whole == parts, "{method}: {file}");
         }

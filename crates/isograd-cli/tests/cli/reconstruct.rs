@@ -300,15 +300,7 @@ fn quiet_says_nothing_and_verbose_says_each_stage() {
         "{quiet:?}"
     );
     let verbose = sandbox.done("reconstruct cloud.ply --resolution 24 -v");
-    for stage in [
-        "read",
-        "normals",
-        "orient",
-        "splat",
-        "poisson",
-        "isosurface",
-        "distance",
-    ] {
+    for stage in "read normals orient splat poisson isosurface distance".split(' ') {
         assert!(
             verbose.stderr.lines().any(|l| l.starts_with(stage)),
             "{stage}: {verbose:?}"

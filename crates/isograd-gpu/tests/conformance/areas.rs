@@ -71,11 +71,9 @@ fn the_pullback_is_the_one_printed_where_every_radius_is_another<R: Runtime, T: 
 ) {
     let n = 307;
     let mut numbers = Numbers(19);
-    let points: Vec<[T; 3]> = (0..n)
-        .map(|_| [0; 3].map(|_| real(numbers.signed())))
-        .collect();
+    let points: Vec<[T; 3]> = numbers.vectors(n);
     let radii: Vec<T> = (0..n).map(|_| real(0.1 + numbers.unit())).collect();
-    let bars: Vec<T> = (0..n).map(|_| real(numbers.signed())).collect();
+    let bars: Vec<T> = numbers.list(n);
     let mut expected = vec![[0.0; 3]; n];
     for i in 0..n {
         let square = Real::f64(radii[i]).powi(2);

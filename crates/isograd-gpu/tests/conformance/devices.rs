@@ -41,6 +41,16 @@ impl Numbers {
     pub fn signed(&mut self) -> f64 {
         2.0 * self.unit() - 1.0
     }
+
+    /// So many of those.
+    pub fn list<T: isograd::Real>(&mut self, count: usize) -> Vec<T> {
+        (0..count).map(|_| T::of(self.signed())).collect()
+    }
+
+    /// So many vectors of those.
+    pub fn vectors<T: isograd::Real>(&mut self, count: usize) -> Vec<[T; 3]> {
+        self.list(3 * count).as_chunks().0.to_vec()
+    }
 }
 
 /// Runs a check that is generic over the number type in single precision, and in double on devices that have it:

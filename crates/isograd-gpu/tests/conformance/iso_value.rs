@@ -24,9 +24,7 @@ const CLOUDS: [([usize; 3], usize, usize); 4] = [
 ];
 
 fn noise<T: Scalar>(cloud: &Cloud<T>, seed: u64) -> Field<T> {
-    let mut numbers = Numbers(seed);
-    let values = (0..cloud.grid.cells()).map(|_| T::of(numbers.signed()));
-    Field::new(cloud.grid, values.collect()).expect("sizes match")
+    Field::new(cloud.grid, Numbers(seed).list(cloud.grid.cells())).expect("sizes match")
 }
 
 fn values_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {

@@ -163,9 +163,7 @@ fn more_groups_than_one_dimension_has_are_reached<R: Runtime>(device: &Device<R>
 }
 
 fn cotangents<T: Scalar>(count: usize) -> Vec<[T; 3]> {
-    let mut numbers = Numbers(count as u64);
-    let mut next = || T::of(numbers.signed());
-    (0..count).map(|_| [next(), next(), next()]).collect()
+    Numbers(count as u64).vectors(count)
 }
 
 /// Largest difference, relative to `scale`.

@@ -258,7 +258,7 @@ impl<T: Scalar> Setting<T> {
     fn weights(&self) -> Vec<T> {
         let mut numbers = Numbers(8);
         let cells = self.cloud.grid.cells();
-        (0..cells).map(|_| T::of(numbers.signed())).collect()
+        numbers.list(cells)
     }
 
     /// What other stages have added, less than this one will.

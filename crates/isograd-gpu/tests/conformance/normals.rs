@@ -21,9 +21,7 @@ tests! {
 fn neighbors_are_those_of_a_plain_loop<R: Runtime, T: Scalar>(device: &Device<R>) {
     for n in [0, 1, 2, 7, 8, 9, 31, 32, 33, 128, 129, 512, 513, 2053] {
         let mut numbers = Numbers(n as u64);
-        let points: Vec<[T; 3]> = (0..n)
-            .map(|_| [0; 3].map(|_| real(numbers.signed())))
-            .collect();
+        let points: Vec<[T; 3]> = numbers.vectors(n);
         let radii: Vec<T> = (0..n)
             .map(|_| real(10f64.powf(1.5 * numbers.signed() - 1.0)))
             .collect();
@@ -155,9 +153,7 @@ fn the_pullback_is_the_one_printed_where_every_radius_is_another<R: Runtime, T: 
         .map(|_| [1.0, 1.0, 0.1].map(|size| real(size * numbers.signed())))
         .collect();
     let radii: Vec<T> = (0..n).map(|_| real(0.3 + 0.7 * numbers.unit())).collect();
-    let bars: Vec<[T; 3]> = (0..n)
-        .map(|_| [0; 3].map(|_| real(numbers.signed())))
-        .collect();
+    let bars: Vec<[T; 3]> = numbers.vectors(n);
     let buffer = device.upload(points.as_flattened()).unwrap();
     let near = neighbors::forward(device, &buffer, &device.upload(&radii).unwrap()).unwrap();
     let (normals, residual) = normals::forward(device, &near).unwrap();

@@ -39,11 +39,6 @@ const SHAPES: [[usize; 3]; 18] = [
     [1, 2, 2053],
 ];
 
-fn noise<T: Scalar>(cells: usize, seed: u64) -> Vec<T> {
-    let mut numbers = Numbers(seed);
-    (0..cells).map(|_| T::of(numbers.signed())).collect()
-}
-
 /// What the CPU finds in f64.
 fn expected<T: Scalar>(shape: [usize; 3], b: &[T], smoothing: f64) -> Vec<f64> {
     let mut field: Vec<f64> = b.iter().map(|v| v.f64()).collect();
@@ -72,7 +67,7 @@ fn solutions_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
     let tolerance = tolerance::<T>();
     let mut worst = [0.0f64; 2];
     for (seed, shape) in SHAPES.into_iter().enumerate() {
-        let b: Vec<T> = noise(shape.iter().product(), seed as u64);
+        let b: Vec<T> = Numbers(seed as u64).list(shape.iter().product());
         let solvers = [
             Solver::new(device, shape),
             Solver::by_definition(device, shape),
@@ -136,7 +131,7 @@ fn stencil(chi: &[f64], shape: [usize; 3]) -> Vec<f64> {
 fn stencil_gives_back_the_right_hand_side<R: Runtime>(device: &Device<R>) {
     for shape in [[20, 24, 30], [11, 131, 8]] {
         let cells: usize = shape.iter().product();
-        let mut b: Vec<f32> = noise(cells, 7);
+        let mut b: Vec<f32> = Numbers(7).list(cells);
         let mean = b.iter().sum::<f32>() / cells as f32;
         b.iter_mut().for_each(|v| *v -= mean);
         let solver = Solver::new(device, shape).unwrap();
@@ -161,7 +156,7 @@ fn pullback_is_the_transpose<R: Runtime, T: Scalar>(device: &Device<R>) {
         let cells = shape.iter().product();
         let sigma = 0.8;
         // Like b in part: two fields of mere noise have a σ̄ of nearly nothing.
-        let (b, other): (Vec<T>, Vec<T>) = (noise(cells, 1), noise(cells, 2));
+        let (b, other): (Vec<T>, Vec<T>) = (Numbers(1).list(cells), Numbers(2).list(cells));
         let chi_bar: Vec<T> = b.iter().zip(&other).map(|(&b, &o)| b + o).collect();
         let solver = Solver::new(device, shape).unwrap();
         let (chi, residual) = forward(device, &solver, &device.upload(&b).unwrap(), sigma).unwrap();
@@ -187,7 +182,7 @@ fn pullback_is_the_transpose<R: Runtime, T: Scalar>(device: &Device<R>) {
 
 fn constant_part_of_the_right_hand_side_is_ignored<R: Runtime>(device: &Device<R>) {
     let shape = [6, 10, 149];
-    let b: Vec<f32> = noise(6 * 10 * 149, 8);
+    let b: Vec<f32> = Numbers(8).list(6 * 10 * 149);
     let shifted: Vec<f32> = b.iter().map(|v| v + 0.75).collect();
     let solver = Solver::new(device, shape).unwrap();
     let solve = |b: &[f32]| {
@@ -204,7 +199,7 @@ fn constant_part_of_the_right_hand_side_is_ignored<R: Runtime>(device: &Device<R
 
 fn second_solve_has_the_same_bits<R: Runtime>(device: &Device<R>) {
     for shape in [[24, 40, 64], [37, 5, 48]] {
-        let b: Vec<f32> = noise(shape.iter().product(), 3);
+        let b: Vec<f32> = Numbers(3).list(shape.iter().product());
         let run = || {
             let solver = Solver::new(device, shape).unwrap();
             let b = device.upload(&b).unwrap();

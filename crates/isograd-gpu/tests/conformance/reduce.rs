@@ -25,9 +25,7 @@ fn sums_are_those_of_a_loop<R: Runtime, T: Scalar>(device: &Device<R>) {
         (1_000_003, 1),
     ] {
         let mut numbers = Numbers(rows as u64 + 1);
-        let values: Vec<T> = (0..rows * columns)
-            .map(|_| T::of(numbers.signed()))
-            .collect();
+        let values: Vec<T> = numbers.list(rows * columns);
         let buffer = device.upload(&values).unwrap();
         let found = device
             .download(&sum_columns(device, &buffer, columns).unwrap())

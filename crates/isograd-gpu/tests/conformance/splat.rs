@@ -54,9 +54,8 @@ fn pullbacks_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
     for (shape, count, crowd) in CLOUDS {
         let cloud = Cloud::<T>::new(shape, count, crowd);
         let on_device = cloud.upload(device);
-        let mut numbers = Numbers(3);
-        let b_bar = (0..cloud.grid.cells()).map(|_| T::of(numbers.signed()));
-        let b_bar = Field::new(cloud.grid, b_bar.collect()).expect("sizes match");
+        let b_bar =
+            Field::new(cloud.grid, Numbers(3).list(cloud.grid.cells())).expect("sizes match");
         for weights in BOTH {
             let mut expected = cloud.started_cotangent();
             let run = || {

@@ -245,6 +245,19 @@ impl<T: Scalar> OnDevice<T> {
         let (samples, surface) = (self.samples(), self.surface());
         extend::forward(device, samples, self.attribute(), surface, band)
     }
+
+    /// The pullback, given cotangents at the vertices and in the band.
+    fn pullback<R: Runtime>(
+        &self,
+        device: &Device<R>,
+        (extension, residual): (&extend::Extension<T>, &extend::Residual<T>),
+        [vertices, values]: [Option<&Buffer<T>>; 2],
+    ) -> Result<extend::Cotangent<T>, extend::Error> {
+        let (samples, of, surface) = (self.samples(), self.attribute(), self.surface());
+        extend::pullback(
+            device, samples, of, surface, residual, extension, vertices, values,
+        )
+    }
 }
 
 /// What came out on a device, in the host's memory.

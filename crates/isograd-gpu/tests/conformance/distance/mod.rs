@@ -15,9 +15,7 @@ use crate::devices::Numbers;
 
 /// A field of signs at random, with the level 0.1: the stage must take them as they are.
 fn signs<T: Real>(grid: Grid<T>) -> Field<T> {
-    let mut numbers = Numbers(5);
-    let values = (0..grid.cells()).map(|_| T::of(numbers.signed()));
-    Field::new(grid, values.collect()).unwrap()
+    Field::new(grid, Numbers(5).list(grid.cells())).unwrap()
 }
 
 fn grid<T: Real>(lower: [f64; 3], spacing: f64, shape: [usize; 3]) -> Grid<T> {

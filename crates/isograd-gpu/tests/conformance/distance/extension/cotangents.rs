@@ -13,16 +13,11 @@ struct Bars<T> {
     cells: Option<Vec<T>>,
 }
 
-fn noise<T: Scalar>(count: usize, seed: u64) -> Vec<T> {
-    let mut numbers = Numbers(seed);
-    (0..count).map(|_| T::of(numbers.signed())).collect()
-}
-
 impl<T: Scalar> Bars<T> {
     /// Of both, or one, or of a few vertices alone.
     fn all(extension: &cpu::Extension<T>) -> [Self; 4] {
-        let vertices = noise(extension.vertices.len(), 21);
-        let cells = noise(extension.values.len(), 22);
+        let vertices = Numbers(21).list(extension.vertices.len());
+        let cells = Numbers(22).list(extension.values.len());
         let mut few = vec![T::of(0.0); vertices.len()];
         few[..10].copy_from_slice(&vertices[..10]);
         let of = |vertices: Option<&Vec<T>>, cells: Option<&Vec<T>>| Self {
@@ -58,17 +53,10 @@ fn pull<R: Runtime, T: Scalar>(
 ) -> (Pulled<T>, usize) {
     let [vertices, cells] = [&bars.vertices, &bars.cells]
         .map(|bar| bar.as_ref().map(|bar| device.upload(bar).unwrap()));
-    let found = extend::pullback(
-        device,
-        scene.samples(),
-        scene.attribute(),
-        scene.surface(),
-        residual,
-        extension,
-        vertices.as_ref(),
-        cells.as_ref(),
-    )
-    .unwrap();
+    let given = [vertices.as_ref(), cells.as_ref()];
+    let found = scene
+        .pullback(device, (extension, residual), given)
+        .unwrap();
     let numbers = |buffer: &Buffer<T>| device.download(buffer).unwrap();
     let grid = numbers(&found.grid);
     let pulled = [
@@ -161,7 +149,7 @@ fn the_attribute_gets_the_transpose_of_the_map<R: Runtime, T: Scalar>(device: &D
         let attribute = Attribute {
             name: "noise".into(),
             components,
-            values: noise(components * scene.points.len(), 55),
+            values: Numbers(55).list(components * scene.points.len()),
         };
         let on_device = scene.upload(device, &attribute);
         let made = on_device.extend(device, 3.0).unwrap();

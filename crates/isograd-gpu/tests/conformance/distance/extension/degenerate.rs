@@ -42,17 +42,10 @@ fn pull_ones<R: Runtime, T: Scalar>(
 ) -> extend::Cotangent<T> {
     let ones = |buffer: &Buffer<T>| device.upload(&vec![T::of(1.0); buffer.len()]).unwrap();
     let (vertices, values) = (ones(&extension.vertices), ones(&extension.values));
-    extend::pullback(
-        device,
-        scene.samples(),
-        scene.attribute(),
-        scene.surface(),
-        residual,
-        extension,
-        Some(&vertices),
-        Some(&values),
-    )
-    .unwrap()
+    let given = [Some(&vertices), Some(&values)];
+    scene
+        .pullback(device, (extension, residual), given)
+        .unwrap()
 }
 
 fn all<R: Runtime, T: Scalar>(device: &Device<R>, buffer: &Buffer<T>) -> Vec<f64> {
@@ -186,16 +179,11 @@ fn what_does_not_fit_is_not_pulled_back<R: Runtime>(device: &Device<R>) {
     let scene = Scene::<f32>::even();
     let on_device = scene.upload(device, &scene.attribute(2));
     let (extension, residual) = on_device.extend(device, 3.0).unwrap();
-    let refused = |extension: &extend::Extension<f32>, bar: Option<&Buffer<f32>>| {
-        let (samples, surface) = (on_device.samples(), on_device.surface());
-        let attribute = on_device.attribute();
-        let found = extend::pullback(
-            device, samples, attribute, surface, &residual, extension, bar, None,
-        );
-        match found {
-            Err(extend::Error::Refused(error)) => error,
-            other => panic!("{:?}", other.map(|_| ())),
-        }
+    let refused = |extension: &extend::Extension<f32>, bar: Option<&Buffer<f32>>| match on_device
+        .pullback(device, (extension, &residual), [bar, None])
+    {
+        Err(extend::Error::Refused(error)) => error,
+        other => panic!("{:?}", other.map(|_| ())),
     };
     let short = device.upload(&[1.0f32]).unwrap();
     let error = refused(&extension, Some(&short));
