@@ -91,10 +91,8 @@ impl<T: Number> Plan<T> {
         if observer(Stage::Normals).is_break() {
             return Err(Error::Interrupted(Stage::Normals));
         }
-        let selection = self.options.outliers.select(cloud.points());
-        let used = selection.used(cloud);
-        let cloud = used.as_ref().unwrap_or(cloud);
-        let mut result = self.reconstruct_used(cloud, observer)?;
+        let (selection, used) = self.options.outliers.apply(cloud);
+        let mut result = self.reconstruct_used(&used, observer)?;
         result.set_selection(selection);
         Ok(result)
     }
@@ -135,10 +133,8 @@ impl<T: Number> Plan<T> {
         saved: &Saved<'_, T>,
     ) -> Result<Reconstruction<T>, Error> {
         saved.check(self.grid.cells(), cloud.len())?;
-        let selection = self.options.outliers.select(cloud.points());
-        let used = selection.used(cloud);
-        let cloud = used.as_ref().unwrap_or(cloud);
-        let mut result = self.restore_used(cloud, selection.gather(saved.normals, 1))?;
+        let (selection, used) = self.options.outliers.apply(cloud);
+        let mut result = self.restore_used(&used, selection.gather(saved.normals, 1))?;
         result.set_selection(selection);
         Ok(result)
     }

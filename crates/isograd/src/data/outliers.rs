@@ -10,6 +10,8 @@
 //! far away, a ground plane and a thin tail are kept: each of their samples has neighbors, or continues what is kept.
 //! The result is independent of the order, position and scale of the points. `O(N)` operations.
 
+use std::borrow::Cow;
+
 use super::cloud::{PointCloud, Sensors, bounds};
 use crate::{Real, vector};
 
@@ -36,6 +38,13 @@ impl Outliers {
                 Self::Keep => Vec::new(),
             },
         }
+    }
+
+    /// The samples of a cloud to use, and the cloud of these.
+    pub fn apply<T: Real>(self, cloud: &PointCloud<T>) -> (Selection, Cow<'_, PointCloud<T>>) {
+        let selection = self.select(cloud.points());
+        let used = selection.used(cloud);
+        (selection, used.map_or(Cow::Borrowed(cloud), Cow::Owned))
     }
 }
 
