@@ -208,32 +208,27 @@ impl Blocks {
         closed: bool,
         out: &mut [T],
     ) -> bool {
-        let odd = |a: usize, n: usize| {
-            let reflections = (origin[a] + n as isize).div_euclid(self.cells[a] as isize);
-            closed && reflections % 2 != 0
-        };
         let inside = |a: usize, n: usize| reflect(origin[a] + n as isize, self.cells[a]);
         let mut any = false;
         for (row, out) in out.chunks_exact_mut(side).enumerate() {
-            let (x, y) = (inside(0, row / side), inside(1, row % side));
+            let ((x, x_odd), (y, y_odd)) = (inside(0, row / side), inside(1, row % side));
             let mut n = 0;
             while n < side {
-                let z = inside(2, n);
+                let (z, z_odd) = inside(2, n);
                 let count = match z as isize == origin[2] + n as isize {
                     true => (EDGE - z % EDGE).min(self.cells[2] - z).min(side - n),
                     false => 1,
                 };
+                let out = &mut out[n..n + count];
                 match self.place([x, y, z]) {
                     Some(place) => {
-                        out[n..n + count].copy_from_slice(&values[place..place + count]);
+                        out.copy_from_slice(&values[place..place + count]);
                         any = true;
                     }
-                    None => out[n..n + count].fill(T::zero()),
+                    None => out.fill(T::zero()),
                 }
-                for (m, value) in out[n..n + count].iter_mut().enumerate() {
-                    if odd(0, row / side) ^ odd(1, row % side) ^ odd(2, n + m) {
-                        *value = -*value;
-                    }
+                if closed && x_odd ^ y_odd ^ z_odd {
+                    out.iter_mut().for_each(|value| *value = -*value);
                 }
                 n += count;
             }
@@ -351,11 +346,14 @@ impl Overlap {
     }
 }
 
-/// The cell of an axis of `n` cells whose even reflection at the walls is at `x`.
+/// The cell of an axis of `n` cells whose reflection at the walls is at `x`, and whether the number of reflections is odd.
 #[inline(always)]
-fn reflect(x: isize, n: usize) -> usize {
+fn reflect(x: isize, n: usize) -> (usize, bool) {
     let place = x.rem_euclid(2 * n as isize) as usize;
-    place.min(2 * n - 1 - place)
+    match place < n {
+        true => (place, false),
+        false => (2 * n - 1 - place, true),
+    }
 }
 
 /// A value at every cell of the blocks that are there.

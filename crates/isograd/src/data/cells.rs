@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::blocks::{BlockField, Blocks};
+use super::blocks::{BlockField, Blocks, EDGE};
 use super::{Field, Grid, LatticeEdge};
 use crate::Real;
 
@@ -56,20 +56,25 @@ impl<'a, T: Real> Cells<'a, T> {
             }
             Self::Blocks(field) => {
                 let [x, y, z] = cell;
-                for (k, value) in row.iter_mut().enumerate() {
-                    *value = field.get([x, y, z + k]).unwrap_or(T::zero());
+                let mut k = 0;
+                while k < N {
+                    let count = (EDGE - (z + k) % EDGE).min(N - k);
+                    if let Some(place) = field.blocks.place([x, y, z + k]) {
+                        row[k..k + count].copy_from_slice(&field.values[place..place + count]);
+                    }
+                    k += count;
                 }
             }
         }
         row
     }
 
-    /// The value of a cell, from its place in a dense field; `None` where there is none.
+    /// The value of a cell; `None` where there is none.
     #[inline(always)]
-    pub(crate) fn get(self, index: usize) -> Option<T> {
+    pub(crate) fn at(self, cell: [usize; 3]) -> Option<T> {
         match self {
-            Self::Dense(_, values) => Some(values[index]),
-            Self::Blocks(field) => field.get(field.grid.cell(index)),
+            Self::Dense(grid, values) => Some(values[grid.index(cell)]),
+            Self::Blocks(field) => field.get(cell),
         }
     }
 

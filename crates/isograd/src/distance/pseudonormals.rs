@@ -5,82 +5,69 @@
 //! `(q − y)·n` is positive outside (J. A. Bærentzen and H. Aanæs, IEEE TVCG 11, 2005). Faces must share their
 //! vertices, by index.
 
-use rayon::prelude::*;
-
 use super::bvh::corners;
 use super::triangle::{Feature, unit_normal};
+use crate::gather::Buckets;
 use crate::vector::{add, dot, norm, scale, sub};
 use crate::{Mesh, Real};
 
-/// Pseudonormals of all features of a mesh; not of unit length.
+/// The faces of each vertex of a mesh. A pseudonormal is summed where it is needed: few are, and stored they would take
+/// six times the memory of the mesh.
 #[derive(Clone, Debug)]
 pub(super) struct Pseudonormals {
-    faces: Vec<[f64; 3]>,
-    /// Of the edges of each face, from each corner to the next.
-    edges: Vec<[[f64; 3]; 3]>,
-    vertices: Vec<[f64; 3]>,
+    faces: Buckets,
 }
 
 impl Pseudonormals {
+    /// Those of a mesh.
     pub(super) fn new<T: Real>(mesh: &Mesh<T>) -> Self {
-        let faces: Vec<[f64; 3]> = (0..mesh.faces().len() as u32)
-            .into_par_iter()
-            .map(|face| unit_normal(corners(mesh, face)).unwrap_or([0.0; 3]))
-            .collect();
-        Self {
-            edges: of_edges(mesh, &faces),
-            vertices: of_vertices(mesh, &faces),
-            faces,
-        }
+        let mut faces = Buckets::default();
+        faces.fill_with_faces(mesh);
+        Self { faces }
     }
 
-    /// Pseudonormal of a feature of a face; zero for a face without area.
+    /// The outward pseudonormal of a feature of a face, not of unit length; zero where faces have no area.
     pub(super) fn of<T: Real>(&self, mesh: &Mesh<T>, face: u32, feature: Feature) -> [f64; 3] {
+        let named = mesh.faces()[face as usize];
         match feature {
-            Feature::Face => self.faces[face as usize],
-            Feature::Edge(k) => self.edges[face as usize][k],
-            Feature::Vertex(k) => self.vertices[mesh.faces()[face as usize][k] as usize],
+            Feature::Face => normal(mesh, face as usize),
+            Feature::Edge(k) => self.of_edge(mesh, [named[k], named[(k + 1) % 3]]),
+            Feature::Vertex(k) => self.of_vertex(mesh, named[k]),
         }
+    }
+
+    /// Sum over the faces of an edge, in their order.
+    fn of_edge<T: Real>(&self, mesh: &Mesh<T>, [a, b]: [u32; 2]) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        let faces = mesh.faces();
+        let visit = |face: usize, k: usize| {
+            let [before, after] = [2, 1].map(|step| faces[face][(k + step) % 3]);
+            for other in [before, after] {
+                if other == b {
+                    sum = add(sum, normal(mesh, face));
+                }
+            }
+        };
+        self.faces.for_each_corner(faces, a as usize, visit);
+        sum
+    }
+
+    /// Sum over the faces of a vertex, in their order.
+    fn of_vertex<T: Real>(&self, mesh: &Mesh<T>, vertex: u32) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        let visit = |face: usize, k: usize| {
+            let weight = angle(corners(mesh, face as u32), k);
+            sum = add(sum, scale(normal(mesh, face), weight));
+        };
+        let faces = mesh.faces();
+        self.faces.for_each_corner(faces, vertex as usize, visit);
+        sum
     }
 }
 
-/// Sums over the faces of each edge: the sides of all faces are sorted by their two vertices, so that those of
-/// one edge follow each other.
-fn of_edges<T: Real>(mesh: &Mesh<T>, normals: &[[f64; 3]]) -> Vec<[[f64; 3]; 3]> {
-    let mut sides: Vec<([u32; 2], u32, u8)> = (0..mesh.faces().len() as u32)
-        .into_par_iter()
-        .flat_map_iter(|face| (0..3).map(move |k| (edge(mesh, face, k), face, k as u8)))
-        .collect();
-    sides.par_sort_unstable();
-    let mut edges = vec![[[0.0; 3]; 3]; normals.len()];
-    for run in sides.chunk_by(|a, b| a.0 == b.0) {
-        let sum = run.iter().fold([0.0; 3], |sum, &(_, face, _)| {
-            add(sum, normals[face as usize])
-        });
-        for &(_, face, k) in run {
-            edges[face as usize][k as usize] = sum;
-        }
-    }
-    edges
-}
-
-/// The two vertices of edge `k` of a face, the lower first.
-fn edge<T: Real>(mesh: &Mesh<T>, face: u32, k: usize) -> [u32; 2] {
-    let corners = mesh.faces()[face as usize];
-    let (a, b) = (corners[k], corners[(k + 1) % 3]);
-    [a.min(b), a.max(b)]
-}
-
-fn of_vertices<T: Real>(mesh: &Mesh<T>, normals: &[[f64; 3]]) -> Vec<[f64; 3]> {
-    let mut vertices = vec![[0.0; 3]; mesh.vertices().len()];
-    for (face, &normal) in normals.iter().enumerate() {
-        let points = corners(mesh, face as u32);
-        for (k, &vertex) in mesh.faces()[face].iter().enumerate() {
-            let sum = &mut vertices[vertex as usize];
-            *sum = add(*sum, scale(normal, angle(points, k)));
-        }
-    }
-    vertices
+/// Unit normal of a face; zero without area.
+fn normal<T: Real>(mesh: &Mesh<T>, face: usize) -> [f64; 3] {
+    unit_normal(corners(mesh, face as u32)).unwrap_or([0.0; 3])
 }
 
 /// Angle of a triangle at corner `k`, in radians.

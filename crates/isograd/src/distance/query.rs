@@ -167,7 +167,7 @@ pub(super) fn corners_agree<T: Real>(field: Cells<'_, T>, c: T, point: [f64; 3])
     }
     let below = |corner: usize| {
         let at = std::array::from_fn(|a| cell[a] + (corner >> a & 1));
-        field.get(grid.index(at)).map(|value| value < c)
+        field.at(at).map(|value| value < c)
     };
     let first = below(0)?;
     (1..8)

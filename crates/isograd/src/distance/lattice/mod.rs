@@ -12,6 +12,7 @@ mod pullback;
 mod sides;
 mod site_list;
 mod sites;
+mod spread;
 mod task;
 mod workspace;
 
@@ -106,8 +107,13 @@ pub(crate) fn forward_on<T: Real>(
         Band::Within(width) if width > 0.0 && width.is_finite() => width,
         Band::Within(width) => return Err(Error::Band { width }),
     };
-    // Beyond the blocks of χ, the closest face decides on the side.
-    let reach = if chi.is_whole() { width } else { f64::INFINITY };
+    // Beyond the blocks of χ sides come from cells of the band, where this has no gaps.
+    let h = grid.spacing().f64();
+    let fills = !chi.is_whole() && width.is_finite() && width > spread::MARGIN * h;
+    let reach = match chi.is_whole() || fills {
+        true => width,
+        false => f64::INFINITY,
+    };
     scratch.bvh.rebuild(mesh)?;
     let magnitude = magnitude(&grid).max(scratch.bvh.magnitude());
     scratch
@@ -125,10 +131,16 @@ pub(crate) fn forward_on<T: Real>(
         let first = planes.start * plane;
         solve_wave(&grid, mesh, planes, reach, scratch);
         let inside = |i: usize, face: u32| sides.is_inside(first + i, face);
-        write_wave(&grid, scratch, inside, phi, closest);
+        match chi.is_whole() {
+            true => write_wave(&grid, scratch, spread::each(inside), phi, closest),
+            false => write_wave(&grid, scratch, spread::along(inside, h), phi, closest),
+        }
         if reach > width {
             clamp(T::of(width), phi, closest);
         }
+    }
+    if fills {
+        spread::fill(grid.shape(), phi.values_mut(), closest);
     }
     Ok(())
 }
@@ -203,11 +215,12 @@ fn magnitude<T: Real>(grid: &Grid<T>) -> f64 {
     corners.fold(0.0, |m, x| m.max(x.f64().abs()))
 }
 
-/// Writes the results of a wave in the order of the field, with their signs.
+/// Writes the results of a wave in the order of the field; `sign(i, φ, closest)` gives the distances of a row that begins
+/// at place `i` of the wave their signs.
 fn write_wave<T: Real>(
     grid: &Grid<T>,
     scratch: &Scratch<T>,
-    inside: impl Fn(usize, u32) -> bool + Sync,
+    sign: impl Fn(usize, &mut [T], &[u32]) + Sync,
     phi: &mut [T],
     closest: &mut [u32],
 ) {
@@ -220,18 +233,9 @@ fn write_wave<T: Real>(
         let runs = phi.chunks_mut(BLOCK).zip(closest.chunks_mut(BLOCK));
         for (run, (phi, closest)) in runs.enumerate() {
             let from = (((first_block + run) * BLOCK + i % BLOCK) * BLOCK + j % BLOCK) * BLOCK;
-            let distance = &scratch.distance[from..from + BLOCK];
-            let found = &scratch.closest[from..from + BLOCK];
-            let first = row * nz + run * BLOCK;
-            for k in 0..phi.len().min(closest.len()) {
-                closest[k] = found[k];
-                let d = distance[k];
-                phi[k] = if inside(first + k, found[k]) {
-                    -d.max(T::min_positive_value())
-                } else {
-                    d
-                };
-            }
+            phi.copy_from_slice(&scratch.distance[from..from + phi.len()]);
+            closest.copy_from_slice(&scratch.closest[from..from + closest.len()]);
         }
+        sign(row * nz, phi, closest);
     });
 }
