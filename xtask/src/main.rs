@@ -69,6 +69,8 @@ Figures and pages
                    python3-openvdb is installed); --quick for a short run
   surfaces [ARGS]  docs/surfaces.md: surfaces of the real shapes in ../shared/data (or --data DIR)
                    against their true meshes, beside PoissonRecon (needs Python 3 and PyPI)
+  large [ARGS]     docs/large.md: 10 million samples at an effective 2048³, beside PoissonRecon;
+                   leave the machine alone meanwhile (needs Python 3 and PyPI)
 
 Exit status: 0 done, 1 a step failed, 2 the command line is wrong.";
 
@@ -119,6 +121,7 @@ fn run(command: &str, rest: &[String]) -> Option<Outcome> {
         ("bench", _) => Some(bench::run(rest)),
         ("peers", _) => Some(peers::run(rest)),
         ("surfaces", _) => Some(peers::surfaces(rest)),
+        ("large", _) => Some(peers::large(rest)),
         _ => None,
     }
 }

@@ -33,16 +33,27 @@ fn release(package: &str, program: &str, features: &[&str]) -> Result<PathBuf, S
 
 /// Compares surfaces of real shapes with their meshes, and renders the page.
 pub fn surfaces(arguments: &[String]) -> Outcome {
+    with_program("surfaces.py", arguments)?;
+    pages::render(&["surfaces"])
+}
+
+/// Reconstructs a large cloud beside PoissonRecon, and renders the page.
+pub fn large(arguments: &[String]) -> Outcome {
+    with_program("large.py", arguments)?;
+    pages::render(&["large"])
+}
+
+/// Runs a script that starts the program `isograd`.
+fn with_program(script: &str, arguments: &[String]) -> Outcome {
     let environment = environment()?;
     process::run(
         Command::new(&environment.python)
-            .arg(folder().join("surfaces.py"))
+            .arg(folder().join(script))
             .arg("--program")
             .arg(release("isograd-cli", "isograd", &[])?)
             .args(arguments)
             .current_dir(process::root()),
-    )?;
-    pages::render(&["surfaces"])
+    )
 }
 
 /// Creates a virtual environment with the pinned libraries, builds the timing program, runs both, and renders the page.
