@@ -32,6 +32,7 @@ pub mod lattice;
 mod pseudonormals;
 mod query;
 mod query_pullback;
+pub(crate) mod samples;
 mod tangent;
 pub mod triangle;
 

@@ -13,7 +13,7 @@ use crate::vector::{dot, normalized, of_f64, scale, to_f64};
 use crate::{Field, Mesh, Real};
 
 /// Packets of points per task: a fixed number, so that the result does not depend on the threads.
-const PACKETS_PER_TASK: usize = 16;
+pub(super) const PACKETS_PER_TASK: usize = 16;
 
 /// Signed distance to a mesh at any point. The distance is defined for any mesh; the sign needs a closed mesh whose
 /// faces share their vertices, or a field with the same inside.
@@ -74,19 +74,22 @@ impl<T: Real> Query<T> {
         points
             .par_iter()
             .zip(nearest)
-            .map(|(&point, place)| self.hit(point, place, signs))
+            .map(|(&point, place)| self.surface().hit(point, place, signs))
             .collect()
+    }
+
+    fn surface(&self) -> Surface<'_, T> {
+        Surface {
+            mesh: &self.mesh,
+            bvh: &self.bvh,
+            pseudonormals: &self.pseudonormals,
+        }
     }
 
     /// Place in the tree of the triangle closest to each point. The points are taken in packets of neighbors
     /// along a Morton curve.
     fn nearest_triangles(&self, points: &[[T; 3]]) -> Vec<u32> {
-        let mut order: Vec<(u64, u32)> = points
-            .par_iter()
-            .enumerate()
-            .map(|(index, &p)| (morton_code(self.bvh.to_morton(to_f64(p))), index as u32))
-            .collect();
-        order.par_sort_unstable();
+        let order = morton_order(&self.bvh, points);
         let arch = Arch::new();
         let mut sorted = vec![NOWHERE; order.len()];
         sorted
@@ -106,8 +109,29 @@ impl<T: Real> Query<T> {
         }
         nearest
     }
+}
 
-    fn hit(&self, point: [T; 3], place: u32, signs: Option<&Field<T>>) -> Hit<T> {
+/// Morton codes and indices of points, sorted: neighbors in space are neighbors in the list.
+pub(super) fn morton_order<T: Real>(bvh: &Bvh, points: &[[T; 3]]) -> Vec<(u64, u32)> {
+    let mut order: Vec<(u64, u32)> = points
+        .par_iter()
+        .enumerate()
+        .map(|(index, &p)| (morton_code(bvh.to_morton(to_f64(p))), index as u32))
+        .collect();
+    order.par_sort_unstable();
+    order
+}
+
+/// A mesh with its tree and its pseudonormals.
+pub(super) struct Surface<'a, T> {
+    pub mesh: &'a Mesh<T>,
+    pub bvh: &'a Bvh,
+    pub pseudonormals: &'a Pseudonormals,
+}
+
+impl<T: Real> Surface<'_, T> {
+    /// Result of a query whose closest triangle is at `place` of the tree.
+    pub(super) fn hit(&self, point: [T; 3], place: u32, signs: Option<&Field<T>>) -> Hit<T> {
         if place == NOWHERE {
             return Hit {
                 distance: T::nan(),
@@ -118,7 +142,7 @@ impl<T: Real> Query<T> {
             };
         }
         let face = self.bvh.face(place);
-        let found = closest_point(to_f64(point), corners(&self.mesh, face));
+        let found = closest_point(to_f64(point), corners(self.mesh, face));
         let inside = signs
             .and_then(|field| corners_agree(field.into(), T::zero(), to_f64(point)))
             .unwrap_or_else(|| self.is_inside(face, &found));
@@ -133,7 +157,7 @@ impl<T: Real> Query<T> {
     }
 
     fn is_inside(&self, face: u32, found: &Closest) -> bool {
-        let normal = self.pseudonormals.of(&self.mesh, face, found.feature);
+        let normal = self.pseudonormals.of(self.mesh, face, found.feature);
         dot(normal, found.offset) < 0.0
     }
 
@@ -141,9 +165,9 @@ impl<T: Real> Query<T> {
         match normalized(found.offset) {
             Some(away) => scale(away, sign),
             None => {
-                let of_face = super::triangle::unit_normal(corners(&self.mesh, face));
+                let of_face = super::triangle::unit_normal(corners(self.mesh, face));
                 let pseudonormal =
-                    || normalized(self.pseudonormals.of(&self.mesh, face, found.feature));
+                    || normalized(self.pseudonormals.of(self.mesh, face, found.feature));
                 of_face.or_else(pseudonormal).unwrap_or([0.0; 3])
             }
         }
@@ -177,7 +201,7 @@ pub(super) fn corners_agree<T: Real>(field: Cells<'_, T>, c: T, point: [f64; 3])
 
 /// Infinity for NaN, since comparisons with NaN all fail and would admit it to absent boxes.
 #[inline(always)]
-fn far_if_nan(x: f64) -> f64 {
+pub(super) fn far_if_nan(x: f64) -> f64 {
     if x.is_nan() { f64::INFINITY } else { x }
 }
 

@@ -3,14 +3,14 @@
 use rayon::prelude::*;
 
 use crate::data::Mesh;
-use crate::distance::Query;
+use crate::distance::samples::{self, Counts, Samples};
 use crate::isosurface::measure;
 use crate::neighbors::Neighborhoods;
 use crate::orient::Orientation;
 use crate::orient::doubt::{self, Doubt};
 use crate::orient::rim;
 use crate::report::{Report, Warning};
-use crate::{Field, Real, vector};
+use crate::{Field, Real, distance, vector};
 
 /// Share of the samples below which thin parts, missed samples and doubtful signs go without a warning.
 const TOLERATED_SHARE: f64 = 0.01;
@@ -31,10 +31,29 @@ impl Report {
         mesh: &Mesh<T>,
         scratch: &mut measure::Scratch,
     ) {
+        self.check_field_beside(points, normals, sdf, mesh, scratch, None);
+    }
+
+    /// Like [`check_field`](Self::check_field), with the scratch buffers of the distance to `mesh`.
+    pub(super) fn check_field_beside<T: Real>(
+        &mut self,
+        points: &[[T; 3]],
+        normals: &[[T; 3]],
+        sdf: &Field<T>,
+        mesh: &Mesh<T>,
+        scratch: &mut measure::Scratch,
+        built: Option<&distance::Scratch<T>>,
+    ) {
         self.measure_field(sdf);
         self.surface = measure::measure(mesh, scratch);
         let (warnings, spacing) = (&mut self.warnings, self.surface_spacing);
-        warnings.extend(thin_and_missed(points, normals, sdf, mesh, T::of(spacing)));
+        let samples = Samples {
+            points,
+            normals,
+            within: T::of(spacing),
+            depth: T::of(THIN_DEPTH) * T::of(spacing),
+        };
+        warnings.extend(thin_and_missed(samples, sdf, mesh, built));
         warnings.extend(sparse(self.sample_spacing, sdf.grid().spacing().f64()));
         warnings.extend(components(self.surface.components));
         warnings.extend(rounded(points, spacing));
@@ -64,50 +83,45 @@ impl Report {
 /// At [`THIN_DEPTH`] cells below a sample on a thick part, φ still grows toward that sample. On a part
 /// thinner than about three cells the opposite side is nearer there, and the gradient has turned round.
 fn thin_and_missed<T: Real>(
-    points: &[[T; 3]],
-    normals: &[[T; 3]],
+    samples: Samples<'_, T>,
     sdf: &Field<T>,
     mesh: &Mesh<T>,
-    h: T,
+    built: Option<&distance::Scratch<T>>,
 ) -> Vec<Warning> {
-    let depth = T::of(THIN_DEPTH) * h;
-    let below = |(&x, &n): (&[T; 3], &[T; 3])| vector::sub(x, vector::scale(n, depth));
-    let below: Vec<[T; 3]> = points.par_iter().zip(normals).map(below).collect();
-    let flag = |distance: T, gradient: [T; 3], n: [T; 3]| {
-        let thin = vector::dot(gradient, n) < T::of(-0.5);
-        [thin, !(distance.abs() <= h)]
-    };
-    let flags: Vec<[bool; 2]> = if sdf.grid().spacing() == h {
-        let samples = points.par_iter().zip(&below).zip(normals);
-        let interpolated = |((&x, &below), &n): ((&[T; 3], _), _)| {
-            flag(
-                sdf.interpolate(x),
-                sdf.interpolate_with_gradient(below).1,
-                n,
-            )
-        };
-        samples.map(interpolated).collect()
+    let counts = if sdf.grid().spacing() == samples.within {
+        interpolated(samples, sdf)
     } else {
         // The grid of φ is too coarse to see parts of this size.
-        let Ok(query) = Query::new(mesh.clone()) else {
+        let Ok(counts) = samples::count(mesh, built, samples) else {
             return Vec::new();
         };
-        let (at, below) = (query.query(points, None), query.query(&below, None));
-        let hits = at.iter().zip(&below).zip(normals);
-        hits.map(|((at, below), &n)| flag(at.distance, below.gradient, n))
-            .collect()
+        counts
     };
-    let share = |which: usize| {
-        flags.iter().filter(|flags| flags[which]).count() as f64 / points.len().max(1) as f64
-    };
+    let share = |count: usize| count as f64 / samples.points.len().max(1) as f64;
+    let (thin, missed) = (share(counts.thin), share(counts.missed));
     let mut warnings = Vec::new();
-    if share(0) > TOLERATED_SHARE {
-        warnings.push(Warning::Thin { share: share(0) });
+    if thin > TOLERATED_SHARE {
+        warnings.push(Warning::Thin { share: thin });
     }
-    if share(1) > TOLERATED_SHARE {
-        warnings.push(Warning::Missed { share: share(1) });
+    if missed > TOLERATED_SHARE {
+        warnings.push(Warning::Missed { share: missed });
     }
     warnings
+}
+
+/// Counts by φ between its cells.
+fn interpolated<T: Real>(samples: Samples<'_, T>, sdf: &Field<T>) -> Counts {
+    let count = |(&x, &n): (&[T; 3], &[T; 3])| {
+        let below = vector::sub(x, vector::scale(n, samples.depth));
+        let gradient = sdf.interpolate_with_gradient(below).1;
+        let distance = sdf.interpolate(x);
+        Counts {
+            thin: usize::from(vector::dot(gradient, n) < T::of(-0.5)),
+            missed: usize::from(!(distance.abs() <= samples.within)),
+        }
+    };
+    let pairs = samples.points.par_iter().zip(samples.normals);
+    pairs.map(count).reduce(Counts::default, Counts::add)
 }
 
 /// Samples further apart than the grid resolves.

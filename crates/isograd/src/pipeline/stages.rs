@@ -381,7 +381,14 @@ impl<T: Real> Reconstructor<T> {
         let scratch = &mut self.scratch.measure;
         match open.as_deref() {
             Some(open) if open.is_sheet() => report.measure_field(sdf),
-            _ => report.check_field(points, &orientation.normals, sdf, mesh, scratch),
+            _ => report.check_field_beside(
+                points,
+                &orientation.normals,
+                sdf,
+                mesh,
+                scratch,
+                Some(&self.scratch.distance),
+            ),
         }
         if let Some(open) = open {
             report.surface = measure::measure(open.mesh(), scratch);

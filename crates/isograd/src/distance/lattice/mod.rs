@@ -51,7 +51,8 @@ const BLOCKS_PER_WAVE: usize = 512;
 /// Scratch buffers reused between calls.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch<T> {
-    bvh: Bvh,
+    /// Tree of the last mesh.
+    pub(super) bvh: Bvh,
     sites: Sites,
     distance: Vec<T>,
     closest: Vec<u32>,
