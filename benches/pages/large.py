@@ -25,6 +25,7 @@ def context(data: dict) -> dict:
         "depth": data["rows"][1]["depth"],
         "forward": sum(isograd["stages"][name] for name in FORWARD),
         "checks": isograd["stages"]["checks"],
+        "others": [row["others"] for row in data["rows"]],
         "table": table([""], columns, rows),
         "stages": table(["stage"], ["seconds"], stages),
     }
