@@ -27,6 +27,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Instant;
 
+use crate::data::blocks::BlockField;
 use crate::data::{Field, Grid, Mesh, PointCloud, Selection};
 use crate::isosurface::measure;
 use crate::report::Report;
@@ -193,6 +194,8 @@ pub struct Reconstruction<T: Real> {
     /// The indicator of a sparse solve.
     sparse: Option<sparse::Sparse<T>>,
     iso_value: T,
+    /// The indicator near the surface on cells half as large.
+    refined: Option<BlockField<T>>,
     mesh: Mesh<T>,
     open: Option<Box<open::Open<T>>>,
     closest: Vec<u32>,
@@ -222,6 +225,7 @@ impl<T: Pipeline> Reconstruction<T> {
             poisson: Arc::new(T::poisson_plan(grid.shape())),
             selection: Selection::default(),
             all: None,
+            refined: None,
             points: Vec::new(),
             given: Vec::new(),
             sdf: Field::zeros(grid),

@@ -42,7 +42,7 @@ class Level(str, Enum):
     LOCAL = "local"
     """The value at the samples nearby."""
     THIN = "thin"
-    """Like ``LOCAL``, and parts thinner than a cell are made a cell thick; gradients oscillate there."""
+    """Like ``LOCAL``, and parts thinner than a cell are made a cell thick; the surface is marched on half cells."""
     MEAN = "mean"
     """The mean at all samples, as in the paper."""
 

@@ -1,7 +1,7 @@
 //! The iso-value: the mean of the indicator at the samples.
 //!
 //! # Map
-//! `c = Σ a_i χ(x_i) / Σ a_i`, with `χ` trilinear between cell centers and `a_i` the area that sample `i`
+//! `c = Σ a_i χ(x_i) / Σ a_i`, with `χ` trilinear between cell centers (quadratic B-splines where it is refined) and `a_i` the area that sample `i`
 //! stands for. The paper takes the value "near the input point samples", after Kazhdan, Bolitho and
 //! Hoppe, *Poisson surface reconstruction* (SGP 2006), §4.4; the weights make it the mean over the
 //! surface for any density of the samples. Sums are in double precision, in one fixed order.
@@ -18,6 +18,7 @@
 
 use rayon::prelude::*;
 
+use super::{Interpolation, spline};
 use crate::data::cells::{Cells, CellsMut};
 use crate::splat::{SampleCotangent, Samples, SortedSamples};
 use crate::trilinear::{self, Cube};
@@ -32,6 +33,8 @@ pub struct Residual<T> {
     pub value: f64,
     /// `(N,)` the indicator at the samples, in input order.
     pub at_samples: Vec<AtSample<T>>,
+    /// How `χ(x_i)` was read.
+    pub(crate) interpolation: Interpolation,
 }
 
 /// The indicator at a sample.
@@ -81,16 +84,18 @@ pub fn forward<T: Real>(
     areas: &[T],
     residual: &mut Residual<T>,
 ) -> Result<T, Error> {
-    forward_on(chi.into(), points, areas, residual)
+    forward_on(chi.into(), points, areas, Interpolation::Linear, residual)
 }
 
-/// Like [`forward`], for a field that is dense or in blocks.
+/// Like [`forward`], for a field that is dense or in blocks, read by `interpolation`.
 pub(crate) fn forward_on<T: Real>(
     chi: Cells<'_, T>,
     points: &[[T; 3]],
     areas: &[T],
+    interpolation: Interpolation,
     residual: &mut Residual<T>,
 ) -> Result<T, Error> {
+    residual.interpolation = interpolation;
     if points.len() != areas.len() {
         return Err(Error::Count {
             points: points.len(),
@@ -99,6 +104,9 @@ pub(crate) fn forward_on<T: Real>(
     }
     let grid = chi.grid();
     let at = |&point: &[T; 3]| {
+        if interpolation == Interpolation::Spline {
+            return spline::at_sample(chi, point);
+        }
         let (value, gradient) = Cube::new(grid, grid.to_index(point)).value_and_gradient_of(chi);
         AtSample { value, gradient }
     };
@@ -165,7 +173,12 @@ pub(crate) fn pullback_on<T: Real>(
         *area += T::of(share * (residual.at_samples[i].value.f64() - residual.value));
     });
     out.add(grid, samples, false, |i| (point_bar(i), T::zero()));
-    trilinear::spread_on(chi_bar, sorted, value_bar);
+    match (residual.interpolation, chi_bar) {
+        (Interpolation::Spline, CellsMut::Dense(grid, chi_bar)) => {
+            spline::spread(grid, sorted, value_bar, chi_bar);
+        }
+        (_, chi_bar) => trilinear::spread_on(chi_bar, sorted, value_bar),
+    }
 }
 
 #[cfg(test)]

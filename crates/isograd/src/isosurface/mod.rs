@@ -46,7 +46,9 @@ mod measure_pullback;
 #[cfg(test)]
 mod measure_pullback_tests;
 mod pullback;
+pub(crate) mod refine;
 mod signs;
+mod spline;
 mod tables;
 #[cfg(test)]
 mod tests;
@@ -68,9 +70,21 @@ pub enum Level {
     /// Local value at the samples near by: [`local_level`].
     #[default]
     Local,
-    /// Like `Local`, also on parts thinner than a cell, which are made about a cell thick. Hardly any of them is
-    /// missed; but their position on the grid shows, so that derivatives oscillate within a cell there.
+    /// Like `Local`, also on parts thinner than a cell, which are made about a cell thick: hardly any of them is missed.
+    /// Where the surface has a grid of its own and a dense solve, the surface is that of quadratic B-splines, marched on
+    /// cells half as large, and derivatives vary less within a cell: on a lens a cell thick, by 12 % instead of 37 %.
+    /// Edges are rounded a little more.
     Thin,
+}
+
+/// The indicator between cell centers, where samples read it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Interpolation {
+    /// Trilinear, as between the ends of the edges on which vertices lie.
+    #[default]
+    Linear,
+    /// Quadratic B-splines, as for the values of a [refined](refine) indicator. For dense fields.
+    Spline,
 }
 
 /// Report of the stage.

@@ -6,6 +6,8 @@ use rayon::prelude::*;
 
 use super::sparse::Bars;
 use super::{CloudCotangent, Cotangent, Pipeline, PullbackError, Reconstruction, Residuals};
+use crate::data::blocks::BlockField;
+use crate::data::cells::CellsMut;
 use crate::data::{Field, GridCotangent};
 use crate::distance::{extend, lattice};
 use crate::isosurface::{Level, local_level};
@@ -189,8 +191,7 @@ impl<T: Real> Reconstruction<T> {
         let PullbackScratch {
             vertices, samples, ..
         } = scratch;
-        let found =
-            isosurface::pullback_on(chi, self.iso_value, &self.mesh, vertices, bars.cells_mut());
+        let found = self.pull_vertices(vertices, bars.cells_mut());
         samples.grid.add(&found.grid);
         out.guarded += found.guarded;
         let given = self.splat_samples();
@@ -248,6 +249,28 @@ impl<T: Real> Reconstruction<T> {
             scratch.field = Some(field);
         }
         Ok(())
+    }
+
+    /// From the vertices to the indicator, its level and the grid of the surface.
+    fn pull_vertices(
+        &self,
+        vertices: &[[T; 3]],
+        mut chi_bar: CellsMut<'_, T>,
+    ) -> isosurface::LevelCotangent {
+        let (level, mesh) = (self.iso_value, &self.mesh);
+        match (&self.refined, &mut chi_bar) {
+            (Some(refined), CellsMut::Dense(grid, chi_bar)) => {
+                let mut bars = BlockField::zeros(refined.grid, refined.blocks.clone());
+                let blocks = CellsMut::Blocks(&mut bars);
+                let mut found =
+                    isosurface::pullback_on(refined.into(), level, mesh, vertices, blocks);
+                isosurface::refine::pullback(&bars, grid, chi_bar);
+                // From the size of the refined cells to that of the indicator's.
+                found.grid.spacing *= 0.5;
+                found
+            }
+            _ => isosurface::pullback_on(self.chi(), level, mesh, vertices, chi_bar),
+        }
     }
 
     /// The cotangent of the smoothing for that of the indicator before anything was taken off it.

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::memory::check_blocks;
-use super::{Error, Reconstruction, Reconstructor};
+use super::{Error, Reconstruction, Reconstructor, SurfaceResolution};
 use crate::data::blocks::{BlockField, Blocks, Marks};
 use crate::data::cells::{Cells, CellsMut};
-use crate::isosurface;
+use crate::isosurface::{self, Level};
 use crate::poisson::pyramid::{Octaves, Pyramid};
 use crate::{Field, Grid, Real, poisson, splat};
 
@@ -171,6 +171,13 @@ impl<T: Real> Reconstruction<T> {
     pub(super) fn has_closed_walls(&self) -> bool {
         let sparse = self.sparse.as_ref();
         sparse.map_or(self.poisson.is_closed(), Sparse::is_closed)
+    }
+
+    /// Whether the surface is that of the indicator on cells half as large.
+    pub(super) fn is_refined(&self) -> bool {
+        let options = &self.options;
+        let is_wanted = options.level == Level::Thin && options.surface != SurfaceResolution::Grid;
+        is_wanted && self.sparse.is_none()
     }
 
     /// The indicator on the grid of the surface.

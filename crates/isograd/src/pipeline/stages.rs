@@ -7,7 +7,7 @@ use super::{Error, Reconstruction, Reconstructor, Residuals, Solve, check_memory
 use crate::data::cells::{Cells, CellsMut};
 use crate::data::{Field, Grid, PointCloud};
 use crate::isosurface::measure;
-use crate::isosurface::{Level, local_level};
+use crate::isosurface::{Interpolation, Level, local_level};
 use crate::neighbors::{Neighborhoods, Radius};
 use crate::poisson::screened;
 use crate::report::{Report, Stage, Warning};
@@ -262,6 +262,10 @@ impl<T: Real> Reconstructor<T> {
 
     /// The iso-value, and the indicator relative to the local one.
     pub(super) fn level(&mut self) -> Result<(), Error> {
+        let interpolation = match self.result.is_refined() {
+            true => Interpolation::Spline,
+            false => Interpolation::Linear,
+        };
         let Reconstruction {
             options,
             points,
@@ -282,7 +286,8 @@ impl<T: Real> Reconstructor<T> {
                 CellsMut::Dense(grid, values)
             }
         };
-        *iso_value = isosurface::iso_value::forward_on(chi.cells(), points, areas, level)?;
+        *iso_value =
+            isosurface::iso_value::forward_on(chi.cells(), points, areas, interpolation, level)?;
         report.iso_value = iso_value.f64();
         if options.level != Level::Mean {
             local_level::forward_on(
@@ -309,18 +314,25 @@ impl<T: Real> Reconstructor<T> {
     }
 
     pub(super) fn isosurface(&mut self) -> Result<(), Error> {
+        let is_refined = self.result.is_refined();
         let Reconstruction {
             indicator,
             sparse,
             iso_value,
+            refined,
             mesh,
             report,
             ..
         } = &mut self.result;
         let scratch = &mut self.scratch.isosurface;
-        let found = match sparse {
-            Some(sparse) => isosurface::blocks::forward(&sparse.chi, *iso_value, mesh)?,
-            None => isosurface::forward(indicator, *iso_value, scratch, mesh)?,
+        *refined = match is_refined {
+            true => Some(isosurface::refine::forward(indicator, *iso_value)?),
+            false => None,
+        };
+        let found = match (sparse, &*refined) {
+            (_, Some(refined)) => isosurface::blocks::forward(refined, *iso_value, mesh)?,
+            (Some(sparse), _) => isosurface::blocks::forward(&sparse.chi, *iso_value, mesh)?,
+            _ => isosurface::forward(indicator, *iso_value, scratch, mesh)?,
         };
         if found.touches_wall {
             report.warnings.push(Warning::TouchesWall);
@@ -333,6 +345,7 @@ impl<T: Real> Reconstructor<T> {
             options,
             indicator,
             sparse,
+            refined,
             iso_value,
             mesh,
             open,
@@ -346,9 +359,10 @@ impl<T: Real> Reconstructor<T> {
             sheet::forward(sheet, thickness, options.band, scratch, sdf, closest)?;
             return Ok(());
         }
-        let chi: Cells<'_, T> = match sparse {
-            Some(sparse) => (&sparse.chi).into(),
-            None => (&*indicator).into(),
+        let chi: Cells<'_, T> = match (sparse, refined) {
+            (_, Some(refined)) => (&*refined).into(),
+            (Some(sparse), _) => (&sparse.chi).into(),
+            _ => (&*indicator).into(),
         };
         distance::lattice::forward_on(
             mesh,

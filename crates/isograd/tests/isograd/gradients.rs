@@ -266,9 +266,14 @@ fn all_results_are_pulled_back_to_all_inputs() {
         .clone()
         .smoothing(Smoothing::Cells(0.9))
         .level(Level::Mean);
+    let thin = estimated
+        .clone()
+        .surface(SurfaceResolution::Factor(1.25))
+        .level(Level::Thin);
     for options in [
         estimated,
         given,
+        thin,
         signs,
         plain,
         screened,
@@ -341,6 +346,7 @@ fn one_two_and_five_threads_give_the_same_bits() {
     assert_same_bits::<f32>(orient(Method::Given));
     assert_same_bits::<f64>(orient(Method::Signs));
     assert_same_bits::<f32>(orient(Method::Given).solve(Solve::Sparse));
+    assert_same_bits::<f32>(orient(Method::Given).level(Level::Thin));
 }
 
 #[test]
@@ -443,6 +449,7 @@ fn assert_restored<T: Pipeline>(options: &Options) {
 #[test]
 fn a_restored_result_pulls_back_to_the_same_bits() {
     assert_restored::<f32>(&Options::default());
+    assert_restored::<f32>(&Options::default().level(Level::Thin));
     assert_restored::<f64>(
         &Options::default()
             .orient(Method::Given)

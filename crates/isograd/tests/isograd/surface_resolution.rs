@@ -121,8 +121,8 @@ fn plates_thinner_than_a_cell_of_phi_are_whole() {
         assert_eq!((measures.components, measures.euler), (1, 2), "{cells}");
         let area = 4.0 * (1.0 * 0.7 + (1.0 + 0.7) * 0.5 * thickness) * 2.0;
         println!("{cells} cells thick: area {} of {area}", measures.area);
-        // Edges are rounded by about a sample spacing.
-        assert!((measures.area / area - 1.0).abs() < 0.03, "{cells}");
+        // Edges are rounded by about a sample spacing, a third of the thickness.
+        assert!((measures.area / area - 1.0).abs() < 0.04, "{cells}");
         let query = Query::new(result.mesh().clone()).expect("a mesh");
         let hits = query.query(cloud.points(), None);
         let off = hits.iter().map(|hit| hit.distance.abs());

@@ -62,7 +62,8 @@ pub(crate) fn forward_on<T: Real>(
     residual: &mut Residual<T>,
 ) {
     let grid = *chi.cells().grid();
-    let near = GridSamples::new(&grid, samples.samples, options.area);
+    let near = GridSamples::new(&grid, samples.samples, options.area, level.interpolation);
+    residual.interpolation = level.interpolation;
     scratch.start(&near, samples, level);
     if residual.passes.is_empty() {
         residual.passes.push(Pass::default());

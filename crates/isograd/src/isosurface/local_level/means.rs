@@ -6,8 +6,9 @@ use rayon::prelude::*;
 use super::Pass;
 use super::gain::Sums;
 use super::layer::{Layer, NODES, Overlap};
-use super::stencil::{CUBE, Stencil};
+use super::stencil::Stencil;
 use crate::element::plate::least_area;
+use crate::isosurface::Interpolation;
 use crate::splat::Samples;
 use crate::{Grid, Real, parallel, simd, vector};
 
@@ -38,15 +39,22 @@ pub(super) struct GridSamples<'a, T> {
     pub(super) samples: Samples<'a, T>,
     /// Whether areas count in cells², or each sample as 1.
     pub(super) in_cells: bool,
+    pub(super) interpolation: Interpolation,
     pub(super) arch: Arch,
 }
 
 impl<'a, T: Real> GridSamples<'a, T> {
-    pub(super) fn new(grid: &'a Grid<T>, samples: Samples<'a, T>, in_cells: bool) -> Self {
+    pub(super) fn new(
+        grid: &'a Grid<T>,
+        samples: Samples<'a, T>,
+        in_cells: bool,
+        interpolation: Interpolation,
+    ) -> Self {
         Self {
             grid,
             samples,
             in_cells,
+            interpolation,
             arch: Arch::new(),
         }
     }
@@ -155,9 +163,13 @@ impl<'a, T: Real> GridSamples<'a, T> {
             return Reading::default();
         };
         let cells: [[[CellMean<T>; 3]; 3]; 3] = layer.read(means, stencil.corner);
-        let (area, corners, [x, y, z]) = (self.area(i), stencil.corners(), stencil.weights());
+        let (area, corners, [x, y, z]) = (
+            self.area(i),
+            stencil.corners(self.interpolation),
+            stencil.weights(),
+        );
         let (mut mean, mut prediction) = (T::zero(), T::zero());
-        for at in CUBE {
+        for at in corners.cells() {
             let [i, j, k] = corners.cell(at);
             let (weight, _) = corners.weight_and_slope(at);
             let cell = cells[i][j][k];

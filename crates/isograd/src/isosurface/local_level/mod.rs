@@ -4,7 +4,7 @@
 //! `χ` rises through the surface as a step that the grid has smoothed. Where the surface is curved, thin or
 //! sharp, where samples are uneven, and depending on its position between cell centers, the value of `χ` on it
 //! differs a little from the mean `c`. The samples measure the difference. Let `r_i = χ(x_i) + δ_i − c`, trilinear
-//! between cell centers, `â_i` the area of a sample in cells², `B` the product of quadratic B-splines, and the trust
+//! between cell centers (quadratic B-splines where the indicator is refined), `â_i` the area of a sample in cells², `B` the product of quadratic B-splines, and the trust
 //! `ω_i` (0 to 1) and the shift `δ_i` as below. A pass takes at every cell center `o` within reach of a sample the mean
 //! of the offsets `s_i = ω_i r_i`,
 //!
@@ -59,6 +59,8 @@
 //! `∇(Te)` jumps where a sample crosses a plane through cell centers, `∇(n·∇χ)` and `∇(n·∇e)` where it crosses a face
 //! of a cell. `λ` has kinks where the fit is 1, and where `ρ` or `λ` is 0.
 
+use super::Interpolation;
+
 mod forward;
 mod gain;
 mod layer;
@@ -101,6 +103,7 @@ const FLATTENED: f64 = 0.5;
 pub struct Residual<T> {
     /// Whether areas count in cells², as in [`Options::area`].
     area: bool,
+    interpolation: Interpolation,
     /// `(N,)` `ω_i`.
     trust: Vec<T>,
     step: Step,

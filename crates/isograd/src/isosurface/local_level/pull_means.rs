@@ -6,7 +6,7 @@ use super::Pass;
 use super::layer::{Layer, NODES, Overlap};
 use super::means::{CellMean, GridSamples, Reading, means_of};
 use super::pullback::{PassScratch, SampleBars};
-use super::stencil::{CUBE, Corners, Stencil};
+use super::stencil::{Corners, Stencil};
 use crate::{Real, simd, vector};
 
 /// Cotangents at a cell.
@@ -51,7 +51,7 @@ impl<T: Real> GridSamples<'_, T> {
         let stencil = self.stencil(i)?;
         Some(PassSample {
             stencil,
-            corners: stencil.corners(),
+            corners: stencil.corners(self.interpolation),
             area: self.area(i),
             offset,
             normal: self.samples.normals[i],
@@ -201,14 +201,14 @@ impl<T: Real> PassSample<T> {
         );
     }
 
-    /// The 2³ cells round the sample in a block.
+    /// The cells of the interpolation in a block.
     #[inline(always)]
     fn overlap(&self, block: [usize; 3]) -> Overlap {
         let lowest = std::array::from_fn(|a| self.stencil.corner[a] + self.corners.place[a]);
-        Overlap::new(lowest, 2, block)
+        Overlap::new(lowest, self.corners.count, block)
     }
 
-    /// Through the trilinear readings `m` and `p`: returns `s̄` and `x̂̄`, and adds `y (v − s)` to `B̄`.
+    /// Through the interpolated readings `m` and `p`: returns `s̄` and `x̂̄`, and adds `y (v − s)` to `B̄`.
     #[inline(always)]
     fn pull_corners(
         &self,
@@ -217,7 +217,7 @@ impl<T: Real> PassSample<T> {
     ) -> (T, [T; 3]) {
         let [x, y, z] = self.stencil.weights();
         let (mut s_bar, mut place) = (T::zero(), [T::zero(); 3]);
-        for at in CUBE {
+        for at in self.corners.cells() {
             let [i, j, k] = self.corners.cell(at);
             let (weight, slope) = self.corners.weight_and_slope(at);
             let own = self.area * x[i] * y[j] * z[k];

@@ -96,7 +96,7 @@ pub(crate) fn pullback_on<T: Real>(
     out: &mut SampleCotangent<T>,
 ) {
     let grid = chi.grid();
-    let near = GridSamples::new(grid, samples.samples, residual.area);
+    let near = GridSamples::new(grid, samples.samples, residual.area, residual.interpolation);
     scratch.start(grid, samples, chi_bar.cells());
     let mut flattened_bar = 0.0;
     for pass in residual.passes.iter().rev() {

@@ -1,5 +1,6 @@
 //! Weights and derivatives on the cells round a sample: small pure functions.
 
+use crate::isosurface::Interpolation;
 use crate::vector::dot;
 use crate::{Grid, Real, splat};
 
@@ -12,26 +13,17 @@ pub(super) struct Stencil<T> {
     offset: [T; 3],
 }
 
-/// The 2³ cell centers round a sample and its trilinear weights.
+/// Interpolation at a sample: the cells that have a weight, among the 3³.
 #[derive(Clone, Copy)]
 pub(super) struct Corners<T> {
     /// Place of the lowest of them in the 3³.
     pub(super) place: [usize; 3],
-    /// Distance from its center, per axis, 0 to 1.
-    fraction: [T; 3],
+    /// Number of cells along each axis: 2 or 3.
+    pub(super) count: usize,
+    /// Weights along each axis, and their derivatives.
+    weights: [[T; 3]; 3],
+    slopes: [[T; 3]; 3],
 }
-
-/// Places of the cells in a cube of 2³, the last axis fastest.
-pub(super) const CUBE: [[usize; 3]; 8] = [
-    [0, 0, 0],
-    [0, 0, 1],
-    [0, 1, 0],
-    [0, 1, 1],
-    [1, 0, 0],
-    [1, 0, 1],
-    [1, 1, 0],
-    [1, 1, 1],
-];
 
 impl<T: Real> Stencil<T> {
     /// Stencil of a point; `None` closer than 2 cells to a wall, where the splat refuses it.
@@ -90,18 +82,34 @@ impl<T: Real> Stencil<T> {
         }
     }
 
-    /// The cell centers round the point, which are among the 3³.
+    /// The cells from which a value at the point is interpolated.
     #[inline(always)]
-    pub(super) fn corners(&self) -> Corners<T> {
-        let (mut place, mut fraction) = ([0; 3], self.offset);
-        for a in 0..3 {
-            if fraction[a] < T::zero() {
-                fraction[a] += T::one();
-            } else {
-                place[a] = 1;
-            }
+    pub(super) fn corners(&self, interpolation: Interpolation) -> Corners<T> {
+        if interpolation == Interpolation::Spline {
+            return Corners {
+                place: [0; 3],
+                count: 3,
+                weights: self.weights(),
+                slopes: self.slopes(),
+            };
         }
-        Corners { place, fraction }
+        let (zero, one) = (T::zero(), T::one());
+        let mut corners = Corners {
+            place: [0; 3],
+            count: 2,
+            weights: [[zero; 3]; 3],
+            slopes: [[-one, one, zero]; 3],
+        };
+        for a in 0..3 {
+            let mut fraction = self.offset[a];
+            if fraction < zero {
+                fraction += one;
+            } else {
+                corners.place[a] = 1;
+            }
+            corners.weights[a] = [one - fraction, fraction, zero];
+        }
+        corners
     }
 }
 
@@ -130,27 +138,26 @@ impl<T: Real> Derivatives<T> {
 }
 
 impl<T: Real> Corners<T> {
-    /// Weights of the 2 cells along each axis.
+    /// The cells, the last axis fastest.
     #[inline(always)]
-    pub(super) fn weights(&self) -> [[T; 2]; 3] {
-        let [x, y, z] = self.fraction;
-        [[T::one() - x, x], [T::one() - y, y], [T::one() - z, z]]
+    pub(super) fn cells(&self) -> impl Iterator<Item = [usize; 3]> + use<T> {
+        let n = self.count;
+        (0..n).flat_map(move |i| (0..n).flat_map(move |j| (0..n).map(move |k| [i, j, k])))
     }
 
-    /// Weight and its derivatives of a cell, by its place among the 2³.
+    /// Weight and its derivatives of a cell, by its place among [`Self::cells`].
     #[inline(always)]
     pub(super) fn weight_and_slope(&self, [i, j, k]: [usize; 3]) -> (T, [T; 3]) {
-        let [x, y, z] = self.weights();
-        let sign = |n: usize| T::of(2.0 * n as f64 - 1.0);
+        let ([x, y, z], [dx, dy, dz]) = (self.weights, self.slopes);
         let slope = [
-            sign(i) * y[j] * z[k],
-            x[i] * sign(j) * z[k],
-            x[i] * y[j] * sign(k),
+            dx[i] * y[j] * z[k],
+            x[i] * dy[j] * z[k],
+            x[i] * y[j] * dz[k],
         ];
         (x[i] * y[j] * z[k], slope)
     }
 
-    /// Place in the 3³ of one of the 2³ cells.
+    /// Place in the 3³ of one of the cells.
     #[inline(always)]
     pub(super) fn cell(&self, [i, j, k]: [usize; 3]) -> [usize; 3] {
         let [x, y, z] = self.place;

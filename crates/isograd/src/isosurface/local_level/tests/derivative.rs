@@ -35,6 +35,7 @@ impl Setting<f64> {
             areas: moved_numbers(&self.areas, &v.areas, s),
             chi: Field::new(grid, chi).expect("sizes match"),
             smoothing: self.smoothing + s * rates.smoothing,
+            interpolation: self.interpolation,
         }
     }
 
@@ -72,8 +73,15 @@ impl Setting<f64> {
 
 #[test]
 fn pullback_is_the_derivative_in_all_inputs() {
-    for (area, thin, noise) in [(true, true, 0.0), (true, false, 0.1), (false, false, 0.0)] {
+    use Interpolation::{Linear, Spline};
+    for (area, thin, noise, interpolation) in [
+        (true, true, 0.0, Linear),
+        (true, false, 0.1, Linear),
+        (false, false, 0.0, Linear),
+        (true, true, 0.0, Spline),
+    ] {
         let mut setting = Setting::<f64>::new(900, noise);
+        setting.interpolation = interpolation;
         // As flat along some normals as on thin parts.
         turn(&mut setting.normals);
         let mut random = Random::new(4);

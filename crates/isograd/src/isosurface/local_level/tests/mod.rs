@@ -16,6 +16,7 @@ struct Setting<T> {
     areas: Vec<T>,
     chi: Field<T>,
     smoothing: f64,
+    interpolation: Interpolation,
 }
 
 fn grid<T: Real>(lower: [f64; 3], spacing: f64) -> Grid<T> {
@@ -39,6 +40,7 @@ impl<T: Real> Setting<T> {
                 .collect(),
             chi: indicator(grid([-1.41, -1.36, -0.83], 0.1)),
             smoothing: 0.5,
+            interpolation: Interpolation::Linear,
         }
     }
 
@@ -52,7 +54,9 @@ impl<T: Real> Setting<T> {
 
     fn level(&self) -> (iso_value::Residual<T>, splat::Residual) {
         let mut level = iso_value::Residual::default();
-        iso_value::forward(&self.chi, &self.points, &self.areas, &mut level).expect("a level");
+        let (chi, interpolation) = ((&self.chi).into(), self.interpolation);
+        iso_value::forward_on(chi, &self.points, &self.areas, interpolation, &mut level)
+            .expect("a level");
         let mut order = splat::Residual::default();
         let mut b = Field::zeros(*self.chi.grid());
         let scratch = &mut Default::default();
@@ -133,10 +137,14 @@ fn means(grid: &Grid<f64>, places: &[[f64; 3]], areas: &[f64], r: &[f64]) -> Vec
     (0..grid.cells()).map(at).collect()
 }
 
-/// The trilinear interpolant at index coordinates.
-fn interpolate(grid: &Grid<f64>, field: &[f64], x: [f64; 3]) -> f64 {
+/// The interpolant at index coordinates.
+fn interpolate(of: Interpolation, grid: &Grid<f64>, field: &[f64], x: [f64; 3]) -> f64 {
+    let f = match of {
+        Interpolation::Linear => hat,
+        Interpolation::Spline => bspline,
+    };
     let cells = (0..grid.cells()).filter(|&c| field[c] != 0.0);
-    cells.map(|c| field[c] * weight(hat, grid.cell(c), x)).sum()
+    cells.map(|c| field[c] * weight(f, grid.cell(c), x)).sum()
 }
 
 /// Turns some normals anywhere: the indicator is as flat along them as it is on thin parts.
@@ -182,13 +190,15 @@ fn trust_and_shifts(slopes: &[f64], areas: &[f64], thin: bool) -> (Vec<f64>, Vec
 
 #[test]
 fn cells_lose_the_means_of_the_samples_near_by() {
-    for thin in [false, true] {
-        assert_means_are_lost(thin);
+    use Interpolation::{Linear, Spline};
+    for (thin, interpolation) in [(false, Linear), (true, Linear), (true, Spline)] {
+        assert_means_are_lost(thin, interpolation);
     }
 }
 
-fn assert_means_are_lost(thin: bool) {
+fn assert_means_are_lost(thin: bool, interpolation: Interpolation) {
     let mut setting = Setting::<f64>::new(60, 0.2);
+    setting.interpolation = interpolation;
     turn(&mut setting.normals);
     let (got, level, residual) = setting.run(true, thin);
     let grid = *setting.chi.grid();
@@ -209,7 +219,9 @@ fn assert_means_are_lost(thin: bool) {
         let r: Vec<f64> = places
             .iter()
             .zip(trust.iter().zip(&shifts))
-            .map(|(&x, (t, shift))| t * (interpolate(&grid, &chi, x) + shift - level.value))
+            .map(|(&x, (t, shift))| {
+                t * (interpolate(interpolation, &grid, &chi, x) + shift - level.value)
+            })
             .collect();
         let e = means(&grid, &places, &areas, &r);
         let [mut rise, mut steep, mut rp, mut rr, mut pp] = [0.0; 5];
@@ -217,7 +229,7 @@ fn assert_means_are_lost(thin: bool) {
             let mut others = areas.clone();
             others[i] = 0.0;
             let without = means(&grid, &places, &others, &r);
-            let p = interpolate(&grid, &without, places[i]);
+            let p = interpolate(interpolation, &grid, &without, places[i]);
             let normal = setting.normals[i];
             let [w, u] = [&e, &chi].map(|f| smooth_slope(&grid, f, places[i], normal));
             rise += areas[i] * w * u;
