@@ -3,6 +3,8 @@
 mod lattice;
 mod query;
 mod query_pullback;
+mod samples;
+mod spread;
 mod triangle;
 
 use super::triangle::{Closest, closest_point};
