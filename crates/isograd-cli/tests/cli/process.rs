@@ -59,6 +59,11 @@ fn each_signal_ends_with_128_and_its_number() {
     let sandbox = Sandbox::new();
     for (signal, status) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
         let child = waiting(sandbox.command("reconstruct - -o out"));
+        if status_line(&child, "SigIgn:") >> (status - 129) & 1 == 1 {
+            println!("SKIPPED: {signal} is ignored here, as under nohup");
+            stopped(child, "-KILL");
+            continue;
+        }
         assert_eq!(stopped(child, signal), Some(status));
     }
     assert!(sandbox.files().is_empty());
