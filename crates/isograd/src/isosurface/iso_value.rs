@@ -1,8 +1,8 @@
 //! The iso-value: the mean of the indicator at the samples.
 //!
 //! # Map
-//! `c = Σ a_i χ(x_i) / Σ a_i`, with `χ` trilinear between cell centers (quadratic B-splines where it is refined) and `a_i` the area that sample `i`
-//! stands for. The paper takes the value "near the input point samples", after Kazhdan, Bolitho and
+//! `c = Σ a_i χ(x_i) / Σ a_i`, with `χ` trilinear between cell centers (quadratic B-splines where it is refined) and
+//! `a_i` the area that sample `i` stands for. The paper takes the value "near the input point samples", after Kazhdan, Bolitho and
 //! Hoppe, *Poisson surface reconstruction* (SGP 2006), §4.4; the weights make it the mean over the
 //! surface for any density of the samples. Sums are in double precision, in one fixed order.
 //!

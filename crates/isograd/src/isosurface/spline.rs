@@ -4,41 +4,22 @@
 use rayon::prelude::*;
 
 use super::iso_value::AtSample;
+use super::local_level::Stencil;
 use crate::data::cells::Cells;
-use crate::splat::{SortedSamples, bspline_slopes, bspline_weights, central_cell};
+use crate::splat::SortedSamples;
 use crate::{Grid, Real};
 
 /// Planes across x that one task of [`spread`] owns.
 const SLAB: usize = 8;
 
-/// The 3³ cells round a point.
-struct Support<T> {
-    corner: [usize; 3],
-    /// Distance from the center of the middle cell, per axis, −½ to ½.
-    offset: [T; 3],
-}
-
-impl<T: Real> Support<T> {
-    /// `None` closer than 2 cells to a wall, where the splat refuses samples.
-    #[inline(always)]
-    fn new(grid: &Grid<T>, point: [T; 3]) -> Option<Self> {
-        let x = grid.to_index(point);
-        let cell = central_cell(grid.shape(), x)?;
-        Some(Self {
-            corner: cell.map(|c| c - 1),
-            offset: std::array::from_fn(|a| x[a] - T::of_usize(cell[a]) - T::of(0.5)),
-        })
-    }
-}
-
 /// The spline at a sample and its gradient, per cell.
 pub(super) fn at_sample<T: Real>(chi: Cells<'_, T>, point: [T; 3]) -> AtSample<T> {
     let mut at = AtSample::default();
-    let Some(Support { corner, offset }) = Support::new(chi.grid(), point) else {
+    let Some(stencil) = Stencil::of(chi.grid(), point) else {
         return at;
     };
-    let ([x, y, z], [dx, dy, dz]) = (bspline_weights(offset), bspline_slopes(offset));
-    let [low, middle, high] = corner;
+    let ([x, y, z], [dx, dy, dz]) = (stencil.weights(), stencil.slopes());
+    let [low, middle, high] = stencil.corner;
     for i in 0..3 {
         for j in 0..3 {
             let row = chi.row::<3>([low + i, middle + j, high]);
@@ -69,10 +50,10 @@ pub(super) fn spread<T: Real>(
         let near = planes.start.saturating_sub(1)..planes.end + 1;
         for &i in sorted.order.in_planes(points, grid, near) {
             let i = i as usize;
-            let Some(Support { corner, offset }) = Support::new(grid, points[i]) else {
+            let Some(stencil) = Stencil::of(grid, points[i]) else {
                 continue;
             };
-            let ([x, y, z], part) = (bspline_weights(offset), value(i));
+            let (corner, [x, y, z], part) = (stencil.corner, stencil.weights(), value(i));
             for a in 0..3 {
                 if !planes.contains(&(corner[0] + a)) {
                     continue;

@@ -4,8 +4,8 @@
 //! `χ` rises through the surface as a step that the grid has smoothed. Where the surface is curved, thin or
 //! sharp, where samples are uneven, and depending on its position between cell centers, the value of `χ` on it
 //! differs a little from the mean `c`. The samples measure the difference. Let `r_i = χ(x_i) + δ_i − c`, trilinear
-//! between cell centers (quadratic B-splines where the indicator is refined), `â_i` the area of a sample in cells², `B` the product of quadratic B-splines, and the trust
-//! `ω_i` (0 to 1) and the shift `δ_i` as below. A pass takes at every cell center `o` within reach of a sample the mean
+//! between cell centers (where the indicator is refined, by `B`), `â_i` the area of a sample in cells², `B` the product
+//! of quadratic B-splines, and the trust `ω_i` (0 to 1) and the shift `δ_i` as below. A pass takes at every cell center `o` within reach of a sample the mean
 //! of the offsets `s_i = ω_i r_i`,
 //!
 //! `e_o = Σ_i â_i B_o(x_i) s_i / D_o`, `D_o = ε + Σ_i â_i B_o(x_i)`, and subtracts it: `χ_o ← χ_o − λ e_o`.
@@ -59,8 +59,6 @@
 //! `∇(Te)` jumps where a sample crosses a plane through cell centers, `∇(n·∇χ)` and `∇(n·∇e)` where it crosses a face
 //! of a cell. `λ` has kinks where the fit is 1, and where `ρ` or `λ` is 0.
 
-use super::Interpolation;
-
 mod forward;
 mod gain;
 mod layer;
@@ -78,7 +76,10 @@ pub use forward::{Options, Scratch, forward};
 pub use gain::Sums;
 pub(crate) use pullback::pullback_on;
 pub use pullback::{Cotangent, PullbackScratch, pullback};
+pub(in crate::isosurface) use stencil::Stencil;
 pub use step::{STEEPEST, Step};
+
+use super::Interpolation;
 
 /// Most passes; fewer where the gain falls to 0. The third takes the missed part of a thin trailing edge from
 /// 0.05 to 0.03 cells in the mean, a fourth to 0.029.

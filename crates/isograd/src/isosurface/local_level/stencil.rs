@@ -6,9 +6,9 @@ use crate::{Grid, Real, splat};
 
 /// A sample among its 3³ cells.
 #[derive(Clone, Copy)]
-pub(super) struct Stencil<T> {
+pub(in crate::isosurface) struct Stencil<T> {
     /// The lowest of the 3³ cells.
-    pub(super) corner: [usize; 3],
+    pub(in crate::isosurface) corner: [usize; 3],
     /// Distance from the center of the middle cell, per axis, −½ to ½.
     offset: [T; 3],
 }
@@ -28,7 +28,7 @@ pub(super) struct Corners<T> {
 impl<T: Real> Stencil<T> {
     /// Stencil of a point; `None` closer than 2 cells to a wall, where the splat refuses it.
     #[inline(always)]
-    pub(super) fn of(grid: &Grid<T>, point: [T; 3]) -> Option<Self> {
+    pub(in crate::isosurface) fn of(grid: &Grid<T>, point: [T; 3]) -> Option<Self> {
         let x = grid.to_index(point);
         let cell = splat::central_cell(grid.shape(), x)?;
         let mut offset = [T::zero(); 3];
@@ -43,13 +43,13 @@ impl<T: Real> Stencil<T> {
 
     /// `B` on the 3 cells along each axis.
     #[inline(always)]
-    pub(super) fn weights(&self) -> [[T; 3]; 3] {
+    pub(in crate::isosurface) fn weights(&self) -> [[T; 3]; 3] {
         splat::bspline_weights(self.offset)
     }
 
     /// Derivatives of [`Self::weights`].
     #[inline(always)]
-    pub(super) fn slopes(&self) -> [[T; 3]; 3] {
+    pub(in crate::isosurface) fn slopes(&self) -> [[T; 3]; 3] {
         splat::bspline_slopes(self.offset)
     }
 
