@@ -19,7 +19,7 @@ pub(super) struct Pseudonormals {
 }
 
 impl Pseudonormals {
-    /// Those of a mesh.
+    /// Pseudonormals of a mesh.
     pub(super) fn new<T: Real>(mesh: &Mesh<T>) -> Self {
         let mut faces = Buckets::default();
         faces.fill_with_faces(mesh);

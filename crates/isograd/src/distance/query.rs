@@ -205,6 +205,18 @@ pub(super) fn far_if_nan(x: f64) -> f64 {
     if x.is_nan() { f64::INFINITY } else { x }
 }
 
+/// Points as the tree takes them.
+#[inline(always)]
+pub(super) fn packet<T: Real>(points: &[[T; 3]; LANES]) -> Points {
+    let mut packet: Points = [[0.0; LANES]; 3];
+    for (l, point) in points.iter().enumerate() {
+        for a in 0..3 {
+            packet[a][l] = far_if_nan(point[a].f64());
+        }
+    }
+    packet
+}
+
 /// Finds the closest triangles of some packets of points.
 struct Packets<'a, T> {
     bvh: &'a Bvh,
@@ -221,14 +233,12 @@ impl<T: Real> WithSimd for Packets<'_, T> {
     fn with_simd<S: Simd>(self, _: S) {
         let mut stack = Stack::new();
         for (order, found) in self.order.chunks(LANES).zip(self.found.chunks_mut(LANES)) {
-            let mut packet: Points = [[0.0; LANES]; 3];
-            for l in 0..LANES {
-                // The last packet repeats its last point.
+            // The last packet repeats its last point.
+            let points = std::array::from_fn(|l| {
                 let (_, index) = order[l.min(order.len() - 1)];
-                for a in 0..3 {
-                    packet[a][l] = far_if_nan(self.points[index as usize][a].f64());
-                }
-            }
+                self.points[index as usize]
+            });
+            let packet = packet(&points);
             let mut nearest = NearestTriangles::NOTHING;
             self.bvh.nearest(&packet, &mut nearest, &mut stack);
             found.copy_from_slice(&nearest.triangle[..found.len()]);

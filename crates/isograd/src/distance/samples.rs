@@ -3,9 +3,9 @@
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::bvh::{Bvh, LANES, NOWHERE, NearestTriangles, Points, Stack};
+use super::bvh::{Bvh, LANES, NOWHERE, NearestTriangles, Stack};
 use super::pseudonormals::Pseudonormals;
-use super::query::{PACKETS_PER_TASK, Surface, far_if_nan, morton_order};
+use super::query::{PACKETS_PER_TASK, Surface, far_if_nan, morton_order, packet};
 use super::{Error, Scratch};
 use crate::vector::{dot, norm, scale, sub, to_f64};
 use crate::{Mesh, Real};
@@ -68,6 +68,18 @@ pub(crate) fn count<T: Real>(
     Ok(tasks.reduce(Counts::default, Counts::add))
 }
 
+impl<T: Real> Samples<'_, T> {
+    /// Counts of one sample, from its normal, its distance from the surface and the gradient of the distance below it.
+    #[inline(always)]
+    pub(crate) fn judged(&self, normal: [T; 3], distance: T, gradient: [T; 3]) -> Counts {
+        Counts {
+            thin: usize::from(dot(gradient, normal) < T::of(-0.5)),
+            // True for NaN.
+            missed: usize::from(!(distance <= self.within)),
+        }
+    }
+}
+
 impl Counts {
     pub(crate) fn add(self, other: Self) -> Self {
         Self {
@@ -92,7 +104,7 @@ impl<T: Real> WithSimd for Task<'_, T> {
     fn with_simd<S: Simd>(self, _: S) -> Counts {
         let mut stack = Stack::new();
         let mut counts = Counts::default();
-        let Samples { within, depth, .. } = self.samples;
+        let depth = self.samples.depth;
         for order in self.order.chunks(LANES) {
             // The last packet repeats its last sample.
             let index: [usize; LANES] =
@@ -112,8 +124,7 @@ impl<T: Real> WithSimd for Task<'_, T> {
             let nearest = self.nearest(&below, bounds, &mut stack);
             for l in 0..order.len() {
                 let gradient = self.surface.hit(below[l], nearest[l], None).gradient;
-                counts.thin += usize::from(dot(gradient, normals[l]) < T::of(-0.5));
-                counts.missed += usize::from(!(at[l] <= within));
+                counts = counts.add(self.samples.judged(normals[l], at[l], gradient));
             }
         }
         counts
@@ -129,12 +140,7 @@ impl<T: Real> Task<'_, T> {
         bounds: [f64; LANES],
         stack: &mut Stack,
     ) -> [u32; LANES] {
-        let mut packet: Points = [[0.0; LANES]; 3];
-        for (l, point) in points.iter().enumerate() {
-            for a in 0..3 {
-                packet[a][l] = far_if_nan(point[a].f64());
-            }
-        }
+        let packet = packet(points);
         let mut found = NearestTriangles {
             squared: bounds,
             ..NearestTriangles::NOTHING

@@ -45,42 +45,40 @@ pub(super) fn along<T: Real>(
 }
 
 /// Gives rows beyond the band, which must be wider than the distance between neighbors, the signs of the rows beside them.
-pub(super) fn fill<T: Real>([nx, ny, nz]: [usize; 3], phi: &mut [T], closest: &[u32]) {
+pub(super) fn fill<T: Real>([_, ny, nz]: [usize; 3], phi: &mut [T], closest: &[u32]) {
     let planes = phi
         .par_chunks_mut(ny * nz)
         .zip(closest.par_chunks(ny * nz))
         .map(|(phi, closest)| fill_plane(nz, phi, closest));
     let known: Vec<bool> = planes.collect();
-    let mut fill_from = |from: usize, to: usize| {
+    carry(&known, |from, to| {
         let sign = phi[from * ny * nz] < T::zero();
         let plane = &mut phi[to * ny * nz..(to + 1) * ny * nz];
         plane.par_iter_mut().for_each(|phi| put(sign, phi));
-    };
-    let Some(first) = known.iter().position(|&known| known) else {
-        return;
-    };
-    (0..first).rev().for_each(|i| fill_from(i + 1, i));
-    (first + 1..nx)
-        .filter(|&i| !known[i])
-        .for_each(|i| fill_from(i - 1, i));
+    });
 }
 
 /// Fills the rows of a plane. Returns whether any of them reaches into the band.
 fn fill_plane<T: Real>(nz: usize, phi: &mut [T], closest: &[u32]) -> bool {
     let in_band = |row: &[u32]| row.iter().any(|&face| face != NO_TRIANGLE);
     let known: Vec<bool> = closest.chunks_exact(nz).map(in_band).collect();
-    let Some(first) = known.iter().position(|&known| known) else {
-        return false;
-    };
-    let mut fill_from = |from: usize, to: usize| {
+    carry(&known, |from, to| {
         let sign = phi[from * nz] < T::zero();
         let row = &mut phi[to * nz..(to + 1) * nz];
         row.iter_mut().for_each(|phi| put(sign, phi));
+    })
+}
+
+/// Calls `fill(from, to)` for neighbors such that each item that is not known is filled from one that is. Returns whether
+/// any is known.
+fn carry(known: &[bool], mut fill: impl FnMut(usize, usize)) -> bool {
+    let Some(first) = known.iter().position(|&known| known) else {
+        return false;
     };
-    (0..first).rev().for_each(|j| fill_from(j + 1, j));
+    (0..first).rev().for_each(|to| fill(to + 1, to));
     (first + 1..known.len())
-        .filter(|&j| !known[j])
-        .for_each(|j| fill_from(j - 1, j));
+        .filter(|&to| !known[to])
+        .for_each(|to| fill(to - 1, to));
     true
 }
 
