@@ -205,7 +205,7 @@ impl<T: Number> Reconstruction<T> {
                 ..Orientation::default()
             };
             let normals = &orientation.normals;
-            report.check_field(&points, normals, self.sdf()?, self.mesh()?, scratch);
+            report.check_field(&points, normals, self.sdf()?, self.mesh()?, scratch, None);
             report.check_samples(&points, self.neighborhoods()?, &orientation);
         }
         let before = report.seconds.of(Stage::Checks);

@@ -22,20 +22,9 @@ const THIN_DEPTH: f64 = 2.0;
 impl Report {
     /// Measures φ and the surface and adds warnings about them, for results that were not made by a
     /// [`Reconstructor`](crate::Reconstructor). `normals` are the outward ones of the points;
-    /// [`Report::sample_spacing`] and [`Report::surface_spacing`] must be set.
+    /// [`Report::sample_spacing`] and [`Report::surface_spacing`] must be set. `built` are the scratch buffers of the
+    /// distance to `mesh`, whose tree is then not built again.
     pub fn check_field<T: Real>(
-        &mut self,
-        points: &[[T; 3]],
-        normals: &[[T; 3]],
-        sdf: &Field<T>,
-        mesh: &Mesh<T>,
-        scratch: &mut measure::Scratch,
-    ) {
-        self.check_field_beside(points, normals, sdf, mesh, scratch, None);
-    }
-
-    /// Like [`check_field`](Self::check_field), with the scratch buffers of the distance to `mesh`.
-    pub(super) fn check_field_beside<T: Real>(
         &mut self,
         points: &[[T; 3]],
         normals: &[[T; 3]],
@@ -115,10 +104,7 @@ fn interpolated<T: Real>(samples: Samples<'_, T>, sdf: &Field<T>) -> Counts {
         let below = vector::sub(x, vector::scale(n, samples.depth));
         let gradient = sdf.interpolate_with_gradient(below).1;
         let distance = sdf.interpolate(x);
-        Counts {
-            thin: usize::from(vector::dot(gradient, n) < T::of(-0.5)),
-            missed: usize::from(!(distance.abs() <= samples.within)),
-        }
+        samples.judged(n, distance.abs(), gradient)
     };
     let pairs = samples.points.par_iter().zip(samples.normals);
     pairs.map(count).reduce(Counts::default, Counts::add)

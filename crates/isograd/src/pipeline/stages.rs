@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
+use super::sparse::Sparse;
 use super::surface::with_shape;
 use super::{Error, Reconstruction, Reconstructor, Residuals, Solve, check_memory};
+use crate::data::blocks::BlockField;
 use crate::data::cells::{Cells, CellsMut};
 use crate::data::{Field, Grid, PointCloud};
 use crate::isosurface::measure;
@@ -329,10 +331,9 @@ impl<T: Real> Reconstructor<T> {
             true => Some(isosurface::refine::forward(indicator, *iso_value)?),
             false => None,
         };
-        let found = match (sparse, &*refined) {
-            (_, Some(refined)) => isosurface::blocks::forward(refined, *iso_value, mesh)?,
-            (Some(sparse), _) => isosurface::blocks::forward(&sparse.chi, *iso_value, mesh)?,
-            _ => isosurface::forward(indicator, *iso_value, scratch, mesh)?,
+        let found = match marched(indicator, sparse, refined) {
+            Cells::Blocks(chi) => isosurface::blocks::forward(chi, *iso_value, mesh)?,
+            Cells::Dense(..) => isosurface::forward(indicator, *iso_value, scratch, mesh)?,
         };
         if found.touches_wall {
             report.warnings.push(Warning::TouchesWall);
@@ -359,14 +360,9 @@ impl<T: Real> Reconstructor<T> {
             sheet::forward(sheet, thickness, options.band, scratch, sdf, closest)?;
             return Ok(());
         }
-        let chi: Cells<'_, T> = match (sparse, refined) {
-            (_, Some(refined)) => (&*refined).into(),
-            (Some(sparse), _) => (&sparse.chi).into(),
-            _ => (&*indicator).into(),
-        };
         distance::lattice::forward_on(
             mesh,
-            chi,
+            marched(indicator, sparse, refined),
             *iso_value,
             options.band,
             &mut self.scratch.distance,
@@ -395,7 +391,7 @@ impl<T: Real> Reconstructor<T> {
         let scratch = &mut self.scratch.measure;
         match open.as_deref() {
             Some(open) if open.is_sheet() => report.measure_field(sdf),
-            _ => report.check_field_beside(
+            _ => report.check_field(
                 points,
                 &orientation.normals,
                 sdf,
@@ -408,6 +404,19 @@ impl<T: Real> Reconstructor<T> {
             report.surface = measure::measure(open.mesh(), scratch);
         }
         report.check_samples(points, neighborhoods, orientation);
+    }
+}
+
+/// The indicator whose surface the mesh is.
+fn marched<'a, T: Real>(
+    indicator: &'a Field<T>,
+    sparse: &'a Option<Sparse<T>>,
+    refined: &'a Option<BlockField<T>>,
+) -> Cells<'a, T> {
+    match (refined, sparse) {
+        (Some(refined), _) => refined.into(),
+        (None, Some(sparse)) => (&sparse.chi).into(),
+        (None, None) => indicator.into(),
     }
 }
 
