@@ -97,17 +97,19 @@ def test_gradient_of_the_volume_agrees_with_differences(x64):  # noqa: F811
     check_grads(lambda p, n: volume(p, n, given), (points, normals), **SMALL_STEPS)
 
 
-def test_extension_is_exact_for_constants_and_zero_off_the_band(dtype):  # noqa: F811
+@pytest.mark.parametrize("fill", ["band", "inside"])
+def test_extension_is_exact_for_constants_and_zero_off_the_band(fill, dtype):  # noqa: F811
     points, _ = torus(dtype=dtype)
     values = np.ones((len(points), 2), dtype) * np.array([1, -3], dtype)
-    sdf, field = jax.jit(lambda p, v: ij.extend(p, v, GRID, band=0.2))(points, values)
+    sdf, field = jax.jit(lambda p, v: ij.extend(p, v, GRID, band=0.2, fill=fill))(points, values)
     np.testing.assert_array_equal(sdf, ij.signed_distance(points, GRID))
-    inside = np.abs(sdf) <= 2 * GRID.spacing
-    assert field.shape == (*GRID.shape, 2) and 0.1 < inside.mean() < 0.9
+    near = np.abs(sdf) <= 2 * GRID.spacing
+    inside = near | (sdf < 0) if fill == "inside" else near
+    assert field.shape == (*GRID.shape, 2) and 0.1 < inside.mean() < 0.9 and (~near & (sdf < 0)).sum() > 100
     tolerance = 100 * np.finfo(dtype).eps
     np.testing.assert_allclose(field[inside], np.broadcast_to(values[0], field[inside].shape), rtol=tolerance)
     assert not field[~inside].any()
-    flat = ij.extend(points, values[:, 0], GRID, band=0.2).values
+    flat = ij.extend(points, values[:, 0], GRID, band=0.2, fill=fill).values
     np.testing.assert_array_equal(flat, field[..., 0])
 
 

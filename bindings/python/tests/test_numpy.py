@@ -131,7 +131,7 @@ def test_a_sparse_solve_agrees_with_the_dense_one():
 def test_attributes_are_carried_to_the_surface():
     values = SPHERE[:, 0]
     result = isograd.reconstruct(SPHERE, GRID, attributes={"x": values})
-    extension = result.extend("x", 2 * GRID.spacing)
+    extension = result.extend("x", 2 * GRID.spacing, fill="band")
     assert np.abs(extension.vertices[:, 0] - result.mesh.vertices[:, 0]).max() < 0.05
     centers = GRID.centers()
     exact = centers[..., 0] / np.linalg.norm(centers, axis=-1)
@@ -141,6 +141,34 @@ def test_attributes_are_carried_to_the_surface():
     assert np.abs(dense - exact)[known].max() < 0.1
     with pytest.raises(ValueError, match="nothing"):
         result.extend("nothing", 0.1)
+
+
+def test_attributes_fill_the_whole_inside():
+    # A body at uniform velocity: its core moves too.
+    result = isograd.reconstruct(SPHERE, GRID, attributes={"v": np.full(len(SPHERE), 2.5)})
+    extension = result.extend("v", 2 * GRID.spacing)
+    dense = extension.dense(fill=np.nan)[..., 0]
+    sdf = result.sdf
+    assert sdf.min() < -4 * GRID.spacing
+    np.testing.assert_array_equal(np.isfinite(dense), sdf <= 2 * GRID.spacing)
+    np.testing.assert_allclose(extension.values, 2.5, rtol=1e-12)
+    with pytest.raises(ValueError, match="fill"):
+        result.extend("v", 0.1, fill="all")
+    narrow = isograd.reconstruct(SPHERE, GRID, attributes={"v": SPHERE}, band=0.2)
+    with pytest.raises(ValueError, match="options.band"):
+        narrow.extend("v", 0.1)
+    assert len(narrow.extend("v", 0.1, fill="band").cells) > 0
+
+
+def test_the_pullback_of_a_filled_inside_is_its_transpose():
+    rng = np.random.default_rng(3)
+    result = isograd.reconstruct(SPHERE, GRID, attributes={"v": rng.normal(size=(len(SPHERE), 2))})
+    extension = result.extend("v", 2 * GRID.spacing)
+    bar = rng.normal(size=extension.values.shape)
+    gradient = result.pullback(extensions=[(extension, None, bar)]).attributes["v"]
+    values = rng.normal(size=gradient.shape)
+    other = isograd.reconstruct(SPHERE, GRID, attributes={"v": values}).extend("v", 2 * GRID.spacing)
+    assert abs((bar * other.values).sum() / (gradient * values).sum() - 1) < 1e-9
 
 
 @pytest.mark.parametrize("dtype", TYPES)

@@ -193,6 +193,22 @@ def check_known(orient: OrientLike, normals: bool, sensors: bool = False) -> Non
             )
 
 
+def check_fill(fill: object, band: float | str = "full") -> str:
+    """The region of extended values: ``"inside"`` or ``"band"``.
+
+    Raises:
+        ValueError: another name, or ``"inside"`` although φ has a ``band`` of its own.
+    """
+    if not isinstance(fill, str) or fill not in ("inside", "band"):
+        raise ValueError(f'fill is {fill!r}; give "inside" or "band"')
+    if fill == "inside" and band != "full":
+        raise ValueError(
+            f"options.band is {band}, and the closest points of cells inside are unknown beyond it; "
+            'give fill="band" or options with band="full"'
+        )
+    return fill
+
+
 def choice(kind: type[Enum], value: object, name: str) -> Enum:
     """One of the values of ``kind``.
 

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from ._arrays import floats, known
 from ._grid import Grid
 from ._mesh import Mesh
 from ._numbers import number
-from ._options import Options, check_known, resolve
+from ._options import Options, check_fill, check_known, resolve
 from ._settings import check_backend, encode, warn_note
 
 if TYPE_CHECKING:
@@ -44,10 +44,14 @@ class Gradients:
 
 
 class Extension:
-    """An attribute of the samples, extended to the surface and to the cells near it."""
+    """An attribute of the samples, extended to the surface and to the cells inside and near it."""
 
-    def __init__(self, core: _core.Extension, name: str, grid: Grid) -> None:
+    def __init__(
+        self, core: _core.Extension, name: str, grid: Grid, kept: np.ndarray | None = None
+    ) -> None:
         self._core = core
+        # Which of the cells of the extension module are part of this; all if it is None.
+        self._kept = kept
         self.name = name
         """Name of the attribute."""
         self.grid = grid
@@ -60,16 +64,28 @@ class Extension:
 
     @cached_property
     def cells(self) -> np.ndarray:
-        """``(B,)`` flat indices of the cells in the band: ``numpy.unravel_index(cells, grid.shape)``."""
-        return self._core.array("cells")
+        """``(B,)`` flat indices of the cells: ``numpy.unravel_index(cells, grid.shape)``."""
+        return self._part("cells")
 
     @cached_property
     def values(self) -> np.ndarray:
         """``(B, components)`` at those cells."""
-        return self._core.array("values")
+        return self._part("values")
+
+    def _part(self, name: str) -> np.ndarray:
+        array = self._core.array(name)
+        return array if self._kept is None else array[self._kept]
+
+    def _at_all_cells(self, bar: np.ndarray | None) -> np.ndarray | None:
+        """A cotangent of :attr:`values`, with zeros at the cells that were dropped."""
+        if bar is None or self._kept is None:
+            return bar
+        out = np.zeros((len(self._kept), *bar.shape[1:]), bar.dtype)
+        out[self._kept] = bar
+        return out
 
     def dense(self, fill: float = 0.0) -> np.ndarray:
-        """``(nx, ny, nz, components)``, with ``fill`` outside the band."""
+        """``(nx, ny, nz, components)``, with ``fill`` at the other cells."""
         components = self.values.shape[1]
         out = np.full((*self.grid.shape, components), fill, dtype=self.values.dtype)
         out.reshape(-1, components)[self.cells] = self.values
@@ -173,18 +189,29 @@ class Reconstruction:
         """Reasons not to trust the result."""
         return list(self.report["warnings"])
 
-    def extend(self, name: str, band: float) -> Extension:
-        """The attribute ``name`` of the cloud at the vertices of the mesh, and at the cells of a band around it.
+    def extend(
+        self, name: str, band: float, *, fill: Literal["inside", "band"] = "inside"
+    ) -> Extension:
+        """The attribute ``name`` of the cloud at the vertices of the mesh, and at the cells inside and around it.
 
         Args:
             name: name of the attribute.
             band: distance from the surface, in the unit of the points, up to which cells get the value at the closest
                 surface point.
+            fill: ``"inside"``: all cells inside get values, however far from the surface; ``"band"``: only those of the
+                band.
 
         Raises:
-            ValueError: an unknown attribute, or a band without width.
+            ValueError: an unknown attribute, a band without width, or ``fill="inside"`` with ``options.band``, beyond
+                which closest points are unknown.
         """
-        return Extension(self._core.extend(str(name), number(band, "band")), str(name), self.grid)
+        band = number(band, "band")
+        if check_fill(fill, self.options.band) == "band" or not 0 < band < np.inf:
+            return Extension(self._core.extend(str(name), band), str(name), self.grid)
+        everywhere = max(band, 2.0 * self.grid.spacing * sum(self.grid.shape))
+        core = self._core.extend(str(name), everywhere)
+        kept = self.sdf.reshape(-1)[core.array("cells")] <= self.dtype.type(band)
+        return Extension(core, str(name), self.grid, kept)
 
     def pullback(
         self,
@@ -252,7 +279,7 @@ class Reconstruction:
         return (
             extension._core,
             bar(at_vertices, extension.vertices),
-            bar(in_band, extension.values),
+            extension._at_all_cells(bar(in_band, extension.values)),
         )
 
 

@@ -29,7 +29,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._options import length
+from ._options import check_fill, length
+from ._surface import Fill, Surface, sample_values, surface
 from ._xla import Plan, call, floats, like, pair, prepare
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     from ._grid import Grid
     from ._options import Options
 
-__all__ = ["Extension", "Mesh", "extend", "mesh", "query", "signed_distance"]
+__all__ = ["Extension", "Mesh", "Surface", "extend", "mesh", "query", "signed_distance", "surface"]
 
 
 def signed_distance(
@@ -257,7 +258,7 @@ class Extension(NamedTuple):
     sdf: jax.Array
     """``(nx, ny, nz)``, as :func:`signed_distance` returns it."""
     values: jax.Array
-    """``(nx, ny, nz, C)`` or ``(nx, ny, nz)``: in the band the value at the closest point of the surface, else 0."""
+    """``(nx, ny, nz, C)`` or ``(nx, ny, nz)``: inside and in the band the value at the closest surface point, else 0."""
 
 
 def extend(
@@ -266,13 +267,14 @@ def extend(
     grid: Grid,
     *,
     band: float | Literal["auto"] = "auto",
+    fill: Fill = "inside",
     normals: ArrayLike | None = None,
     options: Options | None = None,
     backend: str = "cpu",
 ) -> Extension:
-    """φ, and values of the samples (a surface velocity, a temperature) at the cells around the surface.
+    """φ, and values of the samples (a surface velocity, a temperature) at the cells inside and around the surface.
 
-    Both are differentiable in ``points`` and, where they are used, ``normals``; the extended values also in
+    At other places, such as the faces of a staggered grid, use :func:`surface`. Both are differentiable in ``points`` and, where they are used, ``normals``; the extended values also in
     ``values``, of which they are a linear function. Held constant: what :func:`signed_distance` holds, and which
     cells are in the band.
 
@@ -282,6 +284,8 @@ def extend(
         grid: static.
         band: static; distance from the surface up to which values are extended, in the unit of the points, at most
             ``options.band``; ``"auto"`` for 3 cells.
+        fill: static; ``"inside"``: all cells inside get values, however far from the surface; ``"band"``: only those of
+            the band, so that the core of a body thicker than two bands has the value 0.
         normals: as for :func:`signed_distance`.
         options: as for :func:`signed_distance`.
         backend: as for :func:`signed_distance`.
@@ -290,17 +294,19 @@ def extend(
         TypeError, ValueError, RuntimeError, jax.errors.JaxRuntimeError: as for :func:`signed_distance`.
     """
     distance = length(band, "band", "auto")
+    distance = 3.0 * grid.spacing if distance == "auto" else distance
     plan, points, normals = prepare(points, grid, normals, options, backend)
-    plan = replace(plan, band=3.0 * grid.spacing if distance == "auto" else distance)
-    values = jnp.asarray(values)
-    one = values.ndim == 1
-    shape = (points.shape[0],) if one else (points.shape[0], None)
-    values = floats(values, "values", shape, points.dtype)
-    values = values[:, None] if one else values
-    if values.shape[1] == 0:
-        raise ValueError(f"values has the shape {values.shape}; give at least one component")
+    check_fill(fill, "full" if options is None else options.band)
+    # For the inside, values at all cells: those outside the band are dropped below.
+    reach = 2.0 * grid.spacing * sum(grid.shape) if fill == "inside" else distance
+    plan = replace(plan, band=max(reach, distance))
+    if values is None:
+        raise ValueError("values is None; give the values of the samples")
+    values, is_scalar = sample_values(values, points)
     field, sdf = _extend(plan, points, values, normals)
-    return Extension(sdf, field[..., 0] if one else field)
+    if fill == "inside":
+        field = jnp.where((sdf <= distance)[..., None], field, 0)
+    return Extension(sdf, field[..., 0] if is_scalar else field)
 
 
 @functools.partial(jax.custom_vjp, nondiff_argnums=(0,))

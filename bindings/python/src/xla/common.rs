@@ -1,7 +1,8 @@
 //! Steps shared by the targets: run a plan on a cloud, save what a pullback needs, and restore the reconstruction
 //! from it.
 
-use isograd::{CloudCotangent, Cotangent, PointCloud, Real, Saved};
+use isograd::distance::Hit;
+use isograd::{Attribute, CloudCotangent, Cotangent, PointCloud, Real, Saved};
 use isograd_backend::View;
 
 use super::buffers::{Call, Element};
@@ -25,6 +26,36 @@ pub fn cloud<T: Real>(
         Some(normals) => cloud.and_then(|cloud| cloud.with_normals(normals.to_vec())),
     };
     Ok(cloud.map_err(|error| error.to_string())?)
+}
+
+/// `(N, C)` values of the samples as an attribute.
+pub fn attribute<T: Real>(values: &[T], points: usize) -> Attribute<T> {
+    Attribute {
+        name: "values".into(),
+        components: values.len() / points.max(1),
+        values: values.to_vec(),
+    }
+}
+
+/// The directions, faces and weights of hits, without distances and closest points: what a pullback needs.
+///
+/// # Errors
+/// Arrays that differ in length.
+pub fn saved_hits<T: Float>(call: &mut Call<'_>) -> Result<Vec<Hit<T>>, Failure> {
+    let gradient = call.vectors("the gradients")?;
+    let triangle = call.input("the triangles", 1)?;
+    let barycentric = call.vectors("the barycentric weights")?;
+    if gradient.len() != triangle.len() || barycentric.len() != triangle.len() {
+        return Err("the saved hits differ in number".into());
+    }
+    let hit = |i: usize| Hit {
+        distance: T::nan(),
+        point: [T::nan(); 3],
+        gradient: gradient[i],
+        triangle: triangle[i],
+        barycentric: barycentric[i],
+    };
+    Ok((0..triangle.len()).map(hit).collect())
 }
 
 /// Copies an array into one of the same length.
@@ -99,6 +130,15 @@ impl<'a, T: Number> Restored<'a, T> {
 }
 
 impl<'a> Call<'a> {
+    /// The width of the band.
+    ///
+    /// # Errors
+    /// A missing attribute.
+    pub fn band(&self) -> Result<f64, Failure> {
+        let missing = || "the attribute 'band' is missing".into();
+        self.band.ok_or_else(missing)
+    }
+
     /// The next three outputs.
     pub fn saved_outputs<T: Float>(&mut self) -> Result<SavedOutputs<'a, T>, Failure> {
         Ok(SavedOutputs {

@@ -1,11 +1,11 @@
 //! φ and an attribute of the samples at the cells around the surface, and their pullback.
 
 use isograd::distance::extend::Extension;
-use isograd::{Attribute, Cotangent, ExtensionCotangent, Real};
+use isograd::{Cotangent, ExtensionCotangent, Real};
 
 use super::Target;
 use super::buffers::Call;
-use super::common::{Float, cloud, copy};
+use super::common::{Float, attribute, cloud, copy};
 use crate::backend::Failure;
 
 /// Inputs: points, `(N, C)` values, optionally normals. Outputs: values at the cells of a band and zeros elsewhere, φ,
@@ -21,7 +21,7 @@ impl Target for Forward {
         let cloud = cloud(points, call.normals()?)?;
         let field = call.output("the extended values", 4)?;
         let saved = call.saved_outputs()?;
-        let band = band(&call)?;
+        let band = call.band()?;
         call.reconstruct(&cloud, |result| {
             let (extension, _) = result.extend(&attribute, band)?;
             field.fill(T::zero());
@@ -47,7 +47,7 @@ impl Target for Pullback {
         let normals = call.normals()?;
         let values_out = call.output("the cotangent of the values", 2)?;
         let out = call.cloud_outputs(normals.is_some())?;
-        let band = band(&call)?;
+        let band = call.band()?;
         call.restore(&cloud(points, normals)?, &saved, |restored| {
             let (extension, residual) = restored.result.extend(&attribute, band)?;
             let values_bar = gather(&extension, field_bar)?;
@@ -67,19 +67,6 @@ impl Target for Pullback {
             copy("the values' cotangent", attribute_bar, values_out)?;
             out.fill(bar)
         })
-    }
-}
-
-fn band(call: &Call<'_>) -> Result<f64, Failure> {
-    call.band
-        .ok_or_else(|| "the attribute 'band' is missing".into())
-}
-
-fn attribute<T: Real>(values: &[T], points: usize) -> Attribute<T> {
-    Attribute {
-        name: "values".into(),
-        components: values.len() / points.max(1),
-        values: values.to_vec(),
     }
 }
 

@@ -10,6 +10,7 @@ mod extend;
 mod field;
 mod mesh;
 mod query;
+mod surface;
 
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
@@ -67,6 +68,8 @@ const TARGETS: &[Entry] = &[
     Entry::of::<mesh::Pullback>(),
     Entry::of::<extend::Forward>(),
     Entry::of::<extend::Pullback>(),
+    Entry::of::<surface::Forward>(),
+    Entry::of::<surface::Pullback>(),
 ];
 
 /// `{name: capsule}` for `jax.ffi.register_ffi_target`.

@@ -5,7 +5,7 @@ use isograd::distance::{Hit, Query};
 
 use super::Target;
 use super::buffers::Call;
-use super::common::{Float, cloud, copy};
+use super::common::{Float, cloud, copy, saved_hits};
 use crate::backend::Failure;
 
 /// Inputs: points, queries, optionally normals. Outputs: distances, alone or with what the pullback needs.
@@ -103,23 +103,4 @@ impl<T: Float> HitOutputs<'_, T> {
         copy("the triangles", &triangle, self.triangle)?;
         copy("the barycentric weights", &barycentric, self.barycentric)
     }
-}
-
-/// The hits, as [`HitOutputs::fill`] wrote them.
-fn saved_hits<T: Float>(call: &mut Call<'_>) -> Result<Vec<Hit<T>>, Failure> {
-    let gradient = call.vectors("the gradients")?;
-    let triangle = call.input("the triangles", 1)?;
-    let barycentric = call.vectors("the barycentric weights")?;
-    if gradient.len() != triangle.len() || barycentric.len() != triangle.len() {
-        return Err("the saved hits differ in number".into());
-    }
-    let hit = |i: usize| Hit {
-        // Only the cotangent of the closest point would need these two.
-        distance: T::nan(),
-        point: [T::nan(); 3],
-        gradient: gradient[i],
-        triangle: triangle[i],
-        barycentric: barycentric[i],
-    };
-    Ok((0..triangle.len()).map(hit).collect())
 }

@@ -27,6 +27,7 @@
 
 mod bvh;
 pub mod extend;
+pub mod interpolate;
 mod lanes;
 pub mod lattice;
 mod pseudonormals;

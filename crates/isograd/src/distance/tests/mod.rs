@@ -1,5 +1,6 @@
 //! Meshes for the tests of the stage, and the plain slow distance.
 
+mod interpolate;
 mod lattice;
 mod query;
 mod query_pullback;

@@ -1,0 +1,238 @@
+"""Values on a surface at any places, for `isograd.jax`."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ._grid import Grid
+from ._numbers import number
+from ._options import check_fill, length
+from ._xla import Plan, call, floats, like, pair, prepare
+
+if TYPE_CHECKING:
+    from jax.typing import ArrayLike
+
+    from ._options import Options
+
+Offset = tuple[float, float, float]
+Fill = Literal["inside", "band"]
+CENTER: Offset = (0.5, 0.5, 0.5)
+NO_FACE = np.uint32(0xFFFF_FFFF)
+
+
+class Surface(NamedTuple):
+    """Distance, normal, closest point and values of a surface at places of a shape ``S``."""
+
+    sdf: jax.Array
+    """``S``: signed distance φ, in the unit of the points, negative inside."""
+    normal: jax.Array
+    """``(*S, 3)``: ∇φ, a unit vector away from the surface outside and toward it inside; 0 beyond the band."""
+    closest: jax.Array
+    """``(*S, 3)``: the closest point of the surface; beyond the band the place itself."""
+    values: jax.Array | None
+    """``(*S, C)`` or ``S``: values at the closest point; 0 beyond the band. ``None`` if no values are given."""
+
+
+def surface(
+    points: ArrayLike,
+    grid: Grid,
+    places: Grid | Offset | tuple[Offset, ...] | ArrayLike | None = None,
+    *,
+    values: ArrayLike | None = None,
+    normals: ArrayLike | None = None,
+    band: float | Literal["auto", "full"] = "auto",
+    fill: Fill = "inside",
+    options: Options | None = None,
+) -> Surface | tuple[Surface, ...]:
+    """φ, normals, closest points and extended values of the surface through ``points``, at any places.
+
+    The distance is exact to each triangle of the surface. All results are differentiable in ``points``, in ``places``
+    that are an array, and in ``normals`` with ``orient="given"``; the extended values also in ``values``, of which
+    they are a linear function. Held constant: what :func:`isograd.jax.signed_distance` holds, which face is closest,
+    and which places are in the band. On an edge or a corner of the surface the derivative of the normal is unbounded;
+    closer than ``√ε`` cells to the surface (``ε`` of the number type) it is taken as zero.
+
+    Args:
+        points: ``(N, 3)``, as for :func:`isograd.jax.signed_distance`.
+        grid: static; the surface is found on it.
+        places: ``None`` for the cell centers of ``grid``; another :class:`isograd.Grid` (static) for its cell centers;
+            a tuple of three numbers (static) for one place in each cell, at this offset from its lower corner in
+            cells, such as ``(1, 0.5, 0.5)`` for the faces at the upper end of x; a tuple of such tuples for one
+            result each, of a single surface; an ``(M, 3)`` array of positions, on the grid or off it.
+        values: ``(N, C)`` or ``(N,)`` values of the samples, such as their velocities.
+        normals: as for :func:`isograd.jax.signed_distance`.
+        band: static; distance from the surface, in the unit of the points, up to which places count. Beyond it φ is
+            ± this distance. ``"auto"`` is 4 cells, ``"full"`` is everywhere: at cell centers without extra cost, at
+            other places one search each. At cell centers ``options.band`` limits it too.
+        fill: static; ``"inside"``: the inside has no band, and its values are those of the closest point wherever it
+            is; ``"band"``: the band is that of both sides.
+        options: as for :func:`isograd.jax.signed_distance`, without ``trim`` and ``sheet``.
+
+    Returns:
+        A :class:`Surface` with results of the shape of the places: ``(nx, ny, nz)`` or ``(M,)``; NaN and zeros at a
+        position that is not finite. A tuple of them for a tuple of offsets.
+
+    Raises:
+        TypeError, ValueError, jax.errors.JaxRuntimeError: as for :func:`isograd.jax.signed_distance`.
+    """
+    check_fill(fill)
+    width = length(band, "band", "auto", "full")
+    plan, points, normals = prepare(points, grid, normals, options, "cpu")
+    width = {"auto": 4.0 * grid.spacing, "full": np.inf}.get(width, width)
+    plan = replace(plan, band=width)
+    values, is_scalar = sample_values(values, points)
+    positions, shapes = _positions(places, grid, points.dtype)
+    # Without places, φ and the closest faces on the grid save the search.
+    given = positions[:0] if _are_centers(places, grid) else positions
+    found = _surface(plan, (len(positions), grid.spacing), points, given, values, normals)
+    found = _within(found, positions, width) if fill == "band" else found
+    parts, start = [], 0
+    for shape in shapes:
+        end = start + int(np.prod(shape))
+        parts.append(_shaped(found, slice(start, end), shape, is_scalar))
+        start = end
+    return tuple(parts) if _is_offsets(places) else parts[0]
+
+
+def sample_values(values: ArrayLike | None, points: jax.Array) -> tuple[jax.Array, bool | None]:
+    """Values as ``(N, C)``, and whether they were ``(N,)``; ``(N, 0)`` and ``None`` for none.
+
+    Raises:
+        TypeError, ValueError: no array of numbers, another shape, or no component.
+    """
+    if values is None:
+        return jnp.zeros((points.shape[0], 0), points.dtype), None
+    values = jnp.asarray(values)
+    is_scalar = values.ndim == 1
+    shape = (points.shape[0],) if is_scalar else (points.shape[0], None)
+    values = floats(values, "values", shape, points.dtype)
+    values = values[:, None] if is_scalar else values
+    if values.shape[1] == 0:
+        raise ValueError(f"values has the shape {values.shape}; give at least one component")
+    return values, is_scalar
+
+
+def positions_at(grid: Grid, offset: Offset, dtype: np.typing.DTypeLike) -> jax.Array:
+    """``(nx, ny, nz, 3)`` positions at an offset from the lower corner of each cell, in cells."""
+    axes = [
+        jnp.asarray((low + grid.spacing * (np.arange(n) + shift)).astype(dtype))
+        for low, n, shift in zip(grid.lower, grid.shape, offset)
+    ]
+    return jnp.stack(jnp.meshgrid(*axes, indexing="ij"), axis=-1)
+
+
+def _positions(
+    places: object, grid: Grid, dtype: np.typing.DTypeLike
+) -> tuple[jax.Array, list[tuple[int, ...]]]:
+    """``(M, 3)`` positions of all places, and the shape of each part."""
+    if places is None:
+        places = CENTER
+    if isinstance(places, Grid):
+        return positions_at(places, CENTER, dtype).reshape(-1, 3), [places.shape]
+    if not isinstance(places, tuple):
+        positions = floats(places, "places", (None, 3), dtype)
+        return positions, [positions.shape[:1]]
+    offsets = [_offset(offset) for offset in (places if _is_offsets(places) else (places,))]
+    parts = [positions_at(grid, offset, dtype).reshape(-1, 3) for offset in offsets]
+    return jnp.concatenate(parts), [grid.shape] * len(parts)
+
+
+def _are_centers(places: object, grid: Grid) -> bool:
+    if isinstance(places, Grid):
+        return places == grid
+    return places is None or isinstance(places, tuple) and places == CENTER
+
+
+def _is_offsets(places: object) -> bool:
+    return isinstance(places, tuple) and any(isinstance(offset, tuple) for offset in places)
+
+
+def _offset(offset: object) -> Offset:
+    if isinstance(offset, tuple) and len(offset) == 3:
+        x, y, z = (number(shift, "places") for shift in offset)
+        if np.isfinite([x, y, z]).all():
+            return x, y, z
+    raise ValueError(
+        f"places has the offset {offset!r}; give three finite numbers, such as (1, 0.5, 0.5), or positions as an array"
+    )
+
+
+def _within(found: Surface, positions: jax.Array, width: float) -> Surface:
+    """The results without those inside beyond the band."""
+    far = found.sdf < -width
+    row = far[:, None]
+    return Surface(
+        jnp.where(far, -width, found.sdf),
+        jnp.where(row, 0, found.normal),
+        jnp.where(row, positions, found.closest),
+        jnp.where(row, 0, found.values),
+    )
+
+
+def _shaped(found: Surface, part: slice, shape: tuple[int, ...], is_scalar: bool | None) -> Surface:
+    sdf, normal, closest, values = (array[part] for array in found)
+    values = None if is_scalar is None else values[:, 0] if is_scalar else values
+    return Surface(
+        sdf.reshape(shape),
+        normal.reshape(*shape, 3),
+        closest.reshape(*shape, 3),
+        None if values is None else values.reshape(*shape, *values.shape[1:]),
+    )
+
+
+@functools.partial(jax.custom_vjp, nondiff_argnums=(0, 1))
+def _surface(
+    plan: Plan,
+    size: tuple[int, float],
+    points: jax.Array,
+    places: jax.Array,
+    values: jax.Array,
+    normals: jax.Array | None,
+) -> Surface:
+    return _forward(plan, size, points, places, values, normals)[0]
+
+
+def _forward(
+    plan: Plan,
+    size: tuple[int, float],
+    points: jax.Array,
+    places: jax.Array,
+    values: jax.Array,
+    normals: jax.Array | None,
+) -> tuple:
+    count, _ = size
+    scalar = jax.ShapeDtypeStruct((count,), points.dtype)
+    vector = jax.ShapeDtypeStruct((count, 3), points.dtype)
+    rows = jax.ShapeDtypeStruct((count, values.shape[1]), points.dtype)
+    faces = jax.ShapeDtypeStruct((count,), np.uint32)
+    results = (scalar, vector, vector, rows, faces, vector, *plan.saved(points))
+    arrays = (points, places, values, normals)
+    sdf, normal, closest, at, *saved = call("isograd_surface", plan, results, *arrays)
+    return Surface(sdf, normal, closest, at), (arrays, sdf, normal, saved)
+
+
+def _pullback(plan: Plan, size: tuple[int, float], residuals: tuple, bars: Surface) -> tuple:
+    (points, places, values, normals), sdf, normal, saved = residuals
+    smallest = jnp.sqrt(jnp.finfo(sdf.dtype).eps) * size[1]
+    # n = (q − p) / φ, so that dn = (I − n nᵀ) (dq − dp) / φ.
+    turning = bars.normal - normal * jnp.sum(normal * bars.normal, axis=1, keepdims=True)
+    has_face = (saved[0] != NO_FACE)[:, None]
+    apart = has_face & (jnp.abs(sdf) > smallest)[:, None]
+    turning = jnp.where(apart, turning / jnp.where(apart, sdf[:, None], 1), 0)
+    results = like(places, values, points, normals)
+    cotangents = (bars.sdf, bars.closest - turning, bars.values)
+    arrays = (points, places, values, normal, *saved, *cotangents, normals)
+    places_bar, values_bar, *cloud_bars = call("isograd_surface_pullback", plan, results, *arrays)
+    if places.shape[0]:
+        places_bar = places_bar + turning + jnp.where(has_face, 0, bars.closest)
+    points_bar, normals_bar = pair(cloud_bars)
+    return points_bar, places_bar, values_bar, normals_bar
+
+
+_surface.defvjp(_forward, _pullback)
