@@ -1,3 +1,4 @@
+use super::query_pullback::support;
 use super::{Random, soup, torus};
 use crate::Mesh;
 use crate::distance::interpolate::{Cotangent, VertexValues};
@@ -67,7 +68,7 @@ fn points_vertices_and_values_get_the_transpose() {
     let mut kept = 0;
     for i in 0..n {
         // Passing to another face or feature within the step has no derivative.
-        let feature = |hit: &Hit<f64>| (hit.triangle, hit.barycentric.map(|b| b > 0.0));
+        let feature = |hit: &Hit<f64>| support(&mesh, hit);
         match feature(&low[i]) == feature(&middle[i]) && feature(&high[i]) == feature(&middle[i]) {
             true => kept += 1,
             false => bar[i] = [0.0; 3],

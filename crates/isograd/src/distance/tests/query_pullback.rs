@@ -49,7 +49,7 @@ fn moved(at: &[[f64; 3]], direction: &[[f64; 3]], t: f64) -> Vec<[f64; 3]> {
 }
 
 /// The vertices that hold the closest point, whichever face they were found on.
-fn support(mesh: &Mesh<f64>, hit: &Hit<f64>) -> Vec<u32> {
+pub(super) fn support(mesh: &Mesh<f64>, hit: &Hit<f64>) -> Vec<u32> {
     let face = mesh.faces()[hit.triangle as usize];
     let holds = |k: &usize| hit.barycentric[*k] > 0.0;
     let mut vertices: Vec<u32> = (0..3).filter(holds).map(|k| face[k]).collect();
