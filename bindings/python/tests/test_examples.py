@@ -17,9 +17,18 @@ def test_there_are_examples_and_they_are_short():
         assert len(path.read_text().splitlines()) < 80, path.name
 
 
+def imported(path):
+    """Libraries that an example imports, also by modules in folders beside it."""
+    found = set()
+    for name in re.findall(r"^(?:import|from) (\w+)", path.read_text(), re.MULTILINE):
+        beside = sorted((path.parent / name).glob("*.py"))
+        found |= set().union(*map(imported, beside)) if beside else {name}
+    return found
+
+
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.name)
 def test_an_example_runs(path):
-    for name in re.findall(r"^(?:import|from) (\w+)", path.read_text(), re.MULTILINE):
+    for name in sorted(imported(path)):
         if importlib.util.find_spec(name) is None:
             pytest.skip(f"SKIPPED: {name} is not installed")
     subprocess.run([sys.executable, path], check=True, timeout=None)
