@@ -12,7 +12,7 @@ import isograd
 import jax
 import jax.numpy as jnp
 import numpy as np
-from host.jax_cfd_tunnel import Tunnel
+from flow_host.jax_cfd_tunnel import Tunnel
 from isograd import immersed
 
 jax.config.update("jax_enable_x64", True)
@@ -26,7 +26,7 @@ def main(n=16, steps=4, count=1000):
     coordinates = fish.sample(count).coordinates  # the same material points at all times
     times = tunnel.dt * np.arange(-1, steps + 1)
     place = np.array([0.5, 0.5, 0.5])
-    options = isograd.Options(orient="signs", surface="2x")
+    options = isograd.Options(orient="signs", surface="2x", radius=0.05)
 
     def at(time, values):
         return fish.replace(time=float(time), **dict(zip(NAMES, values)))

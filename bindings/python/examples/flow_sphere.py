@@ -11,7 +11,7 @@ import isograd
 import jax
 import jax.numpy as jnp
 import numpy as np
-from host.jax_cfd_tunnel import Tunnel
+from flow_host.jax_cfd_tunnel import Tunnel
 from isograd import immersed
 
 

@@ -90,6 +90,21 @@ def test_differences_are_exact_for_linear_fields_and_periodic_ones_close(x64):  
         immersed.derivative(wave, along, 0.05, "wall")
 
 
+def test_unit_gradients_are_the_normals_of_a_sphere_and_zero_on_a_plateau(x64):  # noqa: F811
+    grid = isograd.Grid((-1.5, -1.5, -1.5), 0.1, (30, 30, 30))
+    x = grid.centers() + 0.003
+    radius = jnp.linalg.norm(x, axis=-1)
+    found = immersed.unit_gradient(jnp.minimum(radius - 1, 0.3), 0.1)
+    near = np.abs(radius - 1) < 0.19
+    # The difference is off by h²/6 times a third derivative of order 1.
+    np.testing.assert_allclose(found[near], (x / radius[..., None])[near], atol=0.005)
+    assert not found[radius > 1.45].any()
+    weights = RNG.standard_normal(found.shape)
+    slope = jax.grad(lambda f: jnp.sum(weights * immersed.unit_gradient(f, 0.1)))(jnp.minimum(radius - 1, 0.3))
+    assert np.isfinite(slope).all()
+    check_grads(lambda f: jnp.sum(weights * immersed.unit_gradient(f, 0.1, "periodic")), (radius**2,), **REVERSE)
+
+
 def share_by_inclusion(sdf, normal, spacing):
     """Share of a cube above a plane, by inclusion and exclusion of the corners: exact, without thin directions."""
     m = np.abs(normal) * spacing

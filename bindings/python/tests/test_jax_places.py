@@ -222,3 +222,40 @@ def test_bad_arguments_are_refused():
     with pytest.raises((ValueError, jax.errors.JaxRuntimeError), match="sample 3 is not finite"):
         ij.surface(points, GRID, values=nan).values.block_until_ready()
     assert ij.surface(points, GRID, points[:0]).closest.shape == (0, 3)
+
+
+def test_sides_follow_a_body_that_turns_over_inside_scan(x64):  # noqa: F811
+    points, normals = torus(count=1500)
+    # Half a turn about x: each normal ends on the other side of space.
+    angles = jnp.linspace(0, np.pi, 13)
+
+    def turned(vectors, angle):
+        c, s = jnp.cos(angle), jnp.sin(angle)
+        return vectors @ jnp.array([[1.0, 0, 0], [0, c, s], [0, -s, c]])
+
+    grid = isograd.Grid((-1.7, -1.7, -1.7), 0.17, (20, 20, 20))
+    first = isograd.orient(points).normals
+
+    @jax.jit
+    def motion(points, first):
+        def step(before, angle):
+            moved = turned(points, angle)
+            now = ij.orient(moved, before)
+            sdf = ij.signed_distance(moved, grid, normals=now, options=isograd.Options(orient="signs"))
+            return now, jnp.sum(jnp.where(sdf < 0, 1.0, 0.0))
+
+        return jax.lax.scan(step, first, angles)
+
+    last, cells = motion(points, first)
+    assert (jnp.sum(last * turned(normals, np.pi), axis=1) > 0.9).all()
+    np.testing.assert_allclose(jnp.linalg.norm(last, axis=1), 1, rtol=1e-12)
+    # The volume of a torus of radii 1 and 0.4, in whole cells, which fit it to 7 %.
+    np.testing.assert_allclose(cells * grid.spacing**3, 2 * np.pi**2 * 0.16, rtol=0.1)
+    expected = isograd.orient(points, normals=first, orient="signs").normals
+    np.testing.assert_array_equal(ij.orient(points, first), expected)
+    np.testing.assert_array_equal(ij.orient(points, -3 * first), -expected)
+    assert not jax.grad(lambda p: jnp.sum(ij.orient(p, first)))(points).any()
+    with pytest.raises(ValueError, match="before"):
+        ij.orient(points, first[1:])
+    with pytest.raises(ValueError, match="radius"):
+        ij.orient(points, first, radius=-1)

@@ -22,14 +22,15 @@ Gradients are of reverse mode and first order; each function lists what is held 
 from __future__ import annotations
 
 import functools
-from dataclasses import replace
+import json
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._options import check_fill, length
+from ._options import Options, Orient, check_fill, length
 from ._surface import Fill, Surface, sample_values, surface
 from ._xla import Plan, call, floats, like, pair, prepare
 
@@ -37,9 +38,8 @@ if TYPE_CHECKING:
     from jax.typing import ArrayLike
 
     from ._grid import Grid
-    from ._options import Options
 
-__all__ = ["Extension", "Mesh", "Surface", "extend", "mesh", "query", "signed_distance", "surface"]
+__all__ = ["Extension", "Mesh", "Surface", "extend", "mesh", "orient", "query", "signed_distance", "surface"]
 
 
 def signed_distance(
@@ -250,6 +250,31 @@ def _surface(points: jax.Array, sizes: tuple[int, int]) -> tuple[jax.ShapeDtypeS
 
 
 _mesh.defvjp(_mesh_forward, _mesh_pullback)
+
+
+def orient(
+    points: ArrayLike, before: ArrayLike, *, radius: float | Literal["auto"] = "auto"
+) -> jax.Array:
+    """``(N, 3)`` unit normals, estimated from the points, each on the side of a given normal.
+
+    For a cloud that moves inside ``jit`` or ``scan``: ``before`` are the normals of the same points in the step before,
+    at first those of :func:`isograd.orient`. Pass the result as ``normals`` with ``orient="signs"``, and as ``before``
+    to the next step. Sides are kept while a normal turns by less than 90° a step. The result has no derivative: with
+    ``orient="signs"`` normals only choose sides.
+
+    Args:
+        points: ``(N, 3)``.
+        before: ``(N, 3)``, of any length but zero.
+        radius: static; of the neighborhoods, in the unit of the points.
+
+    Raises:
+        TypeError, ValueError, jax.errors.JaxRuntimeError: as for :func:`signed_distance`.
+    """
+    points = jax.lax.stop_gradient(floats(points, "points", (None, 3)))
+    before = jax.lax.stop_gradient(floats(before, "before", points.shape, points.dtype))
+    settings = json.dumps(asdict(Options(radius=radius, orient=Orient.SIGNS)))
+    (normals,) = call("isograd_orient", Plan(settings, (0, 0, 0)), like(points), points, before)
+    return normals
 
 
 class Extension(NamedTuple):

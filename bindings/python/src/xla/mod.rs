@@ -9,6 +9,7 @@ mod common;
 mod extend;
 mod field;
 mod mesh;
+mod orient;
 mod query;
 mod surface;
 
@@ -68,6 +69,7 @@ const TARGETS: &[Entry] = &[
     Entry::of::<mesh::Pullback>(),
     Entry::of::<extend::Forward>(),
     Entry::of::<extend::Pullback>(),
+    Entry::of::<orient::Forward>(),
     Entry::of::<surface::Forward>(),
     Entry::of::<surface::Pullback>(),
 ];

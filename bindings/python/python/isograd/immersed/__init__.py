@@ -14,7 +14,7 @@ functions are differentiable, in all arrays, and work inside ``jit``, ``grad``, 
 from ._body import CENTERS, FACES, Body, collocated, positions, sdf_rate, staggered, union
 from ._boltzmann import Links, links
 from ._fractions import apertures, volume_fraction
-from ._kernels import blend, derivative, fluid_share, mu0, mu1
+from ._kernels import blend, derivative, fluid_share, mu0, mu1, unit_gradient
 from ._loads import Loads, inner_momentum, loads
 from ._markers import Markers, markers
 from ._window import paste, window
@@ -42,6 +42,7 @@ __all__ = [
     "sdf_rate",
     "staggered",
     "union",
+    "unit_gradient",
     "volume_fraction",
     "window",
 ]

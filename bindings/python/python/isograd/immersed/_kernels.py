@@ -67,16 +67,33 @@ def derivative(
     Raises:
         ValueError: another boundary.
     """
-    if boundary not in ("edge", "periodic"):
-        raise ValueError(f'boundary is {boundary!r}; give "edge" or "periodic"')
-    total = jnp.zeros_like(field)
-    for axis in range(field.ndim):
-        if boundary == "periodic":
-            slope = (jnp.roll(field, -1, axis) - jnp.roll(field, 1, axis)) / (2 * spacing)
-        else:
-            slope = jnp.gradient(field, spacing, axis=axis)
-        total = total + direction[..., axis] * slope
-    return total
+    slopes = zip(range(3), _slopes(field, spacing, boundary))
+    return sum((direction[..., axis] * slope for axis, slope in slopes), jnp.zeros_like(field))
+
+
+def unit_gradient(sdf: jax.Array, spacing: float, boundary: Boundary = "edge") -> jax.Array:
+    """``(nx, ny, nz, 3)`` normals from central differences of φ: ``∇φ/|∇φ|``, 0 where φ is constant.
+
+    They are continuous as the points move, since φ is; the exact normals of a :class:`Body` are those of triangles, which
+    jump from one to the next.
+
+    Args:
+        sdf: ``(nx, ny, nz)``: φ.
+        spacing: side of a cell.
+        boundary: see :func:`derivative`.
+    """
+    slope = jnp.stack(_slopes(sdf, spacing, boundary), axis=-1)
+    square = jnp.sum(slope**2, axis=-1, keepdims=True)
+    has_slope = square > 0
+    return jnp.where(has_slope, slope / jnp.sqrt(jnp.where(has_slope, square, 1)), 0)
+
+
+def _slopes(field: jax.Array, spacing: float, boundary: Boundary) -> list[jax.Array]:
+    if boundary == "periodic":
+        return [(jnp.roll(field, -1, axis) - jnp.roll(field, 1, axis)) / (2 * spacing) for axis in range(3)]
+    if boundary == "edge":
+        return [jnp.gradient(field, spacing, axis=axis) for axis in range(3)]
+    raise ValueError(f'boundary is {boundary!r}; give "edge" or "periodic"')
 
 
 def blend(
@@ -91,11 +108,12 @@ def blend(
     """The velocity of fluid and body together: ``u_b + μ₀ (u_f − u_b) + μ₁ ∂(u_f − u_b)/∂n``.
 
     It is that of the body inside, that of the fluid outside, with a transition of ``width`` on both sides of the
-    surface. Call it on the predicted velocity of each stage, before its pressure projection.
+    surface. Call it on the predicted velocity of each stage, before its pressure projection. The normals of the last
+    term are those of :func:`unit_gradient`.
 
     Args:
         fluid: components of the velocity, each at the places of the body's.
-        body: the body, or the :func:`union` of several.
+        body: the body, or the :func:`union` of several; its band must be a cell wider than ``width``.
         width: half the width of the transition, in the unit of φ.
         spacing: side of a cell.
         order: 2 with the last term, 1 without it.
@@ -109,11 +127,12 @@ def blend(
     if len(fluid) != len(body.sdf):
         raise ValueError(f"the fluid has {len(fluid)} components and the body {len(body.sdf)}; give as many")
     out = []
-    for k, (component, sdf, normal, velocity) in enumerate(zip(fluid, *body)):
+    for k, (component, sdf, velocity) in enumerate(zip(fluid, body.sdf, body.velocity)):
         own = velocity[..., k]
         slip = component - own
         blended = own + mu0(sdf, width) * slip
         if order == 2:
+            normal = unit_gradient(sdf, spacing, boundary)
             blended = blended + mu1(sdf, width) * derivative(slip, normal, spacing, boundary)
         out.append(blended)
     return tuple(out)
