@@ -1,11 +1,15 @@
 """`isograd.immersed`: bodies, loads, unions and moving grids beside closed forms of spheres."""
 
+import os
+import pathlib
+
 import numpy as np
 import pytest
 
 jax = pytest.importorskip("jax", reason="SKIPPED: JAX is not installed")
 
 import isograd  # noqa: E402
+import isograd.jax  # noqa: E402
 import jax.numpy as jnp  # noqa: E402
 from isograd import immersed  # noqa: E402
 from jax.test_util import check_grads  # noqa: E402
@@ -144,6 +148,34 @@ def test_a_union_takes_the_closer_body(x64):  # noqa: F811
         immersed.union()
     with pytest.raises(ValueError, match="components"):
         immersed.union(one, immersed.Body(*(part[:2] for part in two)))
+
+
+@pytest.mark.skipif(not pathlib.Path("/proc/self/statm").exists(), reason="SKIPPED: memory is read from /proc")
+def test_a_thousand_steps_compile_once_and_keep_their_memory():
+    grid = isograd.Grid((-1.0, -1.0, -1.0), 0.2, (10, 10, 10))
+    points, traced = ball(200, 0.5).astype(np.float32), []
+    options = isograd.Options(orient="signs", surface="grid")
+
+    @jax.jit
+    def step(time, before):
+        traced.append(time)
+        moved = points + 0.1 * jnp.sin(time)
+        normals = isograd.jax.orient(moved, before)
+        body = immersed.staggered(moved, points, grid, normals=normals, options=options)
+        return immersed.blend(body.sdf, body, width=0.2, spacing=0.2)[0].sum(), normals
+
+    def resident():
+        pages = int(pathlib.Path("/proc/self/statm").read_text().split()[1])
+        return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
+
+    normals, sizes = points, []
+    for k in range(1000):
+        total, normals = step(np.float32(0.01 * k), normals)
+        assert np.isfinite(total)
+        sizes.append(resident())
+    assert len(traced) == 1
+    # A leak of one field of 4 kB a step would be 3 MB; allocators return memory in pieces of several.
+    assert sizes[-1] < sizes[249] + 2.5, (sizes[0], sizes[249], sizes[-1])
 
 
 def test_a_window_that_follows_gives_the_body_of_the_whole_grid(x64):  # noqa: F811

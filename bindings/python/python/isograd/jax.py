@@ -31,7 +31,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ._options import Options, Orient, check_fill, length
-from ._surface import Fill, Surface, sample_values, surface
+from ._jax_surface import Fill, Surface, sample_values, surface
 from ._xla import Plan, call, floats, like, pair, prepare
 
 if TYPE_CHECKING:

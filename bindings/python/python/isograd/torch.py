@@ -12,17 +12,13 @@ from typing import Any, Optional
 
 import numpy as np
 
-from . import _pure, _settings
+from . import _pure
 from ._grid import Grid
 from ._options import Options
+from ._torch import Tensor, array, checked, encode, one_by_one, torch
+from ._torch_surface import Surface, surface
 
-try:
-    import torch
-    from torch import Tensor
-except ImportError as error:
-    raise ImportError(f"isograd.torch needs PyTorch ({error}); install it by `pip install torch`") from error
-
-__all__ = ["signed_distance"]
+__all__ = ["Surface", "signed_distance", "surface"]
 
 
 def signed_distance(
@@ -54,36 +50,12 @@ def signed_distance(
             than two cells to a wall of the grid.
         RuntimeError: an unavailable backend.
     """
-    points = _checked(points, "points")
+    points = checked(points, "points")
     if normals is not None:
-        normals = _checked(normals, "normals").to(points.dtype)
+        normals = checked(normals, "normals").to(points.dtype)
     double = points.dtype == torch.float64
-    settings = _encode(grid, options, normals is not None, backend, double)
+    settings = encode(grid, options, normals is not None, backend, double)
     return _signed_distance(points, normals, settings)[0]
-
-
-# The text is the same whenever grid and options are: the compiler need not look inside.
-@torch.compiler.assume_constant_result
-def _encode(
-    grid: Grid, options: Options | None, normals_are_given: bool, backend: str, double: bool
-) -> str:
-    return _settings.encode_pure(grid, options, normals_are_given, backend, double)
-
-
-def _checked(values: Tensor, name: str) -> Tensor:
-    if not isinstance(values, Tensor):
-        raise TypeError(f"{name} is a {type(values).__name__}; give a torch.Tensor")
-    if values.device.type != "cpu":
-        raise ValueError(f"{name} is on {values.device}; isograd takes tensors of the CPU: pass {name}.cpu()")
-    if values.layout != torch.strided:
-        raise ValueError(f"{name} is of the layout {values.layout}; pass {name}.to_dense()")
-    if values.ndim != 2 or values.shape[1] != 3:
-        raise ValueError(f"{name} has the shape {tuple(values.shape)} and must have (N, 3)")
-    if values.dtype in (torch.float16, torch.bfloat16):
-        return values.to(torch.float32)
-    if values.dtype not in (torch.float32, torch.float64):
-        raise TypeError(f"{name} is of {values.dtype}; give float32 or float64")
-    return values
 
 
 # Operators say Optional and not `| None`: PyTorch reads their annotations, in every version the former.
@@ -92,10 +64,10 @@ def _signed_distance(
     points: Tensor, given: Optional[Tensor], settings: str
 ) -> tuple[Tensor, Tensor, Tensor]:
     """φ, and what its pullback needs: closest faces and normals."""
-    sdf, closest, normals = _pure.forward(settings, _array(points), _array(given))
+    sdf, closest, normals = _pure.forward(settings, array(points), array(given))
     # PyTorch hardly supports uint32: the same bits as int32.
     arrays = (sdf, closest.view(np.int32), normals)
-    return tuple(torch.from_numpy(array) for array in arrays)  # type: ignore[return-value]
+    return tuple(torch.from_numpy(a) for a in arrays)  # type: ignore[return-value]
 
 
 @_signed_distance.register_fake
@@ -116,8 +88,8 @@ def _pullback(
     settings: str,
 ) -> tuple[Tensor, Tensor]:
     """Cotangents of the points and of the given normals; the latter has no rows where none were given."""
-    saved = (_array(sdf), _array(closest).view(np.uint32), _array(normals))
-    bars = _pure.pullback(settings, _array(points), _array(given), saved, _array(sdf_bar))
+    saved = (array(sdf), array(closest).view(np.uint32), array(normals))
+    bars = _pure.pullback(settings, array(points), array(given), saved, array(sdf_bar))
     given_bar = torch.from_numpy(bars[1]) if len(bars) > 1 else points.new_empty((0, 3))
     return torch.from_numpy(bars[0]), given_bar
 
@@ -160,26 +132,5 @@ def _twice(ctx: Any, *_bars: Tensor) -> None:
 _pullback.register_autograd(_twice)
 
 
-def _one_by_one(operator: Any) -> Any:
-    """A ``torch.vmap`` rule that calls an operator for one member of the batch after the other."""
-
-    def apply(info: Any, axes: tuple[int | None, ...], *batch: Any) -> tuple[tuple[Tensor, ...], tuple[int, ...]]:
-        if info.batch_size == 0:
-            raise ValueError("vmap over an empty batch: give one cloud or more")
-        calls = [
-            operator(*(x if axis is None else x.select(axis, i) for x, axis in zip(batch, axes)))
-            for i in range(info.batch_size)
-        ]
-        outputs = tuple(torch.stack(output) for output in zip(*calls))
-        return outputs, (0,) * len(outputs)
-
-    return apply
-
-
-_signed_distance.register_vmap(_one_by_one(_signed_distance))
-_pullback.register_vmap(_one_by_one(_pullback))
-
-
-def _array(tensor: Tensor | None) -> np.ndarray | None:
-    """The values in C order; a copy only where the tensor has another order."""
-    return None if tensor is None else tensor.detach().resolve_neg().contiguous().numpy()
+_signed_distance.register_vmap(one_by_one(_signed_distance))
+_pullback.register_vmap(one_by_one(_pullback))

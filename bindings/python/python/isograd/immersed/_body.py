@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from .._surface import Offset, Surface, positions_at, surface
+from .._jax_surface import Offset, Surface, positions_at, surface
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -10,20 +10,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._grid import Grid
-from ._numbers import number
 from ._options import check_fill, length
+from ._places import AUTO_BAND, NO_FACE, Fill, Offset, are_centers, axes_at, is_many, on_grids
 from ._xla import Plan, call, floats, like, pair, prepare
 
 if TYPE_CHECKING:
     from jax.typing import ArrayLike
 
+    from ._grid import Grid
     from ._options import Options
 
-Offset = tuple[float, float, float]
-Fill = Literal["inside", "band"]
-CENTER: Offset = (0.5, 0.5, 0.5)
-NO_FACE = np.uint32(0xFFFF_FFFF)
 
 
 class Surface(NamedTuple):
@@ -84,12 +80,13 @@ def surface(
     check_fill(fill)
     width = length(band, "band", "auto", "full")
     plan, points, normals = prepare(points, grid, normals, options, "cpu")
-    width = {"auto": 4.0 * grid.spacing, "full": np.inf}.get(width, width)
+    width = {"auto": AUTO_BAND * grid.spacing, "full": np.inf}.get(width, width)
     plan = replace(plan, band=width)
     values, is_scalar = sample_values(values, points)
-    positions, shapes = _positions(places, grid, points.dtype)
+    regular = on_grids(places, grid)
+    positions, shapes = _positions(places, regular, points.dtype)
     # Without places, φ and the closest faces on the grid save the search.
-    given = positions[:0] if _are_centers(places, grid) else positions
+    given = positions[:0] if are_centers(regular, grid) else positions
     found = _surface(plan, (len(positions), grid.spacing), points, given, values, normals)
     found = _within(found, positions, width) if fill == "band" else found
     parts, start = [], 0
@@ -97,7 +94,7 @@ def surface(
         end = start + int(np.prod(shape))
         parts.append(_shaped(found, slice(start, end), shape, is_scalar))
         start = end
-    return tuple(parts) if _is_offsets(places) else parts[0]
+    return tuple(parts) if is_many(places) else parts[0]
 
 
 def sample_values(values: ArrayLike | None, points: jax.Array) -> tuple[jax.Array, bool | None]:
@@ -120,47 +117,19 @@ def sample_values(values: ArrayLike | None, points: jax.Array) -> tuple[jax.Arra
 
 def positions_at(grid: Grid, offset: Offset, dtype: np.typing.DTypeLike) -> jax.Array:
     """``(nx, ny, nz, 3)`` positions at an offset from the lower corner of each cell, in cells."""
-    axes = [
-        jnp.asarray((low + grid.spacing * (np.arange(n) + shift)).astype(dtype))
-        for low, n, shift in zip(grid.lower, grid.shape, offset)
-    ]
+    axes = [jnp.asarray(axis) for axis in axes_at(grid, offset, dtype)]
     return jnp.stack(jnp.meshgrid(*axes, indexing="ij"), axis=-1)
 
 
 def _positions(
-    places: object, grid: Grid, dtype: np.typing.DTypeLike
+    places: object, parts: list[tuple[Grid, Offset]] | None, dtype: np.typing.DTypeLike
 ) -> tuple[jax.Array, list[tuple[int, ...]]]:
     """``(M, 3)`` positions of all places, and the shape of each part."""
-    if places is None:
-        places = CENTER
-    if isinstance(places, Grid):
-        return positions_at(places, CENTER, dtype).reshape(-1, 3), [places.shape]
-    if not isinstance(places, tuple):
+    if parts is None:
         positions = floats(places, "places", (None, 3), dtype)
         return positions, [positions.shape[:1]]
-    offsets = [_offset(offset) for offset in (places if _is_offsets(places) else (places,))]
-    parts = [positions_at(grid, offset, dtype).reshape(-1, 3) for offset in offsets]
-    return jnp.concatenate(parts), [grid.shape] * len(parts)
-
-
-def _are_centers(places: object, grid: Grid) -> bool:
-    if isinstance(places, Grid):
-        return places == grid
-    return places is None or isinstance(places, tuple) and places == CENTER
-
-
-def _is_offsets(places: object) -> bool:
-    return isinstance(places, tuple) and any(isinstance(offset, tuple) for offset in places)
-
-
-def _offset(offset: object) -> Offset:
-    if isinstance(offset, tuple) and len(offset) == 3:
-        x, y, z = (number(shift, "places") for shift in offset)
-        if np.isfinite([x, y, z]).all():
-            return x, y, z
-    raise ValueError(
-        f"places has the offset {offset!r}; give three finite numbers, such as (1, 0.5, 0.5), or positions as an array"
-    )
+    each = [positions_at(*part, dtype).reshape(-1, 3) for part in parts]
+    return jnp.concatenate(each), [grid.shape for grid, _ in parts]
 
 
 def _within(found: Surface, positions: jax.Array, width: float) -> Surface:
@@ -222,7 +191,7 @@ def _pullback(plan: Plan, size: tuple[int, float], residuals: tuple, bars: Surfa
     smallest = jnp.sqrt(jnp.finfo(sdf.dtype).eps) * size[1]
     # n = (q − p) / φ, so that dn = (I − n nᵀ) (dq − dp) / φ.
     turning = bars.normal - normal * jnp.sum(normal * bars.normal, axis=1, keepdims=True)
-    has_face = (saved[0] != NO_FACE)[:, None]
+    has_face = (saved[0] != np.uint32(NO_FACE))[:, None]
     apart = has_face & (jnp.abs(sdf) > smallest)[:, None]
     turning = jnp.where(apart, turning / jnp.where(apart, sdf[:, None], 1), 0)
     results = like(places, values, points, normals)

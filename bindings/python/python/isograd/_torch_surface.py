@@ -1,0 +1,225 @@
+"""Values on a surface at any places, for `isograd.torch`."""
+
+from __future__ import annotations
+
+import json
+from typing import Any, Literal, NamedTuple, Optional
+
+import numpy as np
+
+from . import _core
+from ._grid import Grid
+from ._options import Options, check_fill, length
+from ._places import AUTO_BAND, Fill, are_centers, axes_at, is_many, on_grids
+from ._pure import grid_shape
+from ._torch import Tensor, array, checked, encode, one_by_one, torch
+
+
+class Surface(NamedTuple):
+    """Distance, normal, closest point and values of a surface at places of a shape ``S``."""
+
+    sdf: Tensor
+    """``S``: signed distance φ, in the unit of the points, negative inside."""
+    normal: Tensor
+    """``(*S, 3)``: ∇φ, a unit vector away from the surface outside and toward it inside; 0 beyond the band."""
+    closest: Tensor
+    """``(*S, 3)``: the closest point of the surface; beyond the band the place itself."""
+    values: Tensor | None
+    """``(*S, C)`` or ``S``: values at the closest point; 0 beyond the band. ``None`` if no values are given."""
+
+
+def surface(
+    points: Tensor,
+    grid: Grid,
+    places: object = None,
+    *,
+    values: Tensor | None = None,
+    normals: Tensor | None = None,
+    band: float | Literal["auto", "full"] = "auto",
+    fill: Fill = "inside",
+    options: Options | None = None,
+) -> Surface | tuple[Surface, ...]:
+    """φ, normals, closest points and extended values of the surface through ``points``, at any places.
+
+    Differentiable once in ``points``, ``values``, ``places`` that are a tensor, and ``normals`` with
+    ``orient="given"``; what is held constant is listed at :func:`isograd.jax.surface`, which has the same arguments.
+
+    Args:
+        points: ``(N, 3)``, as for :func:`isograd.torch.signed_distance`.
+        grid: the surface is found on it.
+        places: ``None`` for cell centers, another grid, an offset in cells such as ``(1, 0.5, 0.5)``, a tuple of
+            offsets, or an ``(M, 3)`` tensor of positions.
+        values: ``(N, C)`` or ``(N,)``.
+        normals: as for :func:`isograd.torch.signed_distance`.
+        band: distance from the surface up to which places count; ``"auto"`` is 4 cells.
+        fill: ``"inside"``: the inside has no band; ``"band"``: the band is that of both sides.
+        options: options, without ``trim`` and ``sheet``.
+
+    Raises:
+        TypeError, ValueError, RuntimeError: as for :func:`isograd.torch.signed_distance`.
+    """
+    check_fill(fill)
+    width = length(band, "band", "auto", "full")
+    width = {"auto": AUTO_BAND * grid.spacing, "full": np.inf}.get(width, width)
+    points = checked(points, "points")
+    if normals is not None:
+        normals = checked(normals, "normals").to(points.dtype)
+    settings = encode(grid, options, normals is not None, "cpu", points.dtype == torch.float64)
+    rows, is_scalar = _rows(values, points)
+    regular = on_grids(places, grid)
+    positions, shapes = _positions(places, regular, points.dtype)
+    given = positions[:0] if are_centers(regular, grid) else positions
+    found = _surface(points, given, rows, normals, settings, float(width), len(positions))[:4]
+    if fill == "band":
+        far = found[0] < -width
+        beyond = (torch.full_like(found[0], -width), torch.zeros_like(found[1]), positions, torch.zeros_like(found[3]))
+        found = tuple(torch.where(far.reshape(-1, *[1] * (a.ndim - 1)), b, a) for a, b in zip(found, beyond))
+    sizes = [int(np.prod(shape)) for shape in shapes]
+    parts = [
+        _shaped(part, shape, is_scalar) for part, shape in zip(zip(*(a.split(sizes) for a in found)), shapes)
+    ]
+    return tuple(parts) if is_many(places) else parts[0]
+
+
+def _rows(values: Tensor | None, points: Tensor) -> tuple[Tensor, bool | None]:
+    """Values as ``(N, C)``, and whether they were ``(N,)``; ``(N, 0)`` and ``None`` for none."""
+    if values is None:
+        return points.new_empty((len(points), 0)), None
+    is_scalar = isinstance(values, Tensor) and values.ndim == 1
+    rows = checked(values[:, None] if is_scalar else values, "values", None).to(points.dtype)
+    if len(rows) != len(points) or rows.shape[1] == 0:
+        raise ValueError(f"values has the shape {tuple(values.shape)} and must have one row for each point")
+    return rows, is_scalar
+
+
+def _positions(places: Any, regular: Any, dtype: Any) -> tuple[Tensor, list[tuple[int, ...]]]:
+    """``(M, 3)`` positions of all places, and the shape of each part."""
+    if regular is None:
+        positions = checked(places, "places").to(dtype)
+        return positions, [tuple(positions.shape[:1])]
+    each = []
+    for grid, offset in regular:
+        axes = [torch.from_numpy(axis).to(dtype) for axis in axes_at(grid, offset, np.float64)]
+        each.append(torch.stack(torch.meshgrid(*axes, indexing="ij"), dim=-1).reshape(-1, 3))
+    return torch.cat(each), [grid.shape for grid, _ in regular]
+
+
+def _shaped(part: tuple[Tensor, ...], shape: tuple[int, ...], is_scalar: bool | None) -> Surface:
+    sdf, normal, closest, values = part
+    values = None if is_scalar is None else values[:, 0] if is_scalar else values
+    return Surface(
+        sdf.reshape(shape),
+        normal.reshape(*shape, 3),
+        closest.reshape(*shape, 3),
+        None if values is None else values.reshape(*shape, *values.shape[1:]),
+    )
+
+
+def _outputs(points: Tensor, values: Tensor, settings: str, count: int) -> tuple[Tensor, ...]:
+    """Empty results: distance, normal, closest point and values; faces and weights; φ, closest faces and normals."""
+    shape = grid_shape(settings)
+    return (
+        points.new_empty(count),
+        points.new_empty((count, 3)),
+        points.new_empty((count, 3)),
+        points.new_empty((count, values.shape[1])),
+        points.new_empty(count, dtype=torch.int32),
+        points.new_empty((count, 3)),
+        points.new_empty(shape),
+        points.new_empty(shape, dtype=torch.int32),
+        points.new_empty(points.shape),
+    )
+
+
+def _call(name: str, inputs: list[Tensor | None], outputs: tuple[Tensor, ...], settings: str, band: float) -> None:
+    """Calls a target. PyTorch hardly supports uint32: faces are int32 with the same bits."""
+
+    def bits(tensor: Tensor) -> np.ndarray:
+        found = array(tensor)
+        return found.view(np.uint32) if found.dtype == np.int32 else found
+
+    given = [bits(tensor) for tensor in inputs if tensor is not None]
+    _core.call_target(name, given, [bits(tensor) for tensor in outputs], settings, band)
+
+
+@torch.library.custom_op("isograd::surface", mutates_args=(), device_types="cpu")
+def _surface(
+    points: Tensor,
+    places: Tensor,
+    values: Tensor,
+    given: Optional[Tensor],
+    settings: str,
+    band: float,
+    count: int,
+) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor]:
+    outputs = _outputs(points, values, settings, count)
+    _call("isograd_surface", [points, places, values, given], outputs, settings, band)
+    return outputs  # type: ignore[return-value]
+
+
+@_surface.register_fake
+def _(
+    points: Tensor,
+    places: Tensor,
+    values: Tensor,
+    given: Optional[Tensor],
+    settings: str,
+    band: float,
+    count: int,
+) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor]:
+    return _outputs(points, values, settings, count)  # type: ignore[return-value]
+
+
+@torch.library.custom_op("isograd::surface_pullback", mutates_args=(), device_types="cpu")
+def _pullback(
+    inputs: list[Tensor], saved: list[Tensor], bars: list[Tensor], settings: str, band: float
+) -> list[Tensor]:
+    """Cotangents of places, values, points and, where they are given, normals."""
+    points, places, values, *given = inputs
+    outputs = tuple(torch.empty_like(a) for a in (places, values, points, *given))
+    _call("isograd_surface_pullback", [points, places, values, *saved, *bars, *given], outputs, settings, band)
+    return list(outputs)
+
+
+@_pullback.register_fake
+def _(inputs: list[Tensor], saved: list[Tensor], bars: list[Tensor], settings: str, band: float) -> list[Tensor]:
+    points, places, values, *given = inputs
+    return [torch.empty_like(a) for a in (places, values, points, *given)]
+
+
+def _save(ctx: Any, inputs: tuple[Any, ...], output: tuple[Tensor, ...]) -> None:
+    points, places, values, given, ctx.settings, ctx.band, _ = inputs
+    ctx.is_given = given is not None
+    sdf, normal, _closest, _values, *rest = output
+    ctx.save_for_backward(points, places, values, *([given] if ctx.is_given else []), sdf, normal, *rest)
+    ctx.mark_non_differentiable(*rest)
+
+
+def _backward(ctx: Any, sdf_bar: Tensor, normal_bar: Tensor, closest_bar: Tensor, values_bar: Tensor, *_: Any) -> tuple:
+    inputs, saved = ctx.saved_tensors[: 3 + ctx.is_given], ctx.saved_tensors[3 + ctx.is_given :]
+    (points, places, *_), (sdf, normal, faces, *rest) = inputs, saved
+    spacing = json.loads(ctx.settings)["grid"]["spacing"]
+    # n = (q − p) / φ, so that dn = (I − n nᵀ) (dq − dp) / φ.
+    turning = normal_bar - normal * (normal * normal_bar).sum(dim=1, keepdim=True)
+    has_face = (faces != -1)[:, None]
+    apart = has_face & (sdf.abs() > torch.finfo(sdf.dtype).eps ** 0.5 * spacing)[:, None]
+    turning = torch.where(apart, turning / torch.where(apart, sdf[:, None], 1), 0)
+    bars = [sdf_bar, closest_bar - turning, values_bar]
+    places_bar, *others = _pullback(
+        list(inputs), [normal, faces, *rest], [bar.contiguous() for bar in bars], ctx.settings, ctx.band
+    )
+    if len(places):
+        places_bar = places_bar + turning + torch.where(has_face, 0, closest_bar)
+    values_bar, points_bar, *given_bar = others
+    return points_bar, places_bar, values_bar, given_bar[0] if given_bar else None, None, None, None
+
+
+_surface.register_autograd(_backward, setup_context=_save)
+
+
+def _twice(ctx: Any, *_bars: Any) -> None:
+    raise RuntimeError("isograd.torch.surface can be differentiated once, not twice")
+
+
+_pullback.register_autograd(_twice)
+_surface.register_vmap(one_by_one(_surface))
