@@ -56,8 +56,8 @@ def main(n=16, steps=4, count=1000):
         slope += [pulled[name] for name in NAMES]
     print(f"{steps} steps, {count} points, {grid.shape} cells: mean drag {float(mean):.6f}")
     for k, name in enumerate(NAMES):
-        way = 1e-6 * values[k] * np.eye(len(NAMES))[k]
-        change = float(drag(motion(values + way)) - drag(motion(values - way))) / (2e-6 * values[k])
+        way = 1e-7 * values[k] * np.eye(len(NAMES))[k]
+        change = float(drag(motion(values + way)) - drag(motion(values - way))) / (2e-7 * values[k])
         print(f"  d drag / d {name} = {slope[k]:+.6f}, by differences {change:+.6f}, ratio {slope[k] / change:.4f}")
         assert abs(slope[k] / change - 1) < 1e-3, name
     assert np.isfinite(points_bar).all()

@@ -152,6 +152,13 @@ def test_attributes_fill_the_whole_inside():
     assert sdf.min() < -4 * GRID.spacing
     np.testing.assert_array_equal(np.isfinite(dense), sdf <= 2 * GRID.spacing)
     np.testing.assert_allclose(extension.values, 2.5, rtol=1e-12)
+    # At any places, by a query.
+    moving = isograd.reconstruct(SPHERE, GRID, attributes={"v": SPHERE})
+    extension, mesh = moving.extend("v", 2 * GRID.spacing), moving.closest_mesh
+    hits = isograd.query(mesh, GRID.centers().reshape(-1, 3)[extension.cells])
+    values = np.einsum("mk,mkc->mc", hits.barycentric, extension.vertices[mesh.faces[hits.face]])
+    clear = np.abs(hits.distance) < 2 * GRID.spacing
+    np.testing.assert_allclose(values[clear], extension.values[clear], atol=1e-6)
     with pytest.raises(ValueError, match="fill"):
         result.extend("v", 0.1, fill="all")
     narrow = isograd.reconstruct(SPHERE, GRID, attributes={"v": SPHERE}, band=0.2)

@@ -48,11 +48,11 @@ impl Target for Forward {
             };
             let found = of_vertices(mesh, &vertex_values, attribute.components).at(&hits);
             copy("the values", &found.map_err(|e| e.to_string())?, values)?;
-            copy("the distances", &each(&hits, |h| h.distance), distance)?;
-            copy("the directions", &each(&hits, |h| h.gradient), gradient)?;
-            copy("the closest points", &each(&hits, |h| h.point), point)?;
-            copy("the triangles", &each(&hits, |h| h.triangle), triangle)?;
-            copy("the weights", &each(&hits, |h| h.barycentric), barycentric)?;
+            write(&hits, distance, |hit| hit.distance)?;
+            write(&hits, gradient, |hit| hit.gradient)?;
+            write(&hits, point, |hit| hit.point)?;
+            write(&hits, triangle, |hit| hit.triangle)?;
+            write(&hits, barycentric, |hit| hit.barycentric)?;
             saved.fill(result)
         })
     }
@@ -165,6 +165,7 @@ fn at_centers<T: Float>(
     let is_far = |i: usize| sdf[i].f64() > band;
     let has_face = |i: usize| closest[i] != NO_TRIANGLE;
     let deep: Vec<usize> = (0..sdf.len())
+        .into_par_iter()
         .filter(|&i| !is_far(i) && !has_face(i) && sdf[i] < T::zero())
         .collect();
     let center = |i: usize| grid.center(grid.cell(i));
@@ -201,9 +202,15 @@ fn at_places<T: Float>(
         let way: f64 = (0..3).map(|a| (place[a].f64() - center[a]).powi(2)).sum();
         sdf[grid.index(cell)].f64() - way.sqrt() > band + 1e-3 * spacing
     };
-    let near: Vec<usize> = (0..places.len()).filter(|&i| !is_far(places[i])).collect();
+    let near: Vec<usize> = (0..places.len())
+        .into_par_iter()
+        .filter(|&i| !is_far(places[i]))
+        .collect();
     let searched: Vec<[T; 3]> = near.iter().map(|&i| places[i]).collect();
-    let mut hits: Vec<Hit<T>> = places.iter().map(|&place| beyond(place, band)).collect();
+    let mut hits: Vec<Hit<T>> = places
+        .par_iter()
+        .map(|&place| beyond(place, band))
+        .collect();
     for (&i, hit) in near.iter().zip(search(result, mesh, &searched)?) {
         if !(hit.distance.f64() > band) {
             hits[i] = hit;
@@ -264,6 +271,20 @@ fn centers<T: Real>(grid: &Grid<T>) -> Vec<[T; 3]> {
         .collect()
 }
 
-fn each<T, U>(hits: &[Hit<T>], of: impl Fn(&Hit<T>) -> U) -> Vec<U> {
-    hits.iter().map(of).collect()
+/// Writes a part of each hit.
+///
+/// # Errors
+/// An output of another length.
+fn write<T: Real, E: Copy + Send>(
+    hits: &[Hit<T>],
+    out: &mut [E],
+    part: impl Fn(&Hit<T>) -> E + Sync,
+) -> Result<(), Failure> {
+    if out.len() != hits.len() {
+        let (found, expected) = (out.len(), hits.len());
+        return Err(format!("an output has {found} entries and must have {expected}").into());
+    }
+    let entries = out.par_iter_mut().zip(hits);
+    entries.for_each(|(entry, hit)| *entry = part(hit));
+    Ok(())
 }
