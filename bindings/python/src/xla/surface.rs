@@ -72,9 +72,11 @@ impl Target for Pullback {
         let attribute = attribute(call.input("the values", 2)?, points.len());
         let hits = saved_hits(&mut call)?;
         let saved = call.saved()?;
-        let distance_bar = call.input("the cotangent of the distances", 1)?;
-        let point_bar = call.vectors("the cotangent of the closest points")?;
-        let values_bar = call.input("the cotangent of the values", 2)?;
+        let bars = Bars {
+            distance: call.input("the cotangent of the distances", 1)?,
+            point: call.vectors("the cotangent of the closest points")?,
+            values: call.input("the cotangent of the values", 2)?,
+        };
         let normals = call.normals()?;
         let places_out = call.vectors_out("the cotangent of the places")?;
         let attribute_out = call.output("the cotangent of the samples' values", 2)?;
@@ -82,29 +84,15 @@ impl Target for Pullback {
         call.restore(&cloud(points, normals)?, &saved, |restored| {
             let mesh = surface(restored.result)?;
             let are_centers = places.is_empty() && !hits.is_empty();
-            let places = match are_centers {
-                true => &centers(restored.result.grid()),
-                false => places,
-            };
+            let all = are_centers.then(|| centers(restored.result.grid()));
+            let places = all.as_deref().unwrap_or(places);
             let extension = match attribute.components {
                 0 => None,
                 _ => Some(restored.result.extend(&attribute, f64::MIN_POSITIVE)?),
             };
             let vertex_values = extension.as_ref().map_or(&[][..], |(e, _)| &e.vertices);
-            let mut bar = interpolate::Cotangent::default();
             let interpolated = of_vertices(mesh, vertex_values, attribute.components);
-            let pulled = interpolated.pullback(places, &hits, values_bar, &mut bar);
-            pulled.map_err(|e| e.to_string())?;
-            let query = Query::new(mesh.clone()).map_err(|e| e.to_string())?;
-            let pulled = query.pullback(
-                places,
-                &hits,
-                distance_bar,
-                Some(point_bar),
-                &mut bar.points,
-                &mut bar.vertices,
-            );
-            pulled.map_err(|e| e.to_string())?;
+            let bar = to_vertices(interpolated, places, &hits, bars)?;
             if !are_centers {
                 copy("the places' cotangent", &bar.points, places_out)?;
             }
@@ -127,6 +115,36 @@ impl Target for Pullback {
             out.fill(cloud_bar)
         })
     }
+}
+
+/// Cotangents of the results at the places.
+struct Bars<'a, T> {
+    distance: &'a [T],
+    point: &'a [[T; 3]],
+    values: &'a [T],
+}
+
+/// Cotangents of the places, of the vertices of the mesh and of the values there.
+fn to_vertices<T: Real>(
+    interpolated: VertexValues<'_, T>,
+    places: &[[T; 3]],
+    hits: &[Hit<T>],
+    bars: Bars<'_, T>,
+) -> Result<interpolate::Cotangent<T>, Failure> {
+    let mut bar = interpolate::Cotangent::default();
+    let pulled = interpolated.pullback(places, hits, bars.values, &mut bar);
+    pulled.map_err(|e| e.to_string())?;
+    let query = Query::new(interpolated.mesh.clone()).map_err(|e| e.to_string())?;
+    let pulled = query.pullback(
+        places,
+        hits,
+        bars.distance,
+        Some(bars.point),
+        &mut bar.points,
+        &mut bar.vertices,
+    );
+    pulled.map_err(|e| e.to_string())?;
+    Ok(bar)
 }
 
 /// The mesh that distances are measured from.

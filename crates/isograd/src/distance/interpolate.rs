@@ -21,7 +21,7 @@ use super::tangent::{Tangent, tangent};
 use super::triangle::closest_point;
 use super::{Error, NO_TRIANGLE};
 use crate::gather::{Buckets, add_to};
-use crate::vector::{norm, to_f64};
+use crate::vector::{add, norm, to_f64};
 use crate::{Mesh, Real};
 
 /// Values at the vertices of a mesh.
@@ -104,25 +104,39 @@ impl<T: Real> VertexValues<'_, T> {
         let at_vertex = |vertex: usize| {
             let mut sum = [0.0; 3];
             hits_of.for_each_corner(&corners, vertex, |hit, corner| {
-                sum = crate::vector::add(sum, shares[hit].corners[corner]);
+                sum = add(sum, shares[hit].corners[corner]);
             });
             sum
         };
         let bounded =
             add_to(&mut out.points, |i| shares[i].query) + add_to(&mut out.vertices, at_vertex);
-        if self.components > 0 {
-            let rows = out.values.par_chunks_exact_mut(self.components).enumerate();
-            rows.for_each(|(vertex, sums)| {
-                for (c, sum) in sums.iter_mut().enumerate() {
-                    let mut total = sum.f64();
-                    hits_of.for_each_corner(&corners, vertex, |hit, corner| {
-                        total += hits[hit].barycentric[corner].f64() * row(hit)[c].f64();
-                    });
-                    *sum = T::of(total);
-                }
-            });
-        }
+        self.add_to_values(&corners, &hits_of, hits, values_bar, &mut out.values);
         Ok(guarded + bounded)
+    }
+
+    /// Adds `β_k ū` to the cotangents of the values at the corners of each hit.
+    fn add_to_values(
+        &self,
+        corners: &[[u32; 3]],
+        hits_of: &Buckets,
+        hits: &[Hit<T>],
+        values_bar: &[T],
+        out: &mut [T],
+    ) {
+        if self.components == 0 {
+            return;
+        }
+        let rows = out.par_chunks_exact_mut(self.components).enumerate();
+        rows.for_each(|(vertex, sums)| {
+            for (c, sum) in sums.iter_mut().enumerate() {
+                let mut total = sum.f64();
+                hits_of.for_each_corner(corners, vertex, |hit, corner| {
+                    let bar = values_bar[hit * self.components + c].f64();
+                    total += hits[hit].barycentric[corner].f64() * bar;
+                });
+                *sum = T::of(total);
+            }
+        });
     }
 
     /// Cotangents through `β` of one hit.
