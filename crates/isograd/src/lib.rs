@@ -80,6 +80,7 @@ pub(crate) mod simd;
 pub mod splat;
 #[cfg(test)]
 mod testing;
+mod thicken;
 pub(crate) mod trilinear;
 
 use isograd_element::{self as element, vector};

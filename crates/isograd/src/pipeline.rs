@@ -20,6 +20,7 @@ mod sparse;
 mod stages;
 mod surface;
 mod text;
+mod thickened;
 #[cfg(test)]
 mod walls_tests;
 
@@ -32,6 +33,7 @@ use crate::data::{Field, Grid, Mesh, PointCloud, Selection};
 use crate::isosurface::measure;
 use crate::report::Report;
 pub(crate) use crate::report::Stage;
+use crate::thicken::Thickened;
 use crate::{Real, distance, isosurface, neighbors, normals, orient, poisson, splat};
 
 pub use concrete::Pipeline;
@@ -216,6 +218,7 @@ struct Residuals<T> {
     smoothing: f64,
     iso_value: isosurface::iso_value::Residual<T>,
     local_level: isosurface::local_level::Residual<T>,
+    thickened: Thickened<T>,
 }
 
 impl<T: Pipeline> Reconstruction<T> {
@@ -271,7 +274,7 @@ impl<T: Real> Reconstruction<T> {
 
     fn splat_samples(&self) -> splat::Samples<'_, T> {
         splat::Samples {
-            points: &self.points,
+            points: self.residuals.thickened.or(&self.points),
             normals: &self.orientation.normals,
             areas: &self.areas,
         }

@@ -24,7 +24,9 @@ pub struct PullbackScratch<T: Real> {
     field: Option<Field<T>>,
     /// Cotangents of the vertices.
     vertices: Vec<[T; 3]>,
-    samples: SampleCotangent<T>,
+    pub(super) samples: SampleCotangent<T>,
+    /// Cotangents of the moved samples.
+    pub(super) moved: Vec<[T; 3]>,
     distance: lattice::PullbackScratch<T>,
     extension: extend::Cotangent<T>,
     poisson: poisson::Scratch<T>,
@@ -113,7 +115,9 @@ impl<T: Real> Reconstruction<T> {
             // From the cell size of the grid of φ to that of the grid of the surface, and back at the end.
             scratch.samples.grid.spacing /= ratio;
             scratch.samples.grid.add(&of_mesh);
-            self.pull_indicator(cotangent, scratch, out)?;
+            self.pull_thickened(scratch, |scratch| {
+                self.pull_indicator(cotangent, scratch, out)
+            })?;
             scratch.samples.grid.spacing *= ratio;
         }
         self.pull_samples(scratch, out);
@@ -300,7 +304,7 @@ impl<T: Real> Reconstruction<T> {
     }
 
     /// From the smoothing, which goes with the root of the mean area, to areas and cell size.
-    fn pull_smoothing(&self, bar: f64, samples: &mut SampleCotangent<T>) {
+    pub(super) fn pull_smoothing(&self, bar: f64, samples: &mut SampleCotangent<T>) {
         let (mean, count) = splat::area::mean(&self.areas);
         let by_logarithm = bar * self.residuals.smoothing;
         if !(mean > 0.0) {

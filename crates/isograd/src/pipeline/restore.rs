@@ -79,7 +79,7 @@ impl<T: Pipeline> Reconstructor<T> {
         self.normals(cloud, None)?;
         self.splat(None)?;
         // The pullback needs residuals of the indicator before the local iso-value was subtracted.
-        self.solve(None)?;
+        self.solve()?;
         self.isosurface()?;
         let Reconstruction { sdf, closest, .. } = &mut self.result;
         sdf.values_mut().copy_from_slice(saved.sdf);

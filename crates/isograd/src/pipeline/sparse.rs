@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::memory::check_blocks;
-use super::{Error, Reconstruction, Reconstructor, SurfaceResolution};
+use super::{Error, Reconstruction, Reconstructor};
 use crate::data::blocks::{BlockField, Blocks, Marks};
 use crate::data::cells::{Cells, CellsMut};
-use crate::isosurface::{self, Level};
+use crate::isosurface;
 use crate::poisson::pyramid::{Octaves, Pyramid};
 use crate::{Field, Grid, Real, poisson, splat};
 
@@ -175,9 +175,7 @@ impl<T: Real> Reconstruction<T> {
 
     /// Whether the surface is that of the indicator on cells half as large.
     pub(super) fn is_refined(&self) -> bool {
-        let options = &self.options;
-        let is_wanted = options.level == Level::Thin && options.surface != SurfaceResolution::Grid;
-        is_wanted && self.sparse.is_none()
+        self.keeps_thin_parts() && self.sparse.is_none()
     }
 
     /// The indicator on the grid of the surface.
@@ -197,7 +195,8 @@ impl<T: Real> Reconstructor<T> {
         count: usize,
         closed: bool,
     ) -> Result<(), Error> {
-        self.result.sparse = Some(Sparse::new(&self.result.points, grid, count, closed)?);
+        let points = self.result.splat_samples().points;
+        self.result.sparse = Some(Sparse::new(points, grid, count, closed)?);
         self.fill_blocks()
     }
 
@@ -213,7 +212,7 @@ impl<T: Real> Reconstructor<T> {
         } = &mut self.result;
         let Some(sparse) = sparse else { return Ok(()) };
         let samples = splat::Samples {
-            points,
+            points: residuals.thickened.or(points),
             normals: &orientation.normals,
             areas,
         };

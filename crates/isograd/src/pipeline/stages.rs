@@ -28,7 +28,7 @@ impl<T: Real> Reconstructor<T> {
             Stage::Normals => self.normals(cloud, held)?,
             Stage::Orient => self.orient(cloud, held)?,
             Stage::Splat => self.splat(held)?,
-            Stage::Poisson => self.solve(held)?,
+            Stage::Poisson => self.solve()?,
             Stage::Isosurface => self.isosurface()?,
             Stage::Distance => self.distance()?,
             Stage::Checks if held.is_some() => (),
@@ -107,6 +107,8 @@ impl<T: Real> Reconstructor<T> {
 
     pub(super) fn splat(&mut self, held: Option<&Reconstruction<T>>) -> Result<(), Error> {
         let (grid, octaves) = self.choose_surface_grid(held)?;
+        let smoothing = self.smoothing(&grid, held);
+        self.result.thicken(&grid, smoothing);
         let Reconstruction {
             options,
             points,
@@ -138,7 +140,7 @@ impl<T: Real> Reconstructor<T> {
             ..
         } = &mut self.result;
         let samples = splat::Samples {
-            points,
+            points: residuals.thickened.or(points),
             normals: &orientation.normals,
             areas,
         };
@@ -190,23 +192,19 @@ impl<T: Real> Reconstructor<T> {
     }
 
     /// The indicator and the level of its surface.
-    pub(super) fn solve(&mut self, held: Option<&Reconstruction<T>>) -> Result<(), Error> {
-        let smoothing = self.smoothing(held);
+    pub(super) fn solve(&mut self) -> Result<(), Error> {
+        let smoothing = self.result.residuals.smoothing;
         if self.result.sparse.is_some() {
-            let Reconstruction {
-                residuals, report, ..
-            } = &mut self.result;
-            (residuals.smoothing, report.smoothing) = (smoothing, smoothing);
+            self.result.report.smoothing = smoothing;
             return self.solve_in_blocks(smoothing);
         }
         let Reconstruction {
             poisson,
             indicator,
-            residuals,
             report,
             ..
         } = &mut self.result;
-        (residuals.smoothing, report.smoothing) = (smoothing, smoothing);
+        report.smoothing = smoothing;
         poisson.solve(indicator.values_mut(), smoothing, &mut self.scratch.poisson)?;
         if self.result.options.screening > 0.0 {
             self.screen()?;
@@ -215,13 +213,12 @@ impl<T: Real> Reconstructor<T> {
     }
 
     /// Width `σ` of the smoothing, in cells.
-    fn smoothing(&self, held: Option<&Reconstruction<T>>) -> f64 {
+    fn smoothing(&self, grid: &Grid<T>, held: Option<&Reconstruction<T>>) -> f64 {
         let result = &self.result;
         match held.filter(|_| !result.options.smoothing_follows()) {
             Some(held) => held.residuals.smoothing,
             None => {
-                let spacing = result.surface_grid().spacing().f64();
-                let in_cells = result.sample_spacing() / spacing;
+                let in_cells = result.sample_spacing() / grid.spacing().f64();
                 result.options.smoothing.cells(in_cells)
             }
         }
@@ -245,7 +242,7 @@ impl<T: Real> Reconstructor<T> {
             grid: &grid,
             samples: splat::SortedSamples {
                 samples: splat::Samples {
-                    points,
+                    points: residuals.thickened.or(points),
                     normals: &orientation.normals,
                     areas,
                 },
@@ -280,6 +277,7 @@ impl<T: Real> Reconstructor<T> {
             report,
             ..
         } = &mut self.result;
+        let points = residuals.thickened.or(points);
         let level = &mut residuals.iso_value;
         let chi = match sparse {
             Some(sparse) => CellsMut::Blocks(&mut sparse.chi),

@@ -29,10 +29,15 @@ impl Step {
     pub fn new(squares: f64, area: f64, options: Options) -> Self {
         Self {
             usual: (squares / area).sqrt(),
-            width: (UNSMOOTHED + options.smoothing * options.smoothing).sqrt(),
+            width: Self::width_of(options.smoothing),
             smoothing: options.smoothing,
             thin: options.thin,
         }
+    }
+
+    /// `w` for a smoothing of this width, all in cells.
+    pub fn width_of(smoothing: f64) -> f64 {
+        (UNSMOOTHED + smoothing * smoothing).sqrt()
     }
 
     /// `Ū/(U Σâ)` for the cotangent `Ū` of the usual slope and the `area` of [`Self::new`]. Times `â u` it is the

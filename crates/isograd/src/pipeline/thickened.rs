@@ -1,0 +1,83 @@
+//! Samples of thin parts, moved apart before the indicator is computed.
+
+use super::Reconstruction;
+use super::pullback::PullbackScratch;
+use crate::isosurface::Level;
+use crate::isosurface::local_level::Step;
+use crate::thicken::{self, Inputs, Thickened};
+use crate::{Grid, Real, SurfaceResolution};
+
+impl<T> Thickened<T> {
+    /// The moved samples, or the original ones where none are moved.
+    pub(super) fn or<'a>(&'a self, points: &'a [[T; 3]]) -> &'a [[T; 3]] {
+        match self.points.is_empty() {
+            true => points,
+            false => &self.points,
+        }
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&self.points[..]) + size_of_val(&self.sums[..])
+    }
+}
+
+impl<T: Real> Reconstruction<T> {
+    /// Whether thin parts are kept by more than the local level.
+    pub(super) fn keeps_thin_parts(&self) -> bool {
+        self.options.level == Level::Thin && self.options.surface != SurfaceResolution::Grid
+    }
+
+    /// Moves samples of thin parts apart, for a surface on this grid and a smoothing of `σ` of its cells.
+    pub(super) fn thicken(&mut self, grid: &Grid<T>, smoothing: f64) {
+        self.residuals.smoothing = smoothing;
+        let mut thickened = std::mem::take(&mut self.residuals.thickened);
+        thickened.points.clear();
+        if self.keeps_thin_parts() && self.options.area {
+            thicken::forward(self.thin_inputs(grid), &mut thickened);
+        }
+        self.residuals.thickened = thickened;
+    }
+
+    fn thin_inputs(&self, grid: &Grid<T>) -> Inputs<'_, T> {
+        Inputs {
+            index: &self.residuals.neighborhoods.index,
+            points: &self.points,
+            normals: &self.orientation.normals,
+            areas: &self.areas,
+            width: Step::width_of(self.residuals.smoothing) * grid.spacing().f64(),
+        }
+    }
+
+    /// Runs `pull` for the moved samples, and adds their cotangents to those of the samples.
+    pub(super) fn pull_thickened<E>(
+        &self,
+        scratch: &mut PullbackScratch<T>,
+        pull: impl FnOnce(&mut PullbackScratch<T>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let Thickened { points, sums, .. } = &self.residuals.thickened;
+        if points.is_empty() {
+            return pull(scratch);
+        }
+        scratch.moved.clear();
+        scratch.moved.resize(points.len(), [T::zero(); 3]);
+        std::mem::swap(&mut scratch.moved, &mut scratch.samples.points);
+        pull(scratch)?;
+        std::mem::swap(&mut scratch.moved, &mut scratch.samples.points);
+        let samples = &mut scratch.samples;
+        let mut bars = thicken::Cotangent {
+            points: &mut samples.points,
+            normals: &mut samples.normals,
+            areas: &mut samples.areas,
+        };
+        let grid = self.surface_grid();
+        let width_bar = thicken::pullback(self.thin_inputs(grid), sums, &scratch.moved, &mut bars);
+        let smoothing = self.residuals.smoothing;
+        let width = Step::width_of(smoothing);
+        samples.grid.spacing += width_bar * width;
+        if self.options.smoothing_follows() {
+            let bar = width_bar * grid.spacing().f64() * smoothing / width;
+            self.pull_smoothing(bar, samples);
+        }
+        Ok(())
+    }
+}

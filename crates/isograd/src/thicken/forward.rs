@@ -1,0 +1,44 @@
+//! The map.
+
+use rayon::prelude::*;
+
+use super::pair::{add_pair, displacement};
+use super::{Inputs, Sums};
+use crate::Real;
+use crate::vector::{add, of_f64, scale, to_f64};
+
+/// Results of the stage.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Thickened<T> {
+    /// `(N, 3)` `x'`.
+    pub points: Vec<[T; 3]>,
+    /// `(N,)` the residual.
+    pub sums: Vec<Sums>,
+}
+
+/// Fills `out`, in the memory of the last one. The same bits for any number of threads.
+pub(crate) fn forward<T: Real>(inputs: Inputs<'_, T>, out: &mut Thickened<T>) {
+    let Thickened { points, sums } = out;
+    let samples = (0..inputs.points.len()).into_par_iter();
+    let found = samples.map(|i| {
+        let own = inputs.sample(i);
+        let mut sums = Sums {
+            own: own.area,
+            ..Sums::default()
+        };
+        inputs.for_each_near(i, |j| {
+            add_pair(&own, &inputs.sample(j), inputs.width, &mut sums);
+        });
+        sums
+    });
+    found.collect_into_vec(sums);
+    let moves = sums.par_iter().enumerate().map(|(i, sums)| {
+        let away = displacement(sums, inputs.width);
+        if away == 0.0 {
+            return inputs.points[i];
+        }
+        let normal = to_f64(inputs.normals[i]);
+        of_f64(add(to_f64(inputs.points[i]), scale(normal, away)))
+    });
+    moves.collect_into_vec(points);
+}

@@ -1,0 +1,105 @@
+//! Thickening: samples on the two faces of a thin part, moved apart along their normals until it shows in the indicator.
+//!
+//! # Map
+//! A part much thinner than a cell hardly shows in the indicator, for the steps of its two faces cancel; a lattice misses
+//! it here and there, and it is in pieces that come and go as it moves. Its samples know how thick it is. With `ℓ` the
+//! [width](crate::isosurface::local_level::Step) of the step of the indicator, `d = x_i − x_j`, `z = n_i·d` the depth of
+//! sample `j` below the face of `i`, `r =` [`REACH`]` ℓ`, `|d| < r`, and areas `a_j`:
+//! ```text
+//! v_ij = a_j e(n_i·n_j) k(|d|²/r²)             samples of the face of i
+//! w_ij = a_j e(−n_i·n_j) k(|d|²/r²) g(z/ℓ)     samples of the other face
+//! t_i  = Σ_j w_ij z / Σ_j w_ij                 thickness of the part at sample i
+//! s_i  = Σ_j w_ij / Σ_j v_ij                   how much there is of the other face
+//! x'_i = x_i + ½ ℓ f(t_i/ℓ) c(s_i) n_i
+//! ```
+//! - `e(u) = (2u − 1)²` for `u > ½`, else 0: normals within 60° of the face's own, or of the opposite one;
+//! - `k(q) = (1 − q)²`, as in the [areas](crate::splat::area);
+//! - `g` rises smoothly from 0 at `z = −ℓ/4` to 1 at `z = 0`: what lies further outside is another part, across a gap;
+//! - `f(t) = T − t` up to `T − B`, then `(T + B − t)²/4B`, and 0 from `T + B` on, with `T =` [`LEAST`] and `B =` [`BLEND`];
+//! - `c(s) = s(2 − s)`, and 1 from `s = 1` on.
+//!
+//! Each of them has a continuous derivative. At a rim half of either face is missing, and `s` stays about 1: the part is as
+//! thick there as elsewhere, and its edge is blunt. A knife's edge would be where χ is flat, and its place would depend on
+//! how it lies on the grid.
+//!
+//! # Residual
+//! [`Sums`] of each sample.
+//!
+//! # Pullback
+//! With `b = x̄'`, `p = ½ b·n`: `f̄ = ℓ p c`, `c̄ = ℓ p f`; from these `t̄`, `s̄`, and the cotangents `σ`, `ζ`, `υ` of `Σ w`,
+//! `Σ w z`, `Σ v`. A pair of opposite faces has `w̄ = σ + ζ z`, one of the same face `w̄ = υ`, and
+//! ```text
+//! z̄ = ζ w + w̄ ∂w/∂z      ū = w̄ ∂w/∂u      d̄ = z̄ n_i + 2 w̄ ∂w/∂|d|² d
+//! x̄_i += d̄   x̄_j −= d̄   n̄_i += z̄ d + ū n_j   n̄_j += ū n_i   ā_j += w̄ w/a_j
+//! ```
+//! and `x̄_i += b`, `n̄_i += ½ ℓ f c b`. The map is homogeneous in lengths, so `ℓ ℓ̄ = Σ b·(x' − x) − Σ d̄·d − 2 Σ ā a`.
+//! [`pullback`] gathers: a sample adds its own pairs and those in which it is the other one.
+//!
+//! # Not differentiable
+//! Nothing; second derivatives jump.
+
+mod forward;
+mod pair;
+mod pullback;
+#[cfg(test)]
+mod tests;
+
+pub(crate) use forward::{Thickened, forward};
+pub(crate) use pullback::{Cotangent, pullback};
+
+use crate::Real;
+use crate::neighbors::CellIndex;
+
+/// Radius within which the other face is sought, in widths.
+const REACH: f64 = 2.5;
+
+/// Thickness, in widths, that thinner parts are given.
+const LEAST: f64 = 1.2;
+
+/// Half of the range of thicknesses over which parts begin to be thickened, in widths.
+const BLEND: f64 = 0.4;
+
+/// Samples, `(N, 3)`, `(N, 3)` and `(N,)` in input order, with the tree of the points.
+#[derive(Clone, Copy)]
+pub(crate) struct Inputs<'a, T> {
+    pub index: &'a CellIndex<T>,
+    pub points: &'a [[T; 3]],
+    pub normals: &'a [[T; 3]],
+    pub areas: &'a [T],
+    /// `ℓ`, in the unit of the points.
+    pub width: f64,
+}
+
+/// Sums over the pairs of a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Sums {
+    /// `Σ w`, in the unit of the areas.
+    pub weight: f64,
+    /// `Σ w z`.
+    pub depth: f64,
+    /// `Σ v`, with the sample itself, for which `v = a`.
+    pub own: f64,
+}
+
+impl<T: Real> Inputs<'_, T> {
+    fn sample(&self, i: usize) -> pair::Sample {
+        pair::Sample {
+            point: crate::vector::to_f64(self.points[i]),
+            normal: crate::vector::to_f64(self.normals[i]),
+            area: self.areas[i].f64(),
+        }
+    }
+
+    /// Calls `visit` for the other samples within reach of sample `i` whose normals are within 60° of its own, or of the
+    /// opposite one.
+    fn for_each_near(&self, i: usize, mut visit: impl FnMut(usize)) {
+        let reach = T::of(REACH * self.width);
+        let own = self.normals[i];
+        let limit = T::of(0.5);
+        self.index.for_each_within(self.points[i], reach, |j, _| {
+            if j != i && crate::vector::dot(own, self.normals[j]).abs() > limit {
+                visit(j);
+            }
+        });
+    }
+}

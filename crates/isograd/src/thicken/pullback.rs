@@ -1,0 +1,77 @@
+//! The pullback.
+
+use rayon::prelude::*;
+
+use super::pair::{displacement, pull_pair, pull_sums};
+use super::{Inputs, Sums};
+use crate::vector::{add, dot, of_f64, scale, sub, to_f64};
+use crate::{Real, parallel};
+
+/// Cotangents of the inputs, which the pullback adds to.
+pub(crate) struct Cotangent<'a, T> {
+    /// `(N, 3)`.
+    pub points: &'a mut [[T; 3]],
+    /// `(N, 3)`.
+    pub normals: &'a mut [[T; 3]],
+    /// `(N,)`.
+    pub areas: &'a mut [T],
+}
+
+/// What a sample receives.
+#[derive(Clone, Copy, Default)]
+struct Share {
+    point: [f64; 3],
+    normal: [f64; 3],
+    area: f64,
+    /// `d̄·d` of the pairs that it is the first of.
+    length: f64,
+}
+
+/// From the cotangents of the moved points, `(N, 3)`, to those of the inputs. Returns that of the width.
+pub(crate) fn pullback<T: Real>(
+    inputs: Inputs<'_, T>,
+    sums: &[Sums],
+    moved_bar: &[[T; 3]],
+    bars: &mut Cotangent<'_, T>,
+) -> f64 {
+    let width = inputs.width;
+    let bar_along = |i: usize| dot(to_f64(moved_bar[i]), to_f64(inputs.normals[i]));
+    let samples = || (0..sums.len()).into_par_iter();
+    let of_sums = samples().map(|i| pull_sums(&sums[i], width, bar_along(i)));
+    let of_sums: Vec<Sums> = of_sums.collect();
+    let shares: Vec<Share> = samples().map(|i| gather(inputs, &of_sums, i)).collect();
+    let work = bars.points.par_iter_mut().zip(&mut *bars.normals);
+    let work = work.zip(&mut *bars.areas).enumerate();
+    work.for_each(|(i, ((point, normal), area))| {
+        let (share, bar) = (&shares[i], to_f64(moved_bar[i]));
+        let away = displacement(&sums[i], width);
+        *point = of_f64(add(to_f64(*point), add(bar, share.point)));
+        *normal = of_f64(add(to_f64(*normal), add(scale(bar, away), share.normal)));
+        *area = T::of(area.f64() + share.area);
+    });
+    let [by_length] = parallel::sum_array(sums.len(), |i| {
+        let moved = displacement(&sums[i], width) * bar_along(i);
+        [moved - shares[i].length - 2.0 * shares[i].area * inputs.areas[i].f64()]
+    });
+    by_length / width
+}
+
+/// The pairs of sample `i`, and those of which it is the second.
+fn gather<T: Real>(inputs: Inputs<'_, T>, of_sums: &[Sums], i: usize) -> Share {
+    let (own, mut share) = (inputs.sample(i), Share::default());
+    let none = Sums::default();
+    share.area = of_sums[i].own;
+    inputs.for_each_near(i, |j| {
+        if of_sums[i] == none && of_sums[j] == none {
+            return;
+        }
+        let other = inputs.sample(j);
+        let first = pull_pair(&own, &other, inputs.width, &of_sums[i]);
+        let second = pull_pair(&other, &own, inputs.width, &of_sums[j]);
+        share.point = add(share.point, sub(first.offset, second.offset));
+        share.normal = add(share.normal, add(first.normals[0], second.normals[1]));
+        share.area += second.area;
+        share.length += first.length;
+    });
+    share
+}
