@@ -20,6 +20,18 @@ const BLUNT: f32 = 0.22;
 /// A sample lies off a sheet from this many times as far as the samples of the sheet scatter.
 const APART: f32 = 3.0;
 
+/// Least mean share of [interleaved](super::sheets::interleaved) neighbors of two samples whose sheets lie over each
+/// other.
+const INTERLEAVED: f32 = 0.3;
+
+/// Cosines between the axes of two such sheets from which on their reflection is not full, and is as without sheets:
+/// 26 and 46 degrees.
+const FULL: f32 = 0.9;
+const NONE: f32 = 0.7;
+
+/// A sample stands for at most this many times the median area: outliers far apart are no surface.
+const MOST_AREA: f32 = 16.0;
+
 /// Gap of an unknown sheet: no length reaches it.
 const UNKNOWN: f32 = f32::MAX;
 
@@ -73,9 +85,28 @@ pub(super) fn least_gap(a: f32, b: f32) -> f32 {
         if b > a {
             larger = b;
         }
-        (APART * larger) * (APART * larger)
+        largest_height(larger) * largest_height(larger)
     } else {
         UNKNOWN
+    }
+}
+
+/// Height up to which a sample lies on a sheet that scatters so much.
+#[inline(always)]
+pub(super) fn largest_height(scatter: f32) -> f32 {
+    APART * scatter
+}
+
+/// How far the reflection of two samples of known sheets is full, in 0..1: near 1 for parallel sheets, and for all acute
+/// angles where the samples of the two sheets are mixed. Where one sheet bends slightly, they are not.
+#[inline(always)]
+fn facing(parallel: f32, interleaved: f32) -> f32 {
+    if interleaved > INTERLEAVED {
+        ((parallel.abs() - NONE) / (FULL - NONE)).clamp(0.0, 1.0)
+    } else {
+        let second = parallel * parallel;
+        let fourth = second * second;
+        fourth * fourth
     }
 }
 
@@ -99,7 +130,8 @@ pub(super) fn blur(reach: f32, spreads: f32, thicknesses: f32, gap: f32) -> f32 
 /// between them, have opposite outward normals. A [`blur`] takes the reflection back
 /// where `d` is too short to tell. Two parallel sheets much closer to each other than their samples are
 /// face each other although `d` runs along them: there the reflection is full from the height whose square
-/// is `gap` on.
+/// is `gap` on. So do the two sides of a wedge, near its edge: there the samples of both are mixed, of which
+/// `interleaved` is the mean share at the two samples.
 ///
 /// `parallel` is `a·b`, `heights` is `(a·d)(b·d)`, and `square` is `|d|²` and the blur.
 ///
@@ -107,12 +139,10 @@ pub(super) fn blur(reach: f32, spreads: f32, thicknesses: f32, gap: f32) -> f32 
 /// and defective data sets" (2004).
 #[allow(clippy::manual_clamp)] // a kernel has no such method
 #[inline(always)]
-pub(super) fn coupled(parallel: f32, heights: f32, square: f32, gap: f32) -> f32 {
+pub(super) fn coupled(parallel: f32, heights: f32, square: f32, gap: f32, interleaved: f32) -> f32 {
     let mut divisor = square;
     if gap < square && heights * parallel > 0.0 {
-        let second = parallel * parallel;
-        let fourth = second * second;
-        let share = fourth * fourth;
+        let share = facing(parallel, interleaved);
         let full = share * (heights.abs() + gap) + (1.0 - share) * square;
         if full < square {
             divisor = full;
@@ -160,6 +190,12 @@ pub(super) fn area(reach: f32, same: f32) -> f32 {
         share = LEAST_SHARE;
     }
     PI * reach * reach / (IN_RING * share)
+}
+
+/// The area of a sample, limited by the median of all.
+#[inline(always)]
+pub(super) fn bounded_area(area: f32, median: f32) -> f32 {
+    area.min(MOST_AREA * median)
 }
 
 /// How much a neighbor lies off the sheet of a sample: above 0 where its `height`, along the axis, is. `square` is

@@ -9,10 +9,11 @@
 
 use rayon::prelude::*;
 
+use super::Axes;
 pub use super::coupling::NEIGHBORS;
 use super::coupling::{self, RING, ROUNDS};
+use super::sheets::{self, Near, Sheets};
 use super::sites::Sites;
-use super::{Axes, sheet};
 use crate::neighbors::Neighborhoods;
 use crate::normals::Plane;
 use crate::parallel::CHUNK;
@@ -35,6 +36,8 @@ pub struct Graph {
     pub coupling: Vec<[f32; NEIGHBORS]>,
     /// `(N,)` how far the samples of its sheet lie off it, in spacings, where that is known; else 0.
     pub scatter: Vec<f32>,
+    /// `(N,)` in 0..1, the share of the neighbors off its sheet that lie over or under it; 0 without a sheet.
+    pub interleaved: Vec<f32>,
     /// `(N,)` the area of surface that each sample stands for, in squares of the spacing.
     pub area: Vec<f32>,
     /// `(N,)` how far samples lie off their common plane, where they scatter so much that the axis was sought in a
@@ -46,6 +49,9 @@ pub struct Graph {
     pub ring: Vec<f32>,
     /// `(N,)` typical distance of the nearest samples from the tangent plane, in spacings.
     pub thickness: Vec<f32>,
+    sheets: Sheets,
+    /// Scratch for medians.
+    values: Vec<f32>,
 }
 
 impl Graph {
@@ -142,17 +148,24 @@ impl Graph {
 
     /// Takes the axis of its own sheet for each point whose neighbors lie on several.
     fn find_sheets(&mut self) {
-        self.scatter.resize(self.offset.len(), 0.0);
-        let points = self.axis.par_iter_mut().zip(&mut self.scatter);
+        let near = Near {
+            near: &self.near,
+            offset: &self.offset,
+        };
+        self.sheets.find(near, &self.axis);
+        self.scatter.clear();
+        let sheets = self.sheets.sheets();
+        self.scatter
+            .extend(sheets.iter().map(|sheet| sheet.scatter));
+        for (axis, sheet) in self.axis.iter_mut().zip(sheets) {
+            if sheet.scatter > 0.0 {
+                *axis = sheet.axis;
+            }
+        }
+        let points = self.offset.par_iter().zip(sheets);
         points
-            .zip(&self.offset)
-            .for_each(|((axis, scatter), offset)| {
-                *scatter = 0.0;
-                if let Some(found) = sheet::find(offset, *axis) {
-                    *axis = found.axis;
-                    *scatter = found.scatter;
-                }
-            });
+            .map(|(offset, &sheet)| sheets::interleaved(offset, sheet))
+            .collect_into_vec(&mut self.interleaved);
     }
 
     /// Reach and thickness of every point.
@@ -207,7 +220,15 @@ impl Graph {
         let blur = coupling::blur(self.reach[p], spreads, thicknesses, gap);
         let heights = vector::dot(a, d) * vector::dot(b, d);
         let square = vector::norm_squared(d) + blur;
-        coupling::trusted(coupling::coupled(vector::dot(a, b), heights, square, gap))
+        let interleaved = 0.5 * (self.interleaved[p] + self.interleaved[q]);
+        let parallel = vector::dot(a, b);
+        coupling::trusted(coupling::coupled(
+            parallel,
+            heights,
+            square,
+            gap,
+            interleaved,
+        ))
     }
 
     /// In layers with air on both sides, as far as they are that (`slab`, `(N,)` in 0..1), two samples hang together
@@ -244,6 +265,12 @@ impl Graph {
             let same = near[p].iter().enumerate().filter(same).count();
             *area = coupling::area(reach[p], same as f32);
         });
+        self.values.clone_from(&self.area);
+        if !self.values.is_empty() {
+            let median = median(&mut self.values);
+            let areas = self.area.iter_mut();
+            areas.for_each(|area| *area = coupling::bounded_area(*area, median));
+        }
     }
 
     /// Evidence in −1..1 for the sign of the axis of a site from a second sheet close by: the samples of

@@ -77,6 +77,7 @@ mod sensors;
 #[cfg(test)]
 mod shapes;
 mod sheet;
+mod sheets;
 mod sight;
 mod signs;
 mod sites;

@@ -35,13 +35,26 @@ const ROUNDED: f32 = 0.02;
 /// The square of the sine under which two neighbors must be seen to span a plane: 0.3.
 const SLIVER: f32 = 0.3 * 0.3;
 
-/// A local sheet.
-#[derive(Clone, Copy, Debug)]
+/// A local sheet; none if its scatter is 0.
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sheet {
     /// Its axis, on the side of the axis that was given.
     pub axis: [f32; 3],
     /// How far its samples lie off it; above 0.
     pub scatter: f32,
+}
+
+impl Sheet {
+    /// The sheet with its axis on the side of another.
+    pub(super) fn toward(self, axis: [f32; 3]) -> Self {
+        match vector::dot(self.axis, axis) < 0.0 {
+            true => Self {
+                axis: self.axis.map(|x| -x),
+                ..self
+            },
+            false => self,
+        }
+    }
 }
 
 type Offsets = [[f32; 3]; NEIGHBORS];
@@ -59,14 +72,11 @@ pub(super) fn find(offset: &Offsets, axis: [f32; 3]) -> Option<Sheet> {
     let limit = largest_residual(fit, rest);
     let on = offset.iter().zip(apart).filter(|&(_, r)| r <= limit);
     let (found, scatter) = plane(on.map(|(d, _)| *d));
-    Some(Sheet {
-        axis: if vector::dot(found, axis) < 0.0 {
-            found.map(|x| -x)
-        } else {
-            found
-        },
+    let sheet = Sheet {
+        axis: found,
         scatter: bounded_scatter(scatter, limit),
-    })
+    };
+    Some(sheet.toward(axis))
 }
 
 /// Of the given plane and those spanned by two near neighbors, the one closest to a quorum, and how close.
