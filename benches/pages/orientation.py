@@ -13,6 +13,7 @@ FAMILIES = {
     "degraded": "Holes, noise and outliers",
     "thin": "Close sheets",
     "joined": "Cavities, touching bodies, open surfaces",
+    "parts": "Parts with sharp edges",
 }
 # Share of wrong signs that counts as solved, in percent.
 SOLVED = 0.5

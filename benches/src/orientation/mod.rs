@@ -2,6 +2,7 @@
 
 pub mod body;
 pub mod measure;
+pub mod parts;
 pub mod suite;
 
 use std::fs;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::body::{Body, RANDOM, shell, wing};
+use super::parts;
 use crate::sampling::Draw;
 
 /// Extension of the files of real clouds.
@@ -28,6 +29,8 @@ pub enum Family {
     Thin,
     /// Bodies that touch, cavities and open surfaces.
     Joined,
+    /// Parts with sharp edges, ribs and gaps, some with holes.
+    Parts,
 }
 
 /// A cloud of the suite, generated on demand.
@@ -55,6 +58,7 @@ pub fn generated() -> Vec<Cloud> {
     suite.add_wings();
     suite.add_cavities();
     suite.add_boxes();
+    suite.add_parts();
     suite.clouds
 }
 
@@ -227,6 +231,32 @@ impl Suite {
         ] {
             self.add(Family::Joined, format!("boxes {what}"), move || {
                 two_boxes(offset, 18)
+            });
+        }
+    }
+
+    /// Ribbed plates, blades, bundles of tubes, and brackets with and without holes.
+    fn add_parts(&mut self) {
+        for thickness in [0.01, 0.02] {
+            self.add(Family::Parts, format!("ribs {thickness}"), move || {
+                parts::union(&parts::ribbed_plate(thickness), SAMPLES, 31)
+            });
+        }
+        for thickness in [0.02, 0.05, 0.1] {
+            self.add(Family::Parts, format!("blade {thickness}"), move || {
+                parts::union(&[parts::blade(thickness)], 20_000, 32)
+            });
+        }
+        for gap in [0.01, 0.03] {
+            self.add(Family::Parts, format!("tubes {gap}"), move || {
+                parts::union(&parts::bundle(gap), SAMPLES, 33)
+            });
+        }
+        for seed in 1..=3 {
+            let bracket = move || parts::union(&parts::bracket(seed), 30_000, seed);
+            self.add(Family::Parts, format!("bracket {seed}"), bracket);
+            self.add(Family::Parts, format!("bracket {seed} holes"), move || {
+                bracket().with_holes(0.7, 40 + seed)
             });
         }
     }

@@ -49,9 +49,9 @@ pub struct Graph {
     pub ring: Vec<f32>,
     /// `(N,)` typical distance of the nearest samples from the tangent plane, in spacings.
     pub thickness: Vec<f32>,
-    sheets: Sheets,
+    pub(super) sheets: Sheets,
     /// Scratch for medians.
-    values: Vec<f32>,
+    pub(super) values: Vec<f32>,
 }
 
 impl Graph {

@@ -160,3 +160,121 @@ impl Sheet {
         vector::dot(self.axis, other.axis).abs() >= ALIGNED
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::shapes::{Random, neighborhoods, oriented};
+    use super::super::{Method, shapes::Sampled};
+    use super::*;
+    use crate::normals;
+
+    /// `n` random samples of the two sides of a wedge of this angle, in degrees, whose edge is the y axis: 1 × 2.
+    fn wedge(n: usize, degrees: f64, seed: u64) -> Sampled {
+        let (sin, cos) = (0.5 * degrees.to_radians()).sin_cos();
+        let mut random = Random(seed);
+        let sample = |_| {
+            let (x, y) = (random.unit(), 2.0 * random.unit());
+            let side = if random.unit() < 0.5 { -1.0 } else { 1.0 };
+            ([x * cos, y, side * x * sin], [-sin, 0.0, side * cos])
+        };
+        (0..n).map(sample).unzip()
+    }
+
+    /// Neighbors by exhaustive search, and their sheets.
+    fn sheets(points: &[[f64; 3]], spacing: f64, axis: [f32; 3]) -> (Vec<Sheet>, Vec<Sheet>) {
+        let (mut near, mut offset) = (Vec::new(), Vec::new());
+        for &x in points {
+            let distance = |q: usize| vector::norm_squared(vector::sub(points[q], x));
+            let mut all: Vec<usize> = (0..points.len()).collect();
+            all.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)));
+            let neighbors: [usize; NEIGHBORS] = std::array::from_fn(|k| all[k + 1]);
+            near.push(neighbors.map(|q| q as u32));
+            offset.push(
+                neighbors.map(|q| {
+                    vector::of_f64(vector::scale(vector::sub(points[q], x), 1.0 / spacing))
+                }),
+            );
+        }
+        let near = Near {
+            near: &near,
+            offset: &offset,
+        };
+        let alone = offset.iter().map(|d| sheet::find(d, axis));
+        let alone = alone.map(Option::unwrap_or_default).collect();
+        let mut found = Sheets::default();
+        found.find(near, &vec![axis; points.len()]);
+        (alone, found.sheets)
+    }
+
+    fn known(sheets: &[Sheet]) -> usize {
+        sheets.iter().filter(|sheet| sheet.is_known()).count()
+    }
+
+    #[test]
+    fn samples_without_a_sheet_take_that_of_their_neighbors() {
+        let (points, normals) = wedge(2000, 4.0, 5);
+        let (alone, sheets) = sheets(&points, (2.0f64 / 1000.0).sqrt(), [0.0, 0.0, 1.0]);
+        // By chance fewer than six or more than ten of 16 neighbors lie on the sheet of a sample.
+        assert!(known(&alone) < 1960, "{}", known(&alone));
+        assert!(known(&sheets) >= 1990, "{}", known(&sheets));
+        let off = |(sheet, &n): (&Sheet, &[f64; 3])| {
+            vector::dot(vector::to_f64(sheet.axis), n).abs() < 1.0f64.to_radians().cos()
+        };
+        let off = sheets
+            .iter()
+            .zip(&normals)
+            .filter(|&pair| off(pair))
+            .count();
+        assert!(off <= 20, "{off}");
+    }
+
+    #[test]
+    fn noise_has_no_sheets() {
+        let mut random = Random(11);
+        let place = |_| [random.unit(), random.unit(), 0.05 * random.unit()];
+        let points: Vec<[f64; 3]> = (0..2000).map(place).collect();
+        let (alone, sheets) = sheets(&points, (1.0f64 / 2000.0).sqrt(), [0.0, 0.0, 1.0]);
+        assert!(known(&alone) > 5 && known(&sheets) == 0);
+    }
+
+    #[test]
+    fn samples_of_two_sheets_are_mixed_and_those_of_a_bend_are_apart() {
+        let mut random = Random(3);
+        let plane = Sheet {
+            axis: [0.0, 0.0, 1.0],
+            scatter: 1e-3,
+        };
+        let mut mean = |height: fn(f64, f64) -> f64| {
+            let mut share = || {
+                let offset = std::array::from_fn(|_| {
+                    let [x, y, pick] = [(); 3].map(|()| 4.0 * random.unit() - 2.0);
+                    [x, y, height(x, pick)].map(|c| c as f32)
+                });
+                interleaved(&offset, plane)
+            };
+            (0..500).map(|_| share()).sum::<f32>() / 500.0
+        };
+        let two = mean(|_, pick| if pick < 0.0 { 0.0 } else { 0.1 });
+        let bend = mean(|x, _| -0.1 * (x - 0.5).max(0.0));
+        assert!(two > 0.5 && bend < 0.2, "{two} {bend}");
+    }
+
+    #[test]
+    fn signs_are_right_up_to_the_edge_of_a_wedge() {
+        let (mut wrong, mut all) = (0, 0);
+        for degrees in [2.0, 10.0, 25.0] {
+            let (points, normals) = wedge(6000, degrees, 7);
+            let near = neighborhoods(&points);
+            let mut axes = normals::Residual::default();
+            normals::forward(&near, &mut axes);
+            let out = oriented(&points, &axes.normals, &near, None, &Method::Auto).unwrap();
+            let cosines = out.normals.iter().zip(&normals);
+            let cosines = cosines.map(|(&a, &b)| vector::dot(a, b));
+            wrong += cosines.filter(|&c| c < -0.5).count();
+            all += points.len();
+        }
+        println!("{wrong} of {all}");
+        // Without extended sheets, or with wedges coupled like bends, more than one in a hundred.
+        assert!(500 * wrong < all, "{wrong} of {all}");
+    }
+}
