@@ -1,6 +1,6 @@
 //! Machine parts with sharp edges: unions of prisms and cylinders.
 
-use isograd_element::vector::{add, dot, norm, scale, sub};
+use isograd_element::vector::{add, dot, scale, sub};
 
 use super::body::{Body, Random};
 
@@ -194,6 +194,8 @@ pub fn bracket(seed: u64) -> Vec<Prism> {
 
 #[cfg(test)]
 mod tests {
+    use isograd_element::vector::norm;
+
     use super::*;
 
     /// By the divergence theorem, the mean of (x, n) over the surface is three times volume over area.
