@@ -49,6 +49,7 @@
 //! | [`neighbors`] | points → neighborhoods |
 //! | [`normals`] | neighborhoods → unoriented normals |
 //! | [`orient`] | unoriented normals → outward normals |
+//! | `thicken` | samples of parts thinner than a cell → the same moved apart, for [`isosurface::Level::Thin`] |
 //! | [`splat`] | normals and areas → right-hand side of the Poisson equation |
 //! | [`poisson`] | right-hand side → indicator χ |
 //! | [`isosurface`] | χ → iso-value and mesh |

@@ -217,6 +217,8 @@ struct Residuals<T> {
     /// `σ` of the smoothing, in cells.
     smoothing: f64,
     iso_value: isosurface::iso_value::Residual<T>,
+    /// Trilinear values of the indicator at the samples, of a screened equation.
+    screened: isosurface::iso_value::Residual<T>,
     local_level: isosurface::local_level::Residual<T>,
     thickened: Thickened<T>,
 }

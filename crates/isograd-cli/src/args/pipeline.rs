@@ -62,7 +62,7 @@ pub struct MethodArgs {
     #[arg(long, value_name = "ALPHA", default_value = "0", value_parser = not_negative)]
     pub screening: f64,
     /// Value of the indicator at the surface: local (that at the samples nearby), thin (like local, and parts thinner
-    /// than a cell are made a cell thick; the surface is marched on half cells) or mean (the mean at all samples)
+    /// than a cell are made about a cell thick; the surface is marched on half cells) or mean (the mean at all samples)
     #[arg(long, value_name = "LEVEL", default_value = "local")]
     pub level: Level,
     /// Cells that the surface is found on: auto (about the distance between samples, up to twice as fine as the grid of

@@ -71,9 +71,9 @@ pub enum Level {
     #[default]
     Local,
     /// Like `Local`, also on parts thinner than a cell, which are made about a cell thick: hardly any of them is missed.
-    /// Where the surface has a grid of its own and a dense solve, the surface is that of quadratic B-splines, marched on
-    /// cells half as large, and derivatives vary less within a cell: on a lens a cell thick, by 12 % instead of 37 %.
-    /// Edges are rounded a little more.
+    /// Where the surface has a grid of its own, samples of such parts are moved apart until these are thick enough, if
+    /// samples have areas. With a dense solve, the surface is also that of quadratic B-splines, marched on cells half as
+    /// large, and derivatives vary less within a cell. Edges are rounded a little more.
     Thin,
 }
 

@@ -229,7 +229,7 @@ impl<T: Real> Reconstruction<T> {
         );
         if let (true, Bars::Dense(field)) = (self.options.screening > 0.0, &mut bars) {
             let equation = self.screened_equation(sorted);
-            let (level, scratch) = (&residuals.iso_value, &mut scratch.screened);
+            let (level, scratch) = (&residuals.screened, &mut scratch.screened);
             screened::pullback(&equation, level, field.values_mut(), scratch, samples)?;
         }
         let smoothing = residuals.smoothing;

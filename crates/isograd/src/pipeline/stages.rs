@@ -256,6 +256,9 @@ impl<T: Real> Reconstructor<T> {
             indicator.values_mut(),
             &mut self.scratch.screened,
         )?;
+        let (points, chi) = (equation.samples.samples.points, (&*indicator).into());
+        let values = &mut residuals.screened;
+        isosurface::iso_value::forward_on(chi, points, areas, Interpolation::Linear, values)?;
         Ok(())
     }
 

@@ -258,6 +258,7 @@ fn all_results_are_pulled_back_to_all_inputs() {
         .clone()
         .screening(2.0)
         .surface(SurfaceResolution::Factor(1.5));
+    let screened_thin = screened.clone().level(Level::Thin);
     let sparse = estimated
         .clone()
         .solve(Solve::Sparse)
@@ -277,6 +278,7 @@ fn all_results_are_pulled_back_to_all_inputs() {
         signs,
         plain,
         screened,
+        screened_thin,
         sparse,
         sparse_mean,
     ] {

@@ -1,9 +1,12 @@
 //! Hashes of φ, mesh, normals and gradients of four clouds, recorded once: no change of structure may change a bit.
-//! Recorded again when the automatic radius became the median over all points instead of 1,024 of them.
+//! Recorded again when the automatic radius became the median over all points instead of 1,024 of them, when the confidence
+//! of `auto` came from confirmed sheets, and for the plate when samples of thin parts were moved apart.
 //!
 //! The clouds are made with the four operations and square roots alone. The stages also use functions of the C library,
 //! whose last bit is not the same everywhere: the test runs where a hash of those is the recorded one, and is skipped
 //! with a message elsewhere.
+
+use std::fmt::Write as _;
 
 use isograd::distance::Band;
 use isograd::isosurface::Level;
@@ -264,31 +267,31 @@ const RECORDED: [[[u64; 5]; 2]; 5] = [
             0x73e1701fc8902dd5,
             0xb0c209cf5ecea35f,
             0x9e3280704ec80706,
-            0x001341b31b6a4b4c,
+            0x91e108f9238ebc11,
             0x9f91b81e624486ba,
         ],
         [
             0x856408b95f263e3a,
             0x5ec050bdd9afd4d5,
             0x0cd86b2b32bad919,
-            0x67d85c70be244da1,
+            0x3af7526a6360c8da,
             0xb9b3daf3e42e45d6,
         ],
     ],
     [
         [
-            0xce35ce1659c0b2a3,
-            0xa6ee91ce85944409,
-            0xe47472a30c6de5a8,
-            0xae426791c8130acc,
-            0xcb86a0e999af8bed,
+            0xefbe5a92321129f2,
+            0xb3fd8f7515c9e0fd,
+            0x245db8a9fdfda689,
+            0xeed57f3b200d4048,
+            0xe03c5b6dd5b9b3a0,
         ],
         [
-            0xa656980c52654649,
-            0x79992ce9f25f17d1,
-            0x2f41ff6f9f3dc226,
-            0x1bc0656dc4b811e6,
-            0x1655a171c57ca321,
+            0x534e5d63da01b9d2,
+            0xd562ddee8ea62202,
+            0xa09ed30913a6e079,
+            0x2fba966a54370adc,
+            0x7ed42c8a47e02890,
         ],
     ],
     [
@@ -328,14 +331,14 @@ const RECORDED: [[[u64; 5]; 2]; 5] = [
             0xe8aafe28c6c6a803,
             0x35711806b711e961,
             0xd8fffe3c88364574,
-            0x001341b31b6a4b4c,
+            0x91e108f9238ebc11,
             0xa82bed8aa58ce6a2,
         ],
         [
             0x4b5d510b2b6afeec,
             0x0e3edc968cdd1c1e,
             0xdb50342468cd486f,
-            0x67d85c70be244da1,
+            0x3af7526a6360c8da,
             0x316a6b97dba01093,
         ],
     ],
@@ -357,12 +360,16 @@ fn bits_are_those_recorded() {
             ]
         })
         .collect();
+    let mut changed = String::new();
     for ((name, ..), (found, recorded)) in cases().iter().zip(found.iter().zip(&RECORDED)) {
         for (real, (found, recorded)) in ["f32", "f64"].iter().zip(found.iter().zip(recorded)) {
-            assert!(
-                found == recorded,
-                "{name}, {real}: [φ, χ, mesh, normals, gradients] are {found:#018x?}, recorded {recorded:#018x?}"
-            );
+            if found != recorded {
+                let _ = writeln!(
+                    changed,
+                    "{name}, {real}: [φ, χ, mesh, normals, gradients] are {found:#018x?}, recorded {recorded:#018x?}"
+                );
+            }
         }
     }
+    assert!(changed.is_empty(), "{changed}");
 }

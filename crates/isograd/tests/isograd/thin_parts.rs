@@ -84,3 +84,50 @@ fn derivatives_on_a_lens_a_cell_thick_hold_across_a_cell() {
         assert!((row.large_ratio() - 1.0).abs() < 0.15, "{row:?}");
     }
 }
+
+#[test]
+fn derivatives_on_a_lens_that_is_thickened_are_those_of_small_steps() {
+    let cloud = lens_and_ball(20_000, 0.02);
+    let grid = Grid::fit(&cloud, Resolution::Cells(48), 0.15).expect("a grid");
+    let options = gradcheck::Options {
+        reconstruction: Options::default()
+            .orient(Method::Given)
+            .surface(SurfaceResolution::Factor(1.5))
+            .level(Level::Thin),
+        ..gradcheck::Options::default()
+    };
+    let found = gradcheck::gradcheck(&cloud, grid, &options, &mut |_| ()).expect("a surface");
+    assert!(!found.rows.is_empty());
+    for row in &found.rows {
+        println!("{:?}: {:e}", row.motion, row.small_ratio() - 1.0);
+        assert!((row.small_ratio() - 1.0).abs() < 1e-4, "{row:?}");
+    }
+}
+
+#[test]
+fn a_lens_thinner_than_a_cell_is_whole_and_moves_with_its_samples() {
+    let lens = lens_and_ball(20_000, 0.02);
+    let grid = Grid::fit(&lens, Resolution::Cells(48), 0.15).expect("a grid");
+    let step = 0.1 * grid.spacing();
+    let options = Options::default()
+        .orient(Method::Given)
+        .surface(SurfaceResolution::Factor(1.5))
+        .level(Level::Thin);
+    let mut plan = Reconstructor::new(grid, options).expect("options");
+    let mut before: Option<Vec<f64>> = None;
+    for k in 0..6 {
+        let by = vector::scale([0.6, 0.0, 0.8], f64::from(k) * step);
+        let points = lens.points().iter().map(|&x| vector::add(x, by)).collect();
+        let normals = lens.normals().expect("given").to_vec();
+        let cloud = PointCloud::new(points).expect("finite");
+        let cloud = cloud.with_normals(normals).expect("one each");
+        let result = plan.reconstruct(&cloud).expect("a surface");
+        // The lens and the ball.
+        assert_eq!(result.report().surface.components, 2);
+        let now = result.sdf().values();
+        let changes = before.iter().flatten().zip(now).map(|(a, b)| (a - b).abs());
+        let most = changes.fold(0.0, f64::max);
+        assert!(most < 2.0 * step, "{} steps", most / step);
+        before = Some(now.to_vec());
+    }
+}
