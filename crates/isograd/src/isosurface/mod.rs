@@ -72,7 +72,7 @@ pub enum Level {
     Local,
     /// Like `Local`, also on parts thinner than a cell, which are made about a cell thick: hardly any of them is missed.
     /// Where the surface has a grid of its own, samples of such parts are moved apart until these are thick enough, if
-    /// samples have areas. With a dense solve, the surface is also that of quadratic B-splines, marched on cells half as
+    /// samples have areas, and are not less than about a sixth of a cell of the surface apart. With a dense solve, the surface is also that of quadratic B-splines, marched on cells half as
     /// large, and derivatives vary less within a cell. Edges are rounded a little more.
     Thin,
 }

@@ -33,7 +33,10 @@ impl<T: Real> Reconstruction<T> {
         let mut thickened = std::mem::take(&mut self.residuals.thickened);
         thickened.points.clear();
         if self.keeps_thin_parts() && self.options.area {
-            thicken::forward(self.thin_inputs(grid), &mut thickened);
+            let inputs = self.thin_inputs(grid);
+            if self.sample_spacing() > thicken::LEAST_SPACING * inputs.width {
+                thicken::forward(inputs, &mut thickened);
+            }
         }
         self.residuals.thickened = thickened;
     }

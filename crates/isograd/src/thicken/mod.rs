@@ -59,6 +59,10 @@ const LEAST: f64 = 1.2;
 /// Half of the range of thicknesses over which parts begin to be thickened, in widths.
 const BLEND: f64 = 0.4;
 
+/// Distance between samples, in widths, below which they stay where they are: with more than a thousand pairs a sample,
+/// this stage would take longer than all others.
+pub(crate) const LEAST_SPACING: f64 = 1.0 / 6.0;
+
 /// Samples, `(N, 3)`, `(N, 3)` and `(N,)` in input order, with the tree of the points.
 #[derive(Clone, Copy)]
 pub(crate) struct Inputs<'a, T> {
