@@ -131,6 +131,25 @@ def test_vmap_is_a_loop(dtype):
     np.testing.assert_array_equal(shared[0], loss(points[0], normals[0]))
 
 
+def check_batches(gradient, clouds, monkeypatch, *shared):
+    """Checks that a batch of clouds, by handlers and by callbacks, has the bits of one cloud after the other.
+
+    ``gradient`` takes points, normals and the shared arrays, and returns nonzero arrays.
+    """
+    points, normals = (jnp.stack(part) for part in zip(*clouds))
+    axes = (0, 0, *(None for _ in shared))
+    loop = [jax.jit(gradient)(p, n, *shared) for p, n in zip(points, normals)]
+    batch = jax.jit(jax.vmap(gradient, axes))(points, normals, *shared)
+    monkeypatch.setenv("ISOGRAD_JAX_CALLBACK", "1")
+    jax.clear_caches()
+    callback = jax.jit(jax.vmap(gradient, axes))(points, normals, *shared)
+    for k, alone in enumerate(loop):
+        for part, of_batch, of_callback in zip(alone, batch, callback):
+            assert np.abs(part).max() > 0
+            np.testing.assert_array_equal(of_batch[k], part)
+            np.testing.assert_array_equal(of_callback[k], part)
+
+
 def test_scan_compiles_once_and_moves_the_points():
     points, normals = torus(dtype=np.float32)
     traced = []

@@ -9,7 +9,7 @@ import isograd  # noqa: E402
 import isograd.jax as ij  # noqa: E402
 import jax.numpy as jnp  # noqa: E402
 from jax.test_util import check_grads  # noqa: E402
-from test_jax import GIVEN, GRID, dtype, torus, x64  # noqa: E402, F401
+from test_jax import GIVEN, GRID, check_batches, dtype, torus, x64  # noqa: E402, F401
 
 FACES = ((1.0, 0.5, 0.5), (0.5, 1.0, 0.5), (0.5, 0.5, 1.0))
 FIXED = isograd.Options(radius=0.4)
@@ -178,25 +178,13 @@ def test_gradients_are_finite_on_the_surface_and_at_lost_places(x64):  # noqa: F
 
 
 def test_callbacks_and_batches_give_the_same_bits(monkeypatch):
-    clouds = [torus(seed, dtype=np.float32) for seed in range(2)]
-    points, normals = (jnp.stack(part) for part in zip(*clouds))
-
     def loss(points, normals):
         parts = ij.surface(points, GRID, FACES[:2], values=normals, normals=normals, options=GIVEN)
         cells = ij.surface(points, GRID, values=normals[:, 0], normals=normals, options=GIVEN)
         return sum(jnp.sum(x) for x in jax.tree.leaves((parts, cells)))
 
-    gradient = jax.grad(loss, argnums=(0, 1))
-    loop = [jax.jit(gradient)(p, n) for p, n in zip(points, normals)]
-    batch = jax.jit(jax.vmap(gradient))(points, normals)
-    monkeypatch.setenv("ISOGRAD_JAX_CALLBACK", "1")
-    jax.clear_caches()
-    callback = jax.jit(jax.vmap(gradient))(points, normals)
-    for k, alone in enumerate(loop):
-        for part, of_batch, of_callback in zip(alone, batch, callback):
-            assert np.abs(part).max() > 0
-            np.testing.assert_array_equal(of_batch[k], part)
-            np.testing.assert_array_equal(of_callback[k], part)
+    clouds = [torus(seed, dtype=np.float32) for seed in range(2)]
+    check_batches(jax.grad(loss, argnums=(0, 1)), clouds, monkeypatch)
 
 
 def test_bad_arguments_are_refused():

@@ -9,7 +9,7 @@ import isograd  # noqa: E402
 import isograd.jax as ij  # noqa: E402
 import jax.numpy as jnp  # noqa: E402
 from jax.test_util import check_grads  # noqa: E402
-from test_jax import GIVEN, GRID, dtype, torus, x64  # noqa: E402, F401
+from test_jax import GIVEN, GRID, check_batches, dtype, torus, x64  # noqa: E402, F401
 
 FIXED = isograd.Options(radius=0.25)
 """A radius that does not follow the points, as the gradient holds it constant."""
@@ -139,10 +139,6 @@ def test_extension_is_linear_and_its_gradients_agree_with_differences(x64):  # n
 
 @pytest.mark.parametrize("name", ["query", "mesh", "extend"])
 def test_callbacks_and_batches_give_the_same_bits(name, monkeypatch):
-    clouds = [torus(seed, dtype=np.float32) for seed in range(3)]
-    points, normals = (jnp.stack(part) for part in zip(*clouds))
-    places = jnp.asarray(PLACES, jnp.float32)
-
     def loss(points, normals, queries):
         if name == "query":
             return jnp.sum(ij.query(points, GRID, queries, normals=normals, options=GIVEN) ** 2)
@@ -151,17 +147,8 @@ def test_callbacks_and_batches_give_the_same_bits(name, monkeypatch):
         return jnp.sum(ij.extend(points, normals, GRID, normals=normals, options=GIVEN).values[..., 0])
 
     which = (0, 1, 2) if name == "query" else (0, 1)
-    gradient = jax.grad(loss, argnums=which)
-    loop = [jax.jit(gradient)(p, n, places) for p, n in zip(points, normals)]
-    batch = jax.jit(jax.vmap(gradient, in_axes=(0, 0, None)))(points, normals, places)
-    monkeypatch.setenv("ISOGRAD_JAX_CALLBACK", "1")
-    jax.clear_caches()
-    callback = jax.jit(jax.vmap(gradient, in_axes=(0, 0, None)))(points, normals, places)
-    for k, alone in enumerate(loop):
-        for part, of_batch, of_callback in zip(alone, batch, callback):
-            assert np.abs(part).max() > 0
-            np.testing.assert_array_equal(of_batch[k], part)
-            np.testing.assert_array_equal(of_callback[k], part)
+    clouds = [torus(seed, dtype=np.float32) for seed in range(3)]
+    check_batches(jax.grad(loss, which), clouds, monkeypatch, jnp.asarray(PLACES, jnp.float32))
 
 
 def test_bad_arguments_are_refused():

@@ -10,8 +10,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._options import check_fill, length
-from ._places import AUTO_BAND, NO_FACE, Fill, Offset, are_centers, axes_at, is_many, on_grids
+from ._options import check_fill
+from ._places import NO_FACE, Fill, Offset, are_centers, axes_at, band_width, is_many, on_grids, shaped
 from ._xla import Plan, call, floats, like, pair, prepare
 
 if TYPE_CHECKING:
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     from ._grid import Grid
     from ._options import Options
-
 
 
 class Surface(NamedTuple):
@@ -78,9 +77,8 @@ def surface(
         TypeError, ValueError, jax.errors.JaxRuntimeError: as for :func:`isograd.jax.signed_distance`.
     """
     check_fill(fill)
-    width = length(band, "band", "auto", "full")
     plan, points, normals = prepare(points, grid, normals, options, "cpu")
-    width = {"auto": AUTO_BAND * grid.spacing, "full": np.inf}.get(width, width)
+    width = band_width(band, grid, 4, "full")
     plan = replace(plan, band=width)
     values, is_scalar = sample_values(values, points)
     regular = on_grids(places, grid)
@@ -92,7 +90,8 @@ def surface(
     parts, start = [], 0
     for shape in shapes:
         end = start + int(np.prod(shape))
-        parts.append(_shaped(found, slice(start, end), shape, is_scalar))
+        part = tuple(array[start:end] for array in found)
+        parts.append(Surface(*shaped(part, shape, is_scalar)))
         start = end
     return tuple(parts) if is_many(places) else parts[0]
 
@@ -141,17 +140,6 @@ def _within(found: Surface, positions: jax.Array, width: float) -> Surface:
         jnp.where(row, 0, found.normal),
         jnp.where(row, positions, found.closest),
         jnp.where(row, 0, found.values),
-    )
-
-
-def _shaped(found: Surface, part: slice, shape: tuple[int, ...], is_scalar: bool | None) -> Surface:
-    sdf, normal, closest, values = (array[part] for array in found)
-    values = None if is_scalar is None else values[:, 0] if is_scalar else values
-    return Surface(
-        sdf.reshape(shape),
-        normal.reshape(*shape, 3),
-        closest.reshape(*shape, 3),
-        None if values is None else values.reshape(*shape, *values.shape[1:]),
     )
 
 

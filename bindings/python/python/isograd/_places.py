@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from ._grid import Grid
 from ._numbers import number
+from ._options import length
 
 Offset = tuple[float, float, float]
 Fill = Literal["inside", "band"]
 CENTER: Offset = (0.5, 0.5, 0.5)
 NO_FACE = 0xFFFF_FFFF
 """Closest face of a place beyond the band."""
-AUTO_BAND = 4.0
-"""Automatic width of the band, in cells."""
+
+
+def band_width(band: object, grid: Grid, cells: float, *words: str) -> float:
+    """Width of a band in the unit of the points: of ``"auto"`` so many cells, of ``"full"``, if allowed, infinite.
+
+    Raises:
+        ValueError: neither a finite number above 0 nor one of the words.
+    """
+    width = length(band, "band", "auto", *words)
+    return {"auto": cells * grid.spacing, "full": np.inf}.get(width, width)
 
 
 def axes_at(grid: Grid, offset: Offset, dtype: np.typing.DTypeLike) -> list[np.ndarray]:
@@ -44,6 +53,20 @@ def on_grids(places: object, grid: Grid) -> list[tuple[Grid, Offset]] | None:
 def are_centers(parts: list[tuple[Grid, Offset]] | None, grid: Grid) -> bool:
     """Whether the places are the cell centers of the grid of φ, where a search is not needed."""
     return parts == [(grid, CENTER)]
+
+
+def shaped(found: tuple[Any, ...], shape: tuple[int, ...], is_scalar: bool | None) -> tuple[Any, ...]:
+    """Distances, normals, closest points and values ``(M, C)`` at ``M`` places, as arrays of their shape.
+
+    Values lose their axis if they are scalars; ``None`` if that is ``None``, for no values.
+    """
+    sdf, normal, closest, values = found
+    vector = (*shape, 3)
+    if is_scalar is None:
+        values = None
+    else:
+        values = values.reshape(shape if is_scalar else (*shape, values.shape[1]))
+    return sdf.reshape(shape), normal.reshape(vector), closest.reshape(vector), values
 
 
 def is_many(places: object) -> bool:

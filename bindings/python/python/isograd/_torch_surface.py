@@ -9,8 +9,8 @@ import numpy as np
 
 from . import _core
 from ._grid import Grid
-from ._options import Options, check_fill, length
-from ._places import AUTO_BAND, Fill, are_centers, axes_at, is_many, on_grids
+from ._options import Options, check_fill
+from ._places import Fill, are_centers, axes_at, band_width, is_many, on_grids, shaped
 from ._pure import grid_shape
 from ._torch import Tensor, array, checked, encode, one_by_one, torch
 
@@ -59,12 +59,11 @@ def surface(
         TypeError, ValueError, RuntimeError: as for :func:`isograd.torch.signed_distance`.
     """
     check_fill(fill)
-    width = length(band, "band", "auto", "full")
-    width = {"auto": AUTO_BAND * grid.spacing, "full": np.inf}.get(width, width)
     points = checked(points, "points")
     if normals is not None:
         normals = checked(normals, "normals").to(points.dtype)
     settings = encode(grid, options, normals is not None, "cpu", points.dtype == torch.float64)
+    width = band_width(band, grid, 4, "full")
     rows, is_scalar = _rows(values, points)
     regular = on_grids(places, grid)
     positions, shapes = _positions(places, regular, points.dtype)
@@ -75,9 +74,8 @@ def surface(
         beyond = (torch.full_like(found[0], -width), torch.zeros_like(found[1]), positions, torch.zeros_like(found[3]))
         found = tuple(torch.where(far.reshape(-1, *[1] * (a.ndim - 1)), b, a) for a, b in zip(found, beyond))
     sizes = [int(np.prod(shape)) for shape in shapes]
-    parts = [
-        _shaped(part, shape, is_scalar) for part, shape in zip(zip(*(a.split(sizes) for a in found)), shapes)
-    ]
+    split = zip(*(array.split(sizes) for array in found))
+    parts = [Surface(*shaped(part, shape, is_scalar)) for part, shape in zip(split, shapes)]
     return tuple(parts) if is_many(places) else parts[0]
 
 
@@ -102,17 +100,6 @@ def _positions(places: Any, regular: Any, dtype: Any) -> tuple[Tensor, list[tupl
         axes = [torch.from_numpy(axis).to(dtype) for axis in axes_at(grid, offset, np.float64)]
         each.append(torch.stack(torch.meshgrid(*axes, indexing="ij"), dim=-1).reshape(-1, 3))
     return torch.cat(each), [grid.shape for grid, _ in regular]
-
-
-def _shaped(part: tuple[Tensor, ...], shape: tuple[int, ...], is_scalar: bool | None) -> Surface:
-    sdf, normal, closest, values = part
-    values = None if is_scalar is None else values[:, 0] if is_scalar else values
-    return Surface(
-        sdf.reshape(shape),
-        normal.reshape(*shape, 3),
-        closest.reshape(*shape, 3),
-        None if values is None else values.reshape(*shape, *values.shape[1:]),
-    )
 
 
 def _outputs(points: Tensor, values: Tensor, settings: str, count: int) -> tuple[Tensor, ...]:
@@ -158,16 +145,8 @@ def _surface(
 
 
 @_surface.register_fake
-def _(
-    points: Tensor,
-    places: Tensor,
-    values: Tensor,
-    given: Optional[Tensor],
-    settings: str,
-    band: float,
-    count: int,
-) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor]:
-    return _outputs(points, values, settings, count)  # type: ignore[return-value]
+def _(points: Tensor, places: Any, values: Tensor, given: Any, settings: str, band: Any, count: int) -> tuple[Tensor, ...]:
+    return _outputs(points, values, settings, count)
 
 
 @torch.library.custom_op("isograd::surface_pullback", mutates_args=(), device_types="cpu")

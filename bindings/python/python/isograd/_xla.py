@@ -29,6 +29,8 @@ class Plan:
     shape: tuple[int, int, int]
     band: float | None = None
     """Distance up to which an attribute is extended, in the unit of the points."""
+    inside: bool = False
+    """Whether an attribute is extended to all cells inside."""
 
     def saved(self, points: jax.Array) -> tuple[jax.ShapeDtypeStruct, ...]:
         """φ, closest faces and normals, which a pullback needs besides its inputs."""
@@ -109,6 +111,8 @@ def call(
     attributes: dict[str, Any] = {"settings": plan.settings}
     if plan.band is not None:
         attributes["band"] = np.float64(plan.band)
+    if plan.inside:
+        attributes["inside"] = np.float64(1)
 
     def by_callback(*arrays: jax.Array) -> tuple[jax.Array, ...]:
         callback = _Callback(name, results, plan)
@@ -151,7 +155,8 @@ class _Callback:
         inputs = [np.require(array, requirements=["C", "A"]) for array in arrays]
         batch = inputs[0].shape[:-2]
         outputs = [np.empty(batch + result.shape, result.dtype) for result in self.results]
-        _core.call_target(self.name, inputs, outputs, self.plan.settings, self.plan.band)
+        plan = self.plan
+        _core.call_target(self.name, inputs, outputs, plan.settings, plan.band, plan.inside)
         return tuple(outputs)
 
 

@@ -30,8 +30,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._options import Options, Orient, check_fill, length
+from ._options import Options, Orient, check_fill
 from ._jax_surface import Fill, Surface, sample_values, surface
+from ._places import band_width
 from ._xla import Plan, call, floats, like, pair, prepare
 
 if TYPE_CHECKING:
@@ -318,19 +319,14 @@ def extend(
     Raises:
         TypeError, ValueError, RuntimeError, jax.errors.JaxRuntimeError: as for :func:`signed_distance`.
     """
-    distance = length(band, "band", "auto")
-    distance = 3.0 * grid.spacing if distance == "auto" else distance
     plan, points, normals = prepare(points, grid, normals, options, backend)
-    check_fill(fill, "full" if options is None else options.band)
-    # For the inside, values at all cells: those outside the band are dropped below.
-    reach = 2.0 * grid.spacing * sum(grid.shape) if fill == "inside" else distance
-    plan = replace(plan, band=max(reach, distance))
+    width = band_width(band, grid, 3)
+    fill = check_fill(fill, "full" if options is None else options.band)
+    plan = replace(plan, band=width, inside=fill == "inside")
     if values is None:
         raise ValueError("values is None; give the values of the samples")
     values, is_scalar = sample_values(values, points)
     field, sdf = _extend(plan, points, values, normals)
-    if fill == "inside":
-        field = jnp.where((sdf <= distance)[..., None], field, 0)
     return Extension(sdf, field[..., 0] if is_scalar else field)
 
 

@@ -219,6 +219,7 @@ impl CallFrame {
             Ok(Batch {
                 settings,
                 band,
+                inside: self.attributes.find("inside", SCALAR).is_some(),
                 inputs,
                 outputs,
             })

@@ -101,6 +101,8 @@ pub struct Batch<'a> {
     pub settings: &'a str,
     /// Half the width of the band that an attribute is extended to, in the unit of the points.
     pub band: Option<f64>,
+    /// Whether an attribute is extended to all cells inside.
+    pub inside: bool,
     /// Inputs, the points first.
     pub inputs: Vec<Array<Data<'a>>>,
     /// Outputs.
@@ -148,6 +150,7 @@ impl Batch<'_> {
             let call = Call {
                 settings: self.settings,
                 band: self.band,
+                inside: self.inside,
                 inputs: inputs.collect::<Vec<_>>().into_iter(),
                 outputs: outputs.collect::<Vec<_>>().into_iter(),
             };
@@ -165,6 +168,8 @@ pub struct Call<'a> {
     pub settings: &'a str,
     /// See [`Batch::band`].
     pub band: Option<f64>,
+    /// See [`Batch::inside`].
+    pub inside: bool,
     inputs: IntoIter<Array<Data<'a>>>,
     outputs: IntoIter<Array<DataMut<'a>>>,
 }

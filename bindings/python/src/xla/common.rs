@@ -1,9 +1,11 @@
 //! Steps shared by the targets: run a plan on a cloud, save what a pullback needs, and restore the reconstruction
 //! from it.
 
-use isograd::distance::Hit;
+use isograd::distance::extend::Region;
+use isograd::distance::{Hit, Query};
 use isograd::{Attribute, CloudCotangent, Cotangent, PointCloud, Real, Saved};
 use isograd_backend::View;
+use rayon::prelude::*;
 
 use super::buffers::{Call, Element};
 use crate::arrays::Number;
@@ -58,19 +60,56 @@ pub fn saved_hits<T: Float>(call: &mut Call<'_>) -> Result<Vec<Hit<T>>, Failure>
     Ok((0..triangle.len()).map(hit).collect())
 }
 
+/// Hits at any places on the surface of a reconstruction.
+///
+/// # Errors
+/// Errors of the device, and those of [`Query::new`].
+pub fn search<T: Float>(result: View<'_, T>, places: &[[T; 3]]) -> Result<Vec<Hit<T>>, Failure> {
+    if places.is_empty() {
+        return Ok(Vec::new());
+    }
+    // Parts of a finer surface may lie between the cell centers of φ.
+    let signs = match result.surface_grid() == result.grid() {
+        true => Some(result.sdf()?),
+        false => None,
+    };
+    let query = Query::new(result.mesh()?.clone()).map_err(|e| e.to_string())?;
+    Ok(query.query(places, signs))
+}
+
 /// Copies an array into one of the same length.
 ///
 /// # Errors
 /// Arrays of different lengths.
 pub fn copy<E: Copy>(name: &str, from: &[E], to: &mut [E]) -> Result<(), Failure> {
-    if from.len() != to.len() {
-        let (found, expected) = (to.len(), from.len());
-        return Err(Failure::Value(format!(
-            "the array for {name} has {found} entries and must have {expected}"
-        )));
-    }
+    check_length(name, to.len(), from.len())?;
     to.copy_from_slice(from);
     Ok(())
+}
+
+/// Copies a part of each hit into an array of the same length.
+///
+/// # Errors
+/// Arrays of different lengths.
+pub fn copy_part<T: Real, E: Copy + Send>(
+    name: &str,
+    hits: &[Hit<T>],
+    to: &mut [E],
+    part: impl Fn(&Hit<T>) -> E + Sync,
+) -> Result<(), Failure> {
+    check_length(name, to.len(), hits.len())?;
+    let entries = to.par_iter_mut().zip(hits);
+    entries.for_each(|(entry, hit)| *entry = part(hit));
+    Ok(())
+}
+
+fn check_length(name: &str, length: usize, expected: usize) -> Result<(), Failure> {
+    match length == expected {
+        true => Ok(()),
+        false => Err(Failure::Value(format!(
+            "the array for {name} has {length} entries and must have {expected}"
+        ))),
+    }
 }
 
 /// Outputs for φ, closest faces and normals: what a pullback needs, in the order of [`Saved`].
@@ -137,6 +176,18 @@ impl<'a> Call<'a> {
     pub fn band(&self) -> Result<f64, Failure> {
         let missing = || "the attribute 'band' is missing".into();
         self.band.ok_or_else(missing)
+    }
+
+    /// The region that has the band outside.
+    ///
+    /// # Errors
+    /// A missing attribute.
+    pub fn region(&self) -> Result<Region, Failure> {
+        let band = self.band()?;
+        Ok(match self.inside {
+            true => Region::Inside(band),
+            false => Region::Band(band),
+        })
     }
 
     /// The next three outputs.

@@ -8,7 +8,7 @@ use super::buffers::Call;
 use super::common::{Float, attribute, cloud, copy};
 use crate::backend::Failure;
 
-/// Inputs: points, `(N, C)` values, optionally normals. Outputs: values at the cells of a band and zeros elsewhere, φ,
+/// Inputs: points, `(N, C)` values, optionally normals. Outputs: values at the cells of the region and zeros elsewhere, φ,
 /// and what else the pullback needs.
 pub struct Forward;
 
@@ -21,9 +21,9 @@ impl Target for Forward {
         let cloud = cloud(points, call.normals()?)?;
         let field = call.output("the extended values", 4)?;
         let saved = call.saved_outputs()?;
-        let band = call.band()?;
+        let region = call.region()?;
         call.reconstruct(&cloud, |result| {
-            let (extension, _) = result.extend(&attribute, band)?;
+            let (extension, _) = result.extend(&attribute, region)?;
             field.fill(T::zero());
             extension.scatter(field).map_err(|e| e.to_string())?;
             saved.fill(result)
@@ -47,9 +47,9 @@ impl Target for Pullback {
         let normals = call.normals()?;
         let values_out = call.output("the cotangent of the values", 2)?;
         let out = call.cloud_outputs(normals.is_some())?;
-        let band = call.band()?;
+        let region = call.region()?;
         call.restore(&cloud(points, normals)?, &saved, |restored| {
-            let (extension, residual) = restored.result.extend(&attribute, band)?;
+            let (extension, residual) = restored.result.extend(&attribute, region)?;
             let values_bar = gather(&extension, field_bar)?;
             let extended = ExtensionCotangent {
                 attribute: &attribute,
@@ -70,7 +70,7 @@ impl Target for Pullback {
     }
 }
 
-/// The cotangents at the cells of the band, from those of all cells.
+/// The cotangents at the cells of the region, from those of all cells.
 fn gather<T: Real>(extension: &Extension<T>, dense: &[T]) -> Result<Vec<T>, Failure> {
     let components = extension.components;
     let rows = extension.cells.iter().map(|&cell| {

@@ -87,7 +87,7 @@ pub fn xla_targets(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
 /// Calls a target with NumPy arrays, and writes its results into `outputs`: float32, float64 or uint32, in C
 /// order.
 #[pyfunction]
-#[pyo3(signature = (name, inputs, outputs, settings, band=None))]
+#[pyo3(signature = (name, inputs, outputs, settings, band=None, inside=false))]
 pub fn call_target(
     py: Python<'_>,
     name: &str,
@@ -95,6 +95,7 @@ pub fn call_target(
     outputs: Vec<Bound<'_, PyAny>>,
     settings: &str,
     band: Option<f64>,
+    inside: bool,
 ) -> PyResult<()> {
     background::check_process()?;
     let target = TARGETS.iter().find(|target| target.name == name);
@@ -106,6 +107,7 @@ pub fn call_target(
     let batch = Batch {
         settings,
         band,
+        inside,
         inputs: inputs
             .iter()
             .map(Readable::array)

@@ -1,11 +1,11 @@
 //! Signed distance from any points to the surface of a cloud, and its pullback.
 
 use isograd::Cotangent;
-use isograd::distance::{Hit, Query};
+use isograd::distance::{Hit, pull_hits};
 
 use super::Target;
 use super::buffers::Call;
-use super::common::{Float, cloud, copy, saved_hits};
+use super::common::{Float, cloud, copy, copy_part, saved_hits, search};
 use crate::backend::Failure;
 
 /// Inputs: points, queries, optionally normals. Outputs: distances, alone or with what the pullback needs.
@@ -24,15 +24,8 @@ impl Target for Forward {
             _ => Some((hit_outputs(&mut call)?, call.saved_outputs()?)),
         };
         call.reconstruct(&cloud, |result| {
-            let surface = Query::new(result.mesh()?.clone()).map_err(|e| e.to_string())?;
-            // Parts of a finer surface may lie between the cell centers of φ.
-            let signs = match result.surface_grid() == result.grid() {
-                true => Some(result.sdf()?),
-                false => None,
-            };
-            let hits = surface.query(queries, signs);
-            let distances: Vec<T> = hits.iter().map(|hit| hit.distance).collect();
-            copy("the distances", &distances, distance)?;
+            let hits = search(result, queries)?;
+            copy_part("the distances", &hits, distance, |hit| hit.distance)?;
             let Some((hit_outputs, saved)) = saved else {
                 return Ok(());
             };
@@ -59,9 +52,9 @@ impl Target for Pullback {
         let queries_out = call.vectors_out("the cotangent of the queries")?;
         let out = call.cloud_outputs(normals.is_some())?;
         call.restore(&cloud(points, normals)?, &saved, |restored| {
-            let surface = Query::new(restored.result.mesh()?.clone());
             let (mut queries_bar, mut vertices_bar) = (Vec::new(), Vec::new());
-            let pulled = surface.map_err(|e| e.to_string())?.pullback(
+            let pulled = pull_hits(
+                restored.result.mesh()?,
                 queries,
                 &hits,
                 distance_bar,
@@ -96,11 +89,9 @@ fn hit_outputs<'a, T: Float>(call: &mut Call<'a>) -> Result<HitOutputs<'a, T>, F
 
 impl<T: Float> HitOutputs<'_, T> {
     fn fill(self, hits: &[Hit<T>]) -> Result<(), Failure> {
-        let gradient: Vec<_> = hits.iter().map(|hit| hit.gradient).collect();
-        let triangle: Vec<_> = hits.iter().map(|hit| hit.triangle).collect();
-        let barycentric: Vec<_> = hits.iter().map(|hit| hit.barycentric).collect();
-        copy("the gradients", &gradient, self.gradient)?;
-        copy("the triangles", &triangle, self.triangle)?;
-        copy("the barycentric weights", &barycentric, self.barycentric)
+        copy_part("the gradients", hits, self.gradient, |hit| hit.gradient)?;
+        copy_part("the triangles", hits, self.triangle, |hit| hit.triangle)?;
+        let weights = |hit: &Hit<T>| hit.barycentric;
+        copy_part("the barycentric weights", hits, self.barycentric, weights)
     }
 }

@@ -2,14 +2,14 @@
 
 use isograd::distance::interpolate::{self, VertexValues};
 use isograd::distance::triangle::{closest_point, unit_normal};
-use isograd::distance::{Hit, NO_TRIANGLE, Query};
+use isograd::distance::{Hit, NO_TRIANGLE, pull_hits};
 use isograd::{Cotangent, ExtensionCotangent, Grid, Mesh, Real};
 use isograd_backend::View;
 use rayon::prelude::*;
 
 use super::Target;
 use super::buffers::Call;
-use super::common::{Float, attribute, cloud, copy, saved_hits};
+use super::common::{Float, attribute, cloud, copy, copy_part, saved_hits, search};
 use crate::backend::Failure;
 
 /// Inputs: points, places, `(N, C)` values, optionally normals. Outputs: distances, directions, closest points, values
@@ -40,7 +40,7 @@ impl Target for Forward {
             let mesh = surface(result)?;
             let hits = match places.is_empty() && !distance.is_empty() {
                 true => at_centers(result, mesh, band)?,
-                false => at_places(result, mesh, band, places)?,
+                false => at_places(result, band, places)?,
             };
             let vertex_values = match attribute.components {
                 0 => Vec::new(),
@@ -48,11 +48,13 @@ impl Target for Forward {
             };
             let found = of_vertices(mesh, &vertex_values, attribute.components).at(&hits);
             copy("the values", &found.map_err(|e| e.to_string())?, values)?;
-            write(&hits, distance, |hit| hit.distance)?;
-            write(&hits, gradient, |hit| hit.gradient)?;
-            write(&hits, point, |hit| hit.point)?;
-            write(&hits, triangle, |hit| hit.triangle)?;
-            write(&hits, barycentric, |hit| hit.barycentric)?;
+            copy_part("the distances", &hits, distance, |hit| hit.distance)?;
+            copy_part("the directions", &hits, gradient, |hit| hit.gradient)?;
+            copy_part("the closest points", &hits, point, |hit| hit.point)?;
+            copy_part("the triangles", &hits, triangle, |hit| hit.triangle)?;
+            copy_part("the barycentric weights", &hits, barycentric, |hit| {
+                hit.barycentric
+            })?;
             saved.fill(result)
         })
     }
@@ -134,8 +136,8 @@ fn to_vertices<T: Real>(
     let mut bar = interpolate::Cotangent::default();
     let pulled = interpolated.pullback(places, hits, bars.values, &mut bar);
     pulled.map_err(|e| e.to_string())?;
-    let query = Query::new(interpolated.mesh.clone()).map_err(|e| e.to_string())?;
-    let pulled = query.pullback(
+    let pulled = pull_hits(
+        interpolated.mesh,
         places,
         hits,
         bars.distance,
@@ -195,7 +197,7 @@ fn at_centers<T: Float>(
         })
         .collect();
     let places: Vec<[T; 3]> = deep.iter().map(|&i| center(i)).collect();
-    for (&i, hit) in deep.iter().zip(search(result, mesh, &places)?) {
+    for (&i, hit) in deep.iter().zip(search(result, &places)?) {
         hits[i] = hit;
     }
     Ok(hits)
@@ -204,7 +206,6 @@ fn at_centers<T: Float>(
 /// Hits at any places, by a search where φ at the closest cell center does not show that a place is outside the band.
 fn at_places<T: Float>(
     result: View<'_, T>,
-    mesh: &Mesh<T>,
     band: f64,
     places: &[[T; 3]],
 ) -> Result<Vec<Hit<T>>, Failure> {
@@ -229,29 +230,12 @@ fn at_places<T: Float>(
         .par_iter()
         .map(|&place| beyond(place, band))
         .collect();
-    for (&i, hit) in near.iter().zip(search(result, mesh, &searched)?) {
+    for (&i, hit) in near.iter().zip(search(result, &searched)?) {
         if !(hit.distance.f64() > band) {
             hits[i] = hit;
         }
     }
     Ok(hits)
-}
-
-fn search<T: Float>(
-    result: View<'_, T>,
-    mesh: &Mesh<T>,
-    places: &[[T; 3]],
-) -> Result<Vec<Hit<T>>, Failure> {
-    if places.is_empty() {
-        return Ok(Vec::new());
-    }
-    // Parts of a finer surface may lie between the cell centers of φ.
-    let signs = match result.surface_grid() == result.grid() {
-        true => Some(result.sdf()?),
-        false => None,
-    };
-    let query = Query::new(mesh.clone()).map_err(|e| e.to_string())?;
-    Ok(query.query(places, signs))
 }
 
 /// The hit of a place outside the band.
@@ -287,22 +271,4 @@ fn centers<T: Real>(grid: &Grid<T>) -> Vec<[T; 3]> {
     (0..grid.cells())
         .map(|i| grid.center(grid.cell(i)))
         .collect()
-}
-
-/// Writes a part of each hit.
-///
-/// # Errors
-/// An output of another length.
-fn write<T: Real, E: Copy + Send>(
-    hits: &[Hit<T>],
-    out: &mut [E],
-    part: impl Fn(&Hit<T>) -> E + Sync,
-) -> Result<(), Failure> {
-    if out.len() != hits.len() {
-        let (found, expected) = (out.len(), hits.len());
-        return Err(format!("an output has {found} entries and must have {expected}").into());
-    }
-    let entries = out.par_iter_mut().zip(hits);
-    entries.for_each(|(entry, hit)| *entry = part(hit));
-    Ok(())
 }

@@ -1,7 +1,7 @@
 //! Extended attributes on their way to a device and back.
 
 use cubecl::prelude::Runtime;
-use isograd::distance::extend::{Error as Refused, Extension, Fit, Residual};
+use isograd::distance::extend::{Error as Refused, Extension, Fit, Region, Residual};
 use isograd::{Attribute, ExtensionCotangent};
 
 use super::Error;
@@ -15,7 +15,7 @@ pub fn forward<R: Runtime, T: Scalar>(
     plan: &Reconstructor<R, T>,
     result: &Reconstruction<T>,
     attribute: &Attribute<T>,
-    band: f64,
+    region: Region,
 ) -> Result<(Extension<T>, Residual<T>), Error> {
     let device = plan.device();
     let values = device.upload(&attribute.values)?;
@@ -23,7 +23,7 @@ pub fn forward<R: Runtime, T: Scalar>(
         values: &values,
         components: attribute.components,
     };
-    let (found, kept) = plan.extend(result, given, band)?;
+    let (found, kept) = plan.extend(result, given, region)?;
     let extension = Extension {
         components: found.components,
         shape: plan.grid().shape(),

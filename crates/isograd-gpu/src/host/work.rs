@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use cubecl::prelude::{CubeElement, Runtime};
-use isograd::distance::extend::{Extension, Residual};
+use isograd::distance::extend::{Extension, Region, Residual};
 use isograd::neighbors::Radius;
 use isograd::orient::{self, Method};
 use isograd::{
@@ -63,7 +63,7 @@ pub trait Work<T: Scalar>: Send + Sync {
         &self,
         result: &Reconstruction<T>,
         attribute: &Attribute<T>,
-        band: f64,
+        region: Region,
     ) -> Result<(Extension<T>, Residual<T>), Error>;
 
     /// A copy of numbers.
@@ -292,9 +292,9 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
         &self,
         result: &Reconstruction<T>,
         attribute: &Attribute<T>,
-        band: f64,
+        region: Region,
     ) -> Result<(Extension<T>, Residual<T>), Error> {
-        extend::forward(self, result, attribute, band)
+        extend::forward(self, result, attribute, region)
     }
 
     fn numbers(&self, buffer: &Buffer<T>) -> Result<Vec<T>, Error> {

@@ -1,14 +1,15 @@
 //! Attributes of the samples on the reconstructed surface and round it.
 
 use cubecl::prelude::Runtime;
+use isograd::distance::extend::Region;
 
 use super::{Error, Reconstruction, Reconstructor};
 use crate::Scalar;
 use crate::distance::extend::{self, Attribute, Extension, Residual, Samples, Surface};
 
 impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
-    /// An attribute of the samples of `result`, which this plan made, at the vertices of the surface, and at every cell
-    /// within `band` of the surface as it is at the closest surface point; and what the pullback needs. See
+    /// An attribute of the samples of `result`, which this plan made, at the vertices of the surface, and at the
+    /// closest surface point of every cell of a region; and what the pullback needs. See
     /// [`distance::extend`](crate::distance::extend). Cells outside the band that φ was computed in are left out.
     ///
     /// # Errors
@@ -18,11 +19,13 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         &self,
         result: &Reconstruction<T>,
         attribute: Attribute<'_, T>,
-        band: f64,
+        region: impl Into<Region>,
     ) -> Result<(Extension<T>, Residual<T>), Error> {
         let (samples, surface) = (result.extended_samples(), result.extended_surface());
         let device = self.device();
-        Ok(extend::forward(device, samples, attribute, surface, band)?)
+        Ok(extend::forward(
+            device, samples, attribute, surface, region,
+        )?)
     }
 }
 

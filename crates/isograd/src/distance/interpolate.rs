@@ -12,16 +12,17 @@
 //!
 //! # Not differentiable
 //! Where the closest point passes to another face; a direction in which a face is much thinner than the distance is
-//! left out, as in [`Query::pullback`](super::Query::pullback).
+//! left out, as in [`pull_hits`](super::pull_hits).
 
 use rayon::prelude::*;
 
 use super::query::Hit;
+use super::query_pullback::{by_vertex, check, corners_of, gather};
 use super::tangent::{Tangent, tangent};
 use super::triangle::closest_point;
 use super::{Error, NO_TRIANGLE};
 use crate::gather::{Buckets, add_to};
-use crate::vector::{add, norm, to_f64};
+use crate::vector::{norm, to_f64};
 use crate::{Mesh, Real};
 
 /// Values at the vertices of a mesh.
@@ -52,16 +53,18 @@ impl<T: Real> VertexValues<'_, T> {
     /// # Errors
     /// [`Error::Mismatch`] and [`Error::Face`].
     pub fn at(&self, hits: &[Hit<T>]) -> Result<Vec<T>, Error> {
-        let faces = self.faces(hits)?;
+        let corners = self.corners(hits)?;
         let mut out = vec![T::zero(); hits.len() * self.components];
         if self.components == 0 {
             return Ok(out);
         }
         let rows = out.par_chunks_exact_mut(self.components).zip(hits);
-        rows.zip(&faces).for_each(|((row, hit), face)| {
-            let Some(face) = face else { return };
+        rows.zip(&corners).for_each(|((row, hit), corners)| {
+            if hit.triangle == NO_TRIANGLE {
+                return;
+            }
             for (c, value) in row.iter_mut().enumerate() {
-                let corner = |k: usize| hit.barycentric[k].f64() * self.value(face[k], c);
+                let corner = |k: usize| hit.barycentric[k].f64() * self.value(corners[k], c);
                 *value = T::of(corner(0) + corner(1) + corner(2));
             }
         });
@@ -83,31 +86,23 @@ impl<T: Real> VertexValues<'_, T> {
         check(points.len(), "the list of hits", hits.len())?;
         let length = hits.len() * self.components;
         check(length, "the cotangent of the values", values_bar.len())?;
-        let faces = self.faces(hits)?;
-        let vertices = self.mesh.vertices().len();
-        out.points.resize(points.len(), [T::zero(); 3]);
-        out.vertices.resize(vertices, [T::zero(); 3]);
-        out.values.resize(self.values.len(), T::zero());
         let row = |i: usize| &values_bar[i * self.components..][..self.components];
+        let corners = self.corners(hits)?;
         let shares: Vec<Tangent> = (0..hits.len())
             .into_par_iter()
-            .map(|i| faces[i].map_or_else(Tangent::default, |f| self.share(points[i], f, row(i))))
+            .map(|i| match hits[i].triangle {
+                NO_TRIANGLE => Tangent::default(),
+                _ => self.share(points[i], corners[i], row(i)),
+            })
             .collect();
-        let mut hits_of = Buckets::default();
-        // One bucket more, for hits without a face.
-        let corners: Vec<[u32; 3]> = faces
-            .iter()
-            .map(|face| face.unwrap_or([vertices as u32; 3]))
-            .collect();
-        hits_of.fill(vertices + 1, hits.len(), |hit| corners[hit]);
         let guarded = shares.par_iter().filter(|share| share.guarded).count();
-        let at_vertex = |vertex: usize| {
-            let mut sum = [0.0; 3];
-            hits_of.for_each_corner(&corners, vertex, |hit, corner| {
-                sum = add(sum, shares[hit].corners[corner]);
-            });
-            sum
-        };
+
+        let hits_of = by_vertex(self.mesh, &corners);
+        out.points.resize(points.len(), [T::zero(); 3]);
+        out.vertices
+            .resize(self.mesh.vertices().len(), [T::zero(); 3]);
+        out.values.resize(self.values.len(), T::zero());
+        let at_vertex = |vertex| gather(&hits_of, &corners, vertex, |hit| &shares[hit].corners);
         let bounded =
             add_to(&mut out.points, |i| shares[i].query) + add_to(&mut out.vertices, at_vertex);
         self.add_to_values(&corners, &hits_of, hits, values_bar, &mut out.values);
@@ -157,28 +152,10 @@ impl<T: Real> VertexValues<'_, T> {
         self.values[vertex as usize * self.components + component].f64()
     }
 
-    /// Corners of the face of each hit.
-    fn faces(&self, hits: &[Hit<T>]) -> Result<Vec<Option<[u32; 3]>>, Error> {
+    /// [`corners_of`] the hits, with as many values as vertices.
+    fn corners(&self, hits: &[Hit<T>]) -> Result<Vec<[u32; 3]>, Error> {
         let length = self.mesh.vertices().len() * self.components;
         check(length, "the list of values", self.values.len())?;
-        let corners = |hit: &Hit<T>| match hit.triangle {
-            NO_TRIANGLE => Ok(None),
-            face => match self.mesh.faces().get(face as usize) {
-                Some(corners) => Ok(Some(*corners)),
-                None => Err(Error::Face { face }),
-            },
-        };
-        hits.iter().map(corners).collect()
-    }
-}
-
-fn check(expected: usize, what: &'static str, length: usize) -> Result<(), Error> {
-    match length == expected {
-        true => Ok(()),
-        false => Err(Error::Mismatch {
-            what,
-            length,
-            expected,
-        }),
+        corners_of(self.mesh, hits)
     }
 }

@@ -13,8 +13,8 @@
 //! [`triangle::closest_point`].
 //!
 //! # Pullback
-//! [`lattice::pullback`] on a grid, [`Query::pullback`] at points. By the envelope theorem, with `β` held constant: `ȳ_k += −β_k φ̄ ∇φ` for the
-//! corners `y_k` of the closest face, `q̄ += φ̄ ∇φ` for the point, with `∇φ = σ (q − y)/|q − y|`, or the normal of
+//! [`lattice::pullback`] on a grid, [`pull_hits`] at points. By the envelope theorem, with `β` held constant:
+//! `ȳ_k += −β_k φ̄ ∇φ` for the corners `y_k` of the closest face, `q̄ += φ̄ ∇φ` for the point, with `∇φ = σ (q − y)/|q − y|`, or the normal of
 //! the face at distance 0.
 //!
 //! The closest point itself is `p = Σ β_k y_k`. With the corners of the feature that holds it, `E`, `γ` and `o` as
@@ -43,6 +43,7 @@ mod tests;
 pub use lattice::{Band, NO_TRIANGLE, Scratch};
 use query::corners_agree;
 pub use query::{Hit, Query};
+pub use query_pullback::pull_hits;
 
 /// Errors of the distance stage.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -13,7 +13,7 @@ use crate::{Mesh, Real};
 
 /// The faces of each vertex of a mesh. A pseudonormal is summed where it is needed: few are, and stored they would take
 /// six times the memory of the mesh.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Pseudonormals {
     faces: Buckets,
 }
@@ -21,9 +21,14 @@ pub(super) struct Pseudonormals {
 impl Pseudonormals {
     /// Pseudonormals of a mesh.
     pub(super) fn new<T: Real>(mesh: &Mesh<T>) -> Self {
-        let mut faces = Buckets::default();
-        faces.fill_with_faces(mesh);
-        Self { faces }
+        let mut new = Self::default();
+        new.rebuild(mesh);
+        new
+    }
+
+    /// Those of another mesh, in the same memory.
+    pub(super) fn rebuild<T: Real>(&mut self, mesh: &Mesh<T>) {
+        self.faces.fill_with_faces(mesh);
     }
 
     /// The outward pseudonormal of a feature of a face, not of unit length; zero where faces have no area.

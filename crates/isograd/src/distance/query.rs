@@ -70,7 +70,7 @@ impl<T: Real> Query<T> {
     ///
     /// A point that is not finite, or whose squared distance overflows, gets NaN and no triangle.
     pub fn query(&self, points: &[[T; 3]], signs: Option<&Field<T>>) -> Vec<Hit<T>> {
-        let nearest = self.nearest_triangles(points);
+        let nearest = nearest_triangles(&self.bvh, points);
         points
             .par_iter()
             .zip(nearest)
@@ -85,30 +85,30 @@ impl<T: Real> Query<T> {
             pseudonormals: &self.pseudonormals,
         }
     }
+}
 
-    /// Place in the tree of the triangle closest to each point. The points are taken in packets of neighbors
-    /// along a Morton curve.
-    fn nearest_triangles(&self, points: &[[T; 3]]) -> Vec<u32> {
-        let order = morton_order(&self.bvh, points);
-        let arch = Arch::new();
-        let mut sorted = vec![NOWHERE; order.len()];
-        sorted
-            .par_chunks_mut(PACKETS_PER_TASK * LANES)
-            .zip(order.par_chunks(PACKETS_PER_TASK * LANES))
-            .for_each(|(found, order)| {
-                arch.dispatch(Packets {
-                    bvh: &self.bvh,
-                    points,
-                    order,
-                    found,
-                });
+/// Place in the tree of the triangle closest to each point. The points are taken in packets of neighbors
+/// along a Morton curve.
+pub(super) fn nearest_triangles<T: Real>(bvh: &Bvh, points: &[[T; 3]]) -> Vec<u32> {
+    let order = morton_order(bvh, points);
+    let arch = Arch::new();
+    let mut sorted = vec![NOWHERE; order.len()];
+    sorted
+        .par_chunks_mut(PACKETS_PER_TASK * LANES)
+        .zip(order.par_chunks(PACKETS_PER_TASK * LANES))
+        .for_each(|(found, order)| {
+            arch.dispatch(Packets {
+                bvh,
+                points,
+                order,
+                found,
             });
-        let mut nearest = vec![NOWHERE; order.len()];
-        for (&(_, index), place) in order.iter().zip(sorted) {
-            nearest[index as usize] = place;
-        }
-        nearest
+        });
+    let mut nearest = vec![NOWHERE; order.len()];
+    for (&(_, index), place) in order.iter().zip(sorted) {
+        nearest[index as usize] = place;
     }
+    nearest
 }
 
 /// Morton codes and indices of points, sorted: neighbors in space are neighbors in the list.

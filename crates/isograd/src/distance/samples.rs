@@ -4,8 +4,11 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::bvh::{Bvh, LANES, NOWHERE, NearestTriangles, Stack};
+use super::lattice::NO_TRIANGLE;
 use super::pseudonormals::Pseudonormals;
-use super::query::{PACKETS_PER_TASK, Surface, far_if_nan, morton_order, packet};
+use super::query::{
+    PACKETS_PER_TASK, Surface, far_if_nan, morton_order, nearest_triangles, packet,
+};
 use super::{Error, Scratch};
 use crate::vector::{dot, norm, scale, sub, to_f64};
 use crate::{Mesh, Real};
@@ -20,6 +23,8 @@ pub(crate) struct Samples<'a, T> {
     pub normals: &'a [[T; 3]],
     /// Distance from the surface beyond which it misses a sample.
     pub within: T,
+    /// Distance from the surface beyond which a sample is far from it.
+    pub far: T,
     /// Distance below a sample at which its own side must still be the nearest.
     pub depth: T,
 }
@@ -31,6 +36,8 @@ pub(crate) struct Counts {
     pub thin: usize,
     /// The surface is not within the limit.
     pub missed: usize,
+    /// The surface is not within the larger limit.
+    pub far: usize,
 }
 
 /// Counts samples by their distance to `mesh`. The tree in `built`, if given, must be the one of this mesh. Beside the
@@ -76,6 +83,7 @@ impl<T: Real> Samples<'_, T> {
             thin: usize::from(dot(gradient, normal) < T::of(-0.5)),
             // True for NaN.
             missed: usize::from(!(distance <= self.within)),
+            far: usize::from(!(distance <= self.far)),
         }
     }
 }
@@ -85,8 +93,37 @@ impl Counts {
         Self {
             thin: self.thin + other.thin,
             missed: self.missed + other.missed,
+            far: self.far + other.far,
         }
     }
+}
+
+/// For each point the face of `mesh` closest to it; `NO_TRIANGLE` for one that is not finite. The tree in `built`, if
+/// given, must be the one of this mesh.
+///
+/// # Errors
+/// [`Error::Empty`] and [`Error::Range`].
+pub(crate) fn nearest_faces<T: Real>(
+    mesh: &Mesh<T>,
+    built: Option<&Scratch<T>>,
+    points: &[[T; 3]],
+) -> Result<Vec<u32>, Error> {
+    let mut own = Bvh::default();
+    let bvh = match built {
+        Some(scratch) => &scratch.bvh,
+        None => {
+            own.rebuild(mesh)?;
+            &own
+        }
+    };
+    let mut faces = nearest_triangles(bvh, points);
+    faces.par_iter_mut().for_each(|place| {
+        *place = match *place {
+            NOWHERE => NO_TRIANGLE,
+            place => bvh.face(place),
+        }
+    });
+    Ok(faces)
 }
 
 /// Counts some samples that are close to each other.

@@ -2,14 +2,13 @@
 
 use super::Reconstruction;
 use crate::data::{Attribute, PointCloud};
-use crate::distance::extend::{Error, Extension, Residual, Samples, Scratch, Surface};
+use crate::distance::extend::{Error, Extension, Region, Residual, Samples, Scratch, Surface};
 use crate::{Real, distance};
 
 impl<T: Real> Reconstruction<T> {
-    /// The attribute `name` of the cloud at the vertices of the surface, and at every cell within
-    /// a distance of `band` (in the cloud's unit) of the surface as it is at the closest surface point; see
-    /// [`distance::extend`](crate::distance::extend). Cells outside the band that φ was computed in are left
-    /// out.
+    /// The attribute `name` of the cloud at the vertices of the surface, and at the closest surface point of every cell
+    /// of a region: a number is the width of a [band](Region::Band), in the unit of the points. See
+    /// [`distance::extend`](crate::distance::extend). Cells outside the band that φ was computed in are left out.
     ///
     /// # Errors
     /// [`Error::Missing`], a cloud of another size than the one reconstructed, values that are not finite, a
@@ -18,18 +17,10 @@ impl<T: Real> Reconstruction<T> {
         &self,
         cloud: &PointCloud<T>,
         name: &str,
-        band: f64,
+        region: impl Into<Region>,
     ) -> Result<Extension<T>, Error> {
-        let attributes = cloud.attributes();
-        let attribute =
-            attributes
-                .iter()
-                .find(|a| a.name == name)
-                .ok_or_else(|| Error::Missing {
-                    name: name.into(),
-                    known: attributes.iter().map(|a| a.name.clone()).collect(),
-                })?;
-        Ok(self.extend_with_residual(attribute, band)?.0)
+        let attribute = distance::extend::attribute(cloud, name)?;
+        Ok(self.extend_with_residual(attribute, region)?.0)
     }
 
     /// Like [`extend`](Self::extend), for an attribute of the reconstructed samples, with the residual for the pullback.
@@ -39,11 +30,11 @@ impl<T: Real> Reconstruction<T> {
     pub fn extend_with_residual(
         &self,
         attribute: &Attribute<T>,
-        band: f64,
+        region: impl Into<Region>,
     ) -> Result<(Extension<T>, Residual<T>), Error> {
         let (mut residual, mut extension) = (Residual::default(), Extension::default());
         let scratch = &mut Scratch::default();
-        self.extend_into(attribute, band, scratch, &mut residual, &mut extension)?;
+        self.extend_into(attribute, region, scratch, &mut residual, &mut extension)?;
         Ok((extension, residual))
     }
 
@@ -54,7 +45,7 @@ impl<T: Real> Reconstruction<T> {
     pub fn extend_into(
         &self,
         attribute: &Attribute<T>,
-        band: f64,
+        region: impl Into<Region>,
         scratch: &mut Scratch,
         residual: &mut Residual<T>,
         extension: &mut Extension<T>,
@@ -67,7 +58,7 @@ impl<T: Real> Reconstruction<T> {
             self.samples(),
             used.as_ref().unwrap_or(attribute),
             self.surface(),
-            band,
+            region.into(),
             scratch,
             residual,
             extension,

@@ -11,7 +11,7 @@ use crate::grid::{Lattice, low_corner};
 use crate::primitives::scan::exclusive_sum;
 use crate::{Buffer, Device, Error, Scalar};
 
-/// Cells within a reach of the surface, by exclusive sums of flags.
+/// Cells with φ between two bounds, by exclusive sums of flags.
 pub(super) struct Near {
     /// Those that have a closest face.
     pub band: Buffer<u32>,
@@ -22,12 +22,12 @@ pub(super) struct Near {
 pub(super) fn near<R: Runtime, T: Scalar>(
     device: &Device<R>,
     surface: Surface<'_, T>,
-    reach: T,
+    [least, most]: [T; 2],
 ) -> Result<Near, Error> {
     let cells = surface.phi.len();
     let (band, astray) = (device.empty(cells)?, device.empty(cells)?);
     launch!(device, cells => flag_cells<T>(
-        surface.phi, surface.closest, band, astray, reach, surface.faces() as u32,
+        surface.phi, surface.closest, band, astray, least, most, surface.faces() as u32,
     ));
     Ok(Near {
         band: exclusive_sum(device, &band)?,
@@ -59,12 +59,14 @@ fn flag_cells<F: Float + CubeElement>(
     closest: &Array<u32>,
     band: &mut Array<u32>,
     astray: &mut Array<u32>,
-    reach: F,
+    least: F,
+    most: F,
     faces: u32,
 ) {
     if ABSOLUTE_POS < phi.len() {
         let face = closest[ABSOLUTE_POS];
-        let near = phi[ABSOLUTE_POS].abs() <= reach && face != NO_TRIANGLE;
+        let value = phi[ABSOLUTE_POS];
+        let near = value >= least && value <= most && face != NO_TRIANGLE;
         band[ABSOLUTE_POS] = select(near, 1u32, 0u32);
         astray[ABSOLUTE_POS] = select(near && face >= faces, 1u32, 0u32);
     }

@@ -2,15 +2,14 @@
 
 use cubecl::prelude::Runtime;
 
-use super::cpu::Error as Refused;
+use super::cpu::Region;
 use super::neighbor::Sorted;
 use super::{Attribute, Error, Extension, Residual, Samples, Surface, cells, checks, fits};
 use crate::primitives::flags;
 use crate::{Device, Scalar};
 
-/// Extends an attribute of the samples to the vertices of the surface and to the cells with
-/// `|φ| ≤ band` that have a closest face. Values have the unit of the attribute. Waits for the device, once:
-/// the checks, and how many cells there are.
+/// Extends an attribute of the samples to the vertices of the surface and to the cells of a region. Values have the
+/// unit of the attribute. Waits for the device, once: the checks, and how many cells there are.
 ///
 /// # Errors
 /// Errors of [`isograd::distance::extend::forward`]; errors of the device.
@@ -19,18 +18,20 @@ pub fn forward<R: Runtime, T: Scalar>(
     samples: Samples<'_, T>,
     attribute: Attribute<'_, T>,
     surface: Surface<'_, T>,
-    band: f64,
+    region: impl Into<Region>,
 ) -> Result<(Extension<T>, Residual<T>), Error> {
     device.check_number::<T>()?;
     checks::samples(samples, attribute)?;
     let numbers = checks::Numbers::new(device, samples, attribute)?;
-    if !(band > 0.0) || !band.is_finite() {
-        refuse_numbers(device, &numbers)?;
-        return Err(Refused::Band { width: band }.into());
-    }
+    let bounds = match region.into().bounds() {
+        Ok(bounds) => bounds,
+        Err(refused) => {
+            refuse_numbers(device, &numbers)?;
+            return Err(refused.into());
+        }
+    };
     checks::surface(surface)?;
-    let reach = T::of(band);
-    let near = cells::near(device, surface, reach)?;
+    let near = cells::near(device, surface, bounds)?;
     let [bad, count, astray] = flags::totals(device, [&numbers.sums, &near.band, &near.astray])?;
     if bad > 0 {
         return Err(numbers.refuse(device)?);

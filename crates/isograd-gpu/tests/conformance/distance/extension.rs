@@ -5,7 +5,7 @@ mod degenerate;
 
 use cubecl::prelude::Runtime;
 use isograd::distance::Band;
-use isograd::distance::extend as cpu;
+use isograd::distance::extend::{self as cpu, Region};
 use isograd::neighbors::{self, Neighborhoods, Radius};
 use isograd::{Attribute, Field, Grid, Mesh, Real};
 use isograd_gpu::distance::{self, extend};
@@ -136,7 +136,7 @@ impl<T: Scalar> Scene<T> {
     fn on_cpu(
         &self,
         attribute: &Attribute<T>,
-        band: f64,
+        region: impl Into<Region>,
     ) -> Result<(cpu::Extension<T>, cpu::Residual<T>), cpu::Error> {
         let (mut residual, mut extension) = Default::default();
         let scratch = &mut cpu::Scratch::default();
@@ -145,7 +145,7 @@ impl<T: Scalar> Scene<T> {
             samples,
             attribute,
             surface,
-            band,
+            region,
             scratch,
             &mut residual,
             &mut extension,
@@ -240,10 +240,10 @@ impl<T: Scalar> OnDevice<T> {
     fn extend<R: Runtime>(
         &self,
         device: &Device<R>,
-        band: f64,
+        region: impl Into<Region>,
     ) -> Result<(extend::Extension<T>, extend::Residual<T>), extend::Error> {
         let (samples, surface) = (self.samples(), self.surface());
-        extend::forward(device, samples, self.attribute(), surface, band)
+        extend::forward(device, samples, self.attribute(), surface, region)
     }
 
     /// The pullback, given cotangents at the vertices and in the band.
@@ -293,13 +293,18 @@ fn downloaded<R: Runtime, T: Scalar>(
 fn values_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
     let tolerance = tolerance::<T>();
     for scene in Scene::<T>::all() {
-        for (components, band) in [(1, 0.7), (3, 3.0), (6, 50.0)] {
+        let width = |cells: f64| cells * Real::f64(scene.grid().spacing());
+        for (components, region) in [
+            (1, Region::Band(width(0.7))),
+            (2, Region::Inside(width(0.7))),
+            (3, Region::Band(width(3.0))),
+            (6, Region::Band(width(50.0))),
+        ] {
             let attribute = scene.attribute(components);
-            let band = band * Real::f64(scene.grid().spacing());
-            let (expected, kept) = scene.on_cpu(&attribute, band).unwrap();
+            let (expected, kept) = scene.on_cpu(&attribute, region).unwrap();
             let on_device = scene.upload(device, &attribute);
             let shape = scene.grid().shape();
-            let run = || downloaded(device, shape, &on_device.extend(device, band).unwrap());
+            let run = || downloaded(device, shape, &on_device.extend(device, region).unwrap());
             let (found, residual) = run();
             println!("{}, {components} in {}:", scene.name, T::NAME);
             assert_eq!(found.cells, expected.cells);

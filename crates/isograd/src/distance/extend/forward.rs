@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::fit::{self, Fit, Neighbor};
 use super::rule::{ENOUGH, MARGIN, MOST, REACH, SMALLEST_AREA};
-use super::{Error, Extension, NO_TRIANGLE, Residual, Samples, Surface};
+use super::{Error, Extension, NO_TRIANGLE, Region, Residual, Samples, Surface};
 use crate::data::Attribute;
 use crate::distance::triangle;
 use crate::element::fit as element;
@@ -23,8 +23,8 @@ pub struct Scratch {
     counts: Vec<usize>,
 }
 
-/// Extends an attribute of the samples to the vertices of the surface and to the cells with
-/// `|φ| ≤ band` that have a closest face. Values have the unit of the attribute.
+/// Extends an attribute of the samples to the vertices of the surface and to the cells of a region. Values have the
+/// unit of the attribute.
 ///
 /// # Errors
 /// As [`Error`] lists; the outputs are then not to be used.
@@ -32,24 +32,21 @@ pub fn forward<T: Real>(
     samples: Samples<'_, T>,
     attribute: &Attribute<T>,
     surface: Surface<'_, T>,
-    band: f64,
+    region: impl Into<Region>,
     scratch: &mut Scratch,
     residual: &mut Residual<T>,
     out: &mut Extension<T>,
 ) -> Result<(), Error> {
     check_samples(samples, attribute)?;
     let grid = surface.phi.grid();
-    if !(band > 0.0) || !band.is_finite() {
-        return Err(Error::Band { width: band });
-    }
+    let bounds = region.into().bounds()?;
     if surface.closest.len() != grid.cells() {
         return Err(Error::Closest {
             entries: surface.closest.len(),
             cells: grid.cells(),
         });
     }
-    let reach = T::of(band);
-    find_band(surface, reach, &mut scratch.counts, &mut out.cells);
+    find_band(surface, bounds, &mut scratch.counts, &mut out.cells);
     check_faces(surface, &out.cells)?;
     out.components = attribute.components;
     out.shape = grid.shape();
@@ -103,15 +100,15 @@ pub(super) fn check_faces<T: Real>(surface: Surface<'_, T>, cells: &[u32]) -> Re
     }
 }
 
-/// Lists the cells of the band in ascending order: a count per chunk, then every chunk into its own place.
+/// Lists the cells with a closest face and φ between two bounds in ascending order: a count per chunk, then every chunk into its own place.
 fn find_band<T: Real>(
     surface: Surface<'_, T>,
-    reach: T,
+    [least, most]: [T; 2],
     counts: &mut Vec<usize>,
     cells: &mut Vec<u32>,
 ) {
     let (phi, closest) = (surface.phi.values(), surface.closest);
-    let inside = |&i: &usize| phi[i].abs() <= reach && closest[i] != NO_TRIANGLE;
+    let inside = |&i: &usize| least <= phi[i] && phi[i] <= most && closest[i] != NO_TRIANGLE;
     let chunk = |k: usize| k * CELLS..phi.len().min((k + 1) * CELLS);
     let chunks = (0..phi.len().div_ceil(CELLS)).into_par_iter();
     chunks

@@ -2,8 +2,8 @@
 //! surface point closest to every cell of a band.
 //!
 //! # Map
-//! Attribute `v_i` per sample → value `u_v` at every vertex `y_v` of the surface → value at every cell with
-//! `|φ| ≤ band`, `Σ_k β_k u_k` over the corners of the cell's closest triangle, `β` the barycentric
+//! Attribute `v_i` per sample → value `u_v` at every vertex `y_v` of the surface → value at every cell of a
+//! [`Region`], `Σ_k β_k u_k` over the corners of the cell's closest triangle, `β` the barycentric
 //! coordinates of the closest point. The value is constant along the normal of the surface, as a
 //! boundary condition at a cell near the wall needs it.
 //!
@@ -73,7 +73,7 @@ pub use pullback::{Cotangent, Inputs, pullback};
 
 use super::NO_TRIANGLE;
 use crate::neighbors::Neighborhoods;
-use crate::{Field, Mesh, Real};
+use crate::{Attribute, Field, Mesh, PointCloud, Real};
 
 /// The samples whose attribute is extended.
 #[derive(Clone, Copy, Debug)]
@@ -95,6 +95,40 @@ pub struct Surface<'a, T> {
     pub closest: &'a [u32],
 }
 
+/// Cells that get values, of those that have a closest face. The width is a distance from the surface above 0, in the
+/// unit of the points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Region {
+    /// Cells with `|φ|` up to the width.
+    Band(f64),
+    /// All cells inside, and those outside with `φ` up to the width.
+    Inside(f64),
+}
+
+impl From<f64> for Region {
+    fn from(width: f64) -> Self {
+        Self::Band(width)
+    }
+}
+
+impl Region {
+    /// Least and greatest `φ` of its cells.
+    ///
+    /// # Errors
+    /// [`Error::Band`] for a width that is not positive and finite.
+    pub fn bounds<T: Real>(self) -> Result<[T; 2], Error> {
+        let (Self::Band(width) | Self::Inside(width)) = self;
+        if !(width > 0.0) || !width.is_finite() {
+            return Err(Error::Band { width });
+        }
+        let least = match self {
+            Self::Band(_) => T::of(-width),
+            Self::Inside(_) => T::min_value(),
+        };
+        Ok([least, T::of(width)])
+    }
+}
+
 /// An attribute at the vertices of a surface and at the cells round it.
 ///
 /// The cells are a list, as a solver with an immersed boundary goes through them: [`Self::iter`] yields each
@@ -111,6 +145,25 @@ pub struct Extension<T> {
     pub cells: Vec<u32>,
     /// `(B, components)` at those cells, row by row.
     pub values: Vec<T>,
+}
+
+/// The attribute of a cloud that has a name.
+///
+/// # Errors
+/// [`Error::Missing`].
+pub fn attribute<'a, T: Real>(
+    cloud: &'a PointCloud<T>,
+    name: &str,
+) -> Result<&'a Attribute<T>, Error> {
+    let attributes = cloud.attributes();
+    let missing = || Error::Missing {
+        name: name.into(),
+        known: attributes.iter().map(|a| a.name.clone()).collect(),
+    };
+    attributes
+        .iter()
+        .find(|a| a.name == name)
+        .ok_or_else(missing)
 }
 
 /// Values that the pullback needs besides the inputs and the list of cells.

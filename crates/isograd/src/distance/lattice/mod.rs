@@ -21,6 +21,7 @@ use rayon::prelude::*;
 
 use super::Error;
 use super::bvh::Bvh;
+use super::pseudonormals::Pseudonormals;
 use crate::data::cells::Cells;
 use crate::{Field, Grid, Mesh, Real};
 use block::{BLOCK, Block};
@@ -54,6 +55,7 @@ pub struct Scratch<T> {
     /// Tree of the last mesh.
     pub(super) bvh: Bvh,
     sites: Sites,
+    pseudonormals: Pseudonormals,
     distance: Vec<T>,
     closest: Vec<u32>,
     workspaces: Pool,
@@ -120,7 +122,8 @@ pub(crate) fn forward_on<T: Real>(
     scratch
         .sites
         .rebuild(mesh, &scratch.bvh, grid.spacing().f64(), magnitude);
-    let sides = Sides::new(mesh, chi, c, &grid);
+    let pseudonormals = std::mem::take(&mut scratch.pseudonormals);
+    let sides = Sides::new(mesh, chi, c, &grid, pseudonormals);
     closest.resize(grid.cells(), NO_TRIANGLE);
 
     let plane = grid.strides()[0];
@@ -140,6 +143,7 @@ pub(crate) fn forward_on<T: Real>(
             clamp(T::of(width), phi, closest);
         }
     }
+    scratch.pseudonormals = sides.into_pseudonormals();
     if fills {
         spread::fill(grid.shape(), phi.values_mut(), closest);
     }

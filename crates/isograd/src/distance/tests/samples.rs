@@ -1,6 +1,6 @@
 use super::{Random, soup, sphere, torus};
 use crate::distance::lattice::{Band, forward};
-use crate::distance::samples::{Counts, Samples, count};
+use crate::distance::samples::{Counts, Samples, count, nearest_faces};
 use crate::distance::{Query, Scratch};
 use crate::vector::{dot, normalized, of_f64, scale, sub};
 use crate::{Field, Grid, Mesh, Real};
@@ -17,6 +17,7 @@ fn plain<T: Real>(mesh: &Mesh<T>, samples: Samples<'_, T>) -> Counts {
     for ((at, below), &n) in at.iter().zip(&below).zip(samples.normals) {
         counts.thin += usize::from(dot(below.gradient, n) < T::of(-0.5));
         counts.missed += usize::from(!(at.distance.abs() <= samples.within));
+        counts.far += usize::from(!(at.distance.abs() <= samples.far));
     }
     counts
 }
@@ -33,6 +34,7 @@ fn assert_counts<T: Real>(mesh: &Mesh<T>, number: usize, seed: u64) {
             points: &points,
             normals: &normals,
             within: T::of(size),
+            far: T::of(2.5 * size),
             depth: T::of(2.0 * size),
         };
         let expected = plain(mesh, samples);
@@ -55,6 +57,11 @@ fn assert_counts<T: Real>(mesh: &Mesh<T>, number: usize, seed: u64) {
         let built = count(mesh, Some(&scratch), samples);
         assert_eq!(built, Ok(expected), "seed {seed}");
     }
+    let hits = Query::new(mesh.clone())
+        .expect("a mesh")
+        .query(&points, None);
+    let expected: Vec<u32> = hits.iter().map(|hit| hit.triangle).collect();
+    assert_eq!(nearest_faces(mesh, None, &points), Ok(expected));
 }
 
 #[test]

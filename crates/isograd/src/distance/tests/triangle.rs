@@ -4,6 +4,13 @@ use crate::vector::{add, cross, dot, norm, norm_squared, scale, sub};
 
 const SEEDS: u64 = 4000;
 
+/// A random triangle, and a point near its first corner.
+fn triangle_and_point(seed: u64) -> ([[f64; 3]; 3], [f64; 3]) {
+    let mut random = Random::new(seed);
+    let corners = random.triangle();
+    (corners, random.near(corners[0], 0.5))
+}
+
 fn distance_squared(frame: &Frame, q: [f64; 3]) -> f64 {
     frame.distances(&q.map(|x| [x]))[0]
 }
@@ -34,9 +41,7 @@ fn searched_distance(q: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> f64 {
 #[test]
 fn closest_point_is_the_minimum_over_the_triangle() {
     for seed in 0..SEEDS / 8 {
-        let mut random = Random::new(seed);
-        let corners = random.triangle();
-        let q = random.near(corners[0], 0.5);
+        let (corners, q) = triangle_and_point(seed);
         let found = closest_point(q, corners);
         let searched = searched_distance(q, corners);
         // A search on squares finds a distance to the square root of ε, at best, of the size of the problem.
@@ -55,9 +60,7 @@ fn closest_point_is_the_minimum_over_the_triangle() {
 fn weights_make_the_point_and_the_offset_leads_back_to_the_query() {
     let mut kinds = [0; 3];
     for seed in 0..SEEDS {
-        let mut random = Random::new(seed);
-        let corners = random.triangle();
-        let q = random.near(corners[0], 0.5);
+        let (corners, q) = triangle_and_point(seed);
         let found = closest_point(q, corners);
         assert!(
             found.barycentric.iter().all(|&b| (0.0..=1.0).contains(&b)),
@@ -85,9 +88,7 @@ fn weights_make_the_point_and_the_offset_leads_back_to_the_query() {
 #[test]
 fn offset_obeys_the_first_order_condition_of_its_region() {
     for seed in 0..SEEDS {
-        let mut random = Random::new(seed);
-        let corners = random.triangle();
-        let q = random.near(corners[0], 0.5);
+        let (corners, q) = triangle_and_point(seed);
         let found = closest_point(q, corners);
         // No corner lies on the side of the closest point that faces the query: the convex projection.
         for v in corners {
@@ -128,9 +129,7 @@ fn region_of_every_kind_is_named_by_its_corners() {
 #[test]
 fn fast_distance_agrees_with_the_closest_point() {
     for seed in 0..SEEDS {
-        let mut random = Random::new(seed);
-        let corners = random.triangle();
-        let q = random.near(corners[0], 0.5);
+        let (corners, q) = triangle_and_point(seed);
         let fast = distance_squared(&Frame::new(corners), q).sqrt();
         let exact = closest_point(q, corners).distance;
         // A few units in the last place of the longest way in the problem, up to 7.
@@ -144,9 +143,7 @@ fn fast_distance_agrees_with_the_closest_point() {
 #[test]
 fn no_triangle_is_closer_than_its_corners_by_more_than_its_slack() {
     for seed in 0..SEEDS {
-        let mut random = Random::new(seed);
-        let corners = random.triangle();
-        let q = random.near(corners[0], 0.5);
+        let (corners, q) = triangle_and_point(seed);
         let frame = Frame::new(corners);
         let least = corners
             .map(|v| norm_squared(sub(q, v)))

@@ -5,7 +5,7 @@ mod oracle;
 mod properties;
 mod pullback;
 
-use super::{Error, Extension, Residual, Samples, Scratch, Surface, forward};
+use super::{Error, Extension, Region, Residual, Samples, Scratch, Surface, forward};
 use crate::data::{Attribute, Field, Grid, Mesh};
 use crate::neighbors::{self, Neighborhoods, Radius};
 use crate::vector::to_f64;
@@ -69,6 +69,18 @@ impl<T: Real> Scene<T> {
         Self::new(&points, cells)
     }
 
+    /// 400 samples at four places.
+    pub fn coinciding() -> Self {
+        let places = [
+            [0.7, 0.0, 0.25],
+            [-0.7, 0.0, 0.25],
+            [0.0, 0.95, 0.0],
+            [0.0, -0.45, 0.0],
+        ];
+        let points: Vec<[f64; 3]> = (0..400).map(|i| places[i % 4]).collect();
+        Self::new(&points, 24)
+    }
+
     /// One value for each sample, a function of its place.
     pub fn attribute<const C: usize>(&self, f: impl Fn([f64; 3]) -> [f64; C]) -> Attribute<T> {
         let values = self
@@ -103,14 +115,21 @@ impl<T: Real> Scene<T> {
         attribute: &Attribute<T>,
         cells: f64,
     ) -> Result<(Extension<T>, Residual<T>), Error> {
-        let band = cells * self.phi.grid().spacing().f64();
+        self.extend_in(attribute, cells * self.phi.grid().spacing().f64())
+    }
+
+    pub fn extend_in(
+        &self,
+        attribute: &Attribute<T>,
+        region: impl Into<Region>,
+    ) -> Result<(Extension<T>, Residual<T>), Error> {
         let (mut extension, mut residual) = (Extension::default(), Residual::default());
         let (samples, surface, scratch) = (self.samples(), self.surface(), &mut Scratch::default());
         forward(
             samples,
             attribute,
             surface,
-            band,
+            region,
             scratch,
             &mut residual,
             &mut extension,

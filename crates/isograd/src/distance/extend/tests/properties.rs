@@ -95,17 +95,25 @@ fn a_cell_has_the_value_of_its_closest_surface_point() {
 }
 
 #[test]
-fn the_band_is_listed_and_nothing_else_is_written() {
+fn the_region_is_listed_and_nothing_else_is_written() {
     let scene = Scene::<f32>::random(1500, 24);
     let attribute = scene.attribute(wavy);
     // φ itself ends at 4 cells.
-    for band in [0.7, 3.0, 4.0, 50.0] {
-        let (extension, _) = scene.try_extend(&attribute, band).expect("extends");
-        let reach = band as f32 * scene.phi.grid().spacing();
+    for (cells, inside) in [0.7, 3.0, 4.0, 50.0]
+        .map(|n| [(n, false), (n, true)])
+        .concat()
+    {
+        let reach = cells * scene.phi.grid().spacing();
+        let region = match inside {
+            true => Region::Inside(reach.into()),
+            false => Region::Band(reach.into()),
+        };
+        let (extension, _) = scene.extend_in(&attribute, region).expect("extends");
         let mut dense = vec![f32::NEG_INFINITY; 2 * scene.closest.len()];
         extension.scatter(&mut dense).expect("the size of the grid");
         for (cell, value) in dense.chunks_exact(2).enumerate() {
-            let near = scene.phi.values()[cell].abs() <= reach;
+            let phi = scene.phi.values()[cell];
+            let near = phi <= reach && (inside || phi >= -reach);
             if near && scene.closest[cell] != NO_TRIANGLE {
                 assert!(value.iter().all(|v| v.is_finite()));
             } else {
@@ -218,14 +226,7 @@ fn unit_of_length_makes_no_difference() {
 
 #[test]
 fn coinciding_samples_and_samples_without_area_give_finite_values() {
-    let places = [
-        [0.7, 0.0, 0.25],
-        [-0.7, 0.0, 0.25],
-        [0.0, 0.95, 0.0],
-        [0.0, -0.45, 0.0],
-    ];
-    let points: Vec<[f64; 3]> = (0..400).map(|i| places[i % 4]).collect();
-    let mut scene = Scene::<f64>::new(&points, 24);
+    let mut scene = Scene::<f64>::coinciding();
     for areas in [scene.areas.clone(), vec![0.0; 400]] {
         scene.areas = areas;
         let (extension, _) = scene.extend(&scene.attribute(rigid));

@@ -112,14 +112,7 @@ fn assert_finite<T: Real>(scene: &Scene<T>) -> usize {
 
 fn degenerate<T: Real>() {
     // Samples that coincide, with areas and without.
-    let places = [
-        [0.7, 0.0, 0.25],
-        [-0.7, 0.0, 0.25],
-        [0.0, 0.95, 0.0],
-        [0.0, -0.45, 0.0],
-    ];
-    let points: Vec<[f64; 3]> = (0..400).map(|i| places[i % 4]).collect();
-    let mut scene = Scene::<T>::new(&points, 24);
+    let mut scene = Scene::<T>::coinciding();
     assert_finite(&scene);
     scene.areas.fill(T::zero());
     assert_finite(&scene);
