@@ -147,7 +147,7 @@ impl Fingerprints {
 /// The options of a fit: steps of an automatic resolution, or of automatic walls, would be steps of the loss.
 pub fn fixed(options: &isograd::Options) -> isograd::Options {
     let surface = match options.surface {
-        SurfaceResolution::Auto => SurfaceResolution::Grid,
+        SurfaceResolution::Auto => SurfaceResolution::Factor(1.0),
         other => other,
     };
     let walls = match options.walls {

@@ -6,8 +6,8 @@
 //! compiled here, once for each number type.
 //!
 //! # What differs from the CPU
-//! - The surface is found on the grid of φ, also with [`Auto`](isograd::SurfaceResolution::Auto); a spacing or a factor is
-//!   an error. The solve is dense; [`Sparse`](isograd::Solve::Sparse) is an error.
+//! - The surface is found on the grid of φ, also with [`Auto`](isograd::SurfaceResolution::Auto); a spacing or a factor
+//!   other than 1 is an error. The solve is dense; [`Sparse`](isograd::Solve::Sparse) is an error.
 //! - [`trim`](isograd::isosurface::trim) and [`sheet`](isograd::sheet) are errors.
 //! - Walls are free, also with [`Auto`](isograd::poisson::Walls::Auto); closed ones are an error.
 //! - The signs of [`Method::Auto`](isograd::orient::Method::Auto) and

@@ -35,8 +35,8 @@ impl<T: Number> Plan<T> {
     /// # Errors
     /// An unavailable device, with the reason and the remedy; invalid options.
     pub fn new(backend: Backend, grid: Grid<T>, options: Options) -> Result<Self, Error> {
-        use SurfaceResolution::{Auto, Grid};
-        if !matches!(options.surface, Auto | Grid) {
+        use SurfaceResolution::{Auto, Factor, Grid};
+        if !matches!(options.surface, Auto | Grid | Factor(1.0)) {
             return Err(Error::Surface(options.surface));
         }
         if options.solve == Solve::Sparse {
