@@ -1,7 +1,7 @@
 """Renders docs/PAGE.md and its charts from docs/PAGE.json: `python render.py [--check] [PAGE...]`.
 
 The text of a page is templates/PAGE.md.jinja; its module computes tables and figures. `--check` draws no charts and fails
-if a page differs from what its JSON gives."""
+if a page differs from what its JSON gives, or a page that is written by hand from a figure in `claims.py`."""
 
 import argparse
 import importlib
@@ -9,6 +9,7 @@ import json
 import sys
 from pathlib import Path
 
+import claims
 import jinja2
 import text
 
@@ -39,7 +40,10 @@ def main() -> int:
             different.append(str(path))
     if different:
         print("not what their JSON gives; run `cargo xtask docs --render`:", *different, sep="\n  ", file=sys.stderr)
-    return 1 if different else 0
+    stale = claims.missing(DOCS)
+    if stale:
+        print("figures that are not those of the JSON:", *stale, sep="\n  ", file=sys.stderr)
+    return 1 if different or stale else 0
 
 
 def rendered(name: str, context: dict, path: Path) -> str:

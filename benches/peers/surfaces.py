@@ -26,9 +26,9 @@ SHAPES = [
 ]
 CELLS = [64, 128, 256]
 METHODS = {
-    "grid": ["--surface", "grid"],
-    "auto": [],
-    "auto, thin": ["--level", "thin"],
+    "default": [],
+    "local": ["--level", "local"],
+    "local, grid": ["--level", "local", "--surface", "grid"],
 }
 SAMPLES = 200_000
 QUANTILES = [0.99, 0.999]

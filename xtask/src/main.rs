@@ -13,6 +13,7 @@ mod nvrtc;
 mod packages;
 mod pages;
 mod peers;
+mod pictures;
 mod process;
 mod python;
 mod readme;
@@ -56,7 +57,7 @@ Figures and pages
                    where ../shared/data is there
   scaling          docs/scaling.md: time and memory against cells and points; leave the machine
                    alone meanwhile
-  gallery          docs/images/: pictures of the clouds in examples/clouds
+  gallery          docs/images/: pictures of the clouds in examples/clouds, and of bad results
   fit              docs/fit.md: a fish found from its signed distance field
   gpu              docs/gpu.md: time and memory on a GPU
   gpu --pack       target/isograd-gpu-kit.tar.xz: tests and benchmarks for a machine with an NVIDIA

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::process::Command;
 
 use crate::environment::{Environment, Obstacle};
+use crate::pictures;
 use crate::process::{self, Outcome};
 use crate::workspace::Workspace;
 
@@ -53,7 +54,7 @@ pub fn gpu() -> Outcome {
     render(&["gpu"])
 }
 
-/// `docs/images/NAME.png` for every cloud in `examples/clouds`.
+/// `docs/images/NAME.png` for every cloud in `examples/clouds`, and the pictures of bad results.
 pub fn gallery() -> Outcome {
     let pictures = process::root().join("docs").join("images");
     for cloud in clouds()? {
@@ -63,7 +64,7 @@ pub fn gallery() -> Outcome {
         let mut command = process::cargo(["run", "--release", "--quiet", "--", "reconstruct"]);
         process::run(command.arg(cloud).arg("--picture").arg(picture))?;
     }
-    Ok(())
+    pictures::bad_results()
 }
 
 /// A program of `isograd-benches`.

@@ -151,7 +151,10 @@ mod tests {
     #[test]
     fn default_cases_have_the_defaults_of_the_library() {
         let (ours, theirs) = (Case::new("torus", 1, 32).options(1.0), Options::default());
-        let theirs = theirs.checks(false).surface(SurfaceResolution::Grid);
+        let theirs = theirs
+            .checks(false)
+            .surface(SurfaceResolution::Grid)
+            .level(isosurface::Level::Local);
         assert_eq!(format!("{ours:?}"), format!("{theirs:?}"));
         let given = Case {
             normals: Normals::Exact,

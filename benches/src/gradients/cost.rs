@@ -1,5 +1,6 @@
 //! Seconds and bytes of the pipeline forward and backward.
 
+use isograd::isosurface::Level;
 use isograd::{Options, Pipeline, Reconstructor, SurfaceResolution};
 use serde::Serialize;
 
@@ -88,6 +89,7 @@ fn passes<T: Pipeline>(sampled: &Sampled, repeats: usize) -> Result<Passes, Stri
         let cloud = points_only::<T>(sampled.cloud.points())?;
         let options = Options::default()
             .surface(SurfaceResolution::Grid)
+            .level(Level::Local)
             .checks(false);
         let mut plan = Reconstructor::new(convert_grid(&sampled.grid)?, options)?;
         Passes::measure(&mut plan, &cloud, repeats)

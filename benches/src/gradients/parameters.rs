@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use isograd::isosurface::Level;
 use isograd::{
     CloudCotangent, Cotangent, Field, Options, Reconstruction, Reconstructor, SurfaceResolution,
 };
@@ -182,6 +183,7 @@ impl<'a> Bench<'a> {
     fn new(sampled: &'a Sampled, names: &[&'static str]) -> Outcome<Self> {
         let options = Options::default()
             .surface(SurfaceResolution::Grid)
+            .level(Level::Local)
             .checks(false);
         let mut plan = Reconstructor::new(sampled.grid, options)?;
         let points = sampled.shape.points_at::<f64>(&sampled.coordinates)?;

@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use isograd::isosurface::Level;
 use isograd::isosurface::measure_pullback;
 use isograd::{Cotangent, Options, Reconstructor, SurfaceResolution};
 use isograd_element::vector::dot;
@@ -39,6 +40,7 @@ pub fn measure(cells: usize, samples: usize, draw: Draw) -> Outcome<Sphere> {
     let cloud = points_only(sampled.cloud.points())?;
     let options = Options::default()
         .surface(SurfaceResolution::Grid)
+        .level(Level::Local)
         .checks(false);
     let mut plan = Reconstructor::new(sampled.grid, options)?;
     let result = plan.reconstruct(&cloud)?;

@@ -45,7 +45,7 @@ body.defvjp(lambda parameters: (body(parameters), parameters), body_pullback)
 # What is known: the field of another fish, from other samples.
 sought = isograd.sample("fish", 8_000, seed=2, dtype=np.float32, **TRUTH).points
 grid = isograd.Grid.fit(sought, 96)
-options = isograd.Options(surface="grid")  # the same cells at every step
+options = isograd.Options(surface="1x")  # the same cells at every step
 target = isograd.jax.signed_distance(sought, grid, options=options)
 start = jnp.array([fish.values[name] for name in NAMES], jnp.float32)
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use isograd::distance::extend;
+use isograd::distance::extend::{self, Region};
 use isograd::{CloudCotangent, Cotangent, ExtensionCotangent, JsonReport, PointCloud, Real};
 use isograd_backend::Made;
 use pyo3::exceptions::PyKeyError;
@@ -96,11 +96,16 @@ impl ReconstructionArrays {
         }
     }
 
-    /// The attribute `name` of the cloud up to the distance `band` from the surface.
-    fn extend(&self, py: Python<'_>, name: String, band: f64) -> PyResult<Extension> {
+    /// The attribute `name` of the cloud up to the distance `band` from the surface, or, with `inside`, everywhere inside
+    /// and up to that distance outside.
+    fn extend(&self, py: Python<'_>, name: String, band: f64, inside: bool) -> PyResult<Extension> {
+        let region = match inside {
+            true => Region::Inside(band),
+            false => Region::Band(band),
+        };
         let extension = match &self.0 {
-            Either::F32(this) => Either::F32(extended(py, this, name, band)?),
-            Either::F64(this) => Either::F64(extended(py, this, name, band)?),
+            Either::F32(this) => Either::F32(extended(py, this, name, region)?),
+            Either::F64(this) => Either::F64(extended(py, this, name, region)?),
         };
         Ok(Extension(extension))
     }
@@ -308,19 +313,14 @@ fn extended<T: Number>(
     py: Python<'_>,
     this: &Arc<Reconstruction<T>>,
     name: String,
-    band: f64,
+    region: Region,
 ) -> PyResult<Arc<Extended<T>>> {
     let this = this.clone();
     let out = background::run(py, move |_| {
-        let attributes = this.cloud.attributes();
-        let attribute = attributes.iter().find(|a| a.name == name).cloned();
-        let attribute = attribute.ok_or_else(|| {
-            let known = attributes.iter().map(|a| a.name.clone()).collect();
-            Failure::Value(extend::Error::Missing { name, known }.to_string())
-        })?;
-        let (extension, residual) = this.result.view().extend(&attribute, band)?;
+        let attribute = extend::attribute(&this.cloud, &name).map_err(|e| e.to_string())?;
+        let (extension, residual) = this.result.view().extend(attribute, region)?;
         Ok::<_, Failure>(Extended {
-            attribute,
+            attribute: attribute.clone(),
             extension,
             residual,
         })

@@ -490,7 +490,7 @@ def test_options_are_typed_and_strings_are_enum_values():
     options = isograd.Options(orient="signs", splat="paper", radius=0.2)
     assert options.orient is isograd.Orient.SIGNS and options.splat is isograd.Splat.PAPER
     assert dataclasses.replace(options, band=3).band == 3.0
-    assert options.smoothing == "auto" and options.level is isograd.Level.LOCAL
+    assert options.smoothing == "auto" and options.level is isograd.Level.THIN
     assert isograd.Orient.SIGNS == "signs"
     result = isograd.reconstruct(SPHERE, GRID, normals=-SPHERE, orient=isograd.Orient.SIGNS)
     assert result.sdf[GRID.shape[0] // 2, GRID.shape[1] // 2, GRID.shape[2] // 2] > 0

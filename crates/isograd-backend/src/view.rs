@@ -138,12 +138,12 @@ impl<'a, T: Number> View<'a, T> {
     pub fn extend(
         self,
         attribute: &Attribute<T>,
-        band: f64,
+        region: impl Into<extend::Region>,
     ) -> Result<(extend::Extension<T>, extend::Residual<T>), Error> {
         match self.0 {
-            Of::Cpu(of) => Ok(of.extend_with_residual(attribute, band)?),
+            Of::Cpu(of) => Ok(of.extend_with_residual(attribute, region)?),
             #[cfg(feature = "gpu")]
-            Of::Device(of, _) => Ok(of.extend_with_residual(attribute, band)?),
+            Of::Device(of, _) => Ok(of.extend_with_residual(attribute, region)?),
         }
     }
 

@@ -28,7 +28,7 @@ pub struct Cli {
 }
 
 const STATUS: &str = "Exit status: 0 done, 1 the work failed, 2 the command line is wrong, \
-130 stopped by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP, 141 if the reader of the output went away.";
+3 the result is bad (reconstruct --strict), 130 stopped by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP, 141 if the reader of the output went away.";
 
 /// Commands.
 #[derive(Debug, Subcommand)]
@@ -95,6 +95,9 @@ pub struct Reconstruct {
     #[command(flatten)]
     pub reading: ReadingArgs,
 
+    /// Exit with status 3 if the verdict is bad; all outputs are written
+    #[arg(long, help_heading = "Running")]
+    pub strict: bool,
     /// Number type of the computation and of the outputs
     #[arg(long, default_value = "f32", help_heading = "Running")]
     pub precision: Precision,

@@ -38,6 +38,12 @@ pub enum Error {
         /// What was allowed.
         tolerance: f64,
     },
+    /// The verdict is bad, with `--strict`.
+    #[error("{file}: the result is bad, and --strict was given; all outputs were written")]
+    Bad {
+        /// The file.
+        file: String,
+    },
     /// Unknown shape, or invalid parameters.
     #[error(transparent)]
     Shape(#[from] ShapeError),
@@ -93,7 +99,7 @@ impl Error {
         }
     }
 
-    /// 2 where the command line is wrong, 128 and the number of the signal after a signal, of which a pipe without a
+    /// 2 where the command line is wrong, 3 where the result is bad, 128 and the number of the signal after a signal, of which a pipe without a
     /// reader is one (SIGPIPE), else 1.
     pub fn status(&self) -> u8 {
         use isograd_fit::Error as Fit;
@@ -101,6 +107,7 @@ impl Error {
             Self::Usage(_) | Self::Shape(_) => 2,
             Self::Fit(Fit::NoParameters | Fit::Whole { .. } | Fit::Option { .. }) => 2,
             Self::Fit(Fit::Shape(_) | Fit::NoStart { .. }) => 2,
+            Self::Bad { .. } => 3,
             Self::Stopped { .. } => crate::interrupt::status(),
             _ if self.is_broken_pipe() => BROKEN_PIPE,
             _ => 1,

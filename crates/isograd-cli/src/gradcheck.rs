@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use isograd::PointCloud;
 use isograd::gradcheck::{Difference, GradientCheck, Motion, Options, Row, gradcheck};
+use isograd::{PointCloud, Verdict};
 use isograd_io::Attributes;
 use serde::Serialize;
 
@@ -16,8 +16,11 @@ use crate::streams::to_stdout;
 /// Fraction of the derivative of uniform growth below which a derivative is negligible, and its ratio is not shown.
 const NEGLIGIBLE: f64 = 0.005;
 
+/// Relative deviation of a step of the size that an optimizer takes from the pullback, above which it is to be looked at.
+const TOLERATED_STEP: f64 = 0.1;
+
 /// The loss that is differentiated: see [`isograd::gradcheck`].
-const LOSS: &str = "loss: volume of the body, with an edge 2 cells soft and weights that rise from one end to the other; a motion moves \
+const LOSS: &str = "volume of the body, with an edge 2 cells soft and weights that rise from one end to the other; a motion moves \
 the fastest point by 1";
 
 /// Runs the command, in double precision.
@@ -56,14 +59,12 @@ pub fn run(args: &args::Gradcheck) -> Result<(), Error> {
             cloud.len(),
             grid.spacing()
         ));
-        to_stdout(LOSS);
+        to_stdout(&format!("loss: {LOSS}"));
         table(&check, args.step).lines().for_each(to_stdout);
-        verdict(&check, args.step, args.tolerance)
-            .lines()
-            .for_each(to_stdout);
+        to_stdout(&conclusion(&check, args));
     }
     if let Some(report) = &args.report {
-        write(report, &file, &check)?;
+        write(report, &file, &check, verdict(&check, args.tolerance))?;
     }
     check_tolerance(&check, args.tolerance, file)
 }
@@ -96,21 +97,54 @@ fn table(check: &GradientCheck, step: f64) -> String {
     lines.join("\n")
 }
 
-/// The last line: whether the pullback is the derivative, and how far real steps follow it.
-fn verdict(check: &GradientCheck, step: f64, tolerance: f64) -> String {
-    let worst = check.rows.iter().map(error).fold(0.0, f64::max);
-    let word = if worst <= tolerance {
-        "passed"
-    } else {
-        "failed"
-    };
+/// Whether the pullback is the derivative, and real steps follow it: bad beyond the tolerance.
+fn verdict(check: &GradientCheck, tolerance: f64) -> Verdict {
+    if !(worst(check) <= tolerance) {
+        return Verdict::Bad;
+    }
+    match check.rows.iter().any(|row| far(row) > TOLERATED_STEP) {
+        true => Verdict::Check,
+        false => Verdict::Good,
+    }
+}
+
+/// The last line: the verdict, with its figures.
+fn conclusion(check: &GradientCheck, args: &args::Gradcheck) -> String {
+    let (step, tolerance) = (args.step, args.tolerance);
     let relevant = check.rows.iter().filter(|row| is_relevant(row));
-    let ratios: Vec<f64> = relevant.map(Row::large_ratio).collect();
-    let within = ratios.iter().filter(|&&ratio| off(ratio) <= 0.02).count();
+    let is_within = |row: &&Row| off(row.large_ratio()) <= 0.02;
+    let within = relevant.clone().filter(is_within).count();
+    let advice = match verdict(check, tolerance) {
+        Verdict::Good => "",
+        Verdict::Check => {
+            "; larger steps differ: take smaller ones, use more cells (--resolution) or known normals (--orient signs)"
+        }
+        Verdict::Bad => {
+            "; what the row counts as changed has no derivative: try --orient signs, --radius or --resolution"
+        }
+    };
     format!(
-        "{word}: the pullback is within {worst:.1e} of small steps (tolerance {tolerance:.1e}); {within} of {} motions are within 2 % over ±{step} cell",
-        ratios.len()
+        "verdict: {}: the pullback is within {:.1e} of small steps (tolerance {tolerance:.1e}); {within} of {} motions are within 2 % over ±{step} cell{advice}",
+        verdict(check, tolerance),
+        worst(check),
+        relevant.count()
     )
+}
+
+/// Largest error of the pullback against the small step.
+fn worst(check: &GradientCheck) -> f64 {
+    let errors = check.rows.iter().map(error);
+    errors.max_by(f64::total_cmp).unwrap_or(0.0)
+}
+
+/// Deviation of the large step from the pullback, relative to the derivative or, of a small one, to a tenth of that of uniform
+/// growth.
+fn far(row: &Row) -> f64 {
+    let size = row.pullback.abs().max(0.1 * row.scale);
+    match size > 0.0 {
+        true => (row.pullback - row.large.value).abs() / size,
+        false => 0.0,
+    }
 }
 
 /// Notes below the table.
@@ -139,7 +173,7 @@ fn line(row: &Row) -> String {
     let Difference {
         neighborhoods,
         normals,
-        cells,
+        edges,
         ..
     } = row.large;
     let ratio = match is_relevant(row) {
@@ -148,7 +182,7 @@ fn line(row: &Row) -> String {
     };
     let unsmooth = if row.small.is_smooth() { "" } else { " *" };
     format!(
-        "{:<14} {:>12.5e} {:>12.5e} {:>9.1e} {:>12.5e} {ratio:>7}   {neighborhoods} neighborhoods, {normals} normals, {cells} cells{unsmooth}",
+        "{:<14} {:>12.5e} {:>12.5e} {:>9.1e} {:>12.5e} {ratio:>7}   {neighborhoods} neighborhoods, {normals} normals, {edges} edges{unsmooth}",
         row.motion.name(),
         row.pullback,
         row.small.value,
@@ -196,6 +230,8 @@ fn check_tolerance(check: &GradientCheck, tolerance: f64, file: String) -> Resul
 struct Report<'a> {
     version: &'static str,
     path: &'a str,
+    loss: &'static str,
+    verdict: Verdict,
     guarded: usize,
     motions: Vec<MotionReport>,
 }
@@ -217,7 +253,7 @@ struct StepReport {
     value: f64,
     neighborhoods: usize,
     normals: usize,
-    cells: usize,
+    edges: usize,
     crossings: usize,
 }
 
@@ -228,13 +264,13 @@ impl From<Difference> for StepReport {
             value: of.value,
             neighborhoods: of.neighborhoods,
             normals: of.normals,
-            cells: of.cells,
+            edges: of.edges,
             crossings: of.crossings,
         }
     }
 }
 
-fn write(path: &Path, file: &str, check: &GradientCheck) -> Result<(), Error> {
+fn write(path: &Path, file: &str, check: &GradientCheck, verdict: Verdict) -> Result<(), Error> {
     let motions = check.rows.iter().map(|row| MotionReport {
         name: row.motion.name(),
         pullback: row.pullback,
@@ -247,6 +283,8 @@ fn write(path: &Path, file: &str, check: &GradientCheck) -> Result<(), Error> {
     let report = Report {
         version: env!("CARGO_PKG_VERSION"),
         path: file,
+        loss: LOSS,
+        verdict,
         guarded: check.guarded,
         motions: motions.collect(),
     };

@@ -96,9 +96,7 @@ impl Job<'_> {
         plan.orient(&cloud)
             .map_err(Error::input(&self.args.cloud))?;
         let (orientation, report) = plan.into_parts();
-        for warning in &report.warnings {
-            progress.warn(&warning.to_string());
-        }
+        progress.warn_of(&report);
         progress.step("write");
         let begin = Instant::now();
         let out = oriented(&cloud, &orientation.normals, &orientation.confidence)
@@ -134,6 +132,7 @@ impl Job<'_> {
             report.orientation, report.flipped, report.confidence_median, report.confidence_p05
         ));
         progress.print(&doubtful(&report.doubt));
+        progress.conclude(report);
     }
 }
 

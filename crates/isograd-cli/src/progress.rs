@@ -5,6 +5,8 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use isograd::{Report, Verdict};
+
 use crate::args::Running;
 use crate::streams::{to_stderr, to_stdout};
 
@@ -62,6 +64,25 @@ impl Progress {
     /// Prints a warning to standard error, also with `-q`.
     pub fn warn(&self, text: &str) {
         self.bar.suspend(|| to_stderr(&format!("warning: {text}")));
+    }
+
+    /// Prints the warnings of a report.
+    pub fn warn_of(&self, report: &Report) {
+        for warning in report.reasons() {
+            self.warn(&warning.to_string());
+        }
+    }
+
+    /// Prints the verdict of a report, with its reasons and what to try: to standard error with `-q`, and only if it is
+    /// not good.
+    pub fn conclude(&self, report: &Report) {
+        let line = format!("verdict: {}", report.conclusion());
+        match report.verdict() {
+            Some(Verdict::Check | Verdict::Bad) if self.quiet => {
+                self.bar.suspend(|| to_stderr(&line));
+            }
+            _ => self.print(&line),
+        }
     }
 
     /// Prints a detail with `-v`.

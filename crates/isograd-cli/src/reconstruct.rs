@@ -4,13 +4,13 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
-use isograd::{Field, Grid, JsonReport, Mesh, PointCloud, Real, Stage};
+use isograd::{Field, Grid, JsonReport, Mesh, PointCloud, Real, Stage, Verdict};
 use isograd_backend::{Number, Plan, View};
 use isograd_io::{Attributes, Geometry};
 
 use crate::args::{self, Precision};
 use crate::backend;
-use crate::error::Error;
+use crate::error::{Error, file_name};
 use crate::outputs::{Outputs, write_report};
 use crate::plot;
 use crate::progress::Progress;
@@ -45,9 +45,9 @@ pub fn run(args: &args::Reconstruct) -> Result<(), Error> {
         read_seconds,
     };
     match job.needs_double(&geometry)? {
-        Some(warning) => {
-            progress.warn(&warning);
-            job.run::<f64>(&geometry, &mut progress, Some(warning))
+        Some(note) => {
+            progress.warn(&note);
+            job.run::<f64>(&geometry, &mut progress, Some(note))
         }
         None if args.precision == Precision::F64 => job.run::<f64>(&geometry, &mut progress, None),
         None => job.run::<f32>(&geometry, &mut progress, None),
@@ -113,7 +113,7 @@ impl Job<'_> {
         cloud.map_err(Error::input(&self.args.cloud))
     }
 
-    /// The warning if single precision was requested and can't represent the coordinates.
+    /// The note if single precision was requested and can't represent the coordinates.
     fn needs_double(&self, geometry: &Geometry) -> Result<Option<String>, Error> {
         if self.args.precision == Precision::F64 {
             return Ok(None);
@@ -141,7 +141,7 @@ impl Job<'_> {
         &self,
         geometry: &Geometry,
         progress: &mut Progress,
-        warning: Option<String>,
+        note: Option<String>,
     ) -> Result<(), Error> {
         let cloud = self.cloud::<T>(geometry)?;
         let grid = self.grid(&cloud)?;
@@ -172,23 +172,24 @@ impl Job<'_> {
                 Results::new(view)
             })
             .map_err(Error::input(&self.args.cloud))?;
-        let mut report = JsonReport::new(result.report);
-        for warning in &report.warnings {
-            progress.warn(warning);
-        }
-        report.warnings.extend(warning);
+        progress.warn_of(result.report);
         progress.step("write");
-        self.write(&cloud, &result, report, progress)?;
+        self.write(&cloud, &result, note, progress)?;
         progress.finish();
         self.summarize(progress, &result);
-        Ok(())
+        match result.report.verdict() {
+            Some(Verdict::Bad) if self.args.strict => Err(Error::Bad {
+                file: file_name(&self.args.cloud),
+            }),
+            _ => Ok(()),
+        }
     }
 
     fn write<T: Number>(
         &self,
         cloud: &PointCloud<T>,
         result: &Results<'_, T>,
-        report: JsonReport,
+        note: Option<String>,
         progress: &Progress,
     ) -> Result<(), Error> {
         let begin = Instant::now();
@@ -221,8 +222,9 @@ impl Job<'_> {
                 write: begin.elapsed().as_secs_f64(),
                 total: self.start.elapsed().as_secs_f64(),
             };
+            let report = JsonReport::new(result.report);
             let report = Report::new(&self.args.cloud, report, times);
-            let report = report.on_grid(result.sdf.grid(), result.backend);
+            let report = report.on_grid(result.sdf.grid(), result.backend, note);
             write_report(path, &report)?;
             wrote(path);
         }
@@ -254,7 +256,7 @@ impl Job<'_> {
         Ok(plot::write(path, &picture)?)
     }
 
-    /// Prints a summary.
+    /// Prints a summary, and the verdict last.
     fn summarize<T: Real>(&self, progress: &Progress, result: &Results<'_, T>) {
         let report = result.report;
         let (surface, grid) = (&report.surface, result.sdf.grid());
@@ -278,5 +280,6 @@ impl Job<'_> {
             surface.area,
             surface.volume
         ));
+        progress.conclude(report);
     }
 }

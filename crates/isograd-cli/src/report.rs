@@ -15,6 +15,9 @@ pub struct Report {
     input: Input,
     #[serde(skip_serializing_if = "Option::is_none")]
     grid: Option<GridReport>,
+    /// Why the number type is another than the requested one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    note: Option<String>,
     #[serde(flatten)]
     result: JsonReport,
     /// Peak of the allocated memory.
@@ -64,14 +67,16 @@ impl Report {
                 points,
             },
             grid: None,
+            note: None,
             result,
             peak_memory_bytes: crate::ALLOCATOR.peak_usage(),
         }
     }
 
-    /// Adds the grid and the backend of a reconstruction.
-    pub fn on_grid<T: Real>(self, grid: &Grid<T>, backend: &str) -> Self {
+    /// Adds the grid and the backend of a reconstruction, and a note about its number type.
+    pub fn on_grid<T: Real>(self, grid: &Grid<T>, backend: &str, note: Option<String>) -> Self {
         Self {
+            note,
             backend: Some(backend.into()),
             grid: Some(GridReport {
                 shape: grid.shape(),

@@ -36,7 +36,7 @@
 //!
 //! # What is not
 //! - Signs are estimated. Where samples are sparse, noisy or the surface is open they may be wrong: see
-//!   [`Report::warnings`], [`Reconstruction::confidence`] and [`orient::doubt`].
+//!   [`Report::verdict`], its [reasons](Warning), [`Reconstruction::confidence`] and [`orient::doubt`].
 //! - Neighborhoods, signs, the topology of the mesh and the closest triangle are discrete: a pullback holds them constant.
 //!   Forward mode and second derivatives are not supported.
 //!
@@ -98,7 +98,7 @@ pub use pipeline::{
     check_memory,
 };
 pub use real::Real;
-pub use report::{JsonReport, Report, Seconds, Stage, Warning};
+pub use report::{JsonReport, Report, Seconds, Stage, Verdict, Warning};
 
 /// The code of the README, compiled and run with the doc tests.
 #[cfg(doctest)]

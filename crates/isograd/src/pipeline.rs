@@ -216,9 +216,12 @@ struct Residuals<T> {
     splat: splat::Residual,
     /// `σ` of the smoothing, in cells.
     smoothing: f64,
+    /// Whether the surface is that of the indicator on cells half as large.
+    is_refined: bool,
     iso_value: isosurface::iso_value::Residual<T>,
-    /// Trilinear values of the indicator at the samples, of a screened equation.
-    screened: isosurface::iso_value::Residual<T>,
+    /// Trilinear values of the indicator at the samples, of a screened equation whose surface is refined: `iso_value`
+    /// then holds those of the spline.
+    screened: Option<isosurface::iso_value::Residual<T>>,
     local_level: isosurface::local_level::Residual<T>,
     thickened: Thickened<T>,
 }
@@ -275,11 +278,10 @@ impl<T: Real> Reconstruction<T> {
     }
 
     fn splat_samples(&self) -> splat::Samples<'_, T> {
-        splat::Samples {
-            points: self.residuals.thickened.or(&self.points),
-            normals: &self.orientation.normals,
-            areas: &self.areas,
-        }
+        let (points, normals) = (&self.points, &self.orientation.normals);
+        self.residuals
+            .thickened
+            .samples(points, normals, &self.areas)
     }
 
     /// The options of the plan.

@@ -1,20 +1,20 @@
 //! What a reconstruction says about itself: numbers, times and warnings.
 
 mod json;
-
-use std::fmt;
+mod verdict;
+mod warning;
 
 use rayon::prelude::*;
 
 use crate::differential::{Eikonal, EikonalOptions, eikonal};
 use crate::isosurface::measure::Measures;
-use crate::orient::doubt::{Doubt, Reason};
+use crate::orient::doubt::Doubt;
 use crate::{Field, Real};
 
 pub use json::JsonReport;
-
-/// A reason is named where it stands for one in this many of the doubtful samples.
-const SMALLEST_REASON: usize = 10;
+pub(crate) use verdict::TOLERATED_SHARE;
+pub use verdict::Verdict;
+pub use warning::Warning;
 
 /// The parts of a reconstruction, in the order in which they run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -122,6 +122,9 @@ pub struct Report {
     pub trim: Option<(f64, usize)>,
     /// Measures of the mesh.
     pub surface: Measures,
+    /// Share of the surface, from 0 to 1, that is a guess: further from all samples than 2 cells of φ and than 4 times
+    /// the distance between samples.
+    pub guessed: f64,
     /// Least φ.
     pub sdf_min: f64,
     /// Greatest φ.
@@ -130,7 +133,9 @@ pub struct Report {
     pub eikonal: Eikonal,
     /// Wall-clock seconds.
     pub seconds: Seconds,
-    /// What a user should know before trusting the result.
+    /// Whether the result was measured; without that there may be warnings, but no good verdict.
+    pub checked: bool,
+    /// Reasons not to trust the result.
     pub warnings: Vec<Warning>,
 }
 
@@ -161,167 +166,4 @@ impl Report {
 fn quantile<V: Copy>(sorted: &[V], q: f64) -> Option<V> {
     let last = sorted.len().checked_sub(1)?;
     sorted.get((q * last as f64).round() as usize).copied()
-}
-
-/// What a user should know before trusting the result. A warning is not an error: all outputs are there.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Warning {
-    /// Samples were left out: they are isolated, and further from the others than these extend.
-    Outliers {
-        /// Number of such samples.
-        samples: usize,
-    },
-    /// Parts of the body are thinner than three cells.
-    Thin {
-        /// Share of the samples that lie on such parts, from 0 to 1.
-        share: f64,
-    },
-    /// Samples are further apart than the cells are wide.
-    Sparse {
-        /// Typical distance between samples.
-        sample_spacing: f64,
-        /// Cell size.
-        spacing: f64,
-    },
-    /// The samples end at a rim: they do not enclose a volume.
-    Open {
-        /// Number of samples along rims.
-        samples: usize,
-    },
-    /// The surface reaches the wall of the grid.
-    TouchesWall,
-    /// A sheet is thinner than two cells of the surface: its shell may have holes.
-    ThinSheet {
-        /// Thickness, in cells.
-        cells: f64,
-    },
-    /// The surface has several pieces.
-    Components {
-        /// Number of pieces.
-        count: usize,
-    },
-    /// Samples lie off the surface.
-    Missed {
-        /// Share of the samples further than one cell from the surface, from 0 to 1.
-        share: f64,
-    },
-    /// The sign of many normals is a guess.
-    DoubtfulSigns {
-        /// How many, and why.
-        doubt: Doubt,
-    },
-    /// Normals are not defined by their neighbors.
-    Guarded {
-        /// Number of such samples.
-        samples: usize,
-    },
-    /// Coordinates are so large that the number type rounds them visibly.
-    Rounded {
-        /// Distance between neighboring numbers of the type, in cells.
-        cells: f64,
-    },
-}
-
-impl fmt::Display for Warning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Outliers { samples } => write!(
-                f,
-                "{samples} samples were left out as outliers: they are isolated and further from the others than these extend; the option outliers 'keep' keeps them"
-            ),
-            Self::Thin { share } => write!(
-                f,
-                "{} of the samples lie on parts thinner than 3 cells; use a finer grid if these parts matter",
-                percent(*share)
-            ),
-            Self::Sparse {
-                sample_spacing,
-                spacing,
-            } => write!(
-                f,
-                "samples are {:.1} cells apart (spacing {sample_spacing:.3e}, cells {spacing:.3e}); use a coarser grid or more samples",
-                sample_spacing / spacing
-            ),
-            Self::Open { samples } => write!(
-                f,
-                "the surface is open: {samples} samples lie along rims or holes; the gaps are closed by guess and the sign near them can't be trusted"
-            ),
-            Self::TouchesWall => write!(
-                f,
-                "the surface reaches the wall of the grid and is cut off there; use larger bounds or padding, or the option walls 'closed'"
-            ),
-            Self::ThinSheet { cells } => write!(
-                f,
-                "the sheet is {cells:.2} cells of the surface thick and its shell may have holes; φ is exact: use a thicker sheet or a finer surface"
-            ),
-            Self::Components { count } => {
-                write!(f, "the surface has {count} separate pieces")
-            }
-            Self::Missed { share } => write!(
-                f,
-                "{} of the samples lie more than one cell from the surface (parts thinner than a cell, which the level 'thin' finds; outliers or wrong normals)",
-                percent(*share)
-            ),
-            Self::DoubtfulSigns { doubt } => f.write_str(&doubtful_signs(doubt)),
-            Self::Guarded { samples } => write!(
-                f,
-                "{samples} samples have no well-defined normal (a corner, a line or an isolated point)"
-            ),
-            Self::Rounded { cells } => write!(
-                f,
-                "coordinates are rounded to {cells:.1e} cells by the number type; use f64 or move the cloud toward the origin"
-            ),
-        }
-    }
-}
-
-/// What there is to say about doubtful signs: how many, why, and what helps against the main reasons.
-fn doubtful_signs(doubt: &Doubt) -> String {
-    let mut text = format!(
-        "the side of the surface is doubtful for {} of the samples",
-        percent(doubt.share())
-    );
-    let mut named = doubt.by_frequency();
-    named.retain(|&reason| doubt.of(reason) * SMALLEST_REASON >= doubt.doubtful());
-    for (k, &reason) in named.iter().enumerate() {
-        let lead = if k == 0 { ":" } else { "," };
-        text += &format!(
-            "{lead} {} {}",
-            percent(doubt.share_of(reason)),
-            cause(reason)
-        );
-    }
-    let main = named.first().copied().unwrap_or(Reason::Unexplained);
-    text + &format!("; {}", remedy(main))
-}
-
-/// Why samples are doubtful.
-fn cause(reason: Reason) -> &'static str {
-    match reason {
-        Reason::Thin => "lie on sheets less than about 3 samples apart",
-        Reason::Sparse => "are far from all others",
-        Reason::Open => "lie at a rim or hole, or on an open surface",
-        Reason::Noisy => "scatter about the surface",
-        Reason::Unexplained => "for no plain reason",
-    }
-}
-
-/// What helps; how to give more is the same for all.
-fn remedy(reason: Reason) -> &'static str {
-    match reason {
-        Reason::Thin => "sample more densely there, or give sensor positions or normals",
-        Reason::Sparse => {
-            "sample more densely there or remove outliers, or give sensor positions or normals"
-        }
-        Reason::Open => "close the gaps, or give sensor positions or normals",
-        Reason::Noisy => "remove noise, or give sensor positions or normals",
-        Reason::Unexplained => {
-            "give sensor positions or normals, or look at the confidence in the output"
-        }
-    }
-}
-
-fn percent(share: f64) -> String {
-    format!("{:.1} %", 100.0 * share)
 }

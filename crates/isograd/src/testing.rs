@@ -30,6 +30,15 @@ pub(crate) fn assert_adjoint(what: &str, pulled: f64, step: f64, loss: impl Fn(f
     );
 }
 
+/// The quadratic B-spline.
+pub(crate) fn bspline(x: f64) -> f64 {
+    match x.abs() {
+        x if x < 0.5 => 0.75 - x * x,
+        x if x < 1.5 => 0.5 * (1.5 - x).powi(2),
+        _ => 0.0,
+    }
+}
+
 /// Stream of numbers in [−1, 1) from a seed.
 pub(crate) fn noise(seed: u64) -> impl FnMut() -> f64 {
     let mut x = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;

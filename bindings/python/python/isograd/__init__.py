@@ -24,7 +24,14 @@ from ._grid import Grid
 from ._mesh import Hits, Mesh, query, query_pullback, signed_distance
 from ._options import Level, Options, Orient, Outliers, Solve, Splat, Walls
 from ._orient import Oriented, orient
-from ._reconstruction import Extension, Gradients, Reconstruction, Reconstructor, reconstruct
+from ._reconstruction import (
+    Extension,
+    Gradients,
+    Reconstruction,
+    ReconstructionWarning,
+    Reconstructor,
+    reconstruct,
+)
 from ._shapes import Coordinates, Parameter, Samples, Shape, sample, shapes
 
 __all__ = [
@@ -43,6 +50,7 @@ __all__ = [
     "Outliers",
     "Parameter",
     "Reconstruction",
+    "ReconstructionWarning",
     "Reconstructor",
     "Samples",
     "Shape",

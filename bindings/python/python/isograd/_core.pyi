@@ -97,8 +97,8 @@ class Result:
     ) -> _Cotangents:
         """Cotangents of the inputs, by name, from those of the results, by name."""
 
-    def extend(self, name: str, band: float) -> Extension:
-        """The attribute ``name`` of the cloud up to the distance ``band`` from the surface."""
+    def extend(self, name: str, band: float, inside: bool) -> Extension:
+        """The attribute ``name`` of the cloud up to the distance ``band`` from the surface, on both sides or outside."""
 
 @final
 class Plan:
@@ -199,6 +199,7 @@ def call_target(
     outputs: Sequence[NDArray[Any]],
     settings: str,
     band: float | None = None,
+    inside: bool = False,
 ) -> None:
     """Calls a target with NumPy arrays, and writes its results into ``outputs``: float32, float64 or uint32, in C
     order."""

@@ -39,10 +39,11 @@ class Splat(str, Enum):
 class Level(str, Enum):
     """Value of the indicator at the surface."""
 
-    LOCAL = "local"
-    """The value at the samples nearby."""
     THIN = "thin"
-    """Like ``LOCAL``, and parts thinner than a cell are made a cell thick; the surface is marched on half cells."""
+    """The value at the samples nearby. Parts thinner than a cell are made a cell thick, and the surface is marched on half
+    cells where samples are dense."""
+    LOCAL = "local"
+    """Like ``THIN``, without both: thin parts may be cut off."""
     MEAN = "mean"
     """The mean at all samples, as in the paper."""
 
@@ -80,7 +81,7 @@ class Outliers(str, Enum):
 
 OrientLike = Orient | Literal["auto", "parity", "given", "signs", "sensors", "previous"]
 SplatLike = Splat | Literal["bspline", "paper"]
-LevelLike = Level | Literal["local", "thin", "mean"]
+LevelLike = Level | Literal["thin", "local", "mean"]
 SolveLike = Solve | Literal["auto", "dense", "sparse"]
 WallsLike = Walls | Literal["free", "closed", "auto"]
 OutliersLike = Outliers | Literal["ignore", "keep"]
@@ -122,7 +123,7 @@ class Options:
     area: bool = True
     smoothing: float | Literal["auto"] = "auto"
     screening: float = 0.0
-    level: LevelLike = Level.LOCAL
+    level: LevelLike = Level.THIN
     surface: float | str = "auto"
     solve: SolveLike = Solve.AUTO
     walls: WallsLike = Walls.FREE

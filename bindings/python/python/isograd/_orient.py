@@ -11,6 +11,7 @@ import numpy as np
 from . import _core
 from ._arrays import floats, known
 from ._options import Options, Orient, OrientLike, check_known
+from ._reconstruction import texts
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -33,8 +34,8 @@ class Oriented:
 
     @property
     def warnings(self) -> list[str]:
-        """Reasons not to trust the normals."""
-        return self.report["warnings"]
+        """Reasons not to trust the normals, the worst first, each with what to try."""
+        return texts(self.report)
 
 
 def orient(

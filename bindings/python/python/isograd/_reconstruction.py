@@ -16,10 +16,14 @@ from ._grid import Grid
 from ._mesh import Mesh
 from ._numbers import number
 from ._options import Options, check_fill, check_known, resolve
-from ._settings import check_backend, encode, warn_note
+from ._settings import check_backend, encode, warn_caller, warn_note
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+
+
+class ReconstructionWarning(UserWarning):
+    """The verdict of a reconstruction is ``"check"`` or ``"bad"``; the message has the reasons and what to try."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,12 +50,8 @@ class Gradients:
 class Extension:
     """An attribute of the samples, extended to the surface and to the cells inside and near it."""
 
-    def __init__(
-        self, core: _core.Extension, name: str, grid: Grid, kept: np.ndarray | None = None
-    ) -> None:
+    def __init__(self, core: _core.Extension, name: str, grid: Grid) -> None:
         self._core = core
-        # Which of the cells of the extension module are part of this; all if it is None.
-        self._kept = kept
         self.name = name
         """Name of the attribute."""
         self.grid = grid
@@ -65,24 +65,12 @@ class Extension:
     @cached_property
     def cells(self) -> np.ndarray:
         """``(B,)`` flat indices of the cells: ``numpy.unravel_index(cells, grid.shape)``."""
-        return self._part("cells")
+        return self._core.array("cells")
 
     @cached_property
     def values(self) -> np.ndarray:
         """``(B, components)`` at those cells."""
-        return self._part("values")
-
-    def _part(self, name: str) -> np.ndarray:
-        array = self._core.array(name)
-        return array if self._kept is None else array[self._kept]
-
-    def _at_all_cells(self, bar: np.ndarray | None) -> np.ndarray | None:
-        """A cotangent of :attr:`values`, with zeros at the cells that were dropped."""
-        if bar is None or self._kept is None:
-            return bar
-        out = np.zeros((len(self._kept), *bar.shape[1:]), bar.dtype)
-        out[self._kept] = bar
-        return out
+        return self._core.array("values")
 
     def dense(self, fill: float = 0.0) -> np.ndarray:
         """``(nx, ny, nz, components)``, with ``fill`` at the other cells."""
@@ -108,7 +96,8 @@ class Reconstruction:
         """The options of the reconstruction."""
 
     def __repr__(self) -> str:
-        return f"Reconstruction of {self._count} points on {self.grid.shape} cells, {self.dtype}"
+        verdict = self.verdict or "not checked"
+        return f"Reconstruction of {self._count} points on {self.grid.shape} cells, {self.dtype}: {verdict}"
 
     @cached_property
     def sdf(self) -> np.ndarray:
@@ -185,9 +174,22 @@ class Reconstruction:
         return self._core.backend()
 
     @property
+    def verdict(self) -> Literal["good", "check", "bad"] | None:
+        """Whether the result can be trusted; ``None`` where nothing was checked (``checks=False``)."""
+        return self.report["verdict"]
+
+    @property
     def warnings(self) -> list[str]:
-        """Reasons not to trust the result."""
-        return list(self.report["warnings"])
+        """Reasons of the verdict, the worst first, each with what to try."""
+        return texts(self.report)
+
+    def _warn(self) -> None:
+        """Warns the caller unless the verdict is good. Without numbers, so that a time loop repeats the message, which
+        Python then shows once."""
+        if self.options.checks and self.verdict != "good":
+            reasons = "; ".join(f"{w['code']} (try: {w['try']})" for w in self.report["warnings"])
+            message = f"the result is {self.verdict}: {reasons}. Numbers: result.report[\"warnings\"]; help: docs/bad-results.md"
+            warn_caller(message, ReconstructionWarning)
 
     def extend(
         self, name: str, band: float, *, fill: Literal["inside", "band"] = "inside"
@@ -205,13 +207,9 @@ class Reconstruction:
             ValueError: an unknown attribute, a band without width, or ``fill="inside"`` with ``options.band``, beyond
                 which closest points are unknown.
         """
-        band = number(band, "band")
-        if check_fill(fill, self.options.band) == "band" or not 0 < band < np.inf:
-            return Extension(self._core.extend(str(name), band), str(name), self.grid)
-        everywhere = max(band, 2.0 * self.grid.spacing * sum(self.grid.shape))
-        core = self._core.extend(str(name), everywhere)
-        kept = self.sdf.reshape(-1)[core.array("cells")] <= self.dtype.type(band)
-        return Extension(core, str(name), self.grid, kept)
+        inside = check_fill(fill, self.options.band) == "inside"
+        core = self._core.extend(str(name), number(band, "band"), inside)
+        return Extension(core, str(name), self.grid)
 
     def pullback(
         self,
@@ -279,7 +277,7 @@ class Reconstruction:
         return (
             extension._core,
             bar(at_vertices, extension.vertices),
-            extension._at_all_cells(bar(in_band, extension.values)),
+            bar(in_band, extension.values),
         )
 
 
@@ -316,7 +314,9 @@ class Reconstructor:
         check_known(self.options.orient, normals is not None, sensors is not None)
         core = self._plan.reconstruct(cloud, normals, sensors, _attributes(attributes, cloud))
         warn_note(self._plan.take_note())
-        return Reconstruction(core, self.grid, self.options, len(cloud), cloud.dtype)
+        result = Reconstruction(core, self.grid, self.options, len(cloud), cloud.dtype)
+        result._warn()
+        return result
 
     reconstruct = __call__
 
@@ -351,12 +351,19 @@ def reconstruct(
         TypeError, ValueError: invalid input; the message says what is wrong and what to do.
         RuntimeError: an unavailable backend.
         KeyboardInterrupt: at once, on Ctrl-C.
+
+    Warns with :class:`ReconstructionWarning` unless the verdict is good.
     """
     cloud = floats(points, "points", (None, 3))
     options = resolve(options, changes)
     grid = Grid.fit(cloud, outliers=options.outliers) if grid is None else grid
     plan = Reconstructor(grid, options, backend=backend)
     return plan(cloud, normals=normals, sensors=sensors, attributes=attributes)
+
+
+def texts(report: dict[str, Any]) -> list[str]:
+    """The warnings of a report, each with what to try."""
+    return [f"{warning['text']}; try: {warning['try']}" for warning in report["warnings"]]
 
 
 def _attributes(

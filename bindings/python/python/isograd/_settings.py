@@ -60,12 +60,21 @@ def check_backend(backend: object) -> str:
 
 def warn_note(note: str | None) -> None:
     """Warns the first caller outside the package that ``backend="auto"`` selected the CPU."""
-    if note is None:
-        return
-    level, frame = 2, sys._getframe(1)
-    while frame.f_back is not None and frame.f_globals.get("__package__") == __package__:
+    if note is not None:
+        warn_caller(note, RuntimeWarning)
+
+
+def warn_caller(message: str, category: type[Warning]) -> None:
+    """Warns the first caller outside the package."""
+    level, frame = 1, sys._getframe()
+    while frame.f_back is not None and is_ours(frame.f_globals.get("__package__")):
         level, frame = level + 1, frame.f_back
-    warnings.warn(note, RuntimeWarning, stacklevel=level)
+    warnings.warn(message, category, stacklevel=level)
+
+
+def is_ours(package: str | None) -> bool:
+    """Whether this is the package, or one below it."""
+    return (package or "").partition(".")[0] == __package__
 
 
 def check_pure(options: Options) -> None:

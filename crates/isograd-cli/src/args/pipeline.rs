@@ -61,9 +61,10 @@ pub struct MethodArgs {
     /// Strength of the pull of the indicator to one value at the samples; 1 to 4 are usual, 0 is off
     #[arg(long, value_name = "ALPHA", default_value = "0", value_parser = not_negative)]
     pub screening: f64,
-    /// Value of the indicator at the surface: local (that at the samples nearby), thin (like local, and parts thinner
-    /// than a cell are made about a cell thick; the surface is marched on half cells) or mean (the mean at all samples)
-    #[arg(long, value_name = "LEVEL", default_value = "local")]
+    /// Value of the indicator at the surface: thin (that at the samples nearby; parts thinner than a cell are made about a
+    /// cell thick, and the surface is marched on half cells where samples are dense), local (like thin, without both: thin
+    /// parts may be cut off) or mean (the mean at all samples)
+    #[arg(long, value_name = "LEVEL", default_value = "thin")]
     pub level: Level,
     /// Cells that the surface is found on: auto (about the distance between samples, up to twice as fine as the grid of
     /// φ), grid (those of φ), a cell size in the cloud's unit, or a factor such as 3x; φ stays on its own grid

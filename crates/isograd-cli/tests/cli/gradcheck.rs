@@ -11,7 +11,7 @@ fn the_pullback_of_a_torus_agrees_with_small_steps() {
     let table = run.stdout;
     let last = table.lines().last().unwrap_or_default();
     assert!(
-        last.starts_with("passed: the pullback is within"),
+        last.starts_with("verdict: good: the pullback is within"),
         "{table}"
     );
     assert!(table.contains("loss: volume of the body"), "{table}");
@@ -34,6 +34,9 @@ fn the_pullback_of_a_torus_agrees_with_small_steps() {
     );
     let report = sandbox.json("check.json");
     assert_eq!(report["guarded"], 0);
+    assert_eq!(report["verdict"], "good");
+    let loss = report["loss"].as_str().expect("a text");
+    assert!(loss.starts_with("volume of the body"), "{loss}");
     let motions = report["motions"].as_array().expect("a list");
     assert_eq!(motions.len(), 10);
     for motion in motions {

@@ -12,6 +12,7 @@ mod process;
 mod reading;
 mod real_clouds;
 mod real_gradients;
+mod real_verdicts;
 mod reconstruct;
 mod sandbox;
 mod tools;

@@ -46,7 +46,7 @@ fn the_folder_gets_its_five_files_and_the_report_its_fields() {
     let report = sandbox.json("out/new/report.json");
     assert_keys(
         &report,
-        "version backend input grid outliers normals orientation smoothing iso_value surface surface_spacing surface_cells walls trim sdf seconds peak_memory_bytes warnings",
+        "version backend input grid outliers normals orientation smoothing iso_value surface surface_spacing surface_cells walls trim sdf seconds peak_memory_bytes verdict warnings",
     );
     assert_keys(&report["input"], "path points");
     assert_keys(&report["grid"], "shape origin spacing");
@@ -325,11 +325,46 @@ fn warnings_are_on_standard_error_and_in_the_report() {
     sandbox.write("half.xyz", half);
     let run = sandbox.run("reconstruct half.xyz -o out --resolution 32");
     run.says(0, &["warning: ", "open"]);
+    let last = run.stdout.lines().last().unwrap_or_default();
+    assert!(last.starts_with("verdict: bad: open (try: "), "{run:?}");
+    assert!(last.contains("--sheet"), "{last}");
     let report = sandbox.json("out/report.json");
-    let warnings = report["warnings"].as_array().expect("a list");
-    assert!(
-        warnings
-            .iter()
-            .any(|w| w.as_str().is_some_and(|w| w.contains("open")))
+    assert_eq!(report["verdict"], "bad");
+    let open = &report["warnings"][0];
+    assert_keys(open, "code severity text try samples guessed");
+    assert_eq!(
+        (&open["code"], &open["severity"]),
+        (&"open".into(), &"bad".into())
+    );
+    assert!(open["samples"].as_u64() > Some(20), "{open}");
+
+    // The outputs are there, and the status says that they are bad.
+    sandbox.says("3 reconstruct half.xyz --mesh m.ply --resolution 32 --strict -q | half.xyz | verdict: bad: open");
+    assert!(!sandbox.mesh("m.ply").points.is_empty());
+    sandbox.says("0 reconstruct a.xyz --mesh m.ply --resolution 32 --strict");
+}
+
+#[test]
+fn the_last_line_of_a_good_result_is_its_verdict() {
+    let run = sphere().done("reconstruct cloud.ply --resolution 24");
+    assert_eq!(run.stdout.lines().last(), Some("verdict: good"));
+    assert_eq!(run.stderr, "");
+}
+
+#[test]
+fn every_warning_has_its_section_on_the_page() {
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/bad-results.md");
+    let Ok(page) = std::fs::read_to_string(page) else {
+        println!("SKIPPED: docs/bad-results.md is absent");
+        return;
+    };
+    for code in isograd::Warning::CODES {
+        assert!(page.contains(&format!("\n## `{code}`: ")), "{code}");
+    }
+    let sections = page.matches("\n## `").count();
+    assert_eq!(
+        sections,
+        isograd::Warning::CODES.len(),
+        "a code that does not exist"
     );
 }

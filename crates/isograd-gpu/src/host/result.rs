@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
-use isograd::distance::extend::{self, Extension};
+use isograd::distance::extend::{self, Extension, Region};
 use isograd::isosurface::measure;
 use isograd::neighbors::{Neighborhoods, Radii};
 use isograd::orient::Orientation;
@@ -206,7 +206,8 @@ impl<T: Number> Reconstruction<T> {
             };
             let normals = &orientation.normals;
             report.check_field(&points, normals, self.sdf()?, self.mesh()?, scratch, None);
-            report.check_samples(&points, self.neighborhoods()?, &orientation);
+            report.measure_gaps(self.mesh()?, self.neighborhoods()?, self.grid.spacing());
+            report.check_samples(&points, self.neighborhoods()?, &orientation, false);
         }
         let before = report.seconds.of(Stage::Checks);
         let seconds = before + start.elapsed().as_secs_f64();
@@ -214,8 +215,8 @@ impl<T: Number> Reconstruction<T> {
         Ok(report)
     }
 
-    /// The attribute `name` of the cloud at the vertices of the surface, and at every cell within `band` of
-    /// the surface as it is at the closest surface point: [`isograd::Reconstruction::extend`], on the device.
+    /// The attribute `name` of the cloud at the vertices of the surface, and at the closest surface point of every
+    /// cell of a region: [`isograd::Reconstruction::extend`], on the device.
     ///
     /// # Errors
     /// Errors of that, and of the device.
@@ -223,25 +224,20 @@ impl<T: Number> Reconstruction<T> {
         &self,
         cloud: &PointCloud<T>,
         name: &str,
-        band: f64,
+        region: impl Into<Region>,
     ) -> Result<Extension<T>, Error> {
-        let attributes = cloud.attributes();
-        let attribute = attributes.iter().find(|a| a.name == name);
-        let attribute = attribute.ok_or_else(|| extend::Error::Missing {
-            name: name.into(),
-            known: attributes.iter().map(|a| a.name.clone()).collect(),
-        })?;
-        Ok(self.extend_with_residual(attribute, band)?.0)
+        let attribute = extend::attribute(cloud, name)?;
+        Ok(self.extend_with_residual(attribute, region)?.0)
     }
 
     /// [`Self::extend`] for any attribute of the samples, with the residual of its pullback.
     pub fn extend_with_residual(
         &self,
         attribute: &Attribute<T>,
-        band: f64,
+        region: impl Into<Region>,
     ) -> Result<(Extension<T>, extend::Residual<T>), Error> {
         let used = self.selection.attribute(attribute);
-        self.device.extend(&self.result, &used, band)
+        self.device.extend(&self.result, &used, region.into())
     }
 
     /// Pulls cotangents of any of the results, and of what was extended, back to the points, the attributes and the

@@ -61,6 +61,13 @@ pub enum MeshError {
 }
 
 impl<T: Real> Mesh<T> {
+    /// Removes everything, keeping the memory.
+    pub(crate) fn clear(&mut self) {
+        self.vertices.clear();
+        self.faces.clear();
+        self.edges.clear();
+    }
+
     /// A mesh of finite vertices and faces that name them, from 0.
     ///
     /// # Errors

@@ -129,18 +129,22 @@ fn errors(n: usize, options: &Options) -> [f64; 3] {
     worst
 }
 
+/// Checks errors on a grid, and on one twice as fine.
+fn assert_second_order(coarse: &[f64], fine: &[f64]) {
+    for (a, b) in coarse.iter().zip(fine) {
+        let order = (a / b).log2();
+        // The largest error sits nearest the crease, where the next order still shows.
+        assert!(
+            (1.7..2.6).contains(&order),
+            "order {order}: {coarse:?} {fine:?}"
+        );
+    }
+}
+
 #[test]
 fn gradient_normals_and_curvature_converge_at_second_order_up_to_the_walls() {
     for options in [EXACT, Options::default()] {
-        let (coarse, fine) = (errors(48, &options), errors(96, &options));
-        for (a, b) in coarse.iter().zip(fine) {
-            let order = (a / b).log2();
-            // The largest error sits nearest the crease, where the next order still shows.
-            assert!(
-                (1.7..2.6).contains(&order),
-                "order {order}: {coarse:?} {fine:?}"
-            );
-        }
+        assert_second_order(&errors(48, &options), &errors(96, &options));
     }
 }
 
@@ -171,14 +175,7 @@ fn values_at_points_converge_at_second_order_up_to_the_walls() {
         }
         worst
     };
-    let (coarse, fine) = (error(40), error(80));
-    for (a, b) in coarse.iter().zip(fine) {
-        let order = (a / b).log2();
-        assert!(
-            (1.7..2.6).contains(&order),
-            "order {order}: {coarse:?} {fine:?}"
-        );
-    }
+    assert_second_order(&error(40), &error(80));
 }
 
 #[test]

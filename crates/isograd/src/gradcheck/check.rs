@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::functional::{Functional, parting};
 use super::{CheckError, Difference, Motion, Options, Row};
+use crate::data::LatticeEdge;
 use crate::distance::lattice::NO_TRIANGLE;
 use crate::distance::triangle::closest_point;
 use crate::isosurface::Level;
@@ -127,7 +128,7 @@ impl<'a> Check<'a> {
             value: slopes.iter().sum(),
             neighborhoods: unequal(&plus.counts, &minus.counts),
             normals: normals.filter(|(a, b)| dot(**a, **b) < 0.0).count(),
-            cells: unequal(&plus.inside, &minus.inside),
+            edges: symmetric_difference(&plus.edges, &minus.edges),
             crossings: unequal(&plus.between, &minus.between),
         };
         Ok((difference, slopes))
@@ -138,17 +139,19 @@ impl<'a> Check<'a> {
             true => self.plan.reconstruct_held(moved, self.base)?,
             false => self.plan.reconstruct(moved)?,
         };
-        let (grid, chi) = (result.surface_grid(), result.indicator().values());
+        let grid = result.surface_grid();
         let options = result.options();
         let faces = options.splat == Weights::Paper || options.level != Level::Mean;
         let between = |x: f64| match faces {
             true => (2.0 * x).floor() as i64,
             false => (x + 0.5).floor() as i64,
         };
+        let mut edges = result.mesh().edges().to_vec();
+        edges.par_sort_unstable();
         let places = moved.points().iter().map(|&p| grid.to_index(p));
         Ok(Side {
             parts: self.functional.parts(result.sdf()),
-            inside: chi.iter().map(|&chi| chi < result.iso_value()).collect(),
+            edges,
             between: places.map(|x| x.map(between)).collect(),
             counts: [result.neighbor_counts(), result.axis_counts()].concat(),
             normals: result.normals().to_vec(),
@@ -189,13 +192,20 @@ fn pull(base: &Reconstruction<f64>, bar: &[f64]) -> Result<CloudCotangent<f64>, 
 struct Side {
     /// Of the functional, cell by cell.
     parts: Vec<f64>,
-    inside: Vec<bool>,
+    /// Those that the surface crosses, sorted.
+    edges: Vec<LatticeEdge>,
     /// Between which of the planes that have to do with [`Difference::crossings`] each point lies.
     between: Vec<[i64; 3]>,
     counts: Vec<u32>,
     normals: Vec<[f64; 3]>,
     /// Of small steps, the mesh and the closest face of each cell.
     surface: Option<(Mesh<f64>, Vec<u32>)>,
+}
+
+/// Number of entries that only one of two sorted lists has.
+fn symmetric_difference(a: &[LatticeEdge], b: &[LatticeEdge]) -> usize {
+    let common = a.iter().filter(|edge| b.binary_search(edge).is_ok());
+    a.len() + b.len() - 2 * common.count()
 }
 
 /// Number of places in which two lists differ.

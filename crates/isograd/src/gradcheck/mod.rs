@@ -84,8 +84,9 @@ pub struct Difference {
     pub neighborhoods: usize,
     /// Points whose normal changed sides.
     pub normals: usize,
-    /// Cells that changed from inside to outside, or back.
-    pub cells: usize,
+    /// Edges of the surface's lattice that the surface began or ceased to cross: a cell at an end of them changed from
+    /// inside to outside, or back.
+    pub edges: usize,
     /// Points that passed a plane through cell centers, where the slope of the iso-value jumps, or a face of a cell,
     /// where those of the gains and the trust of the local iso-value do, and with the paper's weights the indicator.
     pub crossings: usize,
@@ -94,7 +95,7 @@ pub struct Difference {
 impl Difference {
     /// Whether nothing changed that has no derivative.
     pub fn is_smooth(&self) -> bool {
-        self.neighborhoods + self.normals + self.cells + self.crossings == 0
+        self.neighborhoods + self.normals + self.edges + self.crossings == 0
     }
 }
 

@@ -50,9 +50,7 @@ pub(crate) fn forward<T: Real>(
     level: T,
     mesh: &mut Mesh<T>,
 ) -> Result<Report, Error> {
-    mesh.vertices.clear();
-    mesh.faces.clear();
-    mesh.edges.clear();
+    mesh.clear();
     if !level.is_finite() {
         return Err(Error::Level { level: level.f64() });
     }

@@ -41,9 +41,7 @@ pub fn forward<T: Real>(
     scratch: &mut Scratch,
     mesh: &mut Mesh<T>,
 ) -> Result<Report, Error> {
-    mesh.vertices.clear();
-    mesh.faces.clear();
-    mesh.edges.clear();
+    mesh.clear();
     if !level.is_finite() {
         return Err(Error::Level { level: level.f64() });
     }

@@ -1,5 +1,7 @@
 //! Area, volume, components and topology of a triangle mesh.
 
+pub(crate) mod pieces;
+
 use rayon::prelude::*;
 
 use crate::data::Mesh;
@@ -266,40 +268,18 @@ mod tests {
         let of = |faces: Vec<[u32; 3]>| {
             Measures::of(&Mesh::new(corner_tetrahedron([0.0; 3], 1.0), faces).expect("valid"))
         };
+        let defects = |faces| {
+            let m = of(faces);
+            assert!(!m.closed);
+            [m.boundary_edges, m.misaligned_edges, m.crowded_edges]
+        };
         let mut flipped = TETRAHEDRON.to_vec();
         flipped[1] = [1, 0, 3];
-        let m = of(flipped);
-        assert_eq!(
-            (
-                m.closed,
-                m.boundary_edges,
-                m.misaligned_edges,
-                m.crowded_edges
-            ),
-            (false, 0, 3, 0)
-        );
-        let m = of(TETRAHEDRON[..3].to_vec());
-        assert_eq!(
-            (
-                m.closed,
-                m.boundary_edges,
-                m.misaligned_edges,
-                m.crowded_edges
-            ),
-            (false, 3, 0, 0)
-        );
+        assert_eq!(defects(flipped), [0, 3, 0]);
+        assert_eq!(defects(TETRAHEDRON[..3].to_vec()), [3, 0, 0]);
         let mut doubled = TETRAHEDRON.to_vec();
         doubled.push(doubled[0]);
-        let m = of(doubled);
-        assert_eq!(
-            (
-                m.closed,
-                m.boundary_edges,
-                m.misaligned_edges,
-                m.crowded_edges
-            ),
-            (false, 0, 0, 3)
-        );
+        assert_eq!(defects(doubled), [0, 0, 3]);
         let m = of(vec![[1, 1, 2]]);
         assert_eq!((m.closed, m.boundary_edges, m.vertices), (false, 1, 2));
     }

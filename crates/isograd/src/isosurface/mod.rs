@@ -65,16 +65,17 @@ pub use tables::triangles;
 /// Iso-value of the indicator at which the surface is extracted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Level {
+    /// Local value at the samples nearby, also on parts thinner than a cell, which are made about a cell thick: hardly any
+    /// of them is missed. Where the surface has a grid of its own, samples of such parts are moved apart until these are
+    /// thick enough, if samples have areas and are not less than about a sixth of a cell of the surface apart. Where its cells
+    /// are larger than 0.9 of the distance between samples, and the solve is dense, the surface is also that of quadratic
+    /// B-splines, marched on cells half as large: derivatives vary less within a cell, and edges are rounded a little more.
+    #[default]
+    Thin,
+    /// Local value at the samples nearby: [`local_level`]. Parts thinner than two cells of the surface may be cut off.
+    Local,
     /// The mean at all samples: [`iso_value`], as in the paper.
     Mean,
-    /// Local value at the samples near by: [`local_level`].
-    #[default]
-    Local,
-    /// Like `Local`, also on parts thinner than a cell, which are made about a cell thick: hardly any of them is missed.
-    /// Where the surface has a grid of its own, samples of such parts are moved apart until these are thick enough, if
-    /// samples have areas, and are not less than about a sixth of a cell of the surface apart. With a dense solve, the surface is also that of quadratic B-splines, marched on cells half as
-    /// large, and derivatives vary less within a cell. Edges are rounded a little more.
-    Thin,
 }
 
 /// The indicator between cell centers, where samples read it.

@@ -28,6 +28,9 @@ const OWN: usize = EDGE / 2;
 /// [`OWN`] and one more at both ends.
 const WIDE: usize = OWN + 2;
 
+/// Blocks whose cotangents are held at once.
+const TASK: usize = 1024;
+
 /// Values at the cells of the indicator under a block and round it.
 type Halo<T> = [T; WIDE * WIDE * WIDE];
 
@@ -40,16 +43,27 @@ pub(crate) fn grid<T: Real>(grid: &Grid<T>) -> Result<Grid<T>, GridError> {
     Grid::new(grid.lower(), grid.spacing() * T::of(0.5), shape)
 }
 
-/// The refined indicator near its surface `χ = level`. The same bits for any number of threads.
+/// The refined indicator near its surface `χ = level`, in the memory of a `previous` one. The same bits for any number of
+/// threads.
 ///
 /// # Errors
 /// [`GridError`] for a grid with more cells than can be indexed.
-pub(crate) fn forward<T: Real>(chi: &Field<T>, level: T) -> Result<BlockField<T>, GridError> {
+pub(crate) fn forward<T: Real>(
+    chi: &Field<T>,
+    level: T,
+    previous: Option<BlockField<T>>,
+) -> Result<BlockField<T>, GridError> {
     let fine = grid(chi.grid())?;
     let mut marks = Marks::new(fine.shape());
     marks.add_blocks(&crossed(chi, level));
     let blocks = Arc::new(marks.build());
-    let mut refined = BlockField::zeros(fine, blocks.clone());
+    let mut values = previous.map(|field| field.values).unwrap_or_default();
+    values.resize(blocks.nodes(), T::zero());
+    let mut refined = BlockField {
+        grid: fine,
+        blocks: blocks.clone(),
+        values,
+    };
     let work = refined.values.par_chunks_exact_mut(NODES).enumerate();
     work.for_each(|(block, out)| {
         let mut halo = [T::zero(); WIDE * WIDE * WIDE];
@@ -63,16 +77,16 @@ pub(crate) fn forward<T: Real>(chi: &Field<T>, level: T) -> Result<BlockField<T>
 
 /// Adds to `chi_bar` `(nx, ny, nz)` on `grid` the cotangents of the indicator from those of the refined one.
 pub(crate) fn pullback<T: Real>(refined_bar: &BlockField<T>, grid: &Grid<T>, chi_bar: &mut [T]) {
-    let blocks = &refined_bar.blocks;
-    let parts: Vec<Halo<T>> = refined_bar
-        .values
-        .par_chunks_exact(NODES)
-        .map(interpolate_transposed)
-        .collect();
-    for (block, part) in parts.iter().enumerate() {
-        for_each_cell(grid, blocks.corner(block), |place, cell| {
-            chi_bar[cell] += part[place];
-        });
+    let mut parts: Vec<Halo<T>> = Vec::with_capacity(TASK);
+    let mut corners = (0..refined_bar.blocks.len()).map(|block| refined_bar.blocks.corner(block));
+    for values in refined_bar.values.chunks(TASK * NODES) {
+        let values = values.par_chunks_exact(NODES);
+        values
+            .map(interpolate_transposed)
+            .collect_into_vec(&mut parts);
+        for (part, corner) in parts.iter().zip(&mut corners) {
+            for_each_cell(grid, corner, |place, cell| chi_bar[cell] += part[place]);
+        }
     }
 }
 

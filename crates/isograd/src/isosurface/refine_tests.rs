@@ -1,5 +1,6 @@
 use super::*;
 use crate::neighbors::tests::Random;
+use crate::testing::bspline;
 
 /// Noise on a grid, a step along x.
 fn setting() -> Field<f64> {
@@ -8,14 +9,6 @@ fn setting() -> Field<f64> {
     let value = |n: usize| grid.cell(n)[0] as f64 - 12.2 + random.uniform();
     let values = (0..grid.cells()).map(value).collect();
     Field::new(grid, values).expect("sizes match")
-}
-
-fn bspline(x: f64) -> f64 {
-    match x.abs() {
-        x if x < 0.5 => 0.75 - x * x,
-        x if x < 1.5 => 0.5 * (1.5 - x).powi(2),
-        _ => 0.0,
-    }
 }
 
 /// Weight of a cell at a cell half as large: over the cell itself and its image behind each wall.
@@ -34,7 +27,7 @@ fn weight(shape: [usize; 3], cell: [usize; 3], fine: [usize; 3]) -> f64 {
 #[test]
 fn values_are_those_of_the_spline_and_every_crossing_has_them() {
     let (chi, level) = (setting(), 0.1);
-    let refined = forward(&chi, level).expect("a grid");
+    let refined = forward(&chi, level, None).expect("a grid");
     let (shape, fine) = (chi.grid().shape(), refined.grid);
     assert_eq!(fine.shape(), shape.map(|n| 2 * n));
     assert_eq!(fine.spacing(), 0.125);
@@ -67,7 +60,7 @@ fn values_are_those_of_the_spline_and_every_crossing_has_them() {
 #[test]
 fn pullback_is_the_transpose() {
     let chi = setting();
-    let refined = forward(&chi, 0.1).expect("a grid");
+    let refined = forward(&chi, 0.1, None).expect("a grid");
     let mut random = Random::new(8);
     let mut bars = refined.clone();
     bars.values.fill_with(|| random.uniform() - 0.5);

@@ -16,6 +16,7 @@
 use rayon::prelude::*;
 
 use crate::data::Mesh;
+use crate::neighbors::CellIndex;
 use crate::{Real, vector};
 
 /// Automatic distance, in sample spacings: beyond gaps of clouds whose density varies by a factor of ten.
@@ -104,6 +105,16 @@ pub fn forward<T: Real>(mesh: &Mesh<T>, points: &[[T; 3]], distance: f64) -> Tri
     }
 }
 
+/// Share of the vertices of a mesh, from 0 to 1, that are further than `distance` from all points of an index. Of large
+/// meshes about 2¹⁶ vertices are looked at.
+pub(crate) fn far_share<T: Real>(mesh: &Mesh<T>, index: &CellIndex<T>, distance: T) -> f64 {
+    let step = (mesh.vertices().len() >> 16).max(1);
+    let vertices = mesh.vertices().par_iter().step_by(step);
+    let is_far = |p: &&[T; 3]| !index.any_within(**p, distance);
+    let far = vertices.clone().filter(is_far).count();
+    far as f64 / vertices.len().max(1) as f64
+}
+
 /// Adds the cotangents of the vertices that stay to those of the whole mesh.
 pub fn pullback<T: Real>(trimmed: &Trimmed<T>, bars: &[[T; 3]], whole: &mut [[T; 3]]) {
     for (&v, &bar) in trimmed.vertices.iter().zip(bars) {
@@ -179,6 +190,9 @@ mod tests {
             let at = |&v: &u32| vertices[v as usize];
             let kept: Vec<_> = found.vertices.iter().map(at).collect();
             assert_eq!(found.mesh.vertices(), kept);
+            let far = (0..200).filter(|&v| !is_near(v)).count();
+            let share = far_share(&mesh, &CellIndex::new(&points), size);
+            assert_eq!(share, far as f64 / 200.0);
             let mut bars = vec![[1.0; 3]; 200];
             pullback(&found, &vec![[2.0; 3]; kept.len()], &mut bars);
             let moved = bars.iter().filter(|bar| bar[0] == 3.0).count();

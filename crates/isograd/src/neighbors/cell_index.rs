@@ -258,6 +258,20 @@ impl<T: Real> CellIndex<T> {
         );
     }
 
+    /// Whether any point is within `radius` of `query`, or at it.
+    pub fn any_within(&self, query: [T; 3], radius: T) -> bool {
+        let limit = radius * radius;
+        let found = std::cell::Cell::new(false);
+        self.walk(
+            &mut |node| !found.get() && node.distance_squared(query) <= limit,
+            &mut |cell| {
+                let mut points = cell.map(|position| self.point(position));
+                found.set(points.any(|point| distance_squared(point, query) <= limit));
+            },
+        );
+        found.get()
+    }
+
     pub(super) fn root(&self) -> Place {
         Place {
             node: 0,

@@ -17,6 +17,9 @@ const RIM_GAP: f64 = 0.75 * std::f64::consts::PI;
 const RIM_FLATNESS: f64 = 0.9;
 /// A rim is a line of samples: this many neighbors are at a rim too.
 const RIM_NEIGHBORS: usize = 3;
+/// Neighborhoods of fewer samples are widened to about this many: few directions leave out wide sectors by chance, and at a
+/// rim, where half of the disc is empty, few neighbors are at the rim themselves.
+const RIM_COUNT: u32 = 24;
 
 /// `(N,)` whether each sample is at a rim, of an open surface or of a hole in the sampling.
 ///
@@ -86,12 +89,16 @@ fn borders_a_gap<T: Real>(
     let mut facing = T::zero();
     directions.clear();
     let index = &neighborhoods.index;
-    index.for_each_within(points[i], neighborhoods.radius[i], |j, distance_squared| {
-        facing += vector::dot(normals[i], normals[j]);
-        if distance_squared > T::zero() {
-            directions.push(vector::sub(points[j], points[i]));
-        }
-    });
+    index.for_each_within(
+        points[i],
+        radius(i, neighborhoods),
+        |j, distance_squared| {
+            facing += vector::dot(normals[i], normals[j]);
+            if distance_squared > T::zero() {
+                directions.push(vector::sub(points[j], points[i]));
+            }
+        },
+    );
     let flat = T::of(RIM_FLATNESS) * T::of_usize(directions.len() + 1);
     facing > flat && widest_gap(directions, normals[i]) > RIM_GAP
 }
@@ -112,6 +119,12 @@ fn widest_gap<T: Real>(directions: &[[T; 3]], normal: [T; 3]) -> f64 {
     between.fold(turn - (high - low), f64::max)
 }
 
+/// Radius around a sample that holds about [`RIM_COUNT`] samples.
+fn radius<T: Real>(i: usize, neighborhoods: &Neighborhoods<T>) -> T {
+    let wanted = T::of(f64::from(RIM_COUNT) / f64::from(neighborhoods.count[i].max(1)));
+    neighborhoods.radius[i] * wanted.max(T::one()).sqrt()
+}
+
 fn rim_neighbors<T: Real>(
     i: usize,
     points: &[[T; 3]],
@@ -121,7 +134,7 @@ fn rim_neighbors<T: Real>(
     let mut count = 0;
     neighborhoods
         .index
-        .for_each_within(points[i], neighborhoods.radius[i], |j, _| {
+        .for_each_within(points[i], radius(i, neighborhoods), |j, _| {
             count += usize::from(j != i && at_rim[j]);
         });
     count

@@ -4,20 +4,24 @@ use rayon::prelude::*;
 
 use crate::data::Mesh;
 use crate::distance::samples::{self, Counts, Samples};
-use crate::isosurface::measure;
+use crate::isosurface::measure::pieces::Pieces;
+use crate::isosurface::measure::{self, Measures};
+use crate::isosurface::trim::{self, Trim};
 use crate::neighbors::Neighborhoods;
 use crate::orient::Orientation;
 use crate::orient::doubt::{self, Doubt};
 use crate::orient::rim;
-use crate::report::{Report, Warning};
+use crate::report::{Report, TOLERATED_SHARE, Warning};
 use crate::{Field, Real, distance, vector};
 
-/// Share of the samples below which thin parts, missed samples and doubtful signs go without a warning.
-const TOLERATED_SHARE: f64 = 0.01;
 /// Samples further apart than this many cells leave holes between the supports of their splats.
 const SPARSE_CELLS: f64 = 1.25;
 /// Depth below a sample at which its own side must still be the nearest, in cells.
 const THIN_DEPTH: f64 = 2.0;
+/// Distance between a sample and the surface beyond which they are far from each other, in cells of φ.
+const FAR: f64 = 2.0;
+/// Share of the area of the largest piece below which another one is a fragment.
+const SMALL_PIECE: f64 = 0.01;
 
 impl Report {
     /// Measures φ and the surface and adds warnings about them, for results that were not made by a
@@ -35,67 +39,105 @@ impl Report {
     ) {
         self.measure_field(sdf);
         self.surface = measure::measure(mesh, scratch);
+        let samples = self.samples(points, normals, sdf);
+        let counts = self.count(samples, sdf, mesh, built);
         let (warnings, spacing) = (&mut self.warnings, self.surface_spacing);
-        let samples = Samples {
-            points,
-            normals,
-            within: T::of(spacing),
-            depth: T::of(THIN_DEPTH) * T::of(spacing),
-        };
-        warnings.extend(thin_and_missed(samples, sdf, mesh, built));
+        warnings.extend(thin(counts.thin, points.len()));
+        warnings.extend(missed(counts, points.len()));
         warnings.extend(sparse(self.sample_spacing, sdf.grid().spacing().f64()));
-        warnings.extend(components(self.surface.components));
+        warnings.extend(inside_out(&self.surface));
+        if self.surface.components > 1 {
+            let pieces = Pieces::new(mesh, scratch);
+            warnings.extend(fragments(&pieces, mesh, points, built));
+        }
         warnings.extend(rounded(points, spacing));
     }
 
+    /// Measures φ of a sheet, whose middle is `mesh`, and adds warnings about them; else like [`Self::check_field`].
+    pub(crate) fn check_sheet<T: Real>(
+        &mut self,
+        points: &[[T; 3]],
+        normals: &[[T; 3]],
+        sdf: &Field<T>,
+        mesh: &Mesh<T>,
+        built: &distance::Scratch<T>,
+    ) {
+        self.measure_field(sdf);
+        let samples = self.samples(points, normals, sdf);
+        let counts = samples::count(mesh, Some(built), samples).unwrap_or_default();
+        self.warnings.extend(missed(counts, points.len()));
+        self.warnings.extend(rounded(points, self.surface_spacing));
+    }
+
+    fn samples<'a, T: Real>(
+        &self,
+        points: &'a [[T; 3]],
+        normals: &'a [[T; 3]],
+        sdf: &Field<T>,
+    ) -> Samples<'a, T> {
+        let spacing = T::of(self.surface_spacing);
+        Samples {
+            points,
+            normals,
+            within: spacing,
+            far: T::of(FAR) * sdf.grid().spacing(),
+            depth: T::of(THIN_DEPTH) * spacing,
+        }
+    }
+
+    /// Samples on parts thinner than about three cells of the surface, and samples off the surface.
+    ///
+    /// At [`THIN_DEPTH`] cells below a sample on a thick part, φ still grows toward that sample. On a part
+    /// thinner than about three cells the opposite side is nearer there, and the gradient has turned round.
+    fn count<T: Real>(
+        &self,
+        samples: Samples<'_, T>,
+        sdf: &Field<T>,
+        mesh: &Mesh<T>,
+        built: Option<&distance::Scratch<T>>,
+    ) -> Counts {
+        // The grid of φ may be too coarse to see parts of this size, and its band too narrow.
+        let is_wide = samples.far.f64() < self.sdf_max;
+        if is_wide && sdf.grid().spacing() == samples.within {
+            return interpolated(samples, sdf);
+        }
+        samples::count(mesh, built, samples).unwrap_or_default()
+    }
+
+    /// Measures [the share of the surface](Self::guessed) that has no samples nearby, before [`Self::check_samples`].
+    /// `spacing` is the cell size of φ.
+    pub fn measure_gaps<T: Real>(
+        &mut self,
+        mesh: &Mesh<T>,
+        neighborhoods: &Neighborhoods<T>,
+        spacing: T,
+    ) {
+        let between = Trim::Auto.distance(self.sample_spacing).unwrap_or(0.0);
+        let gap = T::of((FAR * spacing.f64()).max(between));
+        self.guessed = trim::far_share(mesh, &neighborhoods.index, gap);
+    }
+
     /// Measures the samples and their normals and adds warnings about them. `neighborhoods` are those of the points;
-    /// [`Report::guarded`] must be set.
+    /// [`Report::guarded`] must be set. A [sheet](crate::sheet) may end at rims.
     pub fn check_samples<T: Real>(
         &mut self,
         points: &[[T; 3]],
         neighborhoods: &Neighborhoods<T>,
         orientation: &Orientation<T>,
+        is_sheet: bool,
     ) {
+        self.checked = true;
         self.measure_samples(&neighborhoods.count, &orientation.confidence);
         let rims = rim::rims(points, &orientation.normals, neighborhoods);
         let reasons = doubt::reasons_beside(&rims, points, orientation, neighborhoods);
         self.doubt = Doubt::count(points.len(), &reasons);
         let warnings = &mut self.warnings;
-        warnings.extend(open(&rims));
-        warnings.extend(doubtful_signs(self.doubt));
+        if !is_sheet {
+            warnings.extend(open(&rims, self.guessed));
+            warnings.extend(doubtful_signs(self.doubt));
+        }
         warnings.extend(guarded(self.guarded, points.len()));
     }
-}
-
-/// Samples on parts thinner than about three cells of size `h`, those of the surface, and samples off the surface.
-///
-/// At [`THIN_DEPTH`] cells below a sample on a thick part, φ still grows toward that sample. On a part
-/// thinner than about three cells the opposite side is nearer there, and the gradient has turned round.
-fn thin_and_missed<T: Real>(
-    samples: Samples<'_, T>,
-    sdf: &Field<T>,
-    mesh: &Mesh<T>,
-    built: Option<&distance::Scratch<T>>,
-) -> Vec<Warning> {
-    let counts = if sdf.grid().spacing() == samples.within {
-        interpolated(samples, sdf)
-    } else {
-        // The grid of φ is too coarse to see parts of this size.
-        let Ok(counts) = samples::count(mesh, built, samples) else {
-            return Vec::new();
-        };
-        counts
-    };
-    let share = |count: usize| count as f64 / samples.points.len().max(1) as f64;
-    let (thin, missed) = (share(counts.thin), share(counts.missed));
-    let mut warnings = Vec::new();
-    if thin > TOLERATED_SHARE {
-        warnings.push(Warning::Thin { share: thin });
-    }
-    if missed > TOLERATED_SHARE {
-        warnings.push(Warning::Missed { share: missed });
-    }
-    warnings
 }
 
 /// Counts by φ between its cells.
@@ -108,6 +150,23 @@ fn interpolated<T: Real>(samples: Samples<'_, T>, sdf: &Field<T>) -> Counts {
     };
     let pairs = samples.points.par_iter().zip(samples.normals);
     pairs.map(count).reduce(Counts::default, Counts::add)
+}
+
+/// `count` of `all` as a share, from 0 to 1.
+fn share(count: usize, all: usize) -> f64 {
+    count as f64 / all.max(1) as f64
+}
+
+/// Samples on thin parts.
+fn thin(count: usize, points: usize) -> Option<Warning> {
+    let share = share(count, points);
+    (share > TOLERATED_SHARE).then_some(Warning::Thin { share })
+}
+
+/// Samples off the surface.
+fn missed(counts: Counts, points: usize) -> Option<Warning> {
+    let [share, far] = [counts.missed, counts.far].map(|count| share(count, points));
+    (share.max(far) > TOLERATED_SHARE).then_some(Warning::Missed { share, far })
 }
 
 /// Samples further apart than the grid resolves.
@@ -123,9 +182,32 @@ fn doubtful_signs(doubt: Doubt) -> Option<Warning> {
     (doubt.share() > TOLERATED_SHARE).then_some(Warning::DoubtfulSigns { doubt })
 }
 
-/// More than one piece of surface.
-fn components(count: usize) -> Option<Warning> {
-    (count > 1).then_some(Warning::Components { count })
+/// A closed surface of negative volume.
+fn inside_out(surface: &Measures) -> Option<Warning> {
+    let volume = surface.volume;
+    (surface.closed && volume < 0.0).then_some(Warning::InsideOut { volume })
+}
+
+/// Pieces of the surface that are small, or have no samples.
+fn fragments<T: Real>(
+    pieces: &Pieces,
+    mesh: &Mesh<T>,
+    points: &[[T; 3]],
+    built: Option<&distance::Scratch<T>>,
+) -> Option<Warning> {
+    let faces = samples::nearest_faces(mesh, built, points).ok()?;
+    let mut samples = vec![0usize; pieces.areas.len()];
+    for face in faces {
+        if let Some(&piece) = pieces.of_face.get(face as usize) {
+            samples[piece as usize] += 1;
+        }
+    }
+    let largest = pieces.areas.iter().copied().fold(0.0, f64::max);
+    let is_fragment =
+        |&(&area, &samples): &(&f64, &usize)| samples == 0 || area < SMALL_PIECE * largest;
+    let fragments = pieces.areas.iter().zip(&samples).filter(is_fragment);
+    let (fragments, pieces) = (fragments.count(), pieces.areas.len());
+    (fragments > 0).then_some(Warning::Fragments { fragments, pieces })
 }
 
 /// Samples whose neighbors define no normal.
@@ -143,11 +225,11 @@ fn rounded<T: Real>(points: &[[T; 3]], spacing: f64) -> Option<Warning> {
     (cells > 1e-2).then_some(Warning::Rounded { cells })
 }
 
-/// A surface that ends at rims.
-fn open(rims: &[bool]) -> Option<Warning> {
+/// A surface that ends at rims, or that is a guess where samples are missing.
+fn open(rims: &[bool], guessed: f64) -> Option<Warning> {
     let samples = rims.iter().filter(|&&at_rim| at_rim).count();
     // A hole across a fifteenth of the square root of the area has a rim of this many samples; what is
     // shorter is a gap in the sampling, or the tip of a fin whose two sides were taken for one.
     let least = 24.max((0.2 * (rims.len() as f64).sqrt()) as usize);
-    (samples >= least).then_some(Warning::Open { samples })
+    (samples >= least || guessed > TOLERATED_SHARE).then_some(Warning::Open { samples, guessed })
 }

@@ -215,7 +215,8 @@ impl<T: Real> Reconstruction<T> {
             + size_of_val(self.areas.as_slice())
             + size_of_val(self.residuals.splat.order.as_slice())
             + size_of_val(self.residuals.iso_value.at_samples.as_slice())
-            + size_of_val(self.residuals.screened.at_samples.as_slice())
+            + (self.residuals.screened.as_ref())
+                .map_or(0, |level| size_of_val(level.at_samples.as_slice()))
             + self.residuals.local_level.bytes()
             + self.residuals.thickened.bytes()
             + neighbors

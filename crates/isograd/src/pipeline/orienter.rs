@@ -100,7 +100,7 @@ impl<T: Pipeline> Orienter<T> {
         report.flipped = orientation.flipped;
         let start = done(report, Stage::Orient, start);
         if self.checks {
-            report.check_samples(cloud.points(), neighborhoods, orientation);
+            report.check_samples(cloud.points(), neighborhoods, orientation, false);
         }
         done(report, Stage::Checks, start);
         Ok(())

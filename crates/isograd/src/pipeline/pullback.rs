@@ -22,6 +22,8 @@ use crate::{Real, isosurface, normals, orient, poisson, splat, vector};
 pub struct PullbackScratch<T: Real> {
     /// Cotangent of `χ`, then of the right-hand side.
     field: Option<Field<T>>,
+    /// Cotangents of the refined indicator.
+    refined: Vec<T>,
     /// Cotangents of the vertices.
     vertices: Vec<[T; 3]>,
     pub(super) samples: SampleCotangent<T>,
@@ -193,9 +195,12 @@ impl<T: Real> Reconstruction<T> {
             None => Bars::Dense(scratch.take_field(&self.indicator, cotangent.indicator)),
         };
         let PullbackScratch {
-            vertices, samples, ..
+            refined,
+            vertices,
+            samples,
+            ..
         } = scratch;
-        let found = self.pull_vertices(vertices, bars.cells_mut());
+        let found = self.pull_vertices(vertices, refined, bars.cells_mut());
         samples.grid.add(&found.grid);
         out.guarded += found.guarded;
         let given = self.splat_samples();
@@ -229,7 +234,9 @@ impl<T: Real> Reconstruction<T> {
         );
         if let (true, Bars::Dense(field)) = (self.options.screening > 0.0, &mut bars) {
             let equation = self.screened_equation(sorted);
-            let (level, scratch) = (&residuals.screened, &mut scratch.screened);
+            let scratch = &mut scratch.screened;
+            let level = residuals.screened.as_ref();
+            let level = level.unwrap_or(&residuals.iso_value);
             screened::pullback(&equation, level, field.values_mut(), scratch, samples)?;
         }
         let smoothing = residuals.smoothing;
@@ -255,20 +262,29 @@ impl<T: Real> Reconstruction<T> {
         Ok(())
     }
 
-    /// From the vertices to the indicator, its level and the grid of the surface.
+    /// From the vertices to the indicator, its level and the grid of the surface; `buffer` holds the cotangents of the
+    /// refined indicator.
     fn pull_vertices(
         &self,
         vertices: &[[T; 3]],
+        buffer: &mut Vec<T>,
         mut chi_bar: CellsMut<'_, T>,
     ) -> isosurface::LevelCotangent {
         let (level, mesh) = (self.iso_value, &self.mesh);
         match (&self.refined, &mut chi_bar) {
             (Some(refined), CellsMut::Dense(grid, chi_bar)) => {
-                let mut bars = BlockField::zeros(refined.grid, refined.blocks.clone());
+                buffer.clear();
+                buffer.resize(refined.values.len(), T::zero());
+                let mut bars = BlockField {
+                    grid: refined.grid,
+                    blocks: refined.blocks.clone(),
+                    values: std::mem::take(buffer),
+                };
                 let blocks = CellsMut::Blocks(&mut bars);
                 let mut found =
                     isosurface::pullback_on(refined.into(), level, mesh, vertices, blocks);
                 isosurface::refine::pullback(&bars, grid, chi_bar);
+                *buffer = bars.values;
                 // From the size of the refined cells to that of the indicator's.
                 found.grid.spacing *= 0.5;
                 found

@@ -173,11 +173,6 @@ impl<T: Real> Reconstruction<T> {
         sparse.map_or(self.poisson.is_closed(), Sparse::is_closed)
     }
 
-    /// Whether the surface is that of the indicator on cells half as large.
-    pub(super) fn is_refined(&self) -> bool {
-        self.keeps_thin_parts() && self.sparse.is_none()
-    }
-
     /// The indicator on the grid of the surface.
     pub(super) fn chi(&self) -> Cells<'_, T> {
         match &self.sparse {
@@ -211,11 +206,7 @@ impl<T: Real> Reconstructor<T> {
             ..
         } = &mut self.result;
         let Some(sparse) = sparse else { return Ok(()) };
-        let samples = splat::Samples {
-            points: residuals.thickened.or(points),
-            normals: &orientation.normals,
-            areas,
-        };
+        let samples = (residuals.thickened).samples(points, &orientation.normals, areas);
         let (scratch, residual) = (&mut self.scratch.splat, &mut residuals.splat);
         splat::forward_in_blocks(samples, options.splat, scratch, residual, &mut sparse.chi)?;
         Ok(())

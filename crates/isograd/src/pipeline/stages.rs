@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::open::Open;
 use super::sparse::Sparse;
 use super::surface::with_shape;
 use super::{Error, Reconstruction, Reconstructor, Residuals, Solve, check_memory};
@@ -14,7 +15,7 @@ use crate::neighbors::{Neighborhoods, Radius};
 use crate::poisson::screened;
 use crate::report::{Report, Stage, Warning};
 use crate::sheet::{self, Sheet};
-use crate::{Real, distance, isosurface, neighbors, normals, orient, poisson, splat};
+use crate::{Mesh, Real, distance, isosurface, neighbors, normals, orient, poisson, splat};
 
 impl<T: Real> Reconstructor<T> {
     /// One stage, compiled where it is called: see [`concrete`](super::concrete).
@@ -109,6 +110,10 @@ impl<T: Real> Reconstructor<T> {
         let (grid, octaves) = self.choose_surface_grid(held)?;
         let smoothing = self.smoothing(&grid, held);
         self.result.thicken(&grid, smoothing);
+        self.result.residuals.is_refined = match held {
+            Some(held) => held.residuals.is_refined,
+            None => octaves == 0 && self.result.would_be_refined(&grid),
+        };
         let Reconstruction {
             options,
             points,
@@ -139,11 +144,7 @@ impl<T: Real> Reconstructor<T> {
             residuals,
             ..
         } = &mut self.result;
-        let samples = splat::Samples {
-            points: residuals.thickened.or(points),
-            normals: &orientation.normals,
-            areas,
-        };
+        let samples = (residuals.thickened).samples(points, &orientation.normals, areas);
         let (scratch, residual) = (&mut self.scratch.splat, &mut residuals.splat);
         splat::forward(samples, options.splat, scratch, residual, indicator)?;
         Ok(())
@@ -226,6 +227,7 @@ impl<T: Real> Reconstructor<T> {
 
     /// The solution of the screened equation, from that of the plain one.
     fn screen(&mut self) -> Result<(), Error> {
+        let is_refined = self.result.residuals.is_refined;
         let Reconstruction {
             options,
             poisson,
@@ -241,11 +243,7 @@ impl<T: Real> Reconstructor<T> {
             plan: poisson,
             grid: &grid,
             samples: splat::SortedSamples {
-                samples: splat::Samples {
-                    points: residuals.thickened.or(points),
-                    normals: &orientation.normals,
-                    areas,
-                },
+                samples: (residuals.thickened).samples(points, &orientation.normals, areas),
                 order: &residuals.splat,
             },
             area: options.area,
@@ -256,15 +254,19 @@ impl<T: Real> Reconstructor<T> {
             indicator.values_mut(),
             &mut self.scratch.screened,
         )?;
+        if !is_refined {
+            residuals.screened = None;
+            return Ok(());
+        }
         let (points, chi) = (equation.samples.samples.points, (&*indicator).into());
-        let values = &mut residuals.screened;
+        let values = residuals.screened.get_or_insert_with(Default::default);
         isosurface::iso_value::forward_on(chi, points, areas, Interpolation::Linear, values)?;
         Ok(())
     }
 
     /// The iso-value, and the indicator relative to the local one.
     pub(super) fn level(&mut self) -> Result<(), Error> {
-        let interpolation = match self.result.is_refined() {
+        let interpolation = match self.result.residuals.is_refined {
             true => Interpolation::Spline,
             false => Interpolation::Linear,
         };
@@ -280,7 +282,7 @@ impl<T: Real> Reconstructor<T> {
             report,
             ..
         } = &mut self.result;
-        let points = residuals.thickened.or(points);
+        let samples = (residuals.thickened).samples(points, &orientation.normals, areas);
         let level = &mut residuals.iso_value;
         let chi = match sparse {
             Some(sparse) => CellsMut::Blocks(&mut sparse.chi),
@@ -289,6 +291,7 @@ impl<T: Real> Reconstructor<T> {
                 CellsMut::Dense(grid, values)
             }
         };
+        let points = samples.points;
         *iso_value =
             isosurface::iso_value::forward_on(chi.cells(), points, areas, interpolation, level)?;
         report.iso_value = iso_value.f64();
@@ -296,11 +299,7 @@ impl<T: Real> Reconstructor<T> {
             local_level::forward_on(
                 chi,
                 splat::SortedSamples {
-                    samples: splat::Samples {
-                        points,
-                        normals: &orientation.normals,
-                        areas,
-                    },
+                    samples,
                     order: &residuals.splat,
                 },
                 local_level::Options {
@@ -317,7 +316,7 @@ impl<T: Real> Reconstructor<T> {
     }
 
     pub(super) fn isosurface(&mut self) -> Result<(), Error> {
-        let is_refined = self.result.is_refined();
+        let is_refined = self.result.residuals.is_refined;
         let Reconstruction {
             indicator,
             sparse,
@@ -328,14 +327,20 @@ impl<T: Real> Reconstructor<T> {
             ..
         } = &mut self.result;
         let scratch = &mut self.scratch.isosurface;
-        *refined = match is_refined {
-            true => Some(isosurface::refine::forward(indicator, *iso_value)?),
-            false => None,
-        };
-        let found = match marched(indicator, sparse, refined) {
-            Cells::Blocks(chi) => isosurface::blocks::forward(chi, *iso_value, mesh)?,
-            Cells::Dense(..) => isosurface::forward(indicator, *iso_value, scratch, mesh)?,
-        };
+        let previous = refined.take();
+        if is_refined {
+            *refined = Some(isosurface::refine::forward(
+                indicator, *iso_value, previous,
+            )?);
+        }
+        let mut found = march(indicator, sparse, refined, *iso_value, scratch, mesh);
+        if let (Some(_), Err(isosurface::Error::NothingInside { .. })) = (&refined, &found) {
+            // A body far smaller than a cell: the spline does not reach the level, which it has at the samples, at the
+            // center of any cell, but some coefficient of it does.
+            *refined = None;
+            found = march(indicator, sparse, refined, *iso_value, scratch, mesh);
+        }
+        let found = found?;
         if found.touches_wall {
             report.warnings.push(Warning::TouchesWall);
         }
@@ -391,20 +396,28 @@ impl<T: Real> Reconstructor<T> {
         let neighborhoods = &residuals.neighborhoods;
         let scratch = &mut self.scratch.measure;
         match open.as_deref() {
-            Some(open) if open.is_sheet() => report.measure_field(sdf),
-            _ => report.check_field(
-                points,
-                &orientation.normals,
-                sdf,
-                mesh,
-                scratch,
-                Some(&self.scratch.distance),
-            ),
+            Some(open) if open.is_sheet() => {
+                let normals = &orientation.normals;
+                let built = &self.scratch.distance;
+                report.check_sheet(points, normals, sdf, open.trimmed(), built);
+            }
+            _ => {
+                report.check_field(
+                    points,
+                    &orientation.normals,
+                    sdf,
+                    mesh,
+                    scratch,
+                    Some(&self.scratch.distance),
+                );
+                report.measure_gaps(mesh, neighborhoods, sdf.grid().spacing());
+            }
         }
         if let Some(open) = open {
             report.surface = measure::measure(open.mesh(), scratch);
         }
-        report.check_samples(points, neighborhoods, orientation);
+        let is_sheet = open.as_deref().is_some_and(Open::is_sheet);
+        report.check_samples(points, neighborhoods, orientation, is_sheet);
     }
 }
 
@@ -418,6 +431,20 @@ fn marched<'a, T: Real>(
         (Some(refined), _) => refined.into(),
         (None, Some(sparse)) => (&sparse.chi).into(),
         (None, None) => indicator.into(),
+    }
+}
+
+fn march<T: Real>(
+    indicator: &Field<T>,
+    sparse: &Option<Sparse<T>>,
+    refined: &Option<BlockField<T>>,
+    level: T,
+    scratch: &mut isosurface::Scratch,
+    mesh: &mut Mesh<T>,
+) -> Result<isosurface::Report, isosurface::Error> {
+    match marched(indicator, sparse, refined) {
+        Cells::Blocks(chi) => isosurface::blocks::forward(chi, level, mesh),
+        Cells::Dense(..) => isosurface::forward(indicator, level, scratch, mesh),
     }
 }
 

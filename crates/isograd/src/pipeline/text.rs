@@ -66,7 +66,7 @@ from_str!(Weights, "splat", "'bspline' or 'paper'", {
 from_str!(Smoothing, "smoothing", "0 or more cells, or 'auto'", {
     "auto" => Self::Auto,
 }, |cells: f64| cells >= 0.0 => Self::Cells);
-from_str!(Level, "level", "'local', 'thin' or 'mean'", {
+from_str!(Level, "level", "'thin', 'local' or 'mean'", {
     "local" => Self::Local,
     "thin" => Self::Thin,
     "mean" => Self::Mean,
@@ -222,7 +222,7 @@ mod tests {
             ),
             (r#"{"surface": -1}"#, "surface is '-1'"),
             (r#"{"solve": "fast"}"#, "give 'auto', 'dense' or 'sparse'"),
-            (r#"{"level": "global"}"#, "give 'local', 'thin' or 'mean'"),
+            (r#"{"level": "global"}"#, "give 'thin', 'local' or 'mean'"),
             (r#"{"smothing": 1}"#, "unknown field `smothing`"),
         ] {
             let error = serde_json::from_str::<Options>(text).expect_err(text);

@@ -4,15 +4,31 @@ use super::Reconstruction;
 use super::pullback::PullbackScratch;
 use crate::isosurface::Level;
 use crate::isosurface::local_level::Step;
+use crate::splat::Samples;
 use crate::thicken::{self, Inputs, Thickened};
 use crate::{Grid, Real, SurfaceResolution};
 
+/// Least cell size of the surface in sample spacings for which it is refined. Smaller cells, such as automatic ones that are not
+/// limited by the grid of φ, show all that the samples do: on cells half as large, four real shapes lie 5 to 17 % nearer to the truth,
+/// and take 1.7 to 2.4 times as long.
+const LEAST_CELL: f64 = 0.9;
+
 impl<T> Thickened<T> {
-    /// The moved samples, or the original ones where none are moved.
-    pub(super) fn or<'a>(&'a self, points: &'a [[T; 3]]) -> &'a [[T; 3]] {
-        match self.points.is_empty() {
+    /// The samples, at the points they were moved to.
+    pub(super) fn samples<'a>(
+        &'a self,
+        points: &'a [[T; 3]],
+        normals: &'a [[T; 3]],
+        areas: &'a [T],
+    ) -> Samples<'a, T> {
+        let points = match self.points.is_empty() {
             true => points,
             false => &self.points,
+        };
+        Samples {
+            points,
+            normals,
+            areas,
         }
     }
 
@@ -22,6 +38,11 @@ impl<T> Thickened<T> {
 }
 
 impl<T: Real> Reconstruction<T> {
+    /// Whether samples are dense enough for a surface on cells half as large as those of `grid`, of a dense solve.
+    pub(super) fn would_be_refined(&self, grid: &Grid<T>) -> bool {
+        self.keeps_thin_parts() && grid.spacing().f64() > LEAST_CELL * self.sample_spacing()
+    }
+
     /// Whether thin parts are kept by more than the local level.
     pub(super) fn keeps_thin_parts(&self) -> bool {
         self.options.level == Level::Thin && self.options.surface != SurfaceResolution::Grid
@@ -44,9 +65,11 @@ impl<T: Real> Reconstruction<T> {
     fn thin_inputs(&self, grid: &Grid<T>) -> Inputs<'_, T> {
         Inputs {
             index: &self.residuals.neighborhoods.index,
-            points: &self.points,
-            normals: &self.orientation.normals,
-            areas: &self.areas,
+            samples: Samples {
+                points: &self.points,
+                normals: &self.orientation.normals,
+                areas: &self.areas,
+            },
             width: Step::width_of(self.residuals.smoothing) * grid.spacing().f64(),
         }
     }
@@ -66,14 +89,8 @@ impl<T: Real> Reconstruction<T> {
         std::mem::swap(&mut scratch.moved, &mut scratch.samples.points);
         pull(scratch)?;
         std::mem::swap(&mut scratch.moved, &mut scratch.samples.points);
-        let samples = &mut scratch.samples;
-        let mut bars = thicken::Cotangent {
-            points: &mut samples.points,
-            normals: &mut samples.normals,
-            areas: &mut samples.areas,
-        };
-        let grid = self.surface_grid();
-        let width_bar = thicken::pullback(self.thin_inputs(grid), sums, &scratch.moved, &mut bars);
+        let (samples, grid) = (&mut scratch.samples, self.surface_grid());
+        let width_bar = thicken::pullback(self.thin_inputs(grid), sums, &scratch.moved, samples);
         let smoothing = self.residuals.smoothing;
         let width = Step::width_of(smoothing);
         samples.grid.spacing += width_bar * width;

@@ -2,7 +2,7 @@
 
 use serde::{Serialize, Serializer};
 
-use super::{Report, Stage};
+use super::{Report, Stage, Verdict, Warning};
 use crate::differential::Spread;
 use crate::isosurface::measure::Measures;
 use crate::orient::doubt::{Doubt, Reason};
@@ -24,8 +24,22 @@ pub struct JsonReport {
     /// Wall-clock seconds by name.
     #[serde(serialize_with = "as_map")]
     pub seconds: Vec<(&'static str, f64)>,
-    /// Warnings.
-    pub warnings: Vec<String>,
+    /// See [`Report::verdict`].
+    verdict: Option<Verdict>,
+    /// The [reasons](Report::reasons) of the verdict.
+    warnings: Vec<JsonWarning>,
+}
+
+/// A [`Warning`] as it is serialized: its code, severity, text and remedy, and its numbers by name.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+struct JsonWarning {
+    code: &'static str,
+    severity: Verdict,
+    text: String,
+    #[serde(rename = "try")]
+    remedy: &'static str,
+    #[serde(flatten)]
+    numbers: Warning,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -54,9 +68,7 @@ struct Orientation {
     method: &'static str,
     flipped: usize,
     confidence: Confidence,
-    /// Shares of the points, from 0 to 1, by reason.
-    #[serde(serialize_with = "as_map")]
-    doubtful: Vec<(&'static str, f64)>,
+    doubtful: Doubt,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -165,20 +177,34 @@ impl JsonReport {
                     p05: report.confidence_p05,
                     median: report.confidence_median,
                 },
-                doubtful: doubtful(&report.doubt),
+                doubtful: report.doubt,
             },
             surface: None,
             seconds: seconds(report, &[Stage::Normals, Stage::Orient, Stage::Checks]),
-            warnings: report.warnings.iter().map(ToString::to_string).collect(),
+            verdict: report.verdict(),
+            warnings: report.reasons().into_iter().map(JsonWarning::new).collect(),
         }
     }
 }
 
-fn doubtful(doubt: &Doubt) -> Vec<(&'static str, f64)> {
-    let reasons = Reason::ALL.map(|reason| (reason.name(), doubt.share_of(reason)));
-    std::iter::once(("share", doubt.share()))
-        .chain(reasons)
-        .collect()
+impl JsonWarning {
+    fn new(warning: &Warning) -> Self {
+        Self {
+            code: warning.code(),
+            severity: warning.severity(),
+            text: warning.to_string(),
+            remedy: warning.remedy(),
+            numbers: warning.clone(),
+        }
+    }
+}
+
+/// Shares of the points, from 0 to 1, by reason.
+impl Serialize for Doubt {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        let reasons = Reason::ALL.map(|reason| (reason.name(), self.share_of(reason)));
+        to.collect_map(std::iter::once(("share", self.share())).chain(reasons))
+    }
 }
 
 fn surface(measures: &Measures) -> Surface {

@@ -19,8 +19,8 @@ pub(crate) struct Thickened<T> {
 /// Fills `out`, in the memory of the last one. The same bits for any number of threads.
 pub(crate) fn forward<T: Real>(inputs: Inputs<'_, T>, out: &mut Thickened<T>) {
     let Thickened { points, sums } = out;
-    let samples = (0..inputs.points.len()).into_par_iter();
-    let found = samples.map(|i| {
+    let old = inputs.samples.points;
+    let found = (0..old.len()).into_par_iter().map(|i| {
         let own = inputs.sample(i);
         let mut sums = Sums {
             own: own.area,
@@ -35,10 +35,10 @@ pub(crate) fn forward<T: Real>(inputs: Inputs<'_, T>, out: &mut Thickened<T>) {
     let moves = sums.par_iter().enumerate().map(|(i, sums)| {
         let away = displacement(sums, inputs.width);
         if away == 0.0 {
-            return inputs.points[i];
+            return old[i];
         }
-        let normal = to_f64(inputs.normals[i]);
-        of_f64(add(to_f64(inputs.points[i]), scale(normal, away)))
+        let normal = to_f64(inputs.samples.normals[i]);
+        of_f64(add(to_f64(old[i]), scale(normal, away)))
     });
     moves.collect_into_vec(points);
 }

@@ -45,10 +45,12 @@ mod pullback;
 mod tests;
 
 pub(crate) use forward::{Thickened, forward};
-pub(crate) use pullback::{Cotangent, pullback};
+pub(crate) use pullback::pullback;
 
 use crate::Real;
 use crate::neighbors::CellIndex;
+use crate::splat::Samples;
+use crate::vector::{dot, to_f64};
 
 /// Radius within which the other face is sought, in widths.
 const REACH: f64 = 2.5;
@@ -63,13 +65,11 @@ const BLEND: f64 = 0.4;
 /// this stage would take longer than all others.
 pub(crate) const LEAST_SPACING: f64 = 1.0 / 6.0;
 
-/// Samples, `(N, 3)`, `(N, 3)` and `(N,)` in input order, with the tree of the points.
+/// Samples in input order, with the index of their points.
 #[derive(Clone, Copy)]
 pub(crate) struct Inputs<'a, T> {
     pub index: &'a CellIndex<T>,
-    pub points: &'a [[T; 3]],
-    pub normals: &'a [[T; 3]],
-    pub areas: &'a [T],
+    pub samples: Samples<'a, T>,
     /// `ℓ`, in the unit of the points.
     pub width: f64,
 }
@@ -88,9 +88,9 @@ pub(crate) struct Sums {
 impl<T: Real> Inputs<'_, T> {
     fn sample(&self, i: usize) -> pair::Sample {
         pair::Sample {
-            point: crate::vector::to_f64(self.points[i]),
-            normal: crate::vector::to_f64(self.normals[i]),
-            area: self.areas[i].f64(),
+            point: to_f64(self.samples.points[i]),
+            normal: to_f64(self.samples.normals[i]),
+            area: self.samples.areas[i].f64(),
         }
     }
 
@@ -98,10 +98,12 @@ impl<T: Real> Inputs<'_, T> {
     /// opposite one.
     fn for_each_near(&self, i: usize, mut visit: impl FnMut(usize)) {
         let reach = T::of(REACH * self.width);
-        let own = self.normals[i];
+        let Samples {
+            points, normals, ..
+        } = self.samples;
         let limit = T::of(0.5);
-        self.index.for_each_within(self.points[i], reach, |j, _| {
-            if j != i && crate::vector::dot(own, self.normals[j]).abs() > limit {
+        self.index.for_each_within(points[i], reach, |j, _| {
+            if j != i && dot(normals[i], normals[j]).abs() > limit {
                 visit(j);
             }
         });

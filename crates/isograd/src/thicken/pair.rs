@@ -19,7 +19,7 @@ struct Weight {
     by_square: f64,
 }
 
-/// What a pair adds to the cotangents.
+/// Cotangents of the inputs of a pair.
 #[derive(Clone, Copy, Default)]
 pub(super) struct PairCotangent {
     /// Of the offset `x_i − x_j`.
@@ -129,10 +129,16 @@ pub(super) fn pull_pair(i: &Sample, j: &Sample, width: f64, bar: &Sums) -> PairC
 /// Share of the other face below which the thickness is not defined, and samples stay where they are.
 const NO_SHARE: f64 = 1e-12;
 
-/// `t/ℓ` and `s`, where there is another face.
+/// `t/ℓ`, and `s` up to 1, where there is another face. Where areas are 0, `Σ v` may be.
 fn thickness_and_share(sums: &Sums, width: f64) -> Option<[f64; 2]> {
-    let share = sums.weight / sums.own;
-    (share > NO_SHARE).then(|| [sums.depth / sums.weight / width, share])
+    if !(sums.weight > NO_SHARE * sums.own) {
+        return None;
+    }
+    let share = match sums.weight < sums.own {
+        true => sums.weight / sums.own,
+        false => 1.0,
+    };
+    Some([sums.depth / sums.weight / width, share])
 }
 
 /// `f` and its derivative.
@@ -163,11 +169,14 @@ pub(super) fn pull_sums(sums: &Sums, width: f64, bar: f64) -> Sums {
     };
     let ([f, slope], [c, rise]) = (lack(t), credit(s));
     let half = 0.5 * width * bar;
-    let (thickness_bar, share_bar) = (half * c * slope, half * f * rise);
-    let depth = thickness_bar / (sums.weight * width);
+    let depth = half * c * slope / (sums.weight * width);
+    let by_share = match s < 1.0 {
+        true => half * f * rise / sums.own,
+        false => 0.0,
+    };
     Sums {
-        weight: share_bar / sums.own - depth * t * width,
+        weight: by_share - depth * t * width,
         depth,
-        own: -share_bar * s / sums.own,
+        own: -by_share * s,
     }
 }

@@ -4,20 +4,11 @@ use rayon::prelude::*;
 
 use super::pair::{displacement, pull_pair, pull_sums};
 use super::{Inputs, Sums};
+use crate::splat::SampleCotangent;
 use crate::vector::{add, dot, of_f64, scale, sub, to_f64};
 use crate::{Real, parallel};
 
-/// Cotangents of the inputs, which the pullback adds to.
-pub(crate) struct Cotangent<'a, T> {
-    /// `(N, 3)`.
-    pub points: &'a mut [[T; 3]],
-    /// `(N, 3)`.
-    pub normals: &'a mut [[T; 3]],
-    /// `(N,)`.
-    pub areas: &'a mut [T],
-}
-
-/// What a sample receives.
+/// Cotangents of a sample from its pairs.
 #[derive(Clone, Copy, Default)]
 struct Share {
     point: [f64; 3],
@@ -27,21 +18,21 @@ struct Share {
     length: f64,
 }
 
-/// From the cotangents of the moved points, `(N, 3)`, to those of the inputs. Returns that of the width.
+/// Adds the cotangents of the samples, from those `(N, 3)` of the moved points. Returns the cotangent of the width.
 pub(crate) fn pullback<T: Real>(
     inputs: Inputs<'_, T>,
     sums: &[Sums],
     moved_bar: &[[T; 3]],
-    bars: &mut Cotangent<'_, T>,
+    out: &mut SampleCotangent<T>,
 ) -> f64 {
     let width = inputs.width;
-    let bar_along = |i: usize| dot(to_f64(moved_bar[i]), to_f64(inputs.normals[i]));
+    let bar_along = |i: usize| dot(to_f64(moved_bar[i]), to_f64(inputs.samples.normals[i]));
     let samples = || (0..sums.len()).into_par_iter();
     let of_sums = samples().map(|i| pull_sums(&sums[i], width, bar_along(i)));
     let of_sums: Vec<Sums> = of_sums.collect();
     let shares: Vec<Share> = samples().map(|i| gather(inputs, &of_sums, i)).collect();
-    let work = bars.points.par_iter_mut().zip(&mut *bars.normals);
-    let work = work.zip(&mut *bars.areas).enumerate();
+    let work = out.points.par_iter_mut().zip(&mut out.normals);
+    let work = work.zip(&mut out.areas).enumerate();
     work.for_each(|(i, ((point, normal), area))| {
         let (share, bar) = (&shares[i], to_f64(moved_bar[i]));
         let away = displacement(&sums[i], width);
@@ -51,12 +42,12 @@ pub(crate) fn pullback<T: Real>(
     });
     let [by_length] = parallel::sum_array(sums.len(), |i| {
         let moved = displacement(&sums[i], width) * bar_along(i);
-        [moved - shares[i].length - 2.0 * shares[i].area * inputs.areas[i].f64()]
+        [moved - shares[i].length - 2.0 * shares[i].area * inputs.samples.areas[i].f64()]
     });
     by_length / width
 }
 
-/// The pairs of sample `i`, and those of which it is the second.
+/// Sum over the pairs of sample `i`, and those of which it is the second.
 fn gather<T: Real>(inputs: Inputs<'_, T>, of_sums: &[Sums], i: usize) -> Share {
     let (own, mut share) = (inputs.sample(i), Share::default());
     let none = Sums::default();

@@ -1,6 +1,7 @@
 use super::*;
 use crate::neighbors::tests::Random;
-use crate::vector::{add, dot, norm, scale, sub};
+use crate::splat::SampleCotangent;
+use crate::vector::{add, norm, scale, sub};
 
 type Cloud = (Vec<[f64; 3]>, Vec<[f64; 3]>, Vec<f64>);
 
@@ -31,11 +32,14 @@ fn with<R>(
     run: impl FnOnce(Inputs<'_, f64>) -> R,
 ) -> R {
     let index = CellIndex::new(points);
-    run(Inputs {
-        index: &index,
+    let samples = Samples {
         points,
         normals,
         areas,
+    };
+    run(Inputs {
+        index: &index,
+        samples,
         width,
     })
 }
@@ -157,19 +161,19 @@ fn cotangents_are_the_transpose_of_differences() {
         };
         let e = 1e-6;
         let differences = (loss(e) - loss(-e)) / (2.0 * e);
-        let (mut points, mut normals) = (vec![[0.0; 3]; n], vec![[0.0; 3]; n]);
-        let mut areas = vec![0.0; n];
         let sums = thickened(&cloud, width).sums;
-        let mut bars = Cotangent {
-            points: &mut points,
-            normals: &mut normals,
-            areas: &mut areas,
+        let mut bars = SampleCotangent {
+            points: vec![[0.0; 3]; n],
+            normals: vec![[0.0; 3]; n],
+            areas: vec![0.0; n],
+            ..Default::default()
         };
         let of_width = with(&cloud, width, |inputs| {
             pullback(inputs, &sums, &bar, &mut bars)
         });
-        let of_areas: f64 = areas.iter().zip(&da).map(|(a, d)| 0.01 * a * d[0]).sum();
-        let of_vectors = 0.05 * (dot_all(&points, &dx) + dot_all(&normals, &dn));
+        let of_areas = bars.areas.iter().zip(&da).map(|(a, d)| 0.01 * a * d[0]);
+        let of_areas: f64 = of_areas.sum();
+        let of_vectors = 0.05 * (dot_all(&bars.points, &dx) + dot_all(&bars.normals, &dn));
         let pulled = of_vectors + of_areas + 0.1 * width * of_width;
         // Of sums of some hundred random terms, with kinks of second derivatives between.
         let error = (pulled - differences).abs();
@@ -186,4 +190,25 @@ fn results_do_not_depend_on_the_number_of_threads() {
         pool.install(|| thickened(&cloud, 0.1)).points
     };
     assert_eq!(run(1), run(5));
+}
+
+#[test]
+fn samples_without_area_have_finite_cotangents() {
+    let mut cloud = plate(400, 0.05, 3);
+    cloud.2.iter_mut().step_by(2).for_each(|area| *area = 0.0);
+    let width = 0.1;
+    let found = thickened(&cloud, width);
+    assert_ne!(found.points, cloud.0);
+    let mut bars = SampleCotangent {
+        points: vec![[0.0; 3]; 400],
+        normals: vec![[0.0; 3]; 400],
+        areas: vec![0.0; 400],
+        ..Default::default()
+    };
+    let of_width = with(&cloud, width, |inputs| {
+        pullback(inputs, &found.sums, &[[1.0; 3]; 400], &mut bars)
+    });
+    assert!(of_width.is_finite() && bars.areas.iter().all(|x| x.is_finite()));
+    let vectors = bars.points.iter().chain(&bars.normals);
+    assert!(vectors.flatten().all(|x| x.is_finite()));
 }

@@ -149,26 +149,21 @@ fn cases() -> Vec<Case> {
     let mut two = ellipsoid(2500, ([0.5, 0.4, 0.3], [0.0; 3]), 0.01, random);
     two.extend(ellipsoid(1500, ([0.3; 3], [0.95, 0.1, 0.0]), 0.01, random));
     let egg = ellipsoid(3000, ([0.7, 0.5, 0.9], [-0.2, 0.1, 0.3]), 0.003, random);
-    let thin = Options::default()
-        .level(Level::Thin)
-        .band(Band::Within(4.0));
+    let local = Options::default().level(Level::Local);
+    let thin = Options::default().band(Band::Within(4.0));
     let paper = Options::default()
         .orient(Method::Parity(ParityOptions::default()))
         .splat(Weights::Paper)
         .area(false)
         .smoothing(Smoothing::Cells(1.0))
         .level(Level::Mean);
-    let given = Options::default().orient(Method::Given).screening(4.0);
+    let given = local.clone().orient(Method::Given).screening(4.0);
     vec![
-        ("torus, default options", torus.clone(), Options::default()),
+        ("torus, local level", torus.clone(), local.clone()),
         ("thin plate, level thin, band", plate, thin),
         ("two bodies, options of the paper", two, paper),
         ("egg, given normals, screened", egg, given),
-        (
-            "torus, closed walls",
-            torus,
-            Options::default().walls(Walls::Closed),
-        ),
+        ("torus, closed walls", torus, local.walls(Walls::Closed)),
     ]
 }
 

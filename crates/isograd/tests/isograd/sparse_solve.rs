@@ -95,14 +95,18 @@ fn surface_and_gradients_are_those_of_the_dense_solve() {
         let options = Options::default().surface(surface).level(level);
         assert_agreement(&cloud, &options);
     }
-    let options = Options::default().surface(SurfaceResolution::Factor(2.0));
+    let options = Options::default()
+        .surface(SurfaceResolution::Factor(2.0))
+        .level(Level::Local);
     assert_agreement(&TORUS.uniform::<f32>(20_000, 3), &options);
 }
 
 #[test]
 fn surface_is_closed_over_holes_that_are_wider_than_a_block() {
     let cloud = TORUS.cloud::<f64>(20_000, 3, |p| f64::from(u8::from(p[0] < 0.6)));
-    let options = Options::default().surface(SurfaceResolution::Factor(2.0));
+    let options = Options::default()
+        .surface(SurfaceResolution::Factor(2.0))
+        .level(Level::Local);
     assert_agreement(&cloud, &options);
     let [_, sparse] = both(&cloud, &options);
     assert!(sparse.report().surface.closed);

@@ -2,7 +2,6 @@
 //! φ are there.
 
 use isograd::distance::{Band, Query};
-use isograd::isosurface::Level;
 use isograd::orient::Method;
 use isograd::{
     Grid, Mesh, Options, Pipeline, PointCloud, Reconstruction, Reconstructor, SurfaceResolution,
@@ -68,11 +67,8 @@ fn assert_exact<T: Pipeline>(factor: f64, tolerance: f64) {
     let result = reconstruct(&cloud, coarse(), Options::default().surface(surface));
     let fine = *result.surface_grid();
     assert!(fine.spacing().f64() <= 0.1 / factor * (1.0 + 1e-6));
-    let alone = reconstruct(
-        &cloud,
-        fine,
-        Options::default().surface(SurfaceResolution::Grid),
-    );
+    let same = Options::default().surface(SurfaceResolution::Factor(1.0));
+    let alone = reconstruct(&cloud, fine, same);
     assert!(result.mesh() == alone.mesh());
     let expected = distances(result.mesh(), result.sdf().grid());
     for (cell, (&phi, &exact)) in result.sdf().values().iter().zip(&expected).enumerate() {
@@ -115,7 +111,7 @@ fn plates_thinner_than_a_cell_of_phi_are_whole() {
         let cloud = plate(thickness, thickness / 3.0);
         let grid = Grid::new([-1.37, -1.11, -1.23], h, [28, 22, 25]).expect("a grid");
         let surface = SurfaceResolution::Spacing(0.4 * thickness);
-        let options = Options::default().surface(surface).level(Level::Thin);
+        let options = Options::default().surface(surface);
         let result = reconstruct(&cloud, grid, options);
         let measures = &result.report().surface;
         assert_eq!((measures.components, measures.euler), (1, 2), "{cells}");

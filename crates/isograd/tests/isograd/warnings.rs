@@ -1,18 +1,30 @@
 //! Every warning on a cloud that deserves it, and none on one that does not.
 
+use isograd::isosurface::Level;
+use isograd::orient::Method;
 use isograd::orient::doubt::Reason;
-use isograd::{Error, Grid, Options, PointCloud, Reconstructor, Report, Resolution, Warning};
+use isograd::{
+    Error, Grid, Options, PointCloud, Reconstructor, Report, Resolution, Verdict, Warning,
+};
 
 use crate::common::{TORUS, Uniform};
 
 fn report(points: Vec<[f64; 3]>, cells: usize) -> Report {
     let cloud = PointCloud::new(points).expect("finite points");
-    let grid = Grid::fit(&cloud, Resolution::Cells(cells), 0.1).expect("fits");
-    let mut plan = Reconstructor::new(grid, Options::default()).expect("valid options");
-    plan.reconstruct(&cloud)
+    report_with(&cloud, cells, Options::default())
+}
+
+fn report_with(cloud: &PointCloud<f64>, cells: usize, options: Options) -> Report {
+    let grid = Grid::fit(cloud, Resolution::Cells(cells), 0.1).expect("fits");
+    let mut plan = Reconstructor::new(grid, options).expect("valid options");
+    plan.reconstruct(cloud)
         .expect("reconstructs")
         .report()
         .clone()
+}
+
+fn codes(report: &Report) -> Vec<&'static str> {
+    report.reasons().into_iter().map(Warning::code).collect()
 }
 
 /// `n` uniform random points of the unit sphere with `z` above `lowest`, moved and scaled.
@@ -30,16 +42,65 @@ fn sphere(n: usize, lowest: f64, center: [f64; 3], radius: f64) -> Vec<[f64; 3]>
 #[test]
 fn a_sound_cloud_has_no_warning() {
     let torus = TORUS.uniform::<f64>(20_000, 11);
-    assert_eq!(report(torus.points().to_vec(), 64).warnings, []);
-    assert_eq!(report(sphere(10_000, -1.0, [0.0; 3], 1.0), 48).warnings, []);
+    let reports = [
+        report(torus.points().to_vec(), 64),
+        report(sphere(10_000, -1.0, [0.0; 3], 1.0), 48),
+    ];
+    for report in reports {
+        assert_eq!(report.warnings, []);
+        assert_eq!(report.verdict(), Some(Verdict::Good));
+        assert_eq!(report.conclusion(), "good");
+    }
+}
+
+#[test]
+fn without_checks_there_is_no_verdict() {
+    let cloud = PointCloud::new(sphere(2_000, -1.0, [0.0; 3], 1.0)).expect("finite points");
+    let report = report_with(&cloud, 24, Options::default().checks(false));
+    assert_eq!((report.verdict(), &report.warnings[..]), (None, &[][..]));
+    assert_eq!(report.conclusion(), "not checked");
+}
+
+#[test]
+fn normals_that_point_inward_give_a_surface_inside_out() {
+    let points = sphere(4_000, -1.0, [0.0; 3], 1.0);
+    let inward = points.iter().map(|p| p.map(|x| -x)).collect();
+    let cloud = PointCloud::new(points).and_then(|cloud| cloud.with_normals(inward));
+    let options = Options::default().orient(Method::Given);
+    let report = report_with(&cloud.expect("a cloud"), 32, options);
+    assert_eq!(codes(&report).first(), Some(&"inside-out"));
+    assert_eq!(report.verdict(), Some(Verdict::Bad));
+    assert!(report.conclusion().contains("--orient auto"), "{report:?}");
+}
+
+#[test]
+fn a_plate_much_thinner_than_a_cell_is_missed() {
+    let mut random = Uniform::new(6);
+    let mut points = sphere(6_000, -1.0, [0.0; 3], 0.5);
+    for _ in 0..10_000 {
+        let (x, y) = (0.4 + 1.6 * random.next(), random.next() - 0.5);
+        points.push([x, y, if random.next() < 0.5 { 0.004 } else { -0.004 }]);
+    }
+    let cloud = PointCloud::new(points).expect("finite points");
+    let report = report_with(&cloud, 32, Options::default().level(Level::Mean));
+    let far = report.warnings.iter().find_map(|warning| match warning {
+        Warning::Missed { far, .. } => Some(*far),
+        _ => None,
+    });
+    assert!(far > Some(0.1), "{report:?}");
+    assert_eq!(report.verdict(), Some(Verdict::Bad));
+    assert!(report.conclusion().contains("level=\"thin\""), "{report:?}");
 }
 
 #[test]
 fn a_bowl_is_called_open() {
     for lowest in [0.0, -0.8] {
-        let warnings = report(sphere(12_000, lowest, [0.0; 3], 1.0), 48).warnings;
-        let open = warnings.iter().any(|w| matches!(w, Warning::Open { .. }));
-        assert!(open, "rim at z = {lowest}: {warnings:?}");
+        let report = report(sphere(12_000, lowest, [0.0; 3], 1.0), 48);
+        assert!(
+            codes(&report).contains(&"open"),
+            "rim at {lowest}: {report:?}"
+        );
+        assert_eq!(report.verdict(), Some(Verdict::Bad));
     }
 }
 
@@ -53,27 +114,23 @@ fn doubtful_signs_come_with_their_reason_and_a_remedy() {
         Warning::DoubtfulSigns { doubt } => {
             assert_eq!(doubt, &report.doubt);
             assert!(doubt.share_of(Reason::Open) > 0.95, "{doubt:?}");
-            Some(warning.to_string())
+            Some((warning.to_string(), warning.remedy()))
         }
         _ => None,
     });
-    let text = text.expect("a warning");
-    for part in [
-        "% of the samples: ",
-        "open surface; close the gaps, or give",
-    ] {
+    let (text, remedy) = text.expect("a warning");
+    for part in ["% of the samples: ", "open surface"] {
         assert!(text.contains(part), "'{part}' is missing: {text}");
     }
+    assert!(remedy.starts_with("close the gaps, or give"), "{remedy}");
 }
 
 #[test]
-fn two_balls_are_two_pieces() {
+fn two_balls_are_two_pieces_and_no_fragments() {
     let mut points = sphere(5_000, -1.0, [-1.5, 0.0, 0.0], 1.0);
     points.extend(sphere(5_000, -1.0, [1.5, 0.0, 0.0], 1.0));
-    assert_eq!(
-        report(points, 64).warnings,
-        [Warning::Components { count: 2 }]
-    );
+    let report = report(points, 64);
+    assert_eq!((report.surface.components, codes(&report)), (2, vec![]));
 }
 
 #[test]

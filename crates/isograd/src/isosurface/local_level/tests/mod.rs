@@ -6,7 +6,7 @@ use super::*;
 use crate::isosurface::iso_value;
 use crate::neighbors::tests::{Random, torus};
 use crate::splat::{self, SampleCotangent, Samples, SortedSamples, Weights};
-use crate::testing::{numbers, product};
+use crate::testing::{bspline, numbers, product};
 use crate::{Field, Grid, Real, vector};
 
 /// Samples of a torus, their areas, and an indicator that is a little off on it.
@@ -107,14 +107,6 @@ fn indicator<T: Real>(grid: Grid<T>) -> Field<T> {
 
 fn hat(x: f64) -> f64 {
     (1.0 - x.abs()).max(0.0)
-}
-
-fn bspline(x: f64) -> f64 {
-    match x.abs() {
-        x if x < 0.5 => 0.75 - x * x,
-        x if x < 1.5 => 0.5 * (1.5 - x).powi(2),
-        _ => 0.0,
-    }
 }
 
 /// The product over the axes of `f` between a cell center and index coordinates.

@@ -1,0 +1,36 @@
+//! Connected components of a mesh, one by one.
+
+use super::{Scratch, find};
+use crate::data::Mesh;
+use crate::{Real, vector};
+
+/// The connected components of a mesh, in the order of their first faces.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Pieces {
+    /// Number of the piece of each face.
+    pub of_face: Vec<u32>,
+    /// Area of each piece, in unit length².
+    pub areas: Vec<f64>,
+}
+
+impl Pieces {
+    /// The pieces of a mesh. `scratch` must be that of the last [`measure`](super::measure), of this mesh.
+    pub(crate) fn new<T: Real>(mesh: &Mesh<T>, scratch: &mut Scratch) -> Self {
+        const NONE: u32 = u32::MAX;
+        let mut of_root = vec![NONE; mesh.vertices().len()];
+        let mut pieces = Self::default();
+        for (f, face) in mesh.faces().iter().enumerate() {
+            let root = find(&mut scratch.parent, face[0]) as usize;
+            if of_root[root] == NONE {
+                of_root[root] = pieces.areas.len() as u32;
+                pieces.areas.push(0.0);
+            }
+            let piece = of_root[root];
+            let [a, b, c] = mesh.corners(f).map(vector::to_f64);
+            let normal = vector::cross(vector::sub(b, a), vector::sub(c, a));
+            pieces.of_face.push(piece);
+            pieces.areas[piece as usize] += vector::norm(normal) / 2.0;
+        }
+        pieces
+    }
+}
