@@ -1,11 +1,11 @@
-"""Renders docs/PAGE.md and its charts from docs/PAGE.json: `python render.py [--check] [PAGE...]`.
+"""Renders docs/PAGE.md and its charts from docs/PAGE.json: `python render.py [--check] [PAGE...]`. The page `readme` is the
+table of README.md, from several of them.
 
 The text of a page is templates/PAGE.md.jinja; its module computes tables and figures. `--check` draws no charts and fails
 if a page differs from what its JSON gives, or a page that is written by hand from a figure in `claims.py`."""
 
 import argparse
 import importlib
-import json
 import sys
 from pathlib import Path
 
@@ -15,7 +15,8 @@ import text
 
 HERE = Path(__file__).resolve().parent
 DOCS = HERE.parents[1] / "docs"
-PAGES = ["accuracy", "gradients", "orientation", "scaling", "fit", "gpu", "guarantees", "peers", "surfaces", "large"]
+README = DOCS.parent / "README.md"
+PAGES = ["accuracy", "gradients", "orientation", "scaling", "fit", "gpu", "guarantees", "peers", "surfaces", "large", "readme"]
 
 
 def main() -> int:
@@ -28,8 +29,9 @@ def main() -> int:
     different = []
     for name in options.pages or PAGES:
         module = importlib.import_module(name)
-        data = json.loads((DOCS / f"{name}.json").read_text(encoding="utf-8"))
-        path = DOCS / f"{name}.md"
+        path = README if name == "readme" else DOCS / f"{name}.md"
+        data = {source: claims.read(DOCS, source) for source in getattr(module, "SOURCES", [name])}
+        data = data.get(name, data)
         page = rendered(name, module.context(data), path)
         if not options.check:
             path.write_text(page, encoding="utf-8")

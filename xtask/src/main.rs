@@ -57,7 +57,7 @@ Figures and pages
                    where ../shared/data is there
   scaling          docs/scaling.md: time and memory against cells and points; leave the machine
                    alone meanwhile
-  gallery          docs/images/: pictures of the clouds in examples/clouds, and of bad results
+  gallery          docs/images/: the picture of the README, and those of bad results
   fit              docs/fit.md: a fish found from its signed distance field
   gpu              docs/gpu.md: time and memory on a GPU
   gpu --pack       target/isograd-gpu-kit.tar.xz: tests and benchmarks for a machine with an NVIDIA
@@ -117,7 +117,7 @@ fn run(command: &str, rest: &[String]) -> Option<Outcome> {
         ("gpu", [flag, file]) if flag == "--page" => {
             Some(kit::import(file).and_then(|()| pages::render(&["gpu"])))
         }
-        ("gallery", []) => Some(pages::gallery()),
+        ("gallery", []) => Some(pictures::all()),
         ("fit", []) => Some(fit::run()),
         ("bench", _) => Some(bench::run(rest)),
         ("peers", _) => Some(peers::run(rest)),

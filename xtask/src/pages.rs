@@ -1,8 +1,6 @@
 //! The pages and pictures below `docs/` that commands make: a program measures and writes JSON, from which
 //! `benches/pages/render.py` makes Markdown and charts.
 
-use std::fs;
-use std::path::PathBuf;
 use std::process::Command;
 
 use crate::environment::{Environment, Obstacle};
@@ -18,7 +16,7 @@ pub fn all() -> Outcome {
     for page in MEASURED {
         measure(page)?;
     }
-    gallery()?;
+    pictures::all()?;
     crate::fit::run()
 }
 
@@ -54,19 +52,6 @@ pub fn gpu() -> Outcome {
     render(&["gpu"])
 }
 
-/// `docs/images/NAME.png` for every cloud in `examples/clouds`, and the pictures of bad results.
-pub fn gallery() -> Outcome {
-    let pictures = process::root().join("docs").join("images");
-    for cloud in clouds()? {
-        let name = cloud.file_stem().unwrap_or_default();
-        let picture = pictures.join(name).with_extension("png");
-        println!("{} → {}", cloud.display(), picture.display());
-        let mut command = process::cargo(["run", "--release", "--quiet", "--", "reconstruct"]);
-        process::run(command.arg(cloud).arg("--picture").arg(picture))?;
-    }
-    pictures::bad_results()
-}
-
 /// A program of `isograd-benches`.
 fn program(name: &str) -> Command {
     let package = ["run", "--release", "--package", "isograd-benches", "--bin"];
@@ -84,16 +69,4 @@ fn renderer() -> Result<Command, Obstacle> {
     let mut command = Command::new(python);
     command.arg(folder.join("render.py"));
     Ok(command)
-}
-
-/// The clouds in the repository, sorted by name.
-fn clouds() -> Outcome<Vec<PathBuf>> {
-    let folder = process::root().join("examples").join("clouds");
-    let entries = fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    let mut clouds: Vec<PathBuf> = entries
-        .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter(|path| path.extension().is_some_and(|extension| extension == "ply"))
-        .collect();
-    clouds.sort();
-    Ok(clouds)
 }

@@ -1,4 +1,4 @@
-//! The pictures of docs/bad-results.md: bad results, and the same samples with the option that helps.
+//! The picture of README.md, and those of docs/bad-results.md: bad results, and the same samples with the option that helps.
 
 use std::fs;
 use std::path::Path;
@@ -37,7 +37,8 @@ const PICTURES: [(&str, &str, &str); 4] = [
 ];
 
 /// Draws all pictures.
-pub fn bad_results() -> Outcome {
+pub fn all() -> Outcome {
+    isograd("reconstruct examples/clouds/aircraft.ply --picture docs/images/aircraft.png --view 60 30")?;
     let folder = process::root().join(FOLDER);
     fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     for (name, shape, keep) in CLOUDS {
