@@ -5,6 +5,7 @@ mod deny;
 mod environment;
 mod examples;
 mod fit;
+mod flow;
 mod fuzz;
 mod kit;
 mod limits;
@@ -72,6 +73,8 @@ Figures and pages
                    against their true meshes, beside PoissonRecon (needs Python 3 and PyPI)
   large [ARGS]     docs/large.md: 10 million samples at an effective 2048³, beside PoissonRecon;
                    leave the machine alone meanwhile (needs Python 3 and PyPI)
+  flow [CASE...]   docs/flow.md: bodies in a flow solver, its film and its picture; about an hour
+                   (needs Python 3 and PyPI)
 
 Exit status: 0 done, 1 a step failed, 2 the command line is wrong.";
 
@@ -123,6 +126,7 @@ fn run(command: &str, rest: &[String]) -> Option<Outcome> {
         ("peers", _) => Some(peers::run(rest)),
         ("surfaces", _) => Some(peers::surfaces(rest)),
         ("large", _) => Some(peers::large(rest)),
+        ("flow", _) => Some(flow::run(rest)),
         _ => None,
     }
 }

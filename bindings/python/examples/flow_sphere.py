@@ -37,6 +37,7 @@ def main(n=6, count=1000, duration=0.6):
     print(f"{n} cells a diameter, {count} points, time {duration}: Cd {from_cloud:.5f} from the cloud, "
           f"{from_closed_form:.5f} from the closed form, {from_cloud / from_closed_form - 1:+.3%}")
     assert 0.5 < from_closed_form < 4 and abs(from_cloud / from_closed_form - 1) < 0.02
+    return from_cloud, from_closed_form
 
 
 if __name__ == "__main__":

@@ -11,7 +11,11 @@ from ._arrays import floats, indices
 from ._numbers import number, whole
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from numpy.typing import ArrayLike, DTypeLike
+
+    from ._shape_jax import Material
 
 
 class Coordinates(NamedTuple):
@@ -130,6 +134,25 @@ class Shape:
         patch, uv = _checked(coordinates)
         bar = floats(points_bar, "points_bar", (len(patch), 3))
         return dict(zip(self.values, self._core.pullback(patch, uv, bar)))
+
+    def jax(self, coordinates: Coordinates, free: Sequence[str] = ()) -> Callable[[ArrayLike, ArrayLike], Material]:
+        """A JAX function of the values of ``free`` parameters and the time: material points, normals and velocities.
+
+        ``f(values, time)`` with ``(len(free),)`` values gives an ``isograd.jax.Material`` of three ``(N, 3)`` arrays, in
+        JAX's default float type. It works inside ``jit``, ``scan`` and ``vmap``, and is differentiable in both arguments
+        in reverse mode. It is computed on the host in double precision; velocities are central differences over ±1e-4
+        units of time, and so are cotangents of normals over ±1e-5 of the surface coordinates.
+
+        Args:
+            coordinates: those of samples, such as ``shape.sample(1000).coordinates``.
+            free: names of the parameters that are given as values; the others keep those of this shape.
+
+        Raises:
+            ValueError: an unknown or whole parameter, ``"time"``, or coordinates of another shape.
+        """
+        from ._shape_jax import function
+
+        return function(self, coordinates, free)
 
 
 def _checked(coordinates: Coordinates) -> tuple[np.ndarray, np.ndarray]:

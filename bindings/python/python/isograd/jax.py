@@ -33,6 +33,7 @@ import numpy as np
 from ._options import Options, Orient, check_fill
 from ._jax_surface import Fill, Surface, sample_values, surface
 from ._places import band_width
+from ._shape_jax import Material
 from ._xla import Plan, call, floats, like, pair, prepare
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
 
     from ._grid import Grid
 
-__all__ = ["Extension", "Mesh", "Surface", "extend", "mesh", "orient", "query", "signed_distance", "surface"]
+__all__ = ["Extension", "Material", "Mesh", "Surface", "extend", "mesh", "orient", "query", "signed_distance", "surface"]
 
 
 def signed_distance(
