@@ -54,7 +54,7 @@ def picture(swim, state, points, normals):
     return Image.open(buffer).convert("RGB")
 
 
-def drag(n=32, count=50_000, steps=200):
+def drag(n=32, count=50_000, steps=128):
     """Change of the mean drag where the surface grows by a unit volume, at each of all points, from one reverse pass."""
     swim = Swim(n, count, lengths=(2, 1, 1))
     points, normals = swim.motion(1, steps)
