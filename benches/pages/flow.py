@@ -7,20 +7,23 @@ TARGETS = {10: 0.0015, 16: 0.0008}
 
 
 def context(data: dict) -> dict:
-    cost = data["cost"]
-    *coarse, fine = data["fish"]
-    drags = [row["drag"] for row in data["optimization"]["rows"]]
-    return data | {
-        "sphere_table": sphere(data["sphere"]),
-        "fish_table": fish(coarse, fine),
-        "gradient_table": gradient(data["gradient"]["rows"]),
-        "share": cost["geometry"] / cost["forward"],
-        "backward": cost["checkpointed"]["seconds"] / cost["forward"],
-        "megabytes": [cost[name]["bytes"] / 2**20 for name in ("checkpointed", "stored")],
-        "drags": [drags[0], drags[-1]],
-        "fall": 1 - drags[-1] / drags[0],
-        "optimization": data["optimization"] | {"iterations": len(drags) - 1},
-    }
+    """Cases that were not measured are left out of the page."""
+    found = {"data": data}
+    if "sphere" in data:
+        found["sphere"] = sphere(data["sphere"])
+    if "fish" in data:
+        found["fish"] = fish(data["fish"])
+    if "gradient" in data:
+        found["gradient"] = gradient(data["gradient"]["rows"])
+    if "cost" in data:
+        cost = data["cost"]
+        found["share"] = cost["geometry"] / cost["forward"]
+        found["backward"] = cost["checkpointed"]["seconds"] / cost["forward"]
+        found["megabytes"] = [cost[name]["bytes"] / 2**20 for name in ("checkpointed", "stored")]
+    if "optimization" in data:
+        drags = [row["drag"] for row in data["optimization"]["rows"]]
+        found |= {"fall": 1 - drags[-1] / drags[0], "iterations": len(drags) - 1}
+    return found
 
 
 def sphere(rows: list[dict]) -> str:
@@ -38,7 +41,8 @@ def sphere(rows: list[dict]) -> str:
     return table(["sphere at Re 100"], columns, cells)
 
 
-def fish(rows: list[dict], fine: dict) -> str:
+def fish(rows: list[dict]) -> str:
+    *_, fine = rows
     cells = [
         [
             f"{thousands(row['points'])} points, surface {row['surface']}",
@@ -47,7 +51,7 @@ def fish(rows: list[dict], fine: dict) -> str:
             percent(row["side"] / fine["side"] - 1),
             number(max(a / b for a, b in zip(row["noise"], fine["noise"]))),
         ]
-        for row in [*rows, fine]
+        for row in rows
     ]
     return table(["fish"], ["mean force along x", "difference, %", "lateral force, rms, %", "noise, ratio"], cells)
 
@@ -68,6 +72,8 @@ def gradient(rows: list[dict]) -> str:
 
 
 def draw(data: dict, folder) -> None:
+    if "optimization" not in data:
+        return
     rows = data["optimization"]["rows"]
     with charts.figure(folder / "flow-optimization.png", size=(5.5, 3.0)) as (_, axes):
         axes[0, 0].plot([row["drag"] for row in rows], "o-")
