@@ -2,7 +2,7 @@
 
     >>> import isograd
     >>> points = isograd.sample("sphere", 2000).points
-    >>> result = isograd.reconstruct(points, isograd.Grid.fit(points, 32))
+    >>> result = isograd.reconstruct(points, resolution=32)
     >>> gradient = result.pullback(sdf=result.sdf).points   # of the loss Σ φ²/2
 
 φ is negative inside, in the unit of the points, at the centers of the cells; arrays are ``(nx, ny, nz)``, points

@@ -11,15 +11,20 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from . import _core
-from ._arrays import floats, known
+from ._arrays import floats
 from ._grid import Grid
+from ._inputs import read_input
 from ._mesh import Mesh
 from ._numbers import number
-from ._options import Options, check_fill, check_known, resolve
+from ._options import Options, check_fill, resolve
 from ._settings import check_backend, encode, warn_caller, warn_note
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+    from typing_extensions import Unpack
+
+    from ._inputs import CloudLike
+    from ._options import OptionChanges
 
 
 class ReconstructionWarning(UserWarning):
@@ -289,7 +294,12 @@ class Reconstructor:
     """
 
     def __init__(
-        self, grid: Grid, options: Options | None = None, *, backend: str = "cpu", **changes: Any
+        self,
+        grid: Grid,
+        options: Options | None = None,
+        *,
+        backend: str = "cpu",
+        **changes: Unpack[OptionChanges],
     ) -> None:
         self.options = resolve(options, changes)
         """Options of the reconstruction."""
@@ -302,16 +312,17 @@ class Reconstructor:
 
     def __call__(
         self,
-        points: ArrayLike,
+        points: CloudLike,
         *,
         normals: ArrayLike | None = None,
         sensors: ArrayLike | None = None,
         attributes: Mapping[str, ArrayLike] | None = None,
     ) -> Reconstruction:
         """See :func:`reconstruct`."""
-        cloud = floats(points, "points", (None, 3))
-        normals, sensors = known(cloud, normals, sensors)
-        check_known(self.options.orient, normals is not None, sensors is not None)
+        given = read_input(points)
+        cloud, normals, sensors = given.arrays(normals, sensors, self.options.orient)
+        if attributes is None:
+            attributes = given.usable_attributes(len(cloud))
         core = self._plan.reconstruct(cloud, normals, sensors, _attributes(attributes, cloud))
         warn_note(self._plan.take_note())
         result = Reconstruction(core, self.grid, self.options, len(cloud), cloud.dtype)
@@ -322,26 +333,35 @@ class Reconstructor:
 
 
 def reconstruct(
-    points: ArrayLike,
+    points: CloudLike,
     grid: Grid | None = None,
     *,
+    resolution: int | None = None,
+    spacing: float | None = None,
+    padding: float | None = None,
     normals: ArrayLike | None = None,
     sensors: ArrayLike | None = None,
     attributes: Mapping[str, ArrayLike] | None = None,
     options: Options | None = None,
     backend: str = "cpu",
-    **changes: Any,
+    **changes: Unpack[OptionChanges],
 ) -> Reconstruction:
     """Reconstructs the signed distance field and the surface of a cloud.
 
     Args:
-        points: ``(N, 3)`` samples of the surface; float32 or float64 decides the type of all results.
+        points: ``(N, 3)`` samples of the surface; float32 or float64 decides the type of all results. Also the path of a
+            file (see :func:`read_points`), a :class:`Cloud`, :class:`Samples`, a point cloud of Open3D, trimesh, PyVista or
+            VTK, or a data frame with columns x, y and z; of a mesh, its vertices.
         grid: grid of φ; by default ``Grid.fit(points)``, with the given ``outliers``.
-        normals: ``(N, 3)`` outward normals, only with ``orient="given"`` or ``"signs"``.
+        resolution: of that fitted grid: cells on the longest side, by default 128.
+        spacing: of that fitted grid: cell size, in the unit of the points, instead of a resolution.
+        padding: of that fitted grid: see :meth:`Grid.fit`.
+        normals: ``(N, 3)`` outward normals, only with ``orient="given"`` or ``"signs"``. By default those that came with
+            the points, which other orientations ignore: the sides of a scan's normals are often arbitrary.
         sensors: positions of the sensors, only with ``orient="sensors"``: ``(N, 3)`` one for each point, ``(3,)`` one
             for all, or ``(M, 3)`` with another ``M`` where it is unknown which one saw a point.
         attributes: values of the samples, ``(N,)`` or ``(N, components)`` by name, for
-            :meth:`Reconstruction.extend`.
+            :meth:`Reconstruction.extend`. By default the numbers that came with the points.
         options: options of the reconstruction.
         backend: ``"cpu"``, ``"cuda"`` (``"cuda:1"`` is the second device), ``"vulkan"``, or
             ``"auto"``: a GPU if available, else the CPU with a ``RuntimeWarning`` that gives the reason.
@@ -349,14 +369,20 @@ def reconstruct(
 
     Raises:
         TypeError, ValueError: invalid input; the message says what is wrong and what to do.
+        FileNotFoundError, OSError: a file that can't be read.
         RuntimeError: an unavailable backend.
         KeyboardInterrupt: at once, on Ctrl-C.
 
     Warns with :class:`ReconstructionWarning` unless the verdict is good.
     """
-    cloud = floats(points, "points", (None, 3))
+    cloud = read_input(points)
     options = resolve(options, changes)
-    grid = Grid.fit(cloud, outliers=options.outliers) if grid is None else grid
+    fitted: dict[str, Any] = {"resolution": resolution, "spacing": spacing, "padding": padding}
+    fitted = {name: value for name, value in fitted.items() if value is not None}
+    if grid is None:
+        grid = Grid.fit(cloud, outliers=options.outliers, **fitted)
+    elif fitted:
+        raise TypeError(f"grid and {' and '.join(fitted)} are given; leave out grid, or give Grid.fit(points, ...) with them")
     plan = Reconstructor(grid, options, backend=backend)
     return plan(cloud, normals=normals, sensors=sensors, attributes=attributes)
 
