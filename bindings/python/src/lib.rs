@@ -15,6 +15,7 @@ mod query;
 mod result;
 mod settings;
 mod shape;
+mod threads;
 mod xla;
 
 use pyo3::prelude::*;
@@ -43,6 +44,8 @@ mod _core {
     use result::{Extension, ReconstructionArrays};
     #[pymodule_export]
     use shape::{Shape, shapes};
+    #[pymodule_export]
+    use threads::{get_num_threads, set_num_threads};
     #[pymodule_export]
     use xla::{call_target, xla_targets};
 

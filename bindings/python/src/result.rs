@@ -13,6 +13,7 @@ use crate::arrays::{self, Either, Number};
 use crate::backend::Failure;
 use crate::background;
 use crate::errors::value;
+use crate::plan::AttributeArray;
 
 /// A cloud and its reconstruction.
 pub struct Reconstruction<T: Number> {
@@ -52,6 +53,11 @@ impl ReconstructionArrays {
     /// A new copy of one of the arrays, by name.
     fn array<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         each!(&self.0, this => array(py, this, name))
+    }
+
+    /// Points, normals, sensors and attributes of the cloud, as `Plan.reconstruct` takes them.
+    fn inputs<'py>(&self, py: Python<'py>) -> PyResult<Inputs<'py>> {
+        each!(&self.0, this => inputs(py, &this.cloud))
     }
 
     /// The iso-value of the surface.
@@ -134,6 +140,29 @@ impl<T: Number> Extended<T> {
             _ => Err(PyKeyError::new_err(name.to_owned())),
         }
     }
+}
+
+/// Points, normals, sensors and attributes: name, components, values.
+type Inputs<'py> = (
+    Bound<'py, PyAny>,
+    Option<Bound<'py, PyAny>>,
+    Option<Bound<'py, PyAny>>,
+    Vec<AttributeArray<'py>>,
+);
+
+fn inputs<'py, T: Number>(py: Python<'py>, cloud: &PointCloud<T>) -> PyResult<Inputs<'py>> {
+    let vectors = |values| arrays::from_vectors(py, values);
+    let attributes = cloud.attributes().iter().map(|of| {
+        let shape = [cloud.len(), of.components];
+        let values = arrays::shaped(py, of.values.clone(), shape)?;
+        Ok((of.name.clone(), of.components, values))
+    });
+    Ok((
+        vectors(cloud.points()),
+        cloud.normals().map(vectors),
+        cloud.sensors().map(|sensors| vectors(sensors.positions())),
+        attributes.collect::<PyResult<_>>()?,
+    ))
 }
 
 /// Converts the error.

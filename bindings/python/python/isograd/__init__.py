@@ -33,6 +33,7 @@ from ._reconstruction import (
     reconstruct,
 )
 from ._shapes import Coordinates, Parameter, Samples, Shape, sample, shapes
+from ._threads import get_num_threads, set_num_threads
 
 __all__ = [
     "Cloud",
@@ -59,6 +60,7 @@ __all__ = [
     "Walls",
     "__version__",
     "fit",
+    "get_num_threads",
     "orient",
     "query",
     "query_pullback",
@@ -67,6 +69,7 @@ __all__ = [
     "read_sdf",
     "reconstruct",
     "sample",
+    "set_num_threads",
     "shapes",
     "signed_distance",
     "write_mesh",

@@ -25,6 +25,7 @@ __all__ = [
     "call_target",
     "check_grid",
     "fit_grid",
+    "get_num_threads",
     "open_backend",
     "orient",
     "query_mesh",
@@ -33,6 +34,7 @@ __all__ = [
     "read_geometry",
     "run_command",
     "run_fit",
+    "set_num_threads",
     "shapes",
     "write_field",
     "write_mesh",
@@ -80,8 +82,14 @@ class Result:
     def array(self, name: str) -> NDArray[Any]:
         """A new copy of one of the arrays, by name."""
 
+    def inputs(self) -> tuple[_Floats, _Floats | None, _Floats | None, _Attributes]:
+        """Points, normals, sensors and attributes of the cloud, as :meth:`Plan.reconstruct` takes them."""
+
     def iso_value(self) -> float:
         """The iso-value of the surface."""
+
+    def surface_shape(self) -> list[int]:
+        """Number of cells of the surface's grid along each axis."""
 
     def backend(self) -> str:
         """Name of the backend."""
@@ -111,8 +119,10 @@ class Plan:
         normals: _Floats | None,
         sensors: _Floats | None,
         attributes: _Attributes,
+        progress: Callable[[str], object] | None = None,
     ) -> Result:
-        """Reconstructs a cloud: ``points``, ``normals`` and ``sensors`` of one type."""
+        """Reconstructs a cloud: ``points``, ``normals`` and ``sensors`` of one type. ``progress`` is called with the name
+        of each stage, before it."""
 
     def take_note(self) -> str | None:
         """Why ``"auto"`` selected the CPU; once."""
@@ -187,6 +197,14 @@ def run_fit(
     points, φ, vertices, faces.
 
     ``options`` is a JSON text; ``target`` is φ, ``(vertices, faces)`` or points, according to its ``kind``."""
+
+# Threads.
+
+def set_num_threads(n: int) -> None:
+    """Starts ``n`` threads for all work that begins later."""
+
+def get_num_threads() -> int:
+    """Number of threads of the work. Starts none."""
 
 # XLA.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -17,7 +17,9 @@ from ._inputs import read_input
 from ._mesh import Mesh
 from ._numbers import number
 from ._options import Options, check_fill, resolve
+from ._progress import Progress, observe
 from ._settings import check_backend, encode, warn_caller, warn_note
+from ._stored import Stored, checksum, compute_again
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -52,8 +54,11 @@ class Gradients:
     guarded: int
 
 
-class Extension:
-    """An attribute of the samples, extended to the surface and to the cells inside and near it."""
+class Extension(Stored):
+    """An attribute of the samples, extended to the surface and to the cells inside and near it.
+
+    A pickle has its arrays, but no pullback.
+    """
 
     def __init__(self, core: _core.Extension, name: str, grid: Grid) -> None:
         self._core = core
@@ -61,6 +66,15 @@ class Extension:
         """Name of the attribute."""
         self.grid = grid
         """The grid."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self._state("vertices", "cells", "values")
+
+    @cached_property
+    def _core(self) -> _core.Extension:
+        raise RuntimeError(
+            "this extension was unpickled, and has no pullback; give what extend() of the reconstruction returns"
+        )
 
     @cached_property
     def vertices(self) -> np.ndarray:
@@ -85,13 +99,19 @@ class Extension:
         return out
 
 
-class Reconstruction:
-    """Reconstruction of a cloud. Arrays have the type of the points and are copies, which may be modified."""
+class Reconstruction(Stored):
+    """Reconstruction of a cloud. Arrays have the type of the points and are copies, which may be modified.
+
+    A pickle has the inputs, and the results that are small or were read before. All else, such as a pullback, is computed
+    again when it is needed. On a machine that would give other bits, and after ``orient="previous"``, this is a
+    ``RuntimeError``.
+    """
 
     def __init__(
-        self, core: _core.Result, grid: Grid, options: Options, count: int, dtype: np.dtype
+        self, core: _core.Result, grid: Grid, options: Options, backend: str, count: int, dtype: np.dtype
     ) -> None:
         self._core = core
+        self._requested = backend
         self._count = count
         self.dtype = dtype
         """float32 or float64: the type of the points."""
@@ -99,6 +119,17 @@ class Reconstruction:
         """The grid of φ."""
         self.options = options
         """The options of the reconstruction."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        small = ("mesh", "normals", "confidence", "outliers", "iso_value", "surface_grid", "backend", "report")
+        state = self._state("sdf", *small)
+        if "_inputs" not in state:
+            state["_inputs"], state["_checksum"] = self._core.inputs(), checksum(self._core)
+        return state
+
+    @cached_property
+    def _core(self) -> _core.Result:
+        return compute_again(self, self.__dict__["_inputs"], self.__dict__["_checksum"])
 
     def __repr__(self) -> str:
         verdict = self.verdict or "not checked"
@@ -173,7 +204,7 @@ class Reconstruction:
         """Settings, measurements, timings and warnings, with the names of the command line's ``report.json``."""
         return {"backend": self.backend, **json.loads(self._core.report())}
 
-    @property
+    @cached_property
     def backend(self) -> str:
         """Name of the backend: ``"cpu"``, or a backend and its device, such as ``"cuda: NVIDIA H100"``."""
         return self._core.backend()
@@ -289,6 +320,8 @@ class Reconstruction:
 class Reconstructor:
     """A plan for one grid and one set of options: made once, used for every time step.
 
+    Copies and pickles are new plans, without earlier calls.
+
     Calls reuse its memory. It may be called from several threads at once; each call beyond the first then makes a plan
     of its own. With ``orient="previous"``, call it from one thread at a time: the result depends on the previous calls.
     """
@@ -310,6 +343,9 @@ class Reconstructor:
         self._plan = _core.Plan(encode(grid, self.options, self.backend))
         warn_note(self._plan.take_note())
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(type(self), self.grid, self.options, backend=self.backend), ()
+
     def __call__(
         self,
         points: CloudLike,
@@ -317,15 +353,17 @@ class Reconstructor:
         normals: ArrayLike | None = None,
         sensors: ArrayLike | None = None,
         attributes: Mapping[str, ArrayLike] | None = None,
+        progress: Progress | bool | None = None,
     ) -> Reconstruction:
         """See :func:`reconstruct`."""
         given = read_input(points)
         cloud, normals, sensors = given.arrays(normals, sensors, self.options.orient)
         if attributes is None:
             attributes = given.usable_attributes(len(cloud))
-        core = self._plan.reconstruct(cloud, normals, sensors, _attributes(attributes, cloud))
+        with observe(progress) as observer:
+            core = self._plan.reconstruct(cloud, normals, sensors, _attributes(attributes, cloud), observer)
         warn_note(self._plan.take_note())
-        result = Reconstruction(core, self.grid, self.options, len(cloud), cloud.dtype)
+        result = Reconstruction(core, self.grid, self.options, self.backend, len(cloud), cloud.dtype)
         result._warn()
         return result
 
@@ -344,6 +382,7 @@ def reconstruct(
     attributes: Mapping[str, ArrayLike] | None = None,
     options: Options | None = None,
     backend: str = "cpu",
+    progress: Progress | bool | None = None,
     **changes: Unpack[OptionChanges],
 ) -> Reconstruction:
     """Reconstructs the signed distance field and the surface of a cloud.
@@ -365,6 +404,9 @@ def reconstruct(
         options: options of the reconstruction.
         backend: ``"cpu"``, ``"cuda"`` (``"cuda:1"`` is the second device), ``"vulkan"``, or
             ``"auto"``: a GPU if available, else the CPU with a ``RuntimeWarning`` that gives the reason.
+        progress: ``True`` for a bar on standard error (of tqdm, if it is installed), or a function that is called with the
+            name of each stage that begins and the fraction of the work before it, and last with ``"done"`` and 1.0. The
+            fractions are those of typical clouds: stages take fixed shares of the time. An exception ends the work.
         changes: single options by name, such as ``orient="given"``.
 
     Raises:
@@ -384,7 +426,7 @@ def reconstruct(
     elif fitted:
         raise TypeError(f"grid and {' and '.join(fitted)} are given; leave out grid, or give Grid.fit(points, ...) with them")
     plan = Reconstructor(grid, options, backend=backend)
-    return plan(cloud, normals=normals, sensors=sensors, attributes=attributes)
+    return plan(cloud, normals=normals, sensors=sensors, attributes=attributes, progress=progress)
 
 
 def texts(report: dict[str, Any]) -> list[str]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -49,7 +50,8 @@ class Parameter(NamedTuple):
 
 
 class Shape:
-    """A parametric shape: ``Shape("fish", width1=0.04)``. :func:`shapes` lists all.
+    """A parametric shape: ``Shape("fish", width1=0.04)``. :func:`shapes` lists all. Shapes of the same name and values are
+    equal.
 
     Raises:
         ValueError: an unknown shape or parameter, or a value out of range; the message lists the valid ones.
@@ -61,6 +63,17 @@ class Shape:
 
     def __repr__(self) -> str:
         return f"Shape({self.name!r})"
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Shape):
+            return NotImplemented
+        return self.name == other.name and self.values == other.values
+
+    def __hash__(self) -> int:
+        return hash((self.name, *self.values.items()))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(type(self), self.name, **self.values), ()
 
     @property
     def name(self) -> str:
