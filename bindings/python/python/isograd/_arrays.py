@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -64,7 +64,7 @@ def indices(values: object, name: str, shape: tuple[int | None, ...]) -> np.ndar
 
 
 def known(
-    cloud: np.ndarray, normals: object | None, sensors: object | None
+    cloud: np.ndarray, normals: object | None, sensors: Any
 ) -> tuple[np.ndarray | None, np.ndarray | None]:
     """``(N, 3)`` normals and ``(M, 3)`` sensors for a cloud, in its type; one sensor may be ``(3,)``.
 

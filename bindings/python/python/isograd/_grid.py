@@ -78,9 +78,9 @@ class Grid:
         if spacing is not None:
             spacing = number(spacing, "spacing")
         padding = number(padding, "padding")
-        outliers = choice(Outliers, outliers, "outliers")
+        kept = choice(Outliers, outliers, "outliers")
         cloud = floats(read_input(points).points, "points", (None, 3))
-        return cls(*_core.fit_grid(cloud, resolution, spacing, padding, outliers.value))
+        return cls(*_core.fit_grid(cloud, resolution, spacing, padding, kept.value))
 
     @property
     def upper(self) -> tuple[float, float, float]:

@@ -61,7 +61,7 @@ class Input(NamedTuple):
     """Values by name, usable or not."""
 
     def arrays(
-        self, normals: object | None, sensors: object | None, orient: OrientLike
+        self, normals: object | None, sensors: Any, orient: OrientLike
     ) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None]:
         """Points, normals and sensors as arrays. Normals that came with the points are used where ``orient`` uses normals,
         and none are given.

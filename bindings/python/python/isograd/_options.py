@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from difflib import get_close_matches
 from enum import Enum
-from typing import Literal, TypedDict
+from typing import Literal, TypedDict, TypeVar
 
 from ._numbers import number
 
@@ -98,6 +98,7 @@ class Outliers(str, Enum):
     KEEP = "keep"
 
 
+Fill = Literal["inside", "band"]
 OrientLike = Orient | Literal["auto", "parity", "given", "signs", "sensors", "previous"]
 SplatLike = Splat | Literal["bspline", "paper"]
 LevelLike = Level | Literal["thin", "local", "mean"]
@@ -233,23 +234,26 @@ def check_known(orient: OrientLike, normals: bool, sensors: bool = False) -> Non
             )
 
 
-def check_fill(fill: object, band: float | str = "full") -> str:
+def check_fill(fill: object, band: float | str = "full") -> Fill:
     """The region of extended values: ``"inside"`` or ``"band"``.
 
     Raises:
         ValueError: another name, or ``"inside"`` although φ has a ``band`` of its own.
     """
-    if not isinstance(fill, str) or fill not in ("inside", "band"):
+    if fill != "inside" and fill != "band":
         raise ValueError(f'fill is {fill!r}; give "inside" or "band"')
     if fill == "inside" and band != "full":
         raise ValueError(
             f"options.band is {band}, and the closest points of cells inside are unknown beyond it; "
             'give fill="band" or options with band="full"'
         )
-    return fill
+    return "inside" if fill == "inside" else "band"
 
 
-def choice(kind: type[Enum], value: object, name: str) -> Enum:
+E = TypeVar("E", bound=Enum)
+
+
+def choice(kind: type[E], value: object, name: str) -> E:
     """One of the values of ``kind``.
 
     Raises:

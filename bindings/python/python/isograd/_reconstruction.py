@@ -151,8 +151,8 @@ class Reconstruction(Stored):
     @cached_property
     def surface_grid(self) -> Grid:
         """The grid that the surface was found on: that of :attr:`indicator`, unless the solve was sparse."""
-        shape = tuple(self._core.surface_shape())
-        return Grid(self.grid.lower, self.grid.spacing * self.grid.shape[0] / shape[0], shape)
+        nx, ny, nz = self._core.surface_shape()
+        return Grid(self.grid.lower, self.grid.spacing * self.grid.shape[0] / nx, (nx, ny, nz))
 
     @cached_property
     def iso_value(self) -> float:
@@ -212,7 +212,8 @@ class Reconstruction(Stored):
     @property
     def verdict(self) -> Literal["good", "check", "bad"] | None:
         """Whether the result can be trusted; ``None`` where nothing was checked (``checks=False``)."""
-        return self.report["verdict"]
+        verdict: Literal["good", "check", "bad"] | None = self.report["verdict"]
+        return verdict
 
     @property
     def warnings(self) -> list[str]:

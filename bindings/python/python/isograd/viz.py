@@ -74,6 +74,7 @@ def slices(
     planes = [field.take(cell[axis], axis=axis) for axis in range(3)]
     limit = _limit(planes, limit)
 
+    figure: Figure
     figure, row = pyplot.subplots(1, 3, layout="constrained", **_layout(grid))
     for axis, (axes, plane) in enumerate(zip(row, planes)):
         image = _draw_slice(axes, plane, grid, axis, limit)
@@ -81,7 +82,7 @@ def slices(
         axes.set_title(f"{AXES[axis]} = {place:.4g}")
         if dots is not None:
             near = dots[np.abs(dots[:, axis] - place) <= 0.5 * grid.spacing]
-            axes.plot(*_across(near.T, axis), ".", color=POINT_COLOR, markersize=1.5)
+            axes.plot(*_across(list(near.T), axis), ".", color=POINT_COLOR, markersize=1.5)
     figure.colorbar(image, ax=row, label=label, shrink=0.8)
     if title is not None:
         figure.suptitle(title)
