@@ -101,7 +101,7 @@ class Result:
         self,
         bars: dict[str, _Floats],
         iso_value: float,
-        extensions: list[tuple[Extension, _Floats | None, _Floats | None]],
+        extensions: Sequence[tuple[Extension, NDArray[Any] | None, NDArray[Any] | None]],
     ) -> _Cotangents:
         """Cotangents of the inputs, by name, from those of the results, by name."""
 

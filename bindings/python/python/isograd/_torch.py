@@ -103,9 +103,23 @@ def in_batches(function: Function) -> Function:
             if len(value) != len(points):
                 raise ValueError(f"{name} has the shape {tuple(value.shape)} in a batch of {len(points)} clouds")
         shared = {name: value for name, value in given.items() if name not in batch}
-        return torch.vmap(lambda one: function(**one, **shared))(batch)
+        clouds = [{name: value[i] for name, value in batch.items()} for i in range(len(points))]
+        return _stacked([function(**cloud, **shared) for cloud in clouds])
 
     return cast(Function, apply)
+
+
+def _stacked(results: Sequence[Any]) -> Any:
+    """Results of the same structure, with all their tensors stacked."""
+    first = results[0]
+    if first is None:
+        return None
+    if not isinstance(first, Tensor):
+        parts = [_stacked(column) for column in zip(*results)]
+        return type(first)(*parts) if hasattr(first, "_fields") else tuple(parts)
+    if any(result.shape != first.shape for result in results):
+        raise ValueError("the surfaces of a batch differ in size: give max_vertices and max_faces")
+    return torch.stack(list(results))
 
 
 def call(
@@ -133,7 +147,7 @@ def one_by_one(operator: Any) -> Any:
         if info.batch_size == 0:
             raise ValueError("vmap over an empty batch: give one cloud or more")
         calls = [
-            operator(*(x if axis is None else x.select(axis, i) for x, axis in zip(batch, axes)))
+            operator(*(x.select(axis, i) if isinstance(axis, int) else x for x, axis in zip(batch, axes)))
             for i in range(info.batch_size)
         ]
         outputs = tuple(torch.stack(output) for output in zip(*calls))

@@ -108,8 +108,6 @@ def mesh(
     if max_vertices is not None and max_faces is not None:
         sizes = [_size(max_vertices, "max_vertices"), _size(max_faces, "max_faces")]
         return _mesh_of(points, normals, settings, sizes)
-    if torch._C._functorch.is_batchedtensor(points):
-        raise ValueError("the surfaces of a batch differ in size: give max_vertices and max_faces")
     # Enough for most surfaces; others are found again.
     nx, ny, nz = grid.shape
     guess = 8 * (nx * ny + ny * nz + nz * nx)

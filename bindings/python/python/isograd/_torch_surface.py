@@ -144,7 +144,7 @@ def _surface(
 ) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor]:
     outputs = _outputs(points, values, settings, count)
     call("isograd_surface", [points, places, values, given], outputs, settings, band)
-    return outputs
+    return outputs  # pyright: ignore[reportReturnType]
 
 
 @_surface.register_fake
@@ -179,7 +179,8 @@ def _save(ctx: Any, inputs: tuple[Any, ...], output: tuple[Tensor, ...]) -> None
 
 def _backward(ctx: Any, sdf_bar: Tensor, normal_bar: Tensor, closest_bar: Tensor, values_bar: Tensor, *_: Any) -> tuple[Any, ...]:
     inputs, saved = ctx.saved_tensors[: 3 + ctx.is_given], ctx.saved_tensors[3 + ctx.is_given :]
-    (points, places, *_), (sdf, normal, faces, *rest) = inputs, saved
+    points, places = inputs[:2]
+    sdf, normal, faces, *rest = saved
     spacing = json.loads(ctx.settings)["grid"]["spacing"]
     # n = (q − p) / φ, so that dn = (I − n nᵀ) (dq − dp) / φ.
     turning = normal_bar - normal * (normal * normal_bar).sum(dim=1, keepdim=True)

@@ -213,7 +213,8 @@ def mesh(
     """
     plan, points, normals = prepare(points, grid, normals, options, backend)
     sizes = (_size(max_vertices, "max_vertices"), _size(max_faces, "max_faces"))
-    vertices, faces, counts = _mesh(plan, sizes, points, normals)
+    found: Any = _mesh(plan, sizes, points, normals)
+    vertices, faces, counts = found
     return Mesh(vertices, faces, counts[0], counts[1])
 
 
@@ -326,7 +327,8 @@ def extend(
     if values is None:
         raise ValueError("values is None; give the values of the samples")
     values, is_scalar = sample_values(values, points)
-    field, sdf = _extend(plan, points, values, normals)
+    found: Any = _extend(plan, points, values, normals)
+    field, sdf = found
     return Extension(sdf, field[..., 0] if is_scalar else field)
 
 

@@ -67,8 +67,7 @@ def _signed_distance(
     """φ, and what its pullback needs: closest faces and normals."""
     sdf, closest, normals = _pure.forward(settings, array(points), None if given is None else array(given))
     # PyTorch hardly supports uint32: the same bits as int32.
-    arrays = (sdf, closest.view(np.int32), normals)
-    return tuple(torch.from_numpy(a) for a in arrays)
+    return torch.from_numpy(sdf), torch.from_numpy(closest.view(np.int32)), torch.from_numpy(normals)
 
 
 @_signed_distance.register_fake

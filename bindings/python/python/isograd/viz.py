@@ -76,14 +76,15 @@ def slices(
 
     figure: Figure
     figure, row = pyplot.subplots(1, 3, layout="constrained", **_layout(grid))
+    images = []
     for axis, (axes, plane) in enumerate(zip(row, planes)):
-        image = _draw_slice(axes, plane, grid, axis, limit)
+        images.append(_draw_slice(axes, plane, grid, axis, limit))
         place = grid.origin[axis] + grid.spacing * cell[axis]
         axes.set_title(f"{AXES[axis]} = {place:.4g}")
         if dots is not None:
             near = dots[np.abs(dots[:, axis] - place) <= 0.5 * grid.spacing]
             axes.plot(*_across(list(near.T), axis), ".", color=POINT_COLOR, markersize=1.5)
-    figure.colorbar(image, ax=row, label=label, shrink=0.8)
+    figure.colorbar(images[-1], ax=row, label=label, shrink=0.8)
     if title is not None:
         figure.suptitle(title)
     return figure
@@ -194,7 +195,7 @@ def scene(
             few = slice(None, None, -(-len(dots) // MOST_ARROWS))
             length = ARROW_LENGTH * surface.length
             plotter.add_arrows(dots[few], arrows[few], mag=length, color=POINT_COLOR, show_scalar_bar=False)
-    plotter.show_axes()
+    plotter.show_axes()  # pyright: ignore[reportCallIssue]
     return plotter
 
 
