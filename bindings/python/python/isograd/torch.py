@@ -1,9 +1,12 @@
-"""Signed distance of points for PyTorch: inside ``autograd``, ``vmap`` and ``torch.compile``.
+"""Signed distance and surface of points for PyTorch, with the functions of ``isograd.jax``: inside ``autograd``, ``vmap`` and ``torch.compile``.
 
 Tensors are on the CPU, and computations use their number type. With another ``backend``, points, φ and their cotangents
 are copied to the device and back at every call. The operators are registered with
-``torch.library`` as ``isograd::signed_distance`` and ``isograd::signed_distance_pullback``. ``torch.func.grad``
+``torch.library``, such as ``isograd::signed_distance`` and ``isograd::signed_distance_pullback``. ``torch.func.grad``
 does not support custom operators: call ``torch.autograd.grad``. Needs PyTorch 2.5.
+
+Of a batch of clouds ``(B, N, 3)`` the results are stacked. Normals, queries and positions are shared, or have the axis of
+the batch too; ``values`` always have it.
 """
 
 from __future__ import annotations
