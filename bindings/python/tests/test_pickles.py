@@ -4,6 +4,7 @@ import copy
 import dataclasses
 import multiprocessing
 import pickle
+from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 import pytest
@@ -159,8 +160,8 @@ def test_a_plan_is_made_again(duplicate):
 def test_results_come_from_other_processes():
     context = multiprocessing.get_context("spawn")
     plan = isograd.Reconstructor(GRID, checks=False)
-    with context.Pool(1) as pool:
-        (result,) = pool.map(plan, [POINTS])
+    with ProcessPoolExecutor(1, mp_context=context) as pool:
+        result = pool.submit(plan, POINTS).result()
     expected = plan(POINTS)
     assert bits(result.sdf) == bits(expected.sdf)
     assert bits(result.pullback(result.sdf).points) == bits(expected.pullback(expected.sdf).points)

@@ -10,6 +10,7 @@
 """
 
 from ._core import __version__
+from ._extension import Extension
 from ._files import (
     Cloud,
     read_mesh,
@@ -25,7 +26,6 @@ from ._mesh import Hits, Mesh, query, query_pullback, signed_distance
 from ._options import Level, Options, Orient, Outliers, Solve, Splat, Walls
 from ._orient import Oriented, orient
 from ._reconstruction import (
-    Extension,
     Gradients,
     Reconstruction,
     ReconstructionWarning,

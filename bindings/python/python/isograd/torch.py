@@ -1,4 +1,5 @@
-"""Signed distance and surface of points for PyTorch, with the functions of ``isograd.jax``: inside ``autograd``, ``vmap`` and ``torch.compile``.
+"""Signed distance and surface of points for PyTorch: the functions of ``isograd.jax``, inside ``autograd``, ``vmap`` and
+``torch.compile``.
 
 Tensors are on the CPU, and computations use their number type. With another ``backend``, points, φ and their cotangents
 are copied to the device and back at every call. The operators are registered with
