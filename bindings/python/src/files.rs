@@ -1,5 +1,6 @@
 //! Readers and writers.
 
+use std::io::Write;
 use std::path::PathBuf;
 
 use isograd::{Field, Grid};
@@ -69,16 +70,10 @@ fn geometry_arrays<'py, T: Number>(
     geometry: &isograd_io::Geometry,
 ) -> PyResult<Geometry<'py>> {
     let cloud = geometry.cloud::<T>().map_err(value)?;
-    let mut attributes = Vec::new();
-    for attribute in cloud.attributes() {
-        let shape = [cloud.len(), attribute.components];
-        let array = arrays::shaped(py, attribute.values.clone(), shape)?;
-        attributes.push((attribute.name.clone(), array));
-    }
     Ok((
         arrays::from_vectors(py, cloud.points()),
         cloud.normals().map(|n| arrays::from_vectors(py, n)),
-        attributes,
+        arrays::attributes(py, &cloud)?,
         arrays::from_vectors(py, &geometry.faces),
     ))
 }
@@ -185,4 +180,10 @@ pub fn write_field(
         Dtype::F32 => write::<f32>(path, &grid, values),
         Dtype::F64 => write::<f64>(path, &grid, values),
     }
+}
+
+/// Writes a text.
+#[pyfunction]
+pub fn write_text(path: PathBuf, text: &str) -> PyResult<()> {
+    isograd_io::atomic::write(&path, |out| out.write_all(text.as_bytes())).map_err(file)
 }

@@ -1,5 +1,6 @@
 //! A reconstruction, its arrays and its pullback.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use isograd::distance::extend::{self, Region};
@@ -12,7 +13,7 @@ use pyo3::types::PyDict;
 use crate::arrays::{self, Either, Number};
 use crate::backend::Failure;
 use crate::background;
-use crate::errors::value;
+use crate::errors::{file, value};
 
 /// A cloud and its reconstruction.
 pub struct Reconstruction<T: Number> {
@@ -78,6 +79,22 @@ impl ReconstructionArrays {
                 serde_json::to_string(&report).map_err(|e| Failure::Value(e.to_string()))
             })?;
             Ok(text?)
+        })
+    }
+
+    /// Attributes of the cloud: name and `(N, components)` values.
+    fn attributes<'py>(&self, py: Python<'py>) -> PyResult<Vec<(String, Bound<'py, PyAny>)>> {
+        each!(&self.0, this => arrays::attributes(py, &this.cloud))
+    }
+
+    /// Writes slices of φ and the spread of `|∇φ|` as PNG, as the command line does.
+    fn write_slices(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        each!(&self.0, this => {
+            let this = this.clone();
+            let written = background::run(py, move |_| {
+                Ok::<_, Failure>(isograd_cli::write_slices(&path, this.result.view().sdf()?))
+            })?;
+            written?.map_err(file)
         })
     }
 
@@ -165,6 +182,7 @@ fn array<'py, T: Number>(
             py,
             failure(result.closest_mesh())?.faces(),
         )),
+        "points" => Ok(arrays::from_vectors(py, this.cloud.points())),
         "normals" => Ok(arrays::from_vectors(py, failure(result.normals())?)),
         "confidence" => arrays::shaped(py, failure(result.confidence())?.to_vec(), [count]),
         "areas" => arrays::shaped(py, failure(result.areas())?.to_vec(), [count]),

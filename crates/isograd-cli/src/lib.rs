@@ -23,8 +23,10 @@ mod streams;
 mod threads;
 
 use std::ffi::OsString;
+use std::path::Path;
 
 use clap::Parser;
+use isograd::{Field, Real};
 use isograd_io::printable;
 
 use args::{Cli, Command};
@@ -66,6 +68,14 @@ fn report(error: Error) -> u8 {
         to_stderr(&format!("error: {error}"));
     }
     error.status()
+}
+
+/// Writes the picture `slices.png` of a field: three slices, and the spread of `|∇φ|`.
+///
+/// # Errors
+/// A failed write, which leaves the file at `path` unchanged.
+pub fn write_slices<T: Real>(path: &Path, field: &Field<T>) -> Result<(), isograd_io::Error> {
+    plot::write(path, &plot::slices(field))
 }
 
 fn dispatch(command: &Command) -> Result<(), Error> {

@@ -37,6 +37,7 @@ __all__ = [
     "write_field",
     "write_mesh",
     "write_points",
+    "write_text",
     "xla_targets",
 ]
 
@@ -88,6 +89,12 @@ class Result:
 
     def report(self) -> str:
         """The report as JSON."""
+
+    def attributes(self) -> list[tuple[str, NDArray[Any]]]:
+        """Attributes of the cloud: name and ``(N, components)`` values."""
+
+    def write_slices(self, path: _Path) -> None:
+        """Writes slices of φ and the spread of ``|∇φ|`` as PNG, as the command line does."""
 
     def pullback(
         self,
@@ -237,3 +244,6 @@ def write_field(
     path: _Path, lower: _Vector, spacing: float, shape: _Cells, values: _Floats
 ) -> None:
     """Writes a field."""
+
+def write_text(path: _Path, text: str) -> None:
+    """Writes a text."""
