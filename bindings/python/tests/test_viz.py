@@ -138,7 +138,7 @@ def test_a_scene_of_what_can_t_be_drawn_is_refused(pyvista):
     vertices, faces = TETRAHEDRON.vertices, TETRAHEDRON.faces
     with pytest.raises(ValueError, match="no faces"):
         viz.scene((vertices, faces[:0]))
-    with pytest.raises(ValueError, match="corner 3, but there are 3 vertices"):
+    with pytest.raises(ValueError, match="face 1 names vertex 3, but there are only 3"):
         viz.scene((vertices[:3], faces))
     with pytest.raises(ValueError, match="not finite"):
         viz.scene((vertices * np.nan, faces))

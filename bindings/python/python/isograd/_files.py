@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from . import _core
-from ._arrays import floats
+from . import _convert, _core
+from ._arrays import floats, summary
 from ._grid import Grid
 from ._mesh import Mesh, as_mesh
 from ._reconstruction import _attributes
@@ -29,6 +29,12 @@ class Cloud(NamedTuple):
     """``(N, 3)``, unchanged."""
     attributes: dict[str, np.ndarray]
     """``(N, components)`` by name."""
+
+    __repr__ = summary
+
+    def save(self, path: Path) -> None:
+        """Writes points, normals and attributes as PLY, NPZ, XYZ or CSV, as the name ends; see :func:`write_points`."""
+        _convert.save_cloud(self, path)
 
 
 def _names(columns: Sequence[str | int] | None) -> list[str] | None:

@@ -94,12 +94,17 @@ class Grid:
         x, y, z = (low + 0.5 * self.spacing for low in self.lower)
         return (x, y, z)
 
+    @property
+    def axes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Coordinates of the cell centers along each axis: ``(nx,)`` x, ``(ny,)`` y and ``(nz,)`` z."""
+        x, y, z = (
+            low + self.spacing * (np.arange(n) + 0.5) for low, n in zip(self.lower, self.shape)
+        )
+        return (x, y, z)
+
     def centers(self, dtype: DTypeLike = np.float64) -> np.ndarray:
         """``(nx, ny, nz, 3)`` centers of all cells."""
-        axes = [
-            low + self.spacing * (np.arange(n) + 0.5) for low, n in zip(self.lower, self.shape)
-        ]
-        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).astype(dtype)
+        return np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1).astype(dtype)
 
 
 def _three(values: object, name: str) -> tuple[object, ...]:

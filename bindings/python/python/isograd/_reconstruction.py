@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from . import _core
+from . import _convert, _core
 from ._arrays import floats
 from ._grid import Grid
 from ._inputs import read_input
@@ -20,11 +20,20 @@ from ._results import Extension, Gradients
 from ._settings import check_backend, encode, warn_caller, warn_note
 
 if TYPE_CHECKING:
+    import os
+
+    import open3d
+    import pyvista
+    import trimesh
+    import xarray
+    from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
     from typing_extensions import Unpack
 
     from ._inputs import CloudLike
     from ._options import OptionChanges
+
+    from ._files import Cloud
 
 
 class ReconstructionWarning(UserWarning):
@@ -49,6 +58,9 @@ class Reconstruction:
     def __repr__(self) -> str:
         verdict = self.verdict or "not checked"
         return f"Reconstruction of {self._count} points on {self.grid.shape} cells, {self.dtype}: {verdict}"
+
+    def _repr_html_(self) -> str:
+        return _convert.reconstruction_html(self)
 
     @cached_property
     def sdf(self) -> np.ndarray:
@@ -105,6 +117,12 @@ class Reconstruction:
         return self._core.array("areas")
 
     @cached_property
+    def cloud(self) -> Cloud:
+        """The samples in their order, with :attr:`normals`, ``confidence`` and the given attributes: ``points.ply`` of the
+        command line."""
+        return _convert.cloud_of(self)
+
+    @cached_property
     def outliers(self) -> np.ndarray:
         """``(M,)`` uint32: indices of the outliers that were left out. Their normals, confidence, areas and gradients are 0."""
         return self._core.array("outliers")
@@ -141,6 +159,45 @@ class Reconstruction:
             reasons = "; ".join(f"{w['code']} (try: {w['try']})" for w in self.report["warnings"])
             message = f"the result is {self.verdict}: {reasons}. Numbers: result.report[\"warnings\"]; help: docs/bad-results.md"
             warn_caller(message, ReconstructionWarning)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes a result, as the name ends: φ (.vti, .npz), the mesh (.ply, .obj, .stl, .vtp), the report (.json) or
+        slices of φ (.png). Files are written atomically.
+
+        A folder, which exists or ends in ``/``, gets what ``isograd reconstruct -o`` writes: ``sdf.vti``, ``mesh.ply``,
+        ``points.ply``, ``report.json`` and ``slices.png``.
+
+        Raises:
+            ValueError: another ending.
+            FileNotFoundError, OSError: an error of the operating system.
+        """
+        _convert.save_reconstruction(self, path)
+
+    def plot(self, **arguments: Any) -> Figure:
+        """Slices of φ with the samples, by matplotlib: a figure, and arguments, of :func:`isograd.viz.slices`. For a view
+        in three dimensions, ``result.mesh.plot(points=result.cloud.points)``.
+
+        Raises:
+            ImportError: matplotlib is not installed.
+        """
+        return _convert.plot_reconstruction(self, **arguments)
+
+    def to_pyvista(self, *, cells: bool = False) -> pyvista.ImageData:
+        """φ for PyVista, named ``sdf``, as in the VTI file: values at points, which are the centers of the cells, so that
+        ``contour([0.0])`` works. With ``cells`` the box of the grid, with values in its cells."""
+        return _convert.to_image(self, bool(cells))
+
+    def to_xarray(self) -> xarray.DataArray:
+        """φ for xarray, named ``sdf``, with the centers of the cells as coordinates x, y and z."""
+        return _convert.to_xarray(self)
+
+    def to_trimesh(self) -> trimesh.Trimesh:
+        """:attr:`mesh` for trimesh, vertices and faces in this order."""
+        return self.mesh.to_trimesh()
+
+    def to_open3d(self) -> open3d.geometry.TriangleMesh:
+        """:attr:`mesh` for Open3D, with normals."""
+        return self.mesh.to_open3d()
 
     def extend(
         self, name: str, band: float, *, fill: Literal["inside", "band"] = "inside"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from . import _core
-from ._arrays import floats, indices
+from ._arrays import floats, indices, summary
 from ._numbers import number, whole
 
 if TYPE_CHECKING:
@@ -22,6 +22,8 @@ class Coordinates(NamedTuple):
     uv: np.ndarray
     """``(N, 2)`` from 0 to 1."""
 
+    __repr__ = summary
+
 
 class Samples(NamedTuple):
     """Samples of a shape."""
@@ -34,6 +36,8 @@ class Samples(NamedTuple):
     """``(N, 3)`` velocity of a moving shape; ``None`` for others."""
     coordinates: Coordinates
     """Surface coordinates of the samples."""
+
+    __repr__ = summary
 
 
 class Parameter(NamedTuple):
