@@ -175,5 +175,6 @@ _READERS: dict[str, Callable[[Any], Input]] = {
     "trimesh.Trimesh": _from_trimesh,
     "vtkmodules.vtkPolyData": _from_vtk,
     "pyvista.PointSet": _from_vtk,
+    "meshio.Mesh": lambda mesh: _input(mesh.points, None, mesh.point_data),
 }
 """Readers by class: its module, or the library that it is of, and its name."""
