@@ -246,5 +246,7 @@ def test_texts_have_shapes_in_place_of_values():
     cloud = isograd.Cloud(samples.points, None, {"heat": samples.points[:, :1]})
     assert repr(cloud) == "Cloud(points=(500, 3) float64, normals=None, attributes={'heat': (500, 1) float64})"
     assert len(repr(isograd.query(CUBE, samples.points))) < 200
+    gradients = isograd.reconstruct(samples.points, resolution=24, checks=False).pullback(vertices=None)
+    assert repr(gradients).startswith("Gradients(points=(500, 3) float64, normals=None, attributes={}, lower=")
     grid = isograd.Grid.fit(samples.points, 32)
     assert eval(repr(grid), {"Grid": isograd.Grid}) == grid and len(repr(grid)) < 200

@@ -30,7 +30,8 @@ class Cloud(NamedTuple):
     attributes: dict[str, np.ndarray]
     """``(N, components)`` by name."""
 
-    __repr__ = summary
+    def __repr__(self) -> str:
+        return summary(self)
 
     def save(self, path: Path) -> None:
         """Writes points, normals and attributes as PLY, NPZ, XYZ or CSV, as the name ends; see :func:`write_points`."""

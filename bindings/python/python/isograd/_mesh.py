@@ -39,7 +39,8 @@ class Mesh:
         object.__setattr__(self, "vertices", floats(self.vertices, "vertices", (None, 3)))
         object.__setattr__(self, "faces", indices(self.faces, "faces", (None, 3)))
 
-    __repr__ = summary
+    def __repr__(self) -> str:
+        return summary(self)
 
     def _repr_html_(self) -> str:
         return _convert.mesh_html(self)
@@ -146,7 +147,8 @@ class Hits(NamedTuple):
     barycentric: np.ndarray
     """``(M, 3)`` weights of the corners of that face in the closest point."""
 
-    __repr__ = summary
+    def __repr__(self) -> str:
+        return summary(self)
 
 
 def query(mesh: Mesh | tuple[ArrayLike, ArrayLike], queries: ArrayLike) -> Hits:

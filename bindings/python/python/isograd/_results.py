@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from . import _core
+from ._arrays import summary
 from ._grid import Grid
 
 
@@ -30,6 +31,9 @@ class Gradients:
     lower: tuple[float, float, float]
     spacing: float
     guarded: int
+
+    def __repr__(self) -> str:
+        return summary(self)
 
 
 class Extension:

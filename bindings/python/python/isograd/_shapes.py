@@ -22,7 +22,8 @@ class Coordinates(NamedTuple):
     uv: np.ndarray
     """``(N, 2)`` from 0 to 1."""
 
-    __repr__ = summary
+    def __repr__(self) -> str:
+        return summary(self)
 
 
 class Samples(NamedTuple):
@@ -37,7 +38,8 @@ class Samples(NamedTuple):
     coordinates: Coordinates
     """Surface coordinates of the samples."""
 
-    __repr__ = summary
+    def __repr__(self) -> str:
+        return summary(self)
 
 
 class Parameter(NamedTuple):
