@@ -25,13 +25,12 @@ from ._mesh import Hits, Mesh, query, query_pullback, signed_distance
 from ._options import Level, Options, Orient, Outliers, Solve, Splat, Walls
 from ._orient import Oriented, orient
 from ._reconstruction import (
-    Extension,
-    Gradients,
     Reconstruction,
     ReconstructionWarning,
     Reconstructor,
     reconstruct,
 )
+from ._results import Extension, Gradients
 from ._shapes import Coordinates, Parameter, Samples, Shape, sample, shapes
 
 __all__ = [

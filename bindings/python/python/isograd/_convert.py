@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     Path = str | os.PathLike[str]
 
 FIELD_SUFFIXES = (".vti", ".npz")
-MESH_SUFFIXES = (".ply", ".obj", ".stl", ".vtp")
 VERDICT_COLORS = {"good": "green", "check": "darkorange", "bad": "firebrick"}
 
 
@@ -72,17 +71,18 @@ def save_reconstruction(result: Reconstruction, path: Path) -> None:
         _save_folder(result, pathlib.Path(name))
     elif suffix in FIELD_SUFFIXES:
         write_sdf(name, result.grid, result.sdf)
-    elif suffix in MESH_SUFFIXES:
-        result.mesh.save(name)
     elif suffix == ".json":
         _core.write_text(name, _report_text(result))
     elif suffix == ".png":
         result._core.write_slices(name)
     else:
-        raise ValueError(
-            f"{name}: the name must end in {' or '.join(FIELD_SUFFIXES)} for φ, {' or '.join(MESH_SUFFIXES)} for the mesh, "
-            ".json for the report or .png for slices; for all of them give a folder, which exists or ends in /"
-        )
+        try:
+            result.mesh.save(name)
+        except ValueError as error:
+            raise ValueError(
+                f"{error} for the mesh, {' or '.join(FIELD_SUFFIXES)} for φ, .json for the report or .png for slices; "
+                "for all of them give a folder, which exists or ends in /"
+            ) from None
 
 
 def _save_folder(result: Reconstruction, folder: pathlib.Path) -> None:
@@ -137,14 +137,17 @@ def to_trimesh(mesh: Mesh) -> trimesh.Trimesh:
     """A mesh of trimesh, with its vertices and faces in this order."""
     library = require("trimesh", "to_trimesh", "trimesh")
     _measure.check_faces(mesh.vertices, mesh.faces)
-    return library.Trimesh(mesh.vertices.copy(), mesh.faces.copy(), process=False)
+    converted: trimesh.Trimesh = library.Trimesh(mesh.vertices.copy(), mesh.faces.copy(), process=False)
+    return converted
 
 
 def to_polydata(mesh: Mesh) -> pyvista.PolyData:
     """A mesh of PyVista."""
     library = require("pyvista", "to_pyvista", "isograd[viz]")
     _measure.check_faces(mesh.vertices, mesh.faces)
-    return library.PolyData.from_regular_faces(mesh.vertices.copy(), mesh.faces.astype(np.int64))
+    faces = mesh.faces.astype(np.int64)
+    converted: pyvista.PolyData = library.PolyData.from_regular_faces(mesh.vertices.copy(), faces)
+    return converted
 
 
 def to_open3d(mesh: Mesh) -> open3d.geometry.TriangleMesh:
@@ -153,7 +156,7 @@ def to_open3d(mesh: Mesh) -> open3d.geometry.TriangleMesh:
     vectors = library.utility.Vector3dVector
     normals, face_normals = mesh.normals.astype(float), mesh.face_normals.astype(float)
     faces = library.utility.Vector3iVector(mesh.faces.astype(np.int32))
-    converted = library.geometry.TriangleMesh(vectors(mesh.vertices.astype(float)), faces)
+    converted: open3d.geometry.TriangleMesh = library.geometry.TriangleMesh(vectors(mesh.vertices.astype(float)), faces)
     converted.vertex_normals = vectors(normals)
     converted.triangle_normals = vectors(face_normals)
     return converted
@@ -163,7 +166,7 @@ def to_image(result: Reconstruction, cells: bool) -> pyvista.ImageData:
     """φ on a grid of PyVista: at points, which are the centers of the cells, or in its cells."""
     library = require("pyvista", "to_pyvista", "isograd[viz]")
     grid = result.grid
-    image = library.ImageData(
+    image: pyvista.ImageData = library.ImageData(
         dimensions=[n + cells for n in grid.shape],
         spacing=[grid.spacing] * 3,
         origin=grid.lower if cells else grid.origin,
@@ -187,7 +190,8 @@ def to_xarray(result: Reconstruction) -> xarray.DataArray:
         "verdict": result.verdict or "not checked",
     }
     axes = dict(zip("xyz", grid.axes))
-    return library.DataArray(result.sdf.copy(), axes, dims=("x", "y", "z"), name="sdf", attrs=attributes)
+    array: xarray.DataArray = library.DataArray(result.sdf.copy(), axes, dims=["x", "y", "z"], name="sdf", attrs=attributes)
+    return array
 
 
 def reconstruction_html(result: Reconstruction) -> str:

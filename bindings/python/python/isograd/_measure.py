@@ -31,7 +31,7 @@ def face_areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """``(F,)`` areas."""
     sides, scale = _sides(vertices, faces)
     # Not scale², which may be out of range where the area is not.
-    return 0.5 * scale * _length(_cross(sides[0], sides[1])) * scale
+    return np.multiply(0.5 * scale * _length(_cross(sides[0], sides[1])), scale)
 
 
 def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -154,7 +154,7 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return np.einsum("ij,ij->j", a, b)
 
 
 def _length(vectors: np.ndarray) -> np.ndarray:
