@@ -31,7 +31,8 @@ def face_areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """``(F,)`` areas."""
     sides, scale = _sides(vertices, faces)
     # Not scale², which may be out of range where the area is not.
-    return np.multiply(0.5 * scale * _length(_cross(sides[0], sides[1])), scale)
+    areas: np.ndarray = 0.5 * scale * _length(_cross(sides[0], sides[1])) * scale
+    return areas
 
 
 def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -154,14 +155,18 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.einsum("ij,ij->j", a, b)
+    products: np.ndarray = np.einsum("ij,ij->j", a, b)
+    return products
 
 
 def _length(vectors: np.ndarray) -> np.ndarray:
-    return np.sqrt(_dot(vectors, vectors))
+    lengths: np.ndarray = np.sqrt(_dot(vectors, vectors))
+    return lengths
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
     """Vectors of length 1; those without length stay 0."""
     lengths = _length(vectors)
-    return np.divide(vectors, lengths, out=np.zeros_like(vectors), where=lengths != 0.0)
+    units = np.zeros_like(vectors)
+    np.divide(vectors, lengths, out=units, where=lengths != 0.0)
+    return units
