@@ -53,12 +53,13 @@ pub enum Command {
 #[derive(Debug, Args)]
 #[command(after_help = STATUS)]
 pub struct Reconstruct {
-    /// The cloud: PLY, XYZ, CSV, TXT, OBJ, STL, NPY, NPZ or VTP; `-` is standard input (PLY or text)
+    /// The cloud: PLY, PCD, LAS, PTS, XYZ, XYZN, XYZRGB, CSV, TXT, OBJ, OFF, STL, GLB, NPY, NPZ or VTP; `-` is standard
+    /// input (PLY or text)
     pub cloud: PathBuf,
     /// Write mesh.ply, sdf.vti, points.ply, report.json and slices.png into DIR
     #[arg(short, long, value_name = "DIR", help_heading = "Outputs")]
     pub output: Option<PathBuf>,
-    /// The surface: .ply, .obj, .stl or .vtp
+    /// The surface: .ply, .obj, .stl, .off, .glb or .vtp
     #[arg(long, value_name = "FILE", help_heading = "Outputs")]
     pub mesh: Option<PathBuf>,
     /// The signed distance field: .vti or .npz
@@ -124,7 +125,7 @@ pub struct Sample {
     #[arg(short = 'n', value_name = "N", required_unless_present = "list",
         value_parser = clap::value_parser!(u32).range(1..))]
     pub number: Option<u32>,
-    /// Output: .ply, .npz, .xyz, .csv or .txt
+    /// Output: .ply, .npz, .pcd, .xyz, .csv or .txt
     #[arg(short, long, value_name = "CLOUD", required_unless_present = "list")]
     pub output: Option<PathBuf>,
     /// Value of a parameter of the shape
@@ -152,13 +153,13 @@ pub struct Sample {
 #[derive(Debug, Args)]
 #[command(after_help = STATUS)]
 pub struct Query {
-    /// A mesh (.ply, .obj, .stl, .vtp) or a field (.vti, .npz)
+    /// A mesh (.ply, .obj, .stl, .off, .glb, .vtp) or a field (.vti, .npz)
     #[arg(value_name = "MESH_OR_SDF")]
     pub source: PathBuf,
     /// The points; `-` is standard input
     #[arg(long, value_name = "POINTS")]
     pub at: PathBuf,
-    /// Output, the points with the results: .ply, .npz, .xyz, .csv or .txt
+    /// Output, the points with the results: .ply, .npz, .pcd, .xyz, .csv or .txt
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
     /// Arguments of the input; columns are those of the points.

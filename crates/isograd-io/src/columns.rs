@@ -111,6 +111,9 @@ fn attribute(name: &str, values: Vec<f64>) -> Attribute<f64> {
     }
 }
 
+/// Names of the components of a normal in most formats.
+pub(crate) const NORMAL: [&str; 3] = ["nx", "ny", "nz"];
+
 /// Columns of three names, if all are there.
 pub(crate) fn find_columns(names: &[Option<&str>], wanted: [&str; 3]) -> Option<[usize; 3]> {
     let [x, y, z] = wanted.map(|name| names.iter().position(|n| *n == Some(name)));
@@ -119,13 +122,15 @@ pub(crate) fn find_columns(names: &[Option<&str>], wanted: [&str; 3]) -> Option<
 
 /// Names of a cloud's columns in a file: unique, with `_` in place of characters that are not
 /// `allowed`. An attribute of several components has the columns `name_0`, `name_1` and so on. No name of an attribute
-/// is one that readers take for normals.
+/// is `reserved`, or one that readers take for normals.
 ///
 /// # Errors
 /// More columns than readers accept.
 pub(crate) fn column_names<T: Real>(
     cloud: &PointCloud<T>,
     allowed: fn(&char) -> bool,
+    normals: &[&str; 3],
+    reserved: &[&str],
 ) -> io::Result<Vec<String>> {
     let has_normals = cloud.normals().is_some();
     let count: usize = cloud.attributes().iter().map(|a| a.components).sum();
@@ -137,7 +142,7 @@ pub(crate) fn column_names<T: Real>(
     }
     let mut unique = UniqueNames::default();
     let mut names = Vec::with_capacity(count);
-    let fixed = [&["x", "y", "z"][..], &["nx", "ny", "nz"]];
+    let fixed = [&["x", "y", "z"], normals];
     for name in fixed
         .into_iter()
         .take(1 + usize::from(has_normals))
@@ -145,7 +150,7 @@ pub(crate) fn column_names<T: Real>(
     {
         names.push(unique.add(name, |_| true));
     }
-    let is_allowed = |name: &str| has_normals || !is_normal(name);
+    let is_allowed = |name: &str| (has_normals || !is_normal(name)) && !reserved.contains(&name);
     for attribute in cloud.attributes() {
         let plain = attribute.name.replace(|c| !allowed(&c), "_");
         for component in 0..attribute.components {

@@ -7,16 +7,16 @@ use isograd::{Field, Mesh, PointCloud, Real};
 
 use crate::error::Error;
 use crate::format::Format;
-use crate::{atomic, numpy, obj, ply, stl, text, vtk};
+use crate::{atomic, glb, numpy, obj, off, pcd, ply, stl, text, vtk};
 
 /// Extensions of mesh files.
-pub const MESH_EXTENSIONS: &[&str] = &["ply", "obj", "stl", "vtp"];
+pub const MESH_EXTENSIONS: &[&str] = &["ply", "obj", "stl", "off", "glb", "vtp"];
 /// Extensions of files with a field.
 pub const FIELD_EXTENSIONS: &[&str] = &["vti", "npz"];
 /// Extensions of point cloud files.
-pub const CLOUD_EXTENSIONS: &[&str] = &["ply", "npz", "xyz", "csv", "txt"];
+pub const CLOUD_EXTENSIONS: &[&str] = &["ply", "npz", "xyz", "csv", "txt", "pcd"];
 
-/// Writes a mesh in the format of the extension ([`MESH_EXTENSIONS`]) and in type `T` (STL: `f32`).
+/// Writes a mesh in the format of the extension ([`MESH_EXTENSIONS`]) and in type `T` (STL and GLB: `f32`).
 ///
 /// # Errors
 /// Another extension, or a failed write, which leaves the file at `path` unchanged.
@@ -25,6 +25,8 @@ pub fn write_mesh<T: Real>(path: &Path, mesh: &Mesh<T>) -> Result<(), Error> {
         Some(Format::Ply) => atomic::write(path, |out| ply::write_mesh(out, mesh)),
         Some(Format::Obj) => atomic::write(path, |out| obj::write_mesh(out, mesh)),
         Some(Format::Stl) => atomic::write(path, |out| stl::write_mesh(out, mesh)),
+        Some(Format::Off) => atomic::write(path, |out| off::write_mesh(out, mesh)),
+        Some(Format::Glb) => atomic::write(path, |out| glb::write_mesh(out, mesh)),
         Some(Format::Vtp) => atomic::write(path, |out| vtk::write_mesh(out, mesh)),
         _ => Err(wrong_extension(path, MESH_EXTENSIONS)),
     }
@@ -45,6 +47,7 @@ pub fn write_cloud<T: Real>(path: &Path, cloud: &PointCloud<T>) -> Result<(), Er
     match Format::from_path(path) {
         Some(Format::Ply) => atomic::write(path, |out| ply::write_cloud(out, cloud)),
         Some(Format::Npz) => atomic::write(path, |out| numpy::write_cloud(out, cloud)),
+        Some(Format::Pcd) => atomic::write(path, |out| pcd::write_cloud(out, cloud)),
         Some(Format::Text) => {
             let extension = path.extension().unwrap_or_default();
             let is_csv = extension.eq_ignore_ascii_case("csv");

@@ -1,4 +1,4 @@
-"""Readers and writers: PLY, XYZ, CSV, OBJ, STL, NPY, NPZ, VTP and VTI."""
+"""Readers and writers: PLY, PCD, LAS, PTS, XYZ, CSV, OBJ, OFF, STL, GLB, NPY, NPZ, VTP and VTI."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def write_points(
     normals: ArrayLike | None = None,
     attributes: Mapping[str, ArrayLike] | None = None,
 ) -> None:
-    """Writes points (PLY, NPZ, XYZ or CSV); atomically."""
+    """Writes points (PLY, NPZ, PCD, XYZ or CSV); atomically."""
     cloud = floats(points, "points", (None, 3))
     if normals is not None:
         normals = floats(normals, "normals", cloud.shape, cloud.dtype)
@@ -90,7 +90,7 @@ def write_points(
 
 
 def write_mesh(path: Path, mesh: Mesh | tuple[ArrayLike, ArrayLike]) -> None:
-    """Writes a mesh (PLY, OBJ, STL or VTP); atomically."""
+    """Writes a mesh (PLY, OBJ, STL, OFF, GLB or VTP); atomically."""
     mesh = as_mesh(mesh)
     _core.write_mesh(os.fspath(path), mesh.vertices, mesh.faces)
 

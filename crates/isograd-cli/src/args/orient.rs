@@ -90,7 +90,7 @@ impl OrientArgs {
 pub struct OrientCloud {
     /// The cloud, in any format that `reconstruct` reads
     pub cloud: PathBuf,
-    /// Where to write the points with normals and confidence: .ply, .npz, .xyz, .csv or .txt
+    /// Where to write the points with normals and confidence: .ply, .npz, .pcd, .xyz, .csv or .txt
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
     /// Numbers, times and warnings: .json

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use isograd::{Mesh, PointCloud, Real};
 
 use crate::bytes::{scalar_name, write_reals};
-use crate::columns::{column_names, row};
+use crate::columns::{NORMAL, column_names, row};
 
 /// Writes a mesh: vertices of type `T`, faces as lists of `int`.
 pub(crate) fn write_mesh<T: Real>(out: &mut impl Write, mesh: &Mesh<T>) -> io::Result<()> {
@@ -26,7 +26,7 @@ pub(crate) fn write_mesh<T: Real>(out: &mut impl Write, mesh: &Mesh<T>) -> io::R
 /// Writes a cloud in its own order: points, normals and attributes of type `T`. An attribute of several
 /// components becomes the properties `name_0`, `name_1` and so on.
 pub(crate) fn write_cloud<T: Real>(out: &mut impl Write, cloud: &PointCloud<T>) -> io::Result<()> {
-    let names = column_names(cloud, char::is_ascii_graphic)?;
+    let names = column_names(cloud, char::is_ascii_graphic, &NORMAL, &[])?;
     write_header::<T>(out, cloud.len(), &names)?;
     writeln!(out, "end_header")?;
     write_reals(out, (0..cloud.len()).flat_map(|i| row(cloud, i)))
