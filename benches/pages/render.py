@@ -15,7 +15,7 @@ import text
 
 HERE = Path(__file__).resolve().parent
 DOCS = HERE.parents[1] / "docs"
-PAGES = ["accuracy", "gradients", "orientation", "scaling", "fit", "gpu", "guarantees", "peers", "surfaces", "large"]
+PAGES = ["accuracy", "gradients", "orientation", "scaling", "fit", "gpu", "guarantees", "peers", "surfaces", "large", "datasets"]
 
 
 def main() -> int:

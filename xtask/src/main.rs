@@ -72,6 +72,7 @@ Figures and pages
                    against their true meshes, beside PoissonRecon (needs Python 3 and PyPI)
   large [ARGS]     docs/large.md: 10 million samples at an effective 2048³, beside PoissonRecon;
                    leave the machine alone meanwhile (needs Python 3 and PyPI)
+  datasets [ARGS]  docs/datasets.md: clouds per core-hour, with estimated and with given normals
 
 Exit status: 0 done, 1 a step failed, 2 the command line is wrong.";
 
@@ -123,6 +124,7 @@ fn run(command: &str, rest: &[String]) -> Option<Outcome> {
         ("peers", _) => Some(peers::run(rest)),
         ("surfaces", _) => Some(peers::surfaces(rest)),
         ("large", _) => Some(peers::large(rest)),
+        ("datasets", _) => Some(peers::datasets(rest)),
         _ => None,
     }
 }

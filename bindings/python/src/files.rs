@@ -1,5 +1,6 @@
 //! Readers and writers.
 
+use std::io::Write;
 use std::path::PathBuf;
 
 use isograd::{Field, Grid};
@@ -157,6 +158,13 @@ pub fn write_mesh(
         Dtype::F32 => write::<f32>(path, vertices, faces),
         Dtype::F64 => write::<f64>(path, vertices, faces),
     }
+}
+
+/// Writes a file of these bytes.
+#[pyfunction]
+pub fn write_bytes(py: Python<'_>, path: PathBuf, content: &[u8]) -> PyResult<()> {
+    py.detach(|| isograd_io::atomic::write(&path, |out| out.write_all(content)))
+        .map_err(file)
 }
 
 /// Writes a field.

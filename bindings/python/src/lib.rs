@@ -26,7 +26,7 @@ mod _core {
     #[pymodule_export]
     use command::run_command;
     #[pymodule_export]
-    use files::{read_field, read_geometry, write_field, write_mesh, write_points};
+    use files::{read_field, read_geometry, write_bytes, write_field, write_mesh, write_points};
     #[pymodule_export]
     use fit::run_fit;
     #[pymodule_export]

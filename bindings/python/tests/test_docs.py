@@ -9,7 +9,7 @@ import re
 import pytest
 
 ROOT = pathlib.Path(__file__).parents[3]
-PAGES = ["README.md", "docs/python.md", "docs/differentiable.md", "docs/coming-from.md", "docs/flow.md"]
+PAGES = ["README.md", "docs/python.md", "docs/differentiable.md", "docs/coming-from.md", "docs/flow.md", "docs/datasets.md"]
 OPTIONAL = {"jax", "matplotlib", "open3d", "optax", "pyvista", "rtree", "torch", "trimesh", "warp"}
 
 

@@ -33,6 +33,7 @@ from ._reconstruction import (
     reconstruct,
 )
 from ._shapes import Coordinates, Parameter, Samples, Shape, sample, shapes
+from ._to_file import to_file
 
 __all__ = [
     "Cloud",
@@ -69,6 +70,7 @@ __all__ = [
     "sample",
     "shapes",
     "signed_distance",
+    "to_file",
     "write_mesh",
     "write_points",
     "write_sdf",

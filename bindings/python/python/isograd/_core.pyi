@@ -34,6 +34,7 @@ __all__ = [
     "run_command",
     "run_fit",
     "shapes",
+    "write_bytes",
     "write_field",
     "write_mesh",
     "write_points",
@@ -232,6 +233,9 @@ def write_points(
 
 def write_mesh(path: _Path, vertices: _Floats, faces: _Indices) -> None:
     """Writes a mesh."""
+
+def write_bytes(path: _Path, content: bytes) -> None:
+    """Writes a file of these bytes; atomically."""
 
 def write_field(
     path: _Path, lower: _Vector, spacing: float, shape: _Cells, values: _Floats

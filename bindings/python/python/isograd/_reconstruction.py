@@ -309,16 +309,27 @@ class Reconstructor:
         attributes: Mapping[str, ArrayLike] | None = None,
     ) -> Reconstruction:
         """See :func:`reconstruct`."""
+        result = self._run(points, normals=normals, sensors=sensors, attributes=attributes)
+        result._warn()
+        return result
+
+    reconstruct = __call__
+
+    def _run(
+        self,
+        points: ArrayLike,
+        *,
+        normals: ArrayLike | None = None,
+        sensors: ArrayLike | None = None,
+        attributes: Mapping[str, ArrayLike] | None = None,
+    ) -> Reconstruction:
+        """A reconstruction without a warning that its verdict is not good."""
         cloud = floats(points, "points", (None, 3))
         normals, sensors = known(cloud, normals, sensors)
         check_known(self.options.orient, normals is not None, sensors is not None)
         core = self._plan.reconstruct(cloud, normals, sensors, _attributes(attributes, cloud))
         warn_note(self._plan.take_note())
-        result = Reconstruction(core, self.grid, self.options, len(cloud), cloud.dtype)
-        result._warn()
-        return result
-
-    reconstruct = __call__
+        return Reconstruction(core, self.grid, self.options, len(cloud), cloud.dtype)
 
 
 def reconstruct(
