@@ -8,11 +8,13 @@ mod errors;
 mod files;
 mod fit;
 mod grid;
+mod isosurface;
 mod orient;
 mod plan;
 mod pool;
 mod query;
 mod result;
+mod sdf_grid;
 mod settings;
 mod shape;
 mod xla;
@@ -32,6 +34,8 @@ mod _core {
     #[pymodule_export]
     use grid::{check_grid, fit_grid};
     #[pymodule_export]
+    use isosurface::{Isosurface, extract_surface};
+    #[pymodule_export]
     use orient::orient;
     #[pymodule_export]
     use plan::Plan;
@@ -41,6 +45,8 @@ mod _core {
     use query::{query_mesh, query_mesh_pullback};
     #[pymodule_export]
     use result::{Extension, ReconstructionArrays};
+    #[pymodule_export]
+    use sdf_grid::{sdf_of_mesh, sdf_of_mesh_pullback};
     #[pymodule_export]
     use shape::{Shape, shapes};
     #[pymodule_export]

@@ -6,16 +6,18 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use isograd::Backend;
 
+mod field;
 mod fit;
 mod gradcheck;
 mod orient;
 mod pipeline;
 mod reading;
 
+pub use field::{Isosurface, Sdf};
 pub use fit::{Decay, Fit, Method, TargetKind};
 pub use gradcheck::Gradcheck;
 pub use orient::{OrientArgs, OrientCloud};
-pub use pipeline::{GridArgs, MethodArgs};
+pub use pipeline::{CellArgs, GridArgs, MethodArgs};
 pub use reading::ReadingArgs;
 
 /// Point cloud in, exact signed distance field out.
@@ -39,6 +41,10 @@ pub enum Command {
     Orient(Box<OrientCloud>),
     /// Sample a parametric shape as a point cloud
     Sample(Sample),
+    /// Compute the signed distance field of a mesh
+    Sdf(Box<Sdf>),
+    /// Extract the surface of a field as a mesh
+    Isosurface(Isosurface),
     /// Compute signed distances of points to a mesh or in a field
     Query(Query),
     /// Optimize a shape, or points, until their field matches a target
@@ -288,7 +294,7 @@ mod tests {
             panic!("{cli:?}");
         };
         assert_eq!(
-            args.grid.bounds,
+            args.grid.cells.bounds,
             Some(vec![-1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
         );
         assert_eq!(
@@ -340,6 +346,10 @@ mod tests {
             "isograd orient a.ply -o b.ply --sensor 1,2,inf",
             "isograd orient a.ply -o b.ply --parity-gamma 0",
             "isograd query a.ply -o b.ply",
+            "isograd sdf a.ply",
+            "isograd sdf a.ply -o b.vti --band -1",
+            "isograd sdf a.ply -o b.vti --outliers keep",
+            "isograd isosurface a.vti -o b.ply --level nan",
             "isograd gradcheck a.ply --step 0",
             "isograd info a.csv --columns x,y",
             "isograd info a.csv --columns x,,z",

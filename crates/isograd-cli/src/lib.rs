@@ -9,6 +9,7 @@ mod fit;
 mod gradcheck;
 mod info;
 mod interrupt;
+mod isosurface;
 mod memory;
 mod orient;
 mod outputs;
@@ -19,6 +20,7 @@ mod reconstruct;
 mod report;
 mod resample;
 mod sample;
+mod sdf;
 mod streams;
 mod threads;
 
@@ -74,6 +76,8 @@ fn dispatch(command: &Command) -> Result<(), Error> {
         Command::Reconstruct(args) => reconstruct::run(args),
         Command::Orient(args) => orient::run(args),
         Command::Sample(args) => sample::run(args),
+        Command::Sdf(args) => sdf::run(args),
+        Command::Isosurface(args) => isosurface::run(args),
         Command::Query(args) => query::run(args),
         Command::Fit(args) => fit::run(args),
         Command::Gradcheck(args) => gradcheck::run(args),
@@ -86,6 +90,8 @@ fn running(command: &Command) -> Option<&args::Running> {
         Command::Reconstruct(args) => Some(&args.running),
         Command::Orient(args) => Some(&args.running),
         Command::Sample(args) => Some(&args.running),
+        Command::Sdf(args) => Some(&args.running),
+        Command::Isosurface(args) => Some(&args.running),
         Command::Query(args) => Some(&args.running),
         Command::Fit(args) => Some(&args.running),
         Command::Gradcheck(args) => Some(&args.running),

@@ -95,7 +95,7 @@ pub use pipeline::{
     AvailableMemory, CloudCotangent, Cotangent, Error, ExtensionCotangent, MemoryError,
     MemoryLimit, MemoryUse, Options, Orienter, ParseOptionError, Pipeline, PullbackError,
     Reconstruction, Reconstructor, RestoreError, Saved, Solve, SurfaceResolution, available_memory,
-    check_memory,
+    check_distance_memory, check_memory,
 };
 pub use real::Real;
 pub use report::{JsonReport, Report, Seconds, Stage, Verdict, Warning};

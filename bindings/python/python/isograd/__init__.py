@@ -10,6 +10,7 @@
 """
 
 from ._core import __version__
+from ._field import FieldGradients, Isosurface, SdfGradients, SdfGrid, isosurface, sdf_grid
 from ._files import (
     Cloud,
     read_mesh,
@@ -38,10 +39,12 @@ __all__ = [
     "Cloud",
     "Coordinates",
     "Extension",
+    "FieldGradients",
     "Fit",
     "Gradients",
     "Grid",
     "Hits",
+    "Isosurface",
     "Level",
     "Mesh",
     "Options",
@@ -53,12 +56,15 @@ __all__ = [
     "ReconstructionWarning",
     "Reconstructor",
     "Samples",
+    "SdfGradients",
+    "SdfGrid",
     "Shape",
     "Solve",
     "Splat",
     "Walls",
     "__version__",
     "fit",
+    "isosurface",
     "orient",
     "query",
     "query_pullback",
@@ -67,6 +73,7 @@ __all__ = [
     "read_sdf",
     "reconstruct",
     "sample",
+    "sdf_grid",
     "shapes",
     "signed_distance",
     "write_mesh",

@@ -3,7 +3,7 @@
 
 from collections.abc import Callable, Sequence
 from os import PathLike
-from typing import Any, TypeAlias, TypedDict, final
+from typing import Any, Literal, TypeAlias, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +18,14 @@ _Attributes: TypeAlias = list[tuple[str, int, _Floats]]
 
 __all__ = [
     "Extension",
+    "Isosurface",
     "Plan",
     "Result",
     "Shape",
     "__version__",
     "call_target",
     "check_grid",
+    "extract_surface",
     "fit_grid",
     "open_backend",
     "orient",
@@ -33,6 +35,8 @@ __all__ = [
     "read_geometry",
     "run_command",
     "run_fit",
+    "sdf_of_mesh",
+    "sdf_of_mesh_pullback",
     "shapes",
     "write_field",
     "write_mesh",
@@ -139,6 +143,41 @@ def query_mesh_pullback(
     vertices: _Floats, faces: _Indices, queries: _Floats, distance_bar: _Floats
 ) -> list[_Floats]:
     """Cotangents of vertices and queries from those of the distances."""
+
+# Fields of meshes, and meshes of fields.
+
+_Grid: TypeAlias = tuple[_Vector, float, _Cells]
+
+def sdf_of_mesh(
+    vertices: _Floats, faces: _Indices, grid: _Grid, band: float | None
+) -> tuple[_Floats, _Indices, Literal["closed", "winding number"]]:
+    """φ ``(nx, ny, nz)``, the closest faces, and how the sign was found."""
+
+def sdf_of_mesh_pullback(
+    vertices: _Floats,
+    faces: _Indices,
+    grid: _Grid,
+    sdf: _Floats,
+    closest: _Indices,
+    sdf_bar: _Floats,
+) -> tuple[_Floats, _Vector, float]:
+    """Cotangents of vertices, lower corner and spacing."""
+
+@final
+class Isosurface:
+    """Surface of a field."""
+
+    def mesh(self) -> tuple[_Floats, _Indices]:
+        """Vertices and faces."""
+
+    def walls(self) -> list[list[bool]]:
+        """Whether the surface reaches the low and the high wall of each axis."""
+
+    def pullback(self, vertices_bar: _Floats) -> tuple[_Floats, float, _Vector, float, int]:
+        """Cotangents of field, level, lower corner and spacing; number of bounded derivatives."""
+
+def extract_surface(field: _Floats, grid: _Grid, level: float) -> Isosurface:
+    """Extracts the surface of a field."""
 
 # Shapes.
 

@@ -13,9 +13,9 @@ use isograd::{
 
 use super::{OrientArgs, finite, not_negative, positive};
 
-/// Arguments of the grid.
+/// Arguments of the cells of a grid.
 #[derive(Debug, Args)]
-pub struct GridArgs {
+pub struct CellArgs {
     /// Cells on the longest side [default: 128]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=65535),
         conflicts_with = "spacing", help_heading = "Grid")]
@@ -31,6 +31,14 @@ pub struct GridArgs {
         allow_negative_numbers = true, value_parser = finite, conflicts_with = "padding",
         help_heading = "Grid")]
     pub bounds: Option<Vec<f64>>,
+}
+
+/// Arguments of the grid of a cloud.
+#[derive(Debug, Args)]
+pub struct GridArgs {
+    /// Its cells.
+    #[command(flatten)]
+    pub cells: CellArgs,
     /// Use of outliers, isolated samples that are further from the others than these extend: ignore (left out, with a
     /// warning) or keep
     #[arg(
@@ -94,11 +102,13 @@ pub struct MethodArgs {
 impl GridArgs {
     /// The grid: between `--bounds`, or around `cloud`.
     pub fn grid<T: Real>(&self, cloud: &PointCloud<T>) -> Result<Grid<T>, GridError> {
-        self.grid_with(cloud, self.outliers)
+        self.cells.grid(cloud, self.outliers)
     }
+}
 
-    /// Like [`Self::grid`], with another use of outliers.
-    pub fn grid_with<T: Real>(
+impl CellArgs {
+    /// The grid: between `--bounds`, or around `cloud`, with this use of outliers.
+    pub fn grid<T: Real>(
         &self,
         cloud: &PointCloud<T>,
         outliers: Outliers,

@@ -2,6 +2,7 @@
 
 mod backend;
 mod bad_input;
+mod fields;
 mod fit;
 mod gradcheck;
 #[cfg(target_os = "linux")]
