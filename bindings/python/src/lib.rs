@@ -3,6 +3,7 @@
 mod arrays;
 mod backend;
 mod background;
+mod clean;
 mod command;
 mod errors;
 mod files;
@@ -25,6 +26,8 @@ use pyo3::prelude::*;
 mod _core {
     use super::*;
 
+    #[pymodule_export]
+    use clean::clean_points;
     #[pymodule_export]
     use command::run_command;
     #[pymodule_export]

@@ -6,6 +6,7 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use isograd::Backend;
 
+mod clean;
 mod field;
 mod fit;
 mod gradcheck;
@@ -13,6 +14,7 @@ mod orient;
 mod pipeline;
 mod reading;
 
+pub use clean::Clean;
 pub use field::{Isosurface, Sdf};
 pub use fit::{Decay, Fit, Method, TargetKind};
 pub use gradcheck::Gradcheck;
@@ -41,6 +43,8 @@ pub enum Command {
     Orient(Box<OrientCloud>),
     /// Sample a parametric shape as a point cloud
     Sample(Sample),
+    /// Remove duplicates and outliers of a point cloud, and thin it
+    Clean(Clean),
     /// Compute the signed distance field of a mesh
     Sdf(Box<Sdf>),
     /// Extract the surface of a field as a mesh
@@ -350,6 +354,11 @@ mod tests {
             "isograd sdf a.ply -o b.vti --band -1",
             "isograd sdf a.ply -o b.vti --outliers keep",
             "isograd isosurface a.vti -o b.ply --level nan",
+            "isograd clean a.ply -o b.ply",
+            "isograd clean a.ply -o b.ply --voxel 0",
+            "isograd clean a.ply -o b.ply --statistical 8",
+            "isograd clean a.ply -o b.ply --statistical 0,2",
+            "isograd clean a.ply -o b.ply --radius 0.1,x",
             "isograd gradcheck a.ply --step 0",
             "isograd info a.csv --columns x,y",
             "isograd info a.csv --columns x,,z",

@@ -3,6 +3,7 @@
 
 mod args;
 mod backend;
+mod clean;
 mod closed;
 mod error;
 mod fit;
@@ -76,6 +77,7 @@ fn dispatch(command: &Command) -> Result<(), Error> {
         Command::Reconstruct(args) => reconstruct::run(args),
         Command::Orient(args) => orient::run(args),
         Command::Sample(args) => sample::run(args),
+        Command::Clean(args) => clean::run(args),
         Command::Sdf(args) => sdf::run(args),
         Command::Isosurface(args) => isosurface::run(args),
         Command::Query(args) => query::run(args),
@@ -90,6 +92,7 @@ fn running(command: &Command) -> Option<&args::Running> {
         Command::Reconstruct(args) => Some(&args.running),
         Command::Orient(args) => Some(&args.running),
         Command::Sample(args) => Some(&args.running),
+        Command::Clean(args) => Some(&args.running),
         Command::Sdf(args) => Some(&args.running),
         Command::Isosurface(args) => Some(&args.running),
         Command::Query(args) => Some(&args.running),

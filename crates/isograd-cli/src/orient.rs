@@ -51,7 +51,7 @@ fn check(args: &args::OrientCloud) -> Result<(), Error> {
 }
 
 /// Whether single precision holds every number of a file: a time stamp may have more digits than a coordinate.
-fn is_single(geometry: &Geometry) -> bool {
+pub(crate) fn is_single(geometry: &Geometry) -> bool {
     let fits = |&value: &f64| f64::from(value as f32) == value || value.is_nan();
     let mut attributes = geometry.attributes.iter();
     geometry.dtype == Dtype::F32 && attributes.all(|attribute| attribute.values.iter().all(fits))

@@ -56,10 +56,12 @@
 //! | [`distance`] | mesh → φ; queries at points; attributes on the surface |
 //! | [`sheet`] | open surface → φ and closed shell of a membrane |
 //! | [`differential`] | φ → gradient, normal and curvature |
+//! | [`clean`] | points → indices of those to keep: without duplicates and outliers, thinned |
 //! | [`gradcheck`] | comparison of the pullback with finite differences |
 #![warn(missing_docs)]
 
 mod backend;
+pub mod clean;
 pub mod data;
 pub mod differential;
 pub mod distance;

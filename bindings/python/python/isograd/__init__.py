@@ -9,6 +9,7 @@
 ``(N, 3)``; float32 stays float32. ``isograd.jax`` and ``isograd.torch`` are differentiable functions of these libraries.
 """
 
+from ._clean import Cleaned, clean
 from ._core import __version__
 from ._field import FieldGradients, Isosurface, SdfGradients, SdfGrid, isosurface, sdf_grid
 from ._files import (
@@ -36,6 +37,7 @@ from ._reconstruction import (
 from ._shapes import Coordinates, Parameter, Samples, Shape, sample, shapes
 
 __all__ = [
+    "Cleaned",
     "Cloud",
     "Coordinates",
     "Extension",
@@ -63,6 +65,7 @@ __all__ = [
     "Splat",
     "Walls",
     "__version__",
+    "clean",
     "fit",
     "isosurface",
     "orient",

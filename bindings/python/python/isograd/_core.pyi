@@ -25,6 +25,7 @@ __all__ = [
     "__version__",
     "call_target",
     "check_grid",
+    "clean_points",
     "extract_surface",
     "fit_grid",
     "open_backend",
@@ -178,6 +179,19 @@ class Isosurface:
 
 def extract_surface(field: _Floats, grid: _Grid, level: float) -> Isosurface:
     """Extracts the surface of a field."""
+
+# Clouds.
+
+class _Steps(TypedDict):
+    drop_not_finite: bool
+    duplicates: float | None
+    statistical: tuple[int, float] | None
+    radius: tuple[float, int] | None
+    voxel: float | None
+    poisson_disk: float | None
+
+def clean_points(points: _Floats, steps: _Steps) -> tuple[_Indices, list[tuple[str, int]]]:
+    """Indices of the samples kept, and the number that each step removed."""
 
 # Shapes.
 

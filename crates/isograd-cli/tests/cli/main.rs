@@ -2,6 +2,7 @@
 
 mod backend;
 mod bad_input;
+mod clean;
 mod fields;
 mod fit;
 mod gradcheck;
