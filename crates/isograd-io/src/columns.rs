@@ -5,6 +5,7 @@ use std::io;
 use isograd::data::Attribute;
 use isograd::{PointCloud, Real};
 
+use crate::colors::{CHANNELS, byte_colors};
 use crate::format::Format;
 use crate::geometry::{Geometry, check_finite};
 use crate::limits::Memory;
@@ -118,8 +119,8 @@ pub(crate) fn find_columns(names: &[Option<&str>], wanted: [&str; 3]) -> Option<
 }
 
 /// Names of a cloud's columns in a file: unique, with `_` in place of characters that are not
-/// `allowed`. An attribute of several components has the columns `name_0`, `name_1` and so on. No name of an attribute
-/// is one that readers take for normals.
+/// `allowed`. An attribute of several components has the columns `name_0`, `name_1` and so on, a [color](byte_colors) has
+/// `red`, `green` and `blue`. No name of an attribute is one that readers take for normals.
 ///
 /// # Errors
 /// More columns than readers accept.
@@ -146,10 +147,12 @@ pub(crate) fn column_names<T: Real>(
         names.push(unique.add(name, |_| true));
     }
     let is_allowed = |name: &str| has_normals || !is_normal(name);
-    for attribute in cloud.attributes() {
+    let attributes = cloud.attributes();
+    for (attribute, is_color) in attributes.iter().zip(byte_colors(attributes)) {
         let plain = attribute.name.replace(|c| !allowed(&c), "_");
         for component in 0..attribute.components {
             let name = match (plain.as_str(), attribute.components) {
+                (_, 2..) if is_color => CHANNELS[component].to_string(),
                 ("", _) => format!("attribute_{component}"),
                 (plain, 1) => plain.to_string(),
                 (plain, _) => format!("{plain}_{component}"),

@@ -19,6 +19,9 @@
 //! | VTP | points, mesh | mesh |
 //! | VTI | field | field |
 //!
+//! PLY and VTP meshes may have normals and attributes at their vertices ([`write_surface`]). `-` is standard input in readers, and
+//! standard output in writers.
+//!
 //! The columns of a text file are found by the names in its header: `x`, `X`, `x [m]`, `Points:0`, `Points_0`,
 //! `easting`, `nx`, `Normals:0` and the like. A header without coordinates is an error, and [`Columns`] choose.
 //! Columns or properties `sensor_x`, `sensor_y` and `sensor_z`, or an array `sensor` of three components, hold the
@@ -35,6 +38,7 @@
 
 pub mod atomic;
 mod bytes;
+mod colors;
 mod columns;
 mod error;
 mod field;
@@ -57,10 +61,11 @@ mod text;
 mod vtk;
 mod write;
 
+pub use colors::byte_colors;
 pub use error::{Error, Location};
 pub use field::FieldFile;
 pub use format::Format;
-pub use geometry::Geometry;
+pub use geometry::{Geometry, is_sensor};
 pub use limits::{Limits, parse_size};
 pub use message::{LONGEST_LINE, printable};
 pub use number::Dtype;
@@ -68,6 +73,6 @@ pub use options::{Attributes, Columns, ReadOptions};
 pub use read::{Content, parse_field, parse_geometry, read, read_field, read_geometry, read_mesh};
 pub use source::Source;
 pub use write::{
-    CLOUD_EXTENSIONS, FIELD_EXTENSIONS, MESH_EXTENSIONS, check_output, write_cloud, write_field,
-    write_mesh,
+    CLOUD_EXTENSIONS, FIELD_EXTENSIONS, MESH_EXTENSIONS, SURFACE_EXTENSIONS, check_output,
+    write_cloud, write_field, write_mesh, write_surface,
 };

@@ -9,4 +9,5 @@ mod names;
 mod options;
 mod round_trips;
 mod stopping;
+mod surfaces;
 mod traps;
