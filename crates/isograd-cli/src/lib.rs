@@ -3,23 +3,29 @@
 
 mod args;
 mod backend;
+mod batch;
 mod closed;
 mod error;
 mod fit;
+mod generate;
 mod gradcheck;
 mod info;
+mod inputs;
 mod interrupt;
 mod memory;
 mod orient;
 mod outputs;
 mod plot;
+mod prediction;
 mod progress;
 mod query;
 mod reconstruct;
 mod report;
 mod resample;
 mod sample;
+mod sequence;
 mod streams;
+mod surface;
 mod threads;
 
 use std::ffi::OsString;
@@ -78,6 +84,8 @@ fn dispatch(command: &Command) -> Result<(), Error> {
         Command::Fit(args) => fit::run(args),
         Command::Gradcheck(args) => gradcheck::run(args),
         Command::Info(args) => info::run(args),
+        Command::Completions(args) => generate::completions(args),
+        Command::Man(args) => generate::man(args),
     }
 }
 
@@ -89,6 +97,6 @@ fn running(command: &Command) -> Option<&args::Running> {
         Command::Query(args) => Some(&args.running),
         Command::Fit(args) => Some(&args.running),
         Command::Gradcheck(args) => Some(&args.running),
-        Command::Info(_) => None,
+        Command::Info(_) | Command::Completions(_) | Command::Man(_) => None,
     }
 }

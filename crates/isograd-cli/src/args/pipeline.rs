@@ -26,7 +26,7 @@ pub struct GridArgs {
     /// Padding on every side, as a fraction of the longest side [default: 0.1]
     #[arg(long, value_name = "FRACTION", value_parser = not_negative, help_heading = "Grid")]
     pub padding: Option<f64>,
-    /// Corners of the grid, instead of the padded bounds of the cloud
+    /// Corners of the grid, in the cloud's unit, instead of the padded bounds of the cloud
     #[arg(long, num_args = 6, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"],
         allow_negative_numbers = true, value_parser = finite, conflicts_with = "padding",
         help_heading = "Grid")]
@@ -58,7 +58,7 @@ pub struct MethodArgs {
     /// Width of the smoothing of the indicator, in cells of the surface; auto: 0.8 of the distance between samples
     #[arg(long, value_name = "CELLS|auto", default_value = "auto")]
     pub smoothing: Smoothing,
-    /// Strength of the pull of the indicator to one value at the samples; 1 to 4 are usual, 0 is off
+    /// Strength of the pull of the indicator to one value at the samples, without unit; 1 to 4 are usual, 0 is off
     #[arg(long, value_name = "ALPHA", default_value = "0", value_parser = not_negative)]
     pub screening: f64,
     /// Value of the indicator at the surface: thin (that at the samples nearby; parts thinner than a cell are made about a
