@@ -197,12 +197,16 @@ def optimization(n=24, count=3000, steps=200, iterations=12):
 CASES = {function.__name__: function for function in (sphere, oscillation, fish, cost, gradient, optimization)}
 
 
+def store(name, found):
+    """Puts the results of a case into docs/flow.json."""
+    data = json.loads(PAGE.read_text(encoding="utf-8")) if PAGE.exists() else {}
+    PAGE.write_text(json.dumps(data | {name: found}, indent=1) + "\n", encoding="utf-8")
+
+
 def main(names):
-    found = json.loads(PAGE.read_text(encoding="utf-8")) if PAGE.exists() else {}
     for name in names or CASES:
         print(name, flush=True)
-        found[name] = CASES[name]()
-        PAGE.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+        store(name, CASES[name]())
 
 
 if __name__ == "__main__":

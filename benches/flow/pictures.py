@@ -9,7 +9,7 @@ import isograd
 import jax
 import matplotlib.pyplot as plt
 import numpy as np
-from measure import PAGE, Mean
+from measure import PAGE, Mean, store
 from PIL import Image
 from swim import Swim
 
@@ -54,7 +54,7 @@ def picture(swim, state, points, normals):
     return Image.open(buffer).convert("RGB")
 
 
-def drag(n=32, count=50_000, steps=128):
+def drag(n=24, count=50_000, steps=96):
     """Change of the mean drag where the surface grows by a unit volume, at each of all points, from one reverse pass."""
     swim = Swim(n, count, lengths=(2, 1, 1))
     points, normals = swim.motion(1, steps)
@@ -74,6 +74,7 @@ def drag(n=32, count=50_000, steps=128):
     figure.colorbar(dots, ax=axes, label=label, shrink=0.8)
     figure.savefig(IMAGES / "flow-drag.png", bbox_inches="tight")
     plt.close(figure)
+    store("drag", {"cells": n, "points": count, "steps": steps})
 
 
 if __name__ == "__main__":

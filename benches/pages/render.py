@@ -16,7 +16,8 @@ import text
 HERE = Path(__file__).resolve().parent
 DOCS = HERE.parents[1] / "docs"
 README = DOCS.parent / "README.md"
-PAGES = ["accuracy", "gradients", "orientation", "scaling", "fit", "gpu", "guarantees", "peers", "surfaces", "large", "flow", "readme"]
+PAGES = ["accuracy", "gradients", "orientation", "scaling", "fit", "gpu", "guarantees", "peers", "surfaces", "large", "flow"]
+PAGES += ["datasets", "readme"]
 
 
 def main() -> int:

@@ -277,7 +277,7 @@ mod tests {
     fn the_corpus_covers_every_format_and_is_readable() {
         let corpus = corpus().expect("corpus");
         let formats: BTreeSet<&str> = corpus.iter().map(|seed| seed.format.name()).collect();
-        assert_eq!(formats.len(), 8, "{formats:?}");
+        assert_eq!(formats.len(), 15, "{formats:?}");
         for seed in &corpus {
             assert!(reads(seed, seed.bytes.clone()), "{}", seed.name);
         }

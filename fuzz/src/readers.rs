@@ -93,11 +93,12 @@ impl Readers {
         match content {
             Content::Field(file) => field_comes_back(file, &path(random.pick(&["vti", "npz"]))),
             Content::Geometry(geometry) if !geometry.faces.is_empty() && random.one_in(2) => {
-                mesh_comes_back(geometry, &path(random.pick(&["ply", "obj", "vtp"])))
+                mesh_comes_back(geometry, &path(random.pick(&["ply", "obj", "off", "vtp"])))
             }
-            Content::Geometry(geometry) => {
-                cloud_comes_back(geometry, &path(random.pick(&["ply", "npz", "csv", "xyz"])))
-            }
+            Content::Geometry(geometry) => cloud_comes_back(
+                geometry,
+                &path(random.pick(&["ply", "npz", "csv", "xyz", "pcd"])),
+            ),
         }
     }
 }

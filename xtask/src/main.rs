@@ -75,6 +75,7 @@ Figures and pages
                    leave the machine alone meanwhile (needs Python 3 and PyPI)
   flow [CASE...]   docs/flow.md: bodies in a flow solver, its film and its picture; about an hour
                    (needs Python 3 and PyPI)
+  datasets [ARGS]  docs/datasets.md: clouds per core-hour, with estimated and with given normals
 
 Exit status: 0 done, 1 a step failed, 2 the command line is wrong.";
 
@@ -127,6 +128,7 @@ fn run(command: &str, rest: &[String]) -> Option<Outcome> {
         ("surfaces", _) => Some(peers::surfaces(rest)),
         ("large", _) => Some(peers::large(rest)),
         ("flow", _) => Some(flow::run(rest)),
+        ("datasets", _) => Some(peers::datasets(rest)),
         _ => None,
     }
 }

@@ -43,6 +43,12 @@ pub fn large(arguments: &[String]) -> Outcome {
     pages::render(&["large"])
 }
 
+/// Measures clouds per core-hour, and renders the page.
+pub fn datasets(arguments: &[String]) -> Outcome {
+    with_program("datasets.py", arguments)?;
+    pages::render(&["datasets"])
+}
+
 /// Runs a script that starts the program `isograd`.
 fn with_program(script: &str, arguments: &[String]) -> Outcome {
     let environment = environment()?;

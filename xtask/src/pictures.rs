@@ -38,7 +38,9 @@ const PICTURES: [(&str, &str, &str); 4] = [
 
 /// Draws all pictures.
 pub fn all() -> Outcome {
-    isograd("reconstruct examples/clouds/aircraft.ply --picture docs/images/aircraft.png --view 60 30")?;
+    isograd(
+        "reconstruct examples/clouds/aircraft.ply --picture docs/images/aircraft.png --view 60 30",
+    )?;
     let folder = process::root().join(FOLDER);
     fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     for (name, shape, keep) in CLOUDS {

@@ -5,6 +5,7 @@
 The box is 6.4 × 4.8 × 4.8 diameters, periodic, so that drag is above that of a sphere alone.
 """
 
+import json
 import sys
 
 import isograd
@@ -15,8 +16,8 @@ from flow_host.jax_cfd_tunnel import Tunnel
 from isograd import immersed
 
 
-def main(n=6, count=1000, duration=0.6):
-    grid = isograd.Grid((0.0, 0.0, 0.0), 1 / n, tuple(round(x * n) for x in (6.4, 4.8, 4.8)))
+def main(n: int = 6, count: int = 1000, duration: float = 0.6) -> tuple[float, float]:
+    grid = isograd.Grid((0.0, 0.0, 0.0), 1 / n, (round(6.4 * n), round(4.8 * n), round(4.8 * n)))
     tunnel = Tunnel(grid, 0.01, 0.35 / n)
     center = np.array([1.92, 2.413, 2.393])
     sphere = isograd.sample("sphere", count, dtype=np.float32).points
@@ -41,4 +42,4 @@ def main(n=6, count=1000, duration=0.6):
 
 
 if __name__ == "__main__":
-    main(*(kind(x) for kind, x in zip((int, int, float), sys.argv[1:])))
+    main(*(json.loads(x) for x in sys.argv[1:]))

@@ -20,6 +20,7 @@ def main():
     grid = isograd.Grid.fit(points, 40, padding=0.2)
     plan = isograd.Reconstructor(grid)
     wanted = 4 / 3 * np.pi * 0.55**3
+    volume = 0.0
 
     for step in range(20):
         result = plan(points)

@@ -11,6 +11,7 @@ import isograd
 def main():
     fish = isograd.Shape("fish", amplitude=0.1, time=0.3)
     samples = fish.sample(8000)
+    assert samples.velocity is not None
     grid = isograd.Grid.fit(samples.points, 96)
     result = isograd.reconstruct(
         samples.points, grid, attributes={"velocity": samples.velocity}

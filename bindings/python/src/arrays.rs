@@ -1,7 +1,7 @@
 //! NumPy arrays to slices and back. `isograd._arrays` makes them float32 or float64, C-contiguous, aligned and of the
 //! native byte order; other arrays are errors here, and never reinterpreted.
 
-use isograd::{Mesh, Real};
+use isograd::{Mesh, PointCloud, Real};
 use numpy::{
     Element, PyArray1, PyArray2, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray1,
     PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
@@ -152,4 +152,20 @@ pub fn from_vectors<'py, E: Element + Copy>(
         // The numbers of values are equal, so this is unreachable.
         Err(_) => PyArray2::<E>::zeros(py, [0, 3], false).into_any(),
     }
+}
+
+/// Name and new `(N, components)` array of each attribute of a cloud.
+///
+/// # Errors
+/// None, unless Python fails.
+pub fn attributes<'py, T: Number>(
+    py: Python<'py>,
+    cloud: &PointCloud<T>,
+) -> PyResult<Vec<(String, Bound<'py, PyAny>)>> {
+    let array = |attribute: &isograd::Attribute<T>| {
+        let shape = [cloud.len(), attribute.components];
+        let values = shaped(py, attribute.values.clone(), shape)?;
+        Ok((attribute.name.clone(), values))
+    };
+    cloud.attributes().iter().map(array).collect()
 }

@@ -11,6 +11,8 @@ use std::time::Duration;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
+use crate::threads;
+
 /// Interval at which signals are checked.
 const POLL: Duration = Duration::from_millis(50);
 
@@ -28,6 +30,13 @@ impl Stop {
     }
 }
 
+/// What the thread of the work sends.
+enum Event<M, R> {
+    Message(M),
+    /// The result, or the message of a panic.
+    Done(Result<R, String>),
+}
+
 /// Runs `work` with the interpreter released. An exception raised by a signal handler, such as that of Ctrl-C, is
 /// raised at once; the work gets a request to stop, and ends on its own thread.
 ///
@@ -37,6 +46,19 @@ pub fn run<R: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(&Stop) -> R + Send + 'static,
 ) -> PyResult<R> {
+    run_with_messages(py, move |stop, _| work(stop), |(): ()| Ok(()))
+}
+
+/// Like [`run`], where `work` can send messages. The calling thread passes them to `receive`, and an exception that this
+/// raises is raised at once, too.
+///
+/// # Errors
+/// As [`run`], and the exceptions of `receive`.
+pub fn run_with_messages<M: Send + 'static, R: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce(&Stop, &(dyn Fn(M) + Sync)) -> R + Send + 'static,
+    mut receive: impl FnMut(M) -> PyResult<()>,
+) -> PyResult<R> {
     check_process()?;
     let stop = Stop::default();
     let (sender, receiver) = mpsc::channel();
@@ -44,9 +66,11 @@ pub fn run<R: Send + 'static>(
     let spawned = thread::Builder::new()
         .name("isograd".into())
         .spawn(move || {
-            let result = guard(|| work(&observed));
             // After an interrupt there is no receiver.
-            let _ = sender.send(result);
+            let send = |event| _ = sender.send(event);
+            let report = |message| send(Event::Message(message));
+            let result = guard(|| threads::install(|| work(&observed, &report)));
+            send(Event::Done(result));
         });
     spawned.map_err(|e| PyRuntimeError::new_err(format!("no thread could be started: {e}")))?;
     let mut receiver = receiver;
@@ -56,18 +80,18 @@ pub fn run<R: Send + 'static>(
             (receiver, received)
         });
         receiver = back;
-        match received {
-            Ok(Ok(result)) => return Ok(result),
-            Ok(Err(panic)) => return Err(PyRuntimeError::new_err(panic)),
+        let going_on = match received {
+            Ok(Event::Done(Ok(result))) => return Ok(result),
+            Ok(Event::Done(Err(panic))) => return Err(PyRuntimeError::new_err(panic)),
+            Ok(Event::Message(message)) => receive(message),
             Err(RecvTimeoutError::Disconnected) => {
                 return Err(PyRuntimeError::new_err("the work ended without a result"));
             }
-            Err(RecvTimeoutError::Timeout) => {
-                if let Err(raised) = py.check_signals() {
-                    stop.0.store(true, Ordering::Relaxed);
-                    return Err(raised);
-                }
-            }
+            Err(RecvTimeoutError::Timeout) => py.check_signals(),
+        };
+        if let Err(raised) = going_on {
+            stop.0.store(true, Ordering::Relaxed);
+            return Err(raised);
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Readers and writers.
 
+use std::io::Write;
 use std::path::PathBuf;
 
 use isograd::{Field, Grid};
@@ -69,16 +70,10 @@ fn geometry_arrays<'py, T: Number>(
     geometry: &isograd_io::Geometry,
 ) -> PyResult<Geometry<'py>> {
     let cloud = geometry.cloud::<T>().map_err(value)?;
-    let mut attributes = Vec::new();
-    for attribute in cloud.attributes() {
-        let shape = [cloud.len(), attribute.components];
-        let array = arrays::shaped(py, attribute.values.clone(), shape)?;
-        attributes.push((attribute.name.clone(), array));
-    }
     Ok((
         arrays::from_vectors(py, cloud.points()),
         cloud.normals().map(|n| arrays::from_vectors(py, n)),
-        attributes,
+        arrays::attributes(py, &cloud)?,
         arrays::from_vectors(py, &geometry.faces),
     ))
 }
@@ -157,6 +152,13 @@ pub fn write_mesh(
         Dtype::F32 => write::<f32>(path, vertices, faces),
         Dtype::F64 => write::<f64>(path, vertices, faces),
     }
+}
+
+/// Writes a file of these bytes.
+#[pyfunction]
+pub fn write_bytes(py: Python<'_>, path: PathBuf, content: &[u8]) -> PyResult<()> {
+    py.detach(|| isograd_io::atomic::write(&path, |out| out.write_all(content)))
+        .map_err(file)
 }
 
 /// Writes a field.

@@ -4,12 +4,12 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use isograd::data::Attribute;
-use isograd::{Backend, PointCloud, Sensors};
+use isograd::{Backend, PointCloud, Sensors, Stage};
 use pyo3::prelude::*;
 
 use crate::arrays::{self, Dtype, Either, Number};
 use crate::backend::{self, Failure};
-use crate::background;
+use crate::background::{self, Stop};
 use crate::errors::value;
 use crate::result::{Reconstruction, ReconstructionArrays};
 use crate::settings::Settings;
@@ -53,24 +53,31 @@ impl Plan {
         lock(&self.note).take()
     }
 
-    /// Reconstructs a cloud: `points`, `normals` and `sensors` of one type.
-    #[pyo3(signature = (points, normals, sensors, attributes))]
+    /// Reconstructs a cloud: `points`, `normals` and `sensors` of one type. `progress` is called with the name of each
+    /// stage, before it.
+    #[pyo3(signature = (points, normals, sensors, attributes, progress=None))]
     fn reconstruct(
         &self,
         points: &Bound<'_, PyAny>,
         normals: Option<&Bound<'_, PyAny>>,
         sensors: Option<&Bound<'_, PyAny>>,
         attributes: Vec<AttributeArray<'_>>,
+        progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<ReconstructionArrays> {
+        let py = points.py();
+        let observe = |stage: Stage| match progress {
+            Some(progress) => progress.call1((stage.name(),)).map(drop),
+            None => Ok(()),
+        };
         match arrays::dtype(points, "points")? {
             Dtype::F32 => {
                 let cloud = with_sensors(cloud(points, normals, attributes)?, sensors)?;
-                let result = self.run(&self.single, points.py(), cloud)?;
+                let result = self.run(&self.single, py, cloud, observe)?;
                 Ok(ReconstructionArrays(Either::F32(Arc::new(result))))
             }
             Dtype::F64 => {
                 let cloud = with_sensors(cloud(points, normals, attributes)?, sensors)?;
-                let result = self.run(&self.double, points.py(), cloud)?;
+                let result = self.run(&self.double, py, cloud, observe)?;
                 Ok(ReconstructionArrays(Either::F64(Arc::new(result))))
             }
         }
@@ -85,21 +92,26 @@ impl Plan {
         place: &Mutex<Option<isograd_backend::Plan<T>>>,
         py: Python<'_>,
         cloud: PointCloud<T>,
+        observe: impl FnMut(Stage) -> PyResult<()>,
     ) -> PyResult<Reconstruction<T>> {
         let idle = lock(place).take();
         let settings = self.settings.clone();
-        let (plan, result) = background::run(py, move |stop| {
+        let work = move |stop: &Stop, report: &(dyn Fn(Stage) + Sync)| {
             let mut plan = match idle {
                 Some(plan) => plan,
                 None => backend::plan(&settings)?,
             };
-            let mut observer = |_| match stop.is_requested() {
+            let mut observer = |stage| match stop.is_requested() {
                 true => ControlFlow::Break(()),
-                false => ControlFlow::Continue(()),
+                false => {
+                    report(stage);
+                    ControlFlow::Continue(())
+                }
             };
             let result = plan.make(&cloud, &mut observer);
             Ok::<_, Failure>((plan, result.map(|result| Reconstruction { cloud, result })))
-        })??;
+        };
+        let (plan, result) = background::run_with_messages(py, work, observe)??;
         self.store(place, plan);
         Ok(result.map_err(Failure::from)?)
     }

@@ -1,5 +1,6 @@
 //! A reconstruction, its arrays and its pullback.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use isograd::distance::extend::{self, Region};
@@ -12,7 +13,8 @@ use pyo3::types::PyDict;
 use crate::arrays::{self, Either, Number};
 use crate::backend::Failure;
 use crate::background;
-use crate::errors::value;
+use crate::errors::{file, value};
+use crate::plan::AttributeArray;
 
 /// A cloud and its reconstruction.
 pub struct Reconstruction<T: Number> {
@@ -54,6 +56,11 @@ impl ReconstructionArrays {
         each!(&self.0, this => array(py, this, name))
     }
 
+    /// Points, normals, sensors and attributes of the cloud, as `Plan.reconstruct` takes them.
+    fn inputs<'py>(&self, py: Python<'py>) -> PyResult<Inputs<'py>> {
+        each!(&self.0, this => inputs(py, &this.cloud))
+    }
+
     /// The iso-value of the surface.
     fn iso_value(&self) -> PyResult<f64> {
         Ok(each!(&self.0, this => Real::f64(failure(this.result.view().iso_value())?)))
@@ -78,6 +85,22 @@ impl ReconstructionArrays {
                 serde_json::to_string(&report).map_err(|e| Failure::Value(e.to_string()))
             })?;
             Ok(text?)
+        })
+    }
+
+    /// Attributes of the cloud: name and `(N, components)` values.
+    fn attributes<'py>(&self, py: Python<'py>) -> PyResult<Vec<(String, Bound<'py, PyAny>)>> {
+        each!(&self.0, this => arrays::attributes(py, &this.cloud))
+    }
+
+    /// Writes slices of φ and the spread of `|∇φ|` as PNG, as the command line does.
+    fn write_slices(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        each!(&self.0, this => {
+            let this = this.clone();
+            let written = background::run(py, move |_| {
+                Ok::<_, Failure>(isograd_cli::write_slices(&path, this.result.view().sdf()?))
+            })?;
+            written?.map_err(file)
         })
     }
 
@@ -136,6 +159,29 @@ impl<T: Number> Extended<T> {
     }
 }
 
+/// Points, normals, sensors and attributes: name, components, values.
+type Inputs<'py> = (
+    Bound<'py, PyAny>,
+    Option<Bound<'py, PyAny>>,
+    Option<Bound<'py, PyAny>>,
+    Vec<AttributeArray<'py>>,
+);
+
+fn inputs<'py, T: Number>(py: Python<'py>, cloud: &PointCloud<T>) -> PyResult<Inputs<'py>> {
+    let vectors = |values| arrays::from_vectors(py, values);
+    let attributes = cloud.attributes().iter().map(|of| {
+        let shape = [cloud.len(), of.components];
+        let values = arrays::shaped(py, of.values.clone(), shape)?;
+        Ok((of.name.clone(), of.components, values))
+    });
+    Ok((
+        vectors(cloud.points()),
+        cloud.normals().map(vectors),
+        cloud.sensors().map(|sensors| vectors(sensors.positions())),
+        attributes.collect::<PyResult<_>>()?,
+    ))
+}
+
 /// Converts the error.
 fn failure<V>(result: Result<V, isograd_backend::Error>) -> Result<V, Failure> {
     Ok(result?)
@@ -165,6 +211,7 @@ fn array<'py, T: Number>(
             py,
             failure(result.closest_mesh())?.faces(),
         )),
+        "points" => Ok(arrays::from_vectors(py, this.cloud.points())),
         "normals" => Ok(arrays::from_vectors(py, failure(result.normals())?)),
         "confidence" => arrays::shaped(py, failure(result.confidence())?.to_vec(), [count]),
         "areas" => arrays::shaped(py, failure(result.areas())?.to_vec(), [count]),

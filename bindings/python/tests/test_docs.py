@@ -1,16 +1,21 @@
 """Every block of Python code on the pages runs. The blocks of a page run in their order and share their names; a
-block that needs a library beyond NumPy has a copy of these, so that the others never need that library."""
+block that needs a library beyond NumPy has a copy of these, so that the others never need that library. So does the code
+in the table of features."""
 
 import ast
 import importlib.util
 import pathlib
 import re
+import sys
 
+import numpy
 import pytest
 
+import isograd
+
 ROOT = pathlib.Path(__file__).parents[3]
-PAGES = ["README.md", "docs/python.md", "docs/differentiable.md", "docs/coming-from.md", "docs/flow.md"]
-OPTIONAL = {"jax", "matplotlib", "open3d", "optax", "pyvista", "rtree", "torch", "trimesh", "warp"}
+PAGES = ["README.md", "docs/python.md", "docs/differentiable.md", "docs/coming-from.md", "docs/flow.md", "docs/datasets.md"]
+OPTIONAL = {"jax", "matplotlib", "open3d", "optax", "pyvista", "rtree", "torch", "trimesh", "warp", "xarray"}
 
 
 class Page:
@@ -77,3 +82,37 @@ def test_a_block_of_a_page_runs(path, index, monkeypatch):
             line = page.blocks[index][0]
             pytest.skip(f"SKIPPED: {path}, line {line}: {library} is not installed")
     page.run(index)
+
+
+def features():
+    """Name and code of each line of the table of features."""
+    text = (ROOT / "docs/coming-from.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (.+?) \| .*\| (.+) \|$", text.partition("## What is there")[2], re.MULTILINE)
+    return [(name, code) for name, cell in rows for code in re.findall("`([^`]+)`", cell)]
+
+
+@pytest.fixture(scope="module")
+def sphere():
+    """The names that the table of features uses."""
+    points = isograd.sample("sphere", 1000, radius=1.0).points
+    result = isograd.reconstruct(points, resolution=24)
+    names = {"isograd": isograd, "numpy": numpy, "points": points, "result": result, "mesh": result.mesh}
+    return names | {"grid": result.grid, "queries": points[:5] / 2, "values": points}
+
+
+@pytest.mark.parametrize(("name", "code"), features())
+def test_a_feature_of_the_table_is_there(name, code, sphere, request, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    sphere["result"].cloud.save("cloud.ply")
+    if "plot(" in code and "mesh" in code:
+        request.getfixturevalue("pyvista")
+    imported = {}
+    for module in re.findall(r"\b(isograd\.[a-z]+|scipy\.[a-z]+|jax|torch)\b", code):
+        library, _, part = module.partition(".")
+        if library != "isograd" or not hasattr(isograd, part):
+            pytest.importorskip(module, reason=f"SKIPPED: {module} can't be imported", exc_type=ImportError)
+            imported[library] = sys.modules[library]
+    try:
+        exec(code, sphere | imported)
+    except ImportError as error:
+        pytest.skip(f"SKIPPED: {name}: {error}")

@@ -8,6 +8,8 @@ import sys
 
 import pytest
 
+# Data sets are small here.
+SMALL = ["--clouds", "6", "--resolution", "24", "--points", "800", "--workers", "2"]
 EXAMPLES = sorted((pathlib.Path(__file__).parents[1] / "examples").glob("*.py"))
 
 
@@ -31,4 +33,5 @@ def test_an_example_runs(path):
     for name in sorted(imported(path)):
         if importlib.util.find_spec(name) is None:
             pytest.skip(f"SKIPPED: {name} is not installed")
-    subprocess.run([sys.executable, path], check=True, timeout=None)
+    arguments = SMALL if path.name.startswith("dataset_") else []
+    subprocess.run([sys.executable, path, *arguments], check=True, timeout=None)

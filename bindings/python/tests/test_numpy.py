@@ -240,7 +240,7 @@ def resolution_of(points):
         (SPHERE.astype(complex), TypeError, "complex"),
         (np.ones((9, 3), bool), TypeError, "bool"),
         (SPHERE.astype(object), TypeError, "object"),
-        ("points", TypeError, "points"),
+        ("points", (OSError, ValueError), "points"),
         (None, TypeError, "points"),
         (np.ma.masked_array(SPHERE, mask=SPHERE > 0.9), TypeError, "masked"),
         ([[1, 2, 3], [4, 5]], TypeError, "points"),

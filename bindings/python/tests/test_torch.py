@@ -155,7 +155,7 @@ def test_a_second_derivative_is_refused_not_zero():
         (lambda p: p.long(), TypeError, "points is of torch.int64; give float32 or float64"),
         (lambda p: p.to(torch.complex128), TypeError, "torch.complex128"),
         (lambda p: p[:, :2], ValueError, r"\(60, 2\) and must have \(N, 3\)"),
-        (lambda p: p[None], ValueError, r"\(1, 60, 3\)"),
+        (lambda p: p[None, None], ValueError, r"\(1, 1, 60, 3\)"),
         (lambda p: p[:0], ValueError, "point"),
         (lambda p: p * torch.nan, ValueError, "point"),
     ],

@@ -147,6 +147,23 @@ impl<'a, T: Number> View<'a, T> {
         }
     }
 
+    /// An attribute at the vertices of [`mesh`](Self::mesh), row by row: see [`Reconstruction::vertex_values`].
+    ///
+    /// # Errors
+    /// What the stage or the device says.
+    pub fn vertex_values(self, attribute: &Attribute<T>) -> Result<Vec<T>, Error> {
+        match self.0 {
+            Of::Cpu(of) => Ok(of.vertex_values(attribute)?),
+            #[cfg(feature = "gpu")]
+            Of::Device(of, _) => {
+                // Devices make no other mesh than that of φ; the narrowest band has the fewest cells.
+                let band = isograd::Real::f64(self.grid().spacing());
+                let (extension, _) = of.extend_with_residual(attribute, band)?;
+                Ok(extension.vertices)
+            }
+        }
+    }
+
     /// Cotangents of the inputs: see [`Reconstruction::pullback`].
     ///
     /// # Errors

@@ -6,28 +6,41 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use isograd::Backend;
 
+mod clean;
+mod field;
 mod fit;
+mod generate;
 mod gradcheck;
 mod orient;
 mod pipeline;
 mod reading;
+#[cfg(test)]
+mod tests;
 
+pub use clean::Clean;
+pub use field::{Isosurface, Sdf};
 pub use fit::{Decay, Fit, Method, TargetKind};
+pub use generate::{Completions, Man};
 pub use gradcheck::Gradcheck;
 pub use orient::{OrientArgs, OrientCloud};
-pub use pipeline::{GridArgs, MethodArgs};
+pub use pipeline::{CellArgs, GridArgs, MethodArgs};
 pub use reading::ReadingArgs;
 
-/// Point cloud in, exact signed distance field out.
+/// Reconstructs exact signed distance fields, closed meshes and oriented normals from point clouds. Every result ends with a
+/// verdict, good, check or bad, that says whether it can be trusted.
 #[derive(Debug, Parser)]
-#[command(name = "isograd", version, about, after_help = STATUS)]
+#[command(name = "isograd", version, after_help = format!("{EXAMPLE}\n\n{STATUS}"))]
 pub struct Cli {
     /// Command.
     #[command(subcommand)]
     pub command: Command,
 }
 
-const STATUS: &str = "Exit status: 0 done, 1 the work failed, 2 the command line is wrong, \
+const EXAMPLE: &str =
+    "Example, which writes field, mesh, points and report of a cloud into the folder out:
+  isograd reconstruct cloud.ply -o out";
+
+const STATUS: &str = "Exit status: 0 done, 1 the work failed (of several clouds: at least one), 2 the command line is wrong, \
 3 the result is bad (reconstruct --strict), 130 stopped by Ctrl-C, 143 by SIGTERM, 129 by SIGHUP, 141 if the reader of the output went away.";
 
 /// Commands.
@@ -39,6 +52,12 @@ pub enum Command {
     Orient(Box<OrientCloud>),
     /// Sample a parametric shape as a point cloud
     Sample(Sample),
+    /// Remove duplicates and outliers of a point cloud, and thin it
+    Clean(Clean),
+    /// Compute the signed distance field of a mesh
+    Sdf(Box<Sdf>),
+    /// Extract the surface of a field as a mesh
+    Isosurface(Isosurface),
     /// Compute signed distances of points to a mesh or in a field
     Query(Query),
     /// Optimize a shape, or points, until their field matches a target
@@ -47,27 +66,34 @@ pub enum Command {
     Gradcheck(Box<Gradcheck>),
     /// Describe the content of a file
     Info(Info),
+    /// Print the completions of a shell
+    Completions(Completions),
+    /// Write manual pages
+    Man(Man),
 }
 
 /// Arguments of `reconstruct`.
 #[derive(Debug, Args)]
 #[command(after_help = STATUS)]
 pub struct Reconstruct {
-    /// The cloud: PLY, XYZ, CSV, TXT, OBJ, STL, NPY, NPZ or VTP; `-` is standard input (PLY or text)
-    pub cloud: PathBuf,
-    /// Write mesh.ply, sdf.vti, points.ply, report.json and slices.png into DIR
+    /// The cloud: PLY, PCD, LAS, PTS, XYZ, XYZN, XYZRGB, CSV, TXT, OBJ, OFF, STL, GLB, NPY, NPZ or VTP; `-` is standard input
+    /// (PLY or text). More than one, or the folder that they are in, are reconstructed one after another; outputs of each
+    /// go to DIR/NAME, where NAME is its name without extension, or to where `{}` in the name of an output stands for NAME
+    #[arg(value_name = "CLOUD", required = true, num_args = 1..)]
+    pub clouds: Vec<PathBuf>,
+    /// Write mesh.ply, sdf.vti, points.ply, report.json and slices.png into DIR; of several clouds into DIR/NAME
     #[arg(short, long, value_name = "DIR", help_heading = "Outputs")]
     pub output: Option<PathBuf>,
-    /// The surface: .ply, .obj, .stl or .vtp
+    /// The surface: .ply, .obj, .stl, .off, .glb or .vtp; `-` is standard output (PLY)
     #[arg(long, value_name = "FILE", help_heading = "Outputs")]
     pub mesh: Option<PathBuf>,
-    /// The signed distance field: .vti or .npz
+    /// The signed distance field: .vti or .npz; `-` is standard output (VTI)
     #[arg(long, value_name = "FILE", help_heading = "Outputs")]
     pub sdf: Option<PathBuf>,
-    /// The points with normals and confidence: .ply or .npz
+    /// The points with normals and confidence: .ply or .npz; `-` is standard output (PLY)
     #[arg(long, value_name = "FILE", help_heading = "Outputs")]
     pub points: Option<PathBuf>,
-    /// Settings, measurements, times and warnings: .json
+    /// Settings, measurements, times and warnings: .json; `-` is standard output
     #[arg(long, value_name = "FILE", help_heading = "Outputs")]
     pub report: Option<PathBuf>,
     /// Three slices of the field and histograms of |∇φ|: .png
@@ -94,6 +120,14 @@ pub struct Reconstruct {
     /// Arguments of the input.
     #[command(flatten)]
     pub reading: ReadingArgs,
+
+    /// The clouds are steps in time: all have one grid, round all of them, and from the second on each normal keeps its
+    /// side (--orient previous), for which the points must be as many, in the same order
+    #[arg(long, help_heading = "Several clouds")]
+    pub sequence: bool,
+    /// Leave out a cloud if all its outputs exist and none is older than the cloud: to go on after an interruption
+    #[arg(long, help_heading = "Several clouds")]
+    pub skip_existing: bool,
 
     /// Exit with status 3 if the verdict is bad; all outputs are written
     #[arg(long, help_heading = "Running")]
@@ -124,7 +158,7 @@ pub struct Sample {
     #[arg(short = 'n', value_name = "N", required_unless_present = "list",
         value_parser = clap::value_parser!(u32).range(1..))]
     pub number: Option<u32>,
-    /// Output: .ply, .npz, .xyz, .csv or .txt
+    /// Output: .ply, .npz, .pcd, .xyz, .csv or .txt; `-` is standard output (PLY)
     #[arg(short, long, value_name = "CLOUD", required_unless_present = "list")]
     pub output: Option<PathBuf>,
     /// Value of a parameter of the shape
@@ -152,13 +186,13 @@ pub struct Sample {
 #[derive(Debug, Args)]
 #[command(after_help = STATUS)]
 pub struct Query {
-    /// A mesh (.ply, .obj, .stl, .vtp) or a field (.vti, .npz)
+    /// A mesh (.ply, .obj, .stl, .off, .glb, .vtp) or a field (.vti, .npz)
     #[arg(value_name = "MESH_OR_SDF")]
     pub source: PathBuf,
     /// The points; `-` is standard input
     #[arg(long, value_name = "POINTS")]
     pub at: PathBuf,
-    /// Output, the points with the results: .ply, .npz, .xyz, .csv or .txt
+    /// Output, the points with the results: .ply, .npz, .pcd, .xyz, .csv or .txt; `-` is standard output (PLY)
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
     /// Arguments of the input; columns are those of the points.
@@ -264,89 +298,4 @@ fn not_negative(text: &str) -> Result<f64, String> {
 fn name_and_value(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.split_once('=').ok_or("it must be NAME=VALUE")?;
     Ok((name.trim().to_string(), finite(value.trim())?))
-}
-
-#[cfg(test)]
-mod tests {
-    use clap::CommandFactory;
-
-    use super::*;
-
-    #[test]
-    fn the_definition_is_consistent() {
-        Cli::command().debug_assert();
-    }
-
-    #[test]
-    fn negative_bounds_and_parameters_are_values_not_flags() {
-        let parse = |line: &str| Cli::try_parse_from(line.split(' '));
-        let cli = parse("isograd reconstruct a.ply --bounds -1 -1 -1 1 1 1 --radius 0.2");
-        let Ok(Cli {
-            command: Command::Reconstruct(args),
-        }) = cli
-        else {
-            panic!("{cli:?}");
-        };
-        assert_eq!(
-            args.grid.bounds,
-            Some(vec![-1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
-        );
-        assert_eq!(
-            args.method.normals.radius,
-            isograd::neighbors::Radius::Fixed(0.2)
-        );
-        let cli = parse("isograd orient a.ply -o b.ply --sensor -1,0,2e1 --sensor 3,-4,5");
-        let Ok(Cli {
-            command: Command::Orient(args),
-        }) = cli
-        else {
-            panic!("{cli:?}");
-        };
-        assert_eq!(args.normals.sensor, [[-1.0, 0.0, 20.0], [3.0, -4.0, 5.0]]);
-        let cli = parse("isograd sample fish -n 5 -o a.ply --param time=-0.5");
-        let Ok(Cli {
-            command: Command::Sample(args),
-        }) = cli
-        else {
-            panic!("{cli:?}");
-        };
-        assert_eq!(args.parameters, [("time".to_string(), -0.5)]);
-    }
-
-    #[test]
-    fn values_that_make_no_sense_are_refused() {
-        for line in [
-            "isograd",
-            "isograd reconstruct",
-            "isograd reconstruct a.ply --resolution 0",
-            "isograd reconstruct a.ply --resolution 64 --spacing 0.1",
-            "isograd reconstruct a.ply --spacing -1",
-            "isograd reconstruct a.ply --radius wide",
-            "isograd reconstruct a.ply --smoothing -1",
-            "isograd reconstruct a.ply --screening -0.5",
-            "isograd reconstruct a.ply --level global",
-            "isograd reconstruct a.ply --padding nan",
-            "isograd reconstruct a.ply --bounds 0 0 0 1 1",
-            "isograd reconstruct a.ply --orient guess",
-            "isograd reconstruct a.ply --threads 0",
-            "isograd reconstruct a.ply --backend gpu",
-            "isograd reconstruct a.ply --backend cuda:x",
-            "isograd reconstruct a.ply -q -v",
-            "isograd sample fish -o a.ply",
-            "isograd sample fish -n 5 -o a.ply --param time",
-            "isograd sample fish -n 5 -o a.ply --density w:3",
-            "isograd orient a.ply",
-            "isograd orient a.ply -o b.ply --sensor 1,2",
-            "isograd orient a.ply -o b.ply --sensor 1,2,inf",
-            "isograd orient a.ply -o b.ply --parity-gamma 0",
-            "isograd query a.ply -o b.ply",
-            "isograd gradcheck a.ply --step 0",
-            "isograd info a.csv --columns x,y",
-            "isograd info a.csv --columns x,,z",
-            "isograd info a.csv --max-memory many",
-            "isograd info a.csv --max-memory 0",
-        ] {
-            assert!(Cli::try_parse_from(line.split(' ')).is_err(), "{line}");
-        }
-    }
 }

@@ -44,6 +44,26 @@ pub enum Error {
         /// The file.
         file: String,
     },
+    /// Some of several clouds failed; their errors were printed.
+    #[error(
+        "{failed} of {clouds} clouds failed, as said above; the outputs of the others were written"
+    )]
+    Clouds {
+        /// Number of clouds that failed.
+        failed: usize,
+        /// Number of clouds.
+        clouds: usize,
+    },
+    /// The verdicts of some of several clouds are bad, with `--strict`.
+    #[error(
+        "the results of {bad} of {clouds} clouds are bad, and --strict was given; all outputs were written"
+    )]
+    BadClouds {
+        /// Number of clouds with bad results.
+        bad: usize,
+        /// Number of clouds.
+        clouds: usize,
+    },
     /// Unknown shape, or invalid parameters.
     #[error(transparent)]
     Shape(#[from] ShapeError),
@@ -107,11 +127,20 @@ impl Error {
             Self::Usage(_) | Self::Shape(_) => 2,
             Self::Fit(Fit::NoParameters | Fit::Whole { .. } | Fit::Option { .. }) => 2,
             Self::Fit(Fit::Shape(_) | Fit::NoStart { .. }) => 2,
-            Self::Bad { .. } => 3,
+            Self::Bad { .. } | Self::BadClouds { .. } => 3,
             Self::Stopped { .. } => crate::interrupt::status(),
             _ if self.is_broken_pipe() => BROKEN_PIPE,
             _ => 1,
         }
+    }
+
+    /// Whether other clouds would fail in the same way.
+    pub fn is_of_program(&self) -> bool {
+        let of_program = matches!(
+            self,
+            Self::NotBuilt { .. } | Self::Backend { .. } | Self::Stdout(_) | Self::Usage(_)
+        );
+        of_program || self.is_broken_pipe()
     }
 
     /// Whether nobody reads the output any more, which needs no message.

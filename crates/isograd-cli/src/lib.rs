@@ -3,28 +3,39 @@
 
 mod args;
 mod backend;
+mod batch;
+mod clean;
 mod closed;
 mod error;
 mod fit;
+mod generate;
 mod gradcheck;
 mod info;
+mod inputs;
 mod interrupt;
+mod isosurface;
 mod memory;
 mod orient;
 mod outputs;
 mod plot;
+mod prediction;
 mod progress;
 mod query;
 mod reconstruct;
 mod report;
 mod resample;
 mod sample;
+mod sdf;
+mod sequence;
 mod streams;
+mod surface;
 mod threads;
 
 use std::ffi::OsString;
+use std::path::Path;
 
 use clap::Parser;
+use isograd::{Field, Real};
 use isograd_io::printable;
 
 use args::{Cli, Command};
@@ -68,16 +79,29 @@ fn report(error: Error) -> u8 {
     error.status()
 }
 
+/// Writes the picture `slices.png` of a field: three slices, and the spread of `|∇φ|`.
+///
+/// # Errors
+/// A failed write, which leaves the file at `path` unchanged.
+pub fn write_slices<T: Real>(path: &Path, field: &Field<T>) -> Result<(), isograd_io::Error> {
+    plot::write(path, &plot::slices(field))
+}
+
 fn dispatch(command: &Command) -> Result<(), Error> {
     threads::start(running(command).and_then(|running| running.threads))?;
     match command {
         Command::Reconstruct(args) => reconstruct::run(args),
         Command::Orient(args) => orient::run(args),
         Command::Sample(args) => sample::run(args),
+        Command::Clean(args) => clean::run(args),
+        Command::Sdf(args) => sdf::run(args),
+        Command::Isosurface(args) => isosurface::run(args),
         Command::Query(args) => query::run(args),
         Command::Fit(args) => fit::run(args),
         Command::Gradcheck(args) => gradcheck::run(args),
         Command::Info(args) => info::run(args),
+        Command::Completions(args) => generate::completions(args),
+        Command::Man(args) => generate::man(args),
     }
 }
 
@@ -86,9 +110,12 @@ fn running(command: &Command) -> Option<&args::Running> {
         Command::Reconstruct(args) => Some(&args.running),
         Command::Orient(args) => Some(&args.running),
         Command::Sample(args) => Some(&args.running),
+        Command::Clean(args) => Some(&args.running),
+        Command::Sdf(args) => Some(&args.running),
+        Command::Isosurface(args) => Some(&args.running),
         Command::Query(args) => Some(&args.running),
         Command::Fit(args) => Some(&args.running),
         Command::Gradcheck(args) => Some(&args.running),
-        Command::Info(_) => None,
+        Command::Info(_) | Command::Completions(_) | Command::Man(_) => None,
     }
 }

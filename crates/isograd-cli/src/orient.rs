@@ -10,7 +10,7 @@ use crate::args;
 use crate::error::Error;
 use crate::outputs::{check_extension, check_not_input, write_report};
 use crate::progress::Progress;
-use crate::report::{Report, Times};
+use crate::report::{Normals, Report, Times};
 
 /// Runs the command in the number type of the file, or in double precision where single does not hold all its numbers.
 ///
@@ -51,7 +51,7 @@ fn check(args: &args::OrientCloud) -> Result<(), Error> {
 }
 
 /// Whether single precision holds every number of a file: a time stamp may have more digits than a coordinate.
-fn is_single(geometry: &Geometry) -> bool {
+pub(crate) fn is_single(geometry: &Geometry) -> bool {
     let fits = |&value: &f64| f64::from(value as f32) == value || value.is_nan();
     let mut attributes = geometry.attributes.iter();
     geometry.dtype == Dtype::F32 && attributes.all(|attribute| attribute.values.iter().all(fits))
@@ -110,7 +110,9 @@ impl Job<'_> {
                 total: self.start.elapsed().as_secs_f64(),
             };
             let report = JsonReport::samples(&report);
-            write_report(path, &Report::new(&self.args.cloud, report, times))?;
+            let report = Report::new(&self.args.cloud, report, times);
+            let normals = Normals::of(geometry, &self.args.normals);
+            write_report(path, &report.with_normals(normals))?;
             progress.print(&format!("wrote {}", path.display()));
         }
         progress.finish();

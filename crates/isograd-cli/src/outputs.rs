@@ -3,11 +3,13 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use isograd_io::atomic::is_standard_output;
 use isograd_io::{FIELD_EXTENSIONS, MESH_EXTENSIONS, check_output};
 use serde::Serialize;
 
 use crate::args;
 use crate::error::Error;
+use crate::streams::reserve_stdout;
 
 /// Extensions of the points file.
 const POINTS_EXTENSIONS: &[&str] = &["ply", "npz"];
@@ -31,28 +33,61 @@ pub struct Outputs {
 }
 
 impl Outputs {
-    /// The outputs of the command line.
+    /// The outputs for one of the clouds: `{}` in their names stands for `stem`. Those of `several` clouds must hold it, or
+    /// are in a subfolder of that name.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a wrong extension, a repeated name, or the name of the input; [`Error::File`] for a missing
-    /// folder.
-    pub fn new(args: &args::Reconstruct) -> Result<Self, Error> {
+    /// [`Error::Usage`] for no output at all, a wrong extension, a repeated name, or the name of the input;
+    /// [`Error::File`] for a missing folder.
+    pub fn new(
+        args: &args::Reconstruct,
+        input: &Path,
+        stem: &str,
+        several: bool,
+    ) -> Result<Self, Error> {
+        let folder = folder_for(args, stem, several)?;
+        let file = |given: &Option<PathBuf>| {
+            let file = given.as_deref().map(|path| file_for(path, stem, several));
+            file.transpose()
+        };
         let pick = |given: &Option<PathBuf>, name: &str| {
-            let in_folder = || args.output.as_ref().map(|folder| folder.join(name));
-            given.clone().or_else(in_folder)
+            let in_folder = || folder.as_ref().map(|folder| folder.join(name));
+            Ok::<_, Error>(file(given)?.or_else(in_folder))
         };
         let outputs = Self {
-            mesh: pick(&args.mesh, "mesh.ply"),
-            sdf: pick(&args.sdf, "sdf.vti"),
-            points: pick(&args.points, "points.ply"),
-            report: pick(&args.report, "report.json"),
-            plot: pick(&args.plot, "slices.png"),
-            picture: args.picture.clone(),
-            folder: args.output.clone(),
+            mesh: pick(&args.mesh, "mesh.ply")?,
+            sdf: pick(&args.sdf, "sdf.vti")?,
+            points: pick(&args.points, "points.ply")?,
+            report: pick(&args.report, "report.json")?,
+            plot: pick(&args.plot, "slices.png")?,
+            picture: file(&args.picture)?,
+            folder,
         };
-        outputs.check_names(&args.cloud)?;
+        if outputs.all().next().is_none() {
+            return Err(Error::Usage(
+                "no output is named; give -o DIR for all files, or a FILE to --mesh, --sdf, --points, --report, --plot or --picture".into(),
+            ));
+        }
+        outputs.check_names(input)?;
         outputs.check_folders()?;
         Ok(outputs)
+    }
+
+    /// The files.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        self.all().map(|(path, _)| path)
+    }
+
+    /// Whether all files exist, and none is older than the input. Files are written whole or not at all.
+    pub fn are_up_to_date(&self, input: &Path) -> bool {
+        let modified = |path: &Path| {
+            std::fs::metadata(path)
+                .and_then(|file| file.modified())
+                .ok()
+        };
+        let begin = modified(input);
+        self.files()
+            .all(|path| path.is_file() && modified(path) >= begin)
     }
 
     fn all(&self) -> impl Iterator<Item = (&Path, &'static [&'static str])> {
@@ -97,6 +132,14 @@ impl Outputs {
                 folder.display()
             )));
         }
+        // That of several clouds is to hold a folder for each.
+        let outer = self.folder.as_deref().and_then(Path::parent);
+        if let Some(outer) = outer.filter(|outer| outer.exists() && !outer.is_dir()) {
+            return Err(Error::Usage(format!(
+                "{} is a file; -o takes a folder",
+                outer.display()
+            )));
+        }
         let missing = self.folder.as_ref().filter(|folder| !folder.exists());
         for (path, endings) in self.all() {
             let is_created = missing.is_some_and(|folder| path.parent() == Some(folder));
@@ -109,20 +152,25 @@ impl Outputs {
 
     /// Creates the folder of `-o`.
     pub fn create_folder(&self) -> Result<(), Error> {
-        let Some(folder) = &self.folder else {
-            return Ok(());
-        };
-        std::fs::create_dir_all(folder).map_err(|source| {
-            Error::File(isograd_io::Error::Write {
-                file: folder.display().to_string(),
-                source,
-            })
-        })
+        self.folder.as_deref().map_or(Ok(()), create_folder)
     }
 }
 
-/// Checks the extension of a name.
+/// Creates a folder, and those that it is in, unless they exist.
+pub fn create_folder(folder: &Path) -> Result<(), Error> {
+    std::fs::create_dir_all(folder).map_err(|source| {
+        Error::File(isograd_io::Error::Write {
+            file: folder.display().to_string(),
+            source,
+        })
+    })
+}
+
+/// Checks the extension of a name; `-` is standard output, which must not be a terminal unless the file is JSON.
 pub fn check_extension(path: &Path, endings: &[&str]) -> Result<(), Error> {
+    if is_standard_output(path) {
+        return reserve_stdout(path, endings == ["json"]);
+    }
     let known = |e: &str| endings.iter().any(|ending| e.eq_ignore_ascii_case(ending));
     if path.extension().and_then(|e| e.to_str()).is_some_and(known) {
         return Ok(());
@@ -136,7 +184,8 @@ pub fn check_extension(path: &Path, endings: &[&str]) -> Result<(), Error> {
 
 /// Checks that an output is not the input, under whatever name.
 pub fn check_not_input(path: &Path, input: &Path) -> Result<(), Error> {
-    if canonical(path) != canonical(input) && !is_same_file(path, input) {
+    if is_standard_output(path) || canonical(path) != canonical(input) && !is_same_file(path, input)
+    {
         return Ok(());
     }
     Err(Error::Usage(format!(
@@ -145,8 +194,47 @@ pub fn check_not_input(path: &Path, input: &Path) -> Result<(), Error> {
     )))
 }
 
+/// The folder of `-o` for the cloud `stem`.
+fn folder_for(
+    args: &args::Reconstruct,
+    stem: &str,
+    several: bool,
+) -> Result<Option<PathBuf>, Error> {
+    let Some(folder) = &args.output else {
+        return Ok(None);
+    };
+    if is_standard_output(folder) {
+        return Err(Error::Usage(
+            "-o takes a folder; standard output takes one file: --mesh -, --sdf -, --points - or --report -".into(),
+        ));
+    }
+    Ok(Some(match named(folder, stem) {
+        Some(folder) => folder,
+        None if several => folder.join(stem),
+        None => folder.clone(),
+    }))
+}
+
+/// The path of an output for the cloud `stem`.
+fn file_for(path: &Path, stem: &str, several: bool) -> Result<PathBuf, Error> {
+    match named(path, stem) {
+        Some(path) => Ok(path),
+        None if several => Err(Error::Usage(format!(
+            "{} would be written once for every cloud; write {{}} into its name, which stands for the name of the cloud, or give -o DIR",
+            path.display()
+        ))),
+        None => Ok(path.into()),
+    }
+}
+
+/// A path with `stem` for every `{}`; `None` without any.
+fn named(path: &Path, stem: &str) -> Option<PathBuf> {
+    let text = path.to_str().filter(|text| text.contains("{}"))?;
+    Some(text.replace("{}", stem).into())
+}
+
 /// The canonical path of a file, which may not exist yet.
-fn canonical(path: &Path) -> PathBuf {
+pub fn canonical(path: &Path) -> PathBuf {
     isograd_io::atomic::resolve(path).unwrap_or_else(|_| path.to_path_buf())
 }
 

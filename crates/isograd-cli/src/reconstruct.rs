@@ -4,160 +4,239 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
+use isograd::orient::Method;
 use isograd::{Field, Grid, JsonReport, Mesh, PointCloud, Real, Stage, Verdict};
 use isograd_backend::{Number, Plan, View};
 use isograd_io::{Attributes, Geometry};
 
 use crate::args::{self, Precision};
-use crate::backend;
 use crate::error::{Error, file_name};
+use crate::inputs::{Inputs, stem};
 use crate::outputs::{Outputs, write_report};
-use crate::plot;
 use crate::progress::Progress;
-use crate::report::{Report, Times};
-use crate::{orient, resample};
+use crate::report::{Normals, Report, Times};
+use crate::{backend, batch, orient, plot, prediction, resample, surface};
 
 /// Rounding of the coordinates to single precision, in cells, above which the computation uses double precision.
 const TOLERATED_ROUNDING: f64 = 1e-2;
+
+/// Parts of the work on a cloud: reading, the stages, writing.
+pub const PARTS: usize = 2 + Stage::ALL.len();
 
 /// Runs the command.
 ///
 /// # Errors
 /// See [`Error`]; then no file has been left incomplete.
 pub fn run(args: &args::Reconstruct) -> Result<(), Error> {
-    let start = Instant::now();
-    let outputs = Outputs::new(args)?;
     args.method.normals.check()?;
-    // Reading, the stages, writing.
-    let mut progress = Progress::new(2 + Stage::ALL.len(), args.running);
-    progress.step("read");
-    let geometry = read(args, &outputs)?;
-    progress.detail(&format!(
-        "{} points, stored as {}",
-        geometry.points.len(),
-        geometry.dtype.name()
-    ));
-    let read_seconds = start.elapsed().as_secs_f64();
-    let job = Job {
-        args,
-        outputs: &outputs,
-        start,
-        read_seconds,
+    let cloud = match Inputs::new(args)? {
+        Inputs::One(cloud) => cloud,
+        Inputs::Several(clouds) => return batch::run(args, &clouds),
     };
-    match job.needs_double(&geometry)? {
-        Some(note) => {
-            progress.warn(&note);
-            job.run::<f64>(&geometry, &mut progress, Some(note))
-        }
-        None if args.precision == Precision::F64 => job.run::<f64>(&geometry, &mut progress, None),
-        None => job.run::<f32>(&geometry, &mut progress, None),
+    let outputs = Outputs::new(args, &cloud, &stem(&cloud), false)?;
+    let mut progress = Progress::new(PARTS, args.running);
+    if args.skip_existing && outputs.are_up_to_date(&cloud) {
+        progress.print(&format!(
+            "{} was skipped: its outputs exist",
+            cloud.display()
+        ));
+        return Ok(());
+    }
+    let verdict = Job::read(args, &cloud, &outputs, &mut progress)?.alone(&mut progress)?;
+    match verdict {
+        Some(Verdict::Bad) if args.strict => Err(Error::Bad {
+            file: file_name(&cloud),
+        }),
+        _ => Ok(()),
     }
 }
 
-fn read(args: &args::Reconstruct, outputs: &Outputs) -> Result<Geometry, Error> {
-    // Only the file of the points has attributes.
-    let attributes = match outputs.points {
-        Some(_) => Attributes::All,
-        None => Attributes::Sensors,
-    };
+/// Options of the reader of the clouds.
+pub fn read(
+    args: &args::Reconstruct,
+    cloud: &Path,
+    attributes: Attributes,
+) -> Result<Geometry, Error> {
     let options = args.reading.options(attributes);
     let Some(n) = args.sample else {
-        return Ok(options.read_geometry(&args.cloud)?);
+        return Ok(options.read_geometry(cloud)?);
     };
-    let mesh = options.read_mesh(&args.cloud)?;
+    let mesh = options.read_mesh(cloud)?;
     resample::resample(&mesh, n as usize).ok_or_else(|| {
         Error::File(isograd_io::Error::Format {
-            file: args.cloud.display().to_string(),
+            file: cloud.display().to_string(),
             problem: "its faces have no area; --sample can't be used".into(),
         })
     })
 }
 
+/// The note if single precision was requested and can't represent coordinates on a grid; then double is to be used.
+pub fn rounding(args: &args::Reconstruct, grid: &Grid<f64>) -> Option<String> {
+    let corners = grid.lower().into_iter().chain(grid.upper());
+    let largest = corners.fold(0.0f64, |m, x| m.max(x.abs()));
+    let cells = largest * f64::from(f32::EPSILON) / grid.spacing();
+    (args.precision == Precision::F32 && cells > TOLERATED_ROUNDING).then(|| {
+        format!(
+            "coordinates reach {largest:.3e} with cells of {:.3e}, which f32 rounds to {cells:.1e} cells; computed in f64",
+            grid.spacing()
+        )
+    })
+}
+
+/// A plan for a grid and a method of orientation; errors name the file `cloud`.
+pub fn plan<T: Number>(
+    args: &args::Reconstruct,
+    cloud: &Path,
+    grid: Grid<T>,
+    orient: Method,
+    progress: &Progress,
+) -> Result<Plan<T>, Error> {
+    progress.detail(&format!(
+        "grid {:?}, cells of {}",
+        grid.shape(),
+        grid.spacing()
+    ));
+    let options = args.method.options(args.grid.outliers).orient(orient);
+    let plan = Plan::new(args.backend, grid, options)
+        .map_err(|error| backend::plan_error(args.backend, error, cloud))?;
+    progress.detail(&format!("on {}", plan.name()));
+    if let Some(note) = plan.note() {
+        progress.warn(note);
+    }
+    Ok(plan)
+}
+
 /// Results of a reconstruction on any backend.
-struct Results<'a, T> {
+struct Results<'a, T: Number> {
+    view: View<'a, T>,
     sdf: &'a Field<T>,
     mesh: &'a Mesh<T>,
     normals: &'a [[T; 3]],
     confidence: &'a [T],
     report: &'a isograd::Report,
-    /// Name of the backend.
-    backend: &'a str,
 }
 
 impl<'a, T: Number> Results<'a, T> {
     /// Copies the results of a device.
     fn new(view: View<'a, T>) -> Result<Self, isograd_backend::Error> {
         Ok(Self {
+            view,
             sdf: view.sdf()?,
             mesh: view.mesh()?,
             normals: view.normals()?,
             confidence: view.confidence()?,
             report: view.report()?,
-            backend: view.backend(),
         })
     }
 }
 
-/// A reconstruction, independent of its number type.
-struct Job<'a> {
+/// The reconstruction of one cloud, independent of its number type.
+pub struct Job<'a> {
     args: &'a args::Reconstruct,
+    /// The file.
+    pub cloud: &'a Path,
     outputs: &'a Outputs,
+    geometry: Geometry,
     start: Instant,
     read_seconds: f64,
+    normals: Normals,
 }
 
-impl Job<'_> {
-    fn cloud<T: Real>(&self, geometry: &Geometry) -> Result<PointCloud<T>, Error> {
-        let cloud = geometry.cloud();
-        let cloud = cloud.and_then(|cloud| self.args.method.normals.with_sensors(cloud));
-        cloud.map_err(Error::input(&self.args.cloud))
+impl<'a> Job<'a> {
+    /// Reads a cloud.
+    pub fn read(
+        args: &'a args::Reconstruct,
+        cloud: &'a Path,
+        outputs: &'a Outputs,
+        progress: &mut Progress,
+    ) -> Result<Self, Error> {
+        let start = Instant::now();
+        progress.step("read");
+        // Neither the field nor the pictures have attributes.
+        let attributes = match (&outputs.points, &outputs.mesh) {
+            (None, None) => Attributes::Sensors,
+            _ => Attributes::All,
+        };
+        let geometry = read(args, cloud, attributes)?;
+        progress.detail(&format!(
+            "{} points, stored as {}",
+            geometry.points.len(),
+            geometry.dtype.name()
+        ));
+        let job = Self {
+            args,
+            cloud,
+            outputs,
+            start,
+            read_seconds: start.elapsed().as_secs_f64(),
+            normals: Normals::of(&geometry, &args.method.normals),
+            geometry,
+        };
+        if job.normals == Normals::Unused {
+            let of = match args.sample {
+                Some(_) => "of the faces".into(),
+                None => format!("in {}", file_name(cloud)),
+            };
+            let text = format!(
+                "the normals {of} are not used; if they point outward, --orient signs takes their sides"
+            );
+            progress.note("normals", &text);
+        }
+        Ok(job)
     }
 
-    /// The note if single precision was requested and can't represent the coordinates.
-    fn needs_double(&self, geometry: &Geometry) -> Result<Option<String>, Error> {
-        if self.args.precision == Precision::F64 {
-            return Ok(None);
+    /// Number of points.
+    pub fn points(&self) -> usize {
+        self.geometry.points.len()
+    }
+
+    /// Reconstructs the cloud on a grid of its own.
+    pub fn alone(&self, progress: &mut Progress) -> Result<Option<Verdict>, Error> {
+        let cloud = PointCloud::new(self.geometry.points.clone());
+        let grid = self.grid(&cloud.map_err(Error::input(self.cloud))?)?;
+        match rounding(self.args, &grid) {
+            Some(note) => {
+                progress.warn(&note);
+                self.alone_in::<f64>(Some(&note), progress)
+            }
+            None if self.args.precision == Precision::F64 => self.alone_in::<f64>(None, progress),
+            None => self.alone_in::<f32>(None, progress),
         }
-        let cloud =
-            PointCloud::new(geometry.points.clone()).map_err(Error::input(&self.args.cloud))?;
-        let grid = self.grid(&cloud)?;
-        let corners = grid.lower().into_iter().chain(grid.upper());
-        let largest = corners.fold(0.0f64, |m, x| m.max(x.abs()));
-        let cells = largest * f64::from(f32::EPSILON) / grid.spacing();
-        Ok((cells > TOLERATED_ROUNDING).then(|| {
-            format!(
-                "coordinates reach {largest:.3e} with cells of {:.3e}, which f32 rounds to {cells:.1e} cells; computed in f64",
-                grid.spacing()
-            )
-        }))
+    }
+
+    fn alone_in<T: Number>(
+        &self,
+        note: Option<&str>,
+        progress: &mut Progress,
+    ) -> Result<Option<Verdict>, Error> {
+        let grid = self.grid(&self.cloud::<T>()?)?;
+        let orient = self.args.method.normals.method();
+        let mut plan = plan(self.args, self.cloud, grid, orient, progress)?;
+        self.with_plan(&mut plan, &grid, note, progress)
+    }
+
+    fn cloud<T: Real>(&self) -> Result<PointCloud<T>, Error> {
+        let cloud = self.geometry.cloud();
+        let cloud = cloud.and_then(|cloud| self.args.method.normals.with_sensors(cloud));
+        cloud.map_err(Error::input(self.cloud))
     }
 
     fn grid<T: Real>(&self, cloud: &PointCloud<T>) -> Result<Grid<T>, Error> {
         let grid = self.args.grid.grid(cloud);
-        grid.map_err(Error::input(&self.args.cloud))
+        grid.map_err(Error::input(self.cloud))
     }
 
-    fn run<T: Number>(
+    /// Reconstructs the cloud with a plan for `grid`, writes the outputs and returns the verdict. `note` tells why the
+    /// number type is not the one asked for.
+    pub fn with_plan<T: Number>(
         &self,
-        geometry: &Geometry,
+        plan: &mut Plan<T>,
+        grid: &Grid<T>,
+        note: Option<&str>,
         progress: &mut Progress,
-        note: Option<String>,
-    ) -> Result<(), Error> {
-        let cloud = self.cloud::<T>(geometry)?;
-        let grid = self.grid(&cloud)?;
-        progress.detail(&format!(
-            "grid {:?}, cells of {}",
-            grid.shape(),
-            grid.spacing()
-        ));
-        let options = self.args.method.options(self.args.grid.outliers);
-        let plan = Plan::new(self.args.backend, grid, options);
-        let mut plan =
-            plan.map_err(|e| backend::plan_error(self.args.backend, e, &self.args.cloud))?;
-        progress.detail(&format!("on {}", plan.name()));
-        if let Some(note) = plan.note() {
-            progress.warn(note);
-        }
+    ) -> Result<Option<Verdict>, Error> {
+        let cloud = self.cloud::<T>()?;
+        progress.expect(prediction::seconds(cloud.len(), grid.cells()));
         let mut observer = |stage: Stage| {
             progress.step(stage.name());
             ControlFlow::Continue(())
@@ -171,50 +250,44 @@ impl Job<'_> {
                 }
                 Results::new(view)
             })
-            .map_err(Error::input(&self.args.cloud))?;
+            .map_err(Error::input(self.cloud))?;
         progress.warn_of(result.report);
         progress.step("write");
         self.write(&cloud, &result, note, progress)?;
-        progress.finish();
+        progress.finish_cloud();
         self.summarize(progress, &result);
-        match result.report.verdict() {
-            Some(Verdict::Bad) if self.args.strict => Err(Error::Bad {
-                file: file_name(&self.args.cloud),
-            }),
-            _ => Ok(()),
-        }
+        Ok(result.report.verdict())
     }
 
     fn write<T: Number>(
         &self,
         cloud: &PointCloud<T>,
         result: &Results<'_, T>,
-        note: Option<String>,
-        progress: &Progress,
+        note: Option<&str>,
+        progress: &mut Progress,
     ) -> Result<(), Error> {
         let begin = Instant::now();
         let outputs = self.outputs;
         outputs.create_folder()?;
-        let wrote = |path: &Path| progress.print(&format!("wrote {}", path.display()));
         if let Some(path) = &outputs.mesh {
-            isograd_io::write_mesh(path, result.mesh)?;
-            wrote(path);
+            surface::write(path, result.view, result.mesh, cloud, progress)?;
+            progress.wrote(path);
         }
         if let Some(path) = &outputs.sdf {
             isograd_io::write_field(path, result.sdf)?;
-            wrote(path);
+            progress.wrote(path);
         }
         if let Some(path) = &outputs.points {
             isograd_io::write_cloud(path, &self.oriented(cloud, result)?)?;
-            wrote(path);
+            progress.wrote(path);
         }
         if let Some(path) = &outputs.plot {
             plot::write(path, &plot::slices(result.sdf))?;
-            wrote(path);
+            progress.wrote(path);
         }
         if let Some(path) = &outputs.picture {
             self.write_picture(path, &self.oriented(cloud, result)?, result)?;
-            wrote(path);
+            progress.wrote(path);
         }
         if let Some(path) = &outputs.report {
             let times = Times {
@@ -223,25 +296,25 @@ impl Job<'_> {
                 total: self.start.elapsed().as_secs_f64(),
             };
             let report = JsonReport::new(result.report);
-            let report = Report::new(&self.args.cloud, report, times);
-            let report = report.on_grid(result.sdf.grid(), result.backend, note);
+            let report = Report::new(self.cloud, report, times).with_normals(self.normals);
+            let (grid, backend) = (result.sdf.grid(), result.view.backend());
+            let report = report.on_grid(grid, backend, note.map(String::from));
             write_report(path, &report)?;
-            wrote(path);
+            progress.wrote(path);
         }
         Ok(())
     }
 
     /// The cloud with estimated normals and their confidence.
-    fn oriented<T: Real>(
+    fn oriented<T: Number>(
         &self,
         cloud: &PointCloud<T>,
         result: &Results<'_, T>,
     ) -> Result<PointCloud<T>, Error> {
-        orient::oriented(cloud, result.normals, result.confidence)
-            .map_err(Error::input(&self.args.cloud))
+        orient::oriented(cloud, result.normals, result.confidence).map_err(Error::input(self.cloud))
     }
 
-    fn write_picture<T: Real>(
+    fn write_picture<T: Number>(
         &self,
         path: &Path,
         cloud: &PointCloud<T>,
@@ -257,17 +330,17 @@ impl Job<'_> {
     }
 
     /// Prints a summary, and the verdict last.
-    fn summarize<T: Real>(&self, progress: &Progress, result: &Results<'_, T>) {
+    fn summarize<T: Number>(&self, progress: &Progress, result: &Results<'_, T>) {
         let report = result.report;
         let (surface, grid) = (&report.surface, result.sdf.grid());
         let [nx, ny, nz] = grid.shape();
-        progress.print(&format!(
+        progress.print_one(&format!(
             "{} points, {nx} × {ny} × {nz} cells of {:.4e}, {:.2} s",
             report.points,
             grid.spacing(),
             self.start.elapsed().as_secs_f64()
         ));
-        progress.print(&format!(
+        progress.print_one(&format!(
             "surface: {} faces, {}, {} piece{}, area {:.6}, volume {:.6}",
             surface.faces,
             if surface.closed {

@@ -3,7 +3,10 @@
 use std::path::Path;
 
 use isograd::{Grid, JsonReport, Real};
+use isograd_io::Geometry;
 use serde::Serialize;
+
+use crate::args::OrientArgs;
 
 /// Contents of `report.json`.
 #[derive(Debug, Serialize)]
@@ -29,6 +32,32 @@ struct Input {
     /// The file, as on the command line.
     path: String,
     points: usize,
+    /// Whether the normals of the input were used, if it has any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    normals: Option<&'static str>,
+}
+
+/// Normals of the input.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Normals {
+    /// The input has none, or only zeros.
+    Absent,
+    /// The orientation is taken from them.
+    Used,
+    /// The method of the orientation takes no normals.
+    Unused,
+}
+
+impl Normals {
+    /// Those of a file, for a method of orientation.
+    pub fn of(geometry: &Geometry, args: &OrientArgs) -> Self {
+        let is_zero = |normal: &[f64; 3]| *normal == [0.0; 3];
+        match &geometry.normals {
+            Some(_) if args.uses_normals() => Self::Used,
+            Some(normals) if !normals.iter().all(is_zero) => Self::Unused,
+            _ => Self::Absent,
+        }
+    }
 }
 
 /// The grid, in the cloud's unit.
@@ -65,12 +94,23 @@ impl Report {
             input: Input {
                 path: path.display().to_string(),
                 points,
+                normals: None,
             },
             grid: None,
             note: None,
             result,
             peak_memory_bytes: crate::ALLOCATOR.peak_usage(),
         }
+    }
+
+    /// Adds whether the normals of the input were used.
+    pub fn with_normals(mut self, normals: Normals) -> Self {
+        self.input.normals = match normals {
+            Normals::Absent => None,
+            Normals::Used => Some("used"),
+            Normals::Unused => Some("unused"),
+        };
+        self
     }
 
     /// Adds the grid and the backend of a reconstruction, and a note about its number type.

@@ -62,14 +62,17 @@ pub fn remove_unfinished() {
 /// Writes the output of `content` to `path`; the file is created or replaced only on success, when its content is on
 /// the disk.
 ///
-/// Devices and pipes (`/dev/stdout`) are written to directly; a symbolic link is followed, also where its target does
+/// Standard output (`-`), devices and pipes are written to directly; a symbolic link is followed, also where its target does
 /// not exist yet.
 pub fn write(
     path: &Path,
     content: impl FnOnce(&mut Output) -> io::Result<()>,
 ) -> Result<(), Error> {
     let failed = |source| Error::Write {
-        file: path.display().to_string(),
+        file: match is_standard_output(path) {
+            true => "standard output".into(),
+            false => path.display().to_string(),
+        },
         source,
     };
     let mut output = Output::create(path).map_err(failed)?;
@@ -122,12 +125,18 @@ fn clean(folder: &Path) {
 /// A file that is being written.
 pub struct Output {
     writer: BufWriter<File>,
-    /// The temporary and the final path; `None` for a device, which is written to directly.
+    /// The temporary and the final path; `None` for a device or standard output, which are written to directly.
     rename: Option<(PathBuf, PathBuf)>,
 }
 
 impl Output {
     fn create(path: &Path) -> io::Result<Self> {
+        if is_standard_output(path) {
+            return Ok(Self {
+                writer: BufWriter::with_capacity(1 << 16, standard_output()?),
+                rename: None,
+            });
+        }
         match fs::metadata(path) {
             Ok(metadata) if metadata.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
             Ok(metadata) if !metadata.is_file() => Ok(Self {
@@ -196,6 +205,33 @@ impl Write for Output {
     fn flush(&mut self) -> io::Result<()> {
         self.writer.flush()
     }
+}
+
+/// Whether a path, `-`, stands for standard output.
+pub fn is_standard_output(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+/// Standard output without its line buffer.
+#[cfg(unix)]
+fn standard_output() -> io::Result<File> {
+    use std::os::fd::AsFd;
+    io::stdout().flush()?;
+    Ok(io::stdout().as_fd().try_clone_to_owned()?.into())
+}
+
+/// Standard output without its line buffer.
+#[cfg(windows)]
+fn standard_output() -> io::Result<File> {
+    use std::os::windows::io::AsHandle;
+    io::stdout().flush()?;
+    Ok(io::stdout().as_handle().try_clone_to_owned()?.into())
+}
+
+/// Standard output can't be written as a file here.
+#[cfg(not(any(unix, windows)))]
+fn standard_output() -> io::Result<File> {
+    Err(io::ErrorKind::Unsupported.into())
 }
 
 /// Waits until the content of a file is on the disk, if its file system can do that.

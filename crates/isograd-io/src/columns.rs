@@ -5,6 +5,7 @@ use std::io;
 use isograd::data::Attribute;
 use isograd::{PointCloud, Real};
 
+use crate::colors::{CHANNELS, byte_colors};
 use crate::format::Format;
 use crate::geometry::{Geometry, check_finite};
 use crate::limits::Memory;
@@ -111,6 +112,9 @@ fn attribute(name: &str, values: Vec<f64>) -> Attribute<f64> {
     }
 }
 
+/// Names of the components of a normal in most formats.
+pub(crate) const NORMAL: [&str; 3] = ["nx", "ny", "nz"];
+
 /// Columns of three names, if all are there.
 pub(crate) fn find_columns(names: &[Option<&str>], wanted: [&str; 3]) -> Option<[usize; 3]> {
     let [x, y, z] = wanted.map(|name| names.iter().position(|n| *n == Some(name)));
@@ -118,14 +122,16 @@ pub(crate) fn find_columns(names: &[Option<&str>], wanted: [&str; 3]) -> Option<
 }
 
 /// Names of a cloud's columns in a file: unique, with `_` in place of characters that are not
-/// `allowed`. An attribute of several components has the columns `name_0`, `name_1` and so on. No name of an attribute
-/// is one that readers take for normals.
+/// `allowed`. An attribute of several components has the columns `name_0`, `name_1` and so on, a [color](byte_colors) has
+/// `red`, `green` and `blue`. No name of an attribute is `reserved`, or one that readers take for normals.
 ///
 /// # Errors
 /// More columns than readers accept.
 pub(crate) fn column_names<T: Real>(
     cloud: &PointCloud<T>,
     allowed: fn(&char) -> bool,
+    normals: &[&str; 3],
+    reserved: &[&str],
 ) -> io::Result<Vec<String>> {
     let has_normals = cloud.normals().is_some();
     let count: usize = cloud.attributes().iter().map(|a| a.components).sum();
@@ -137,7 +143,7 @@ pub(crate) fn column_names<T: Real>(
     }
     let mut unique = UniqueNames::default();
     let mut names = Vec::with_capacity(count);
-    let fixed = [&["x", "y", "z"][..], &["nx", "ny", "nz"]];
+    let fixed = [&["x", "y", "z"], normals];
     for name in fixed
         .into_iter()
         .take(1 + usize::from(has_normals))
@@ -145,11 +151,13 @@ pub(crate) fn column_names<T: Real>(
     {
         names.push(unique.add(name, |_| true));
     }
-    let is_allowed = |name: &str| has_normals || !is_normal(name);
-    for attribute in cloud.attributes() {
+    let is_allowed = |name: &str| (has_normals || !is_normal(name)) && !reserved.contains(&name);
+    let attributes = cloud.attributes();
+    for (attribute, is_color) in attributes.iter().zip(byte_colors(attributes)) {
         let plain = attribute.name.replace(|c| !allowed(&c), "_");
         for component in 0..attribute.components {
             let name = match (plain.as_str(), attribute.components) {
+                (_, 2..) if is_color => CHANNELS[component].to_string(),
                 ("", _) => format!("attribute_{component}"),
                 (plain, 1) => plain.to_string(),
                 (plain, _) => format!("{plain}_{component}"),

@@ -23,10 +23,24 @@ pub enum Format {
     Vtp,
     /// VTK XML ImageData: a field.
     Vti,
+    /// Point Cloud Library: points.
+    Pcd,
+    /// Text of scanners, under a line with the number of points: points with intensity and color.
+    Pts,
+    /// Text of points and normals.
+    Xyzn,
+    /// Text of points and colors.
+    Xyzrgb,
+    /// Object file format (also `COFF` and `NOFF`): points or a mesh.
+    Off,
+    /// glTF 2.0 in one binary file: points or a mesh.
+    Glb,
+    /// ASPRS laser scans, not compressed: points.
+    Las,
 }
 
 /// Name and file extensions of each format.
-const FORMATS: [(Format, &str, &[&str]); 8] = [
+const FORMATS: [(Format, &str, &[&str]); 15] = [
     (Format::Ply, "PLY", &["ply"]),
     (Format::Text, "text", &["xyz", "csv", "txt"]),
     (Format::Obj, "OBJ", &["obj"]),
@@ -35,6 +49,13 @@ const FORMATS: [(Format, &str, &[&str]); 8] = [
     (Format::Npz, "NPZ", &["npz"]),
     (Format::Vtp, "VTP", &["vtp"]),
     (Format::Vti, "VTI", &["vti"]),
+    (Format::Pcd, "PCD", &["pcd"]),
+    (Format::Pts, "PTS", &["pts"]),
+    (Format::Xyzn, "XYZN", &["xyzn"]),
+    (Format::Xyzrgb, "XYZRGB", &["xyzrgb"]),
+    (Format::Off, "OFF", &["off"]),
+    (Format::Glb, "GLB", &["glb"]),
+    (Format::Las, "LAS", &["las", "laz"]),
 ];
 
 impl Format {
@@ -55,6 +76,12 @@ impl Format {
             Some(Self::Npy)
         } else if head.starts_with(b"PK\x03\x04") || head.starts_with(b"PK\x05\x06") {
             Some(Self::Npz)
+        } else if head.starts_with(b"# .PCD") {
+            Some(Self::Pcd)
+        } else if head.starts_with(b"glTF") {
+            Some(Self::Glb)
+        } else if head.starts_with(b"LASF") {
+            Some(Self::Las)
         } else if holds(b"<VTKFile") && holds(b"PolyData") {
             Some(Self::Vtp)
         } else if holds(b"<VTKFile") && holds(b"ImageData") {
@@ -67,6 +94,11 @@ impl Format {
     /// Usual name.
     pub fn name(self) -> &'static str {
         FORMATS[self as usize].1
+    }
+
+    /// Whether the file has rows of numbers as text.
+    pub(crate) fn is_table(self) -> bool {
+        matches!(self, Self::Text | Self::Pts | Self::Xyzn | Self::Xyzrgb)
     }
 
     fn extension(self) -> &'static str {
@@ -92,8 +124,11 @@ pub(crate) fn detect(path: &Path, name: &str, bytes: &[u8]) -> Result<Format, Er
             content.name(),
             content.extension()
         ))),
-        // STL, OBJ and text have no signature, and XML may begin with long comments.
-        (Some(named @ (Format::Ply | Format::Npy | Format::Npz)), None) => Err(refuse(format!(
+        // The others have no signature, or may begin with comments.
+        (
+            Some(named @ (Format::Ply | Format::Npy | Format::Npz | Format::Glb | Format::Las)),
+            None,
+        ) => Err(refuse(format!(
             "the content does not begin as {} does; check the file, or rename it to its real format",
             named.name()
         ))),
@@ -108,5 +143,4 @@ pub(crate) fn detect(path: &Path, name: &str, bytes: &[u8]) -> Result<Format, Er
 }
 
 /// Readable formats, for messages.
-pub(crate) const KNOWN: &str =
-    "the name must end in .ply, .xyz, .csv, .txt, .obj, .stl, .npy, .npz, .vtp or .vti";
+pub(crate) const KNOWN: &str = "the name must end in .ply, .xyz, .csv, .txt, .pts, .xyzn, .xyzrgb, .pcd, .las, .obj, .stl, .off, .glb, .npy, .npz, .vtp or .vti";

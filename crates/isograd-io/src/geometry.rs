@@ -96,8 +96,8 @@ const SENSOR_AXES: [[&str; 3]; 2] = [
     ["sensor_0", "sensor_1", "sensor_2"],
 ];
 
-/// Whether an attribute may hold sensor positions.
-pub(crate) fn is_sensor(name: &str) -> bool {
+/// Whether an attribute of this name may hold sensor positions.
+pub fn is_sensor(name: &str) -> bool {
     let mut names = SENSOR_AXES.as_flattened().iter().chain([&SENSOR]);
     names.any(|known| name.eq_ignore_ascii_case(known))
 }

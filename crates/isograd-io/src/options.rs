@@ -61,13 +61,13 @@ impl ReadOptions {
 
     /// Refuses a choice of columns in a format without columns.
     pub(crate) fn check_columns(&self, name: &str, format: Format) -> Result<(), Error> {
-        if format == Format::Text || self.columns.is_default() {
+        if format.is_table() || self.columns.is_default() {
             return Ok(());
         }
         Err(Error::Format {
             file: name.into(),
             problem: format!(
-                "columns can be chosen in text files (.csv, .xyz, .txt), and this is {}; leave the columns out",
+                "columns can be chosen in text files (.csv, .xyz, .txt, .pts, .xyzn, .xyzrgb), and this is {}; leave the columns out",
                 format.name()
             ),
         })

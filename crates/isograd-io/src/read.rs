@@ -8,7 +8,7 @@ use crate::format::{Format, detect};
 use crate::geometry::Geometry;
 use crate::options::ReadOptions;
 use crate::source::{Input, Source};
-use crate::{numpy, obj, ply, stl, text, vtk};
+use crate::{glb, las, numpy, obj, off, pcd, ply, stl, text, vtk};
 
 /// Content of a file.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,7 +75,11 @@ impl ReadOptions {
         let input = &Input::new(source, self);
         match format {
             Format::Ply => ply::read(input),
-            Format::Text => text::read(input),
+            Format::Text | Format::Pts | Format::Xyzn | Format::Xyzrgb => text::read(input, format),
+            Format::Pcd => pcd::read(input),
+            Format::Off => off::read(input),
+            Format::Glb => glb::read(input),
+            Format::Las => las::read(input),
             Format::Obj => obj::read(input),
             Format::Stl => stl::read(input),
             Format::Npy => numpy::read_npy(input),

@@ -1,16 +1,19 @@
-//! Columns of numbers as text: `.xyz`, `.csv`, `.txt`.
+//! Columns of numbers as text: `.xyz`, `.csv`, `.txt`, and `.pts`, `.xyzn`, `.xyzrgb`.
 //!
 //! The delimiter is `;`, `,` or white space, as in the first row; fields may be quoted. A line that begins with `#` or
 //! `//` is a comment. Column names come from a first line that is not all numbers, or from a comment just before the first
 //! row. A header must name the coordinates ([`names::find`]), or the user chooses columns. Without a header, 3 columns are
 //! points, 6 are points and normals (or colors, if all of them are whole numbers from 0 to 255), and any others are
 //! attributes. A first line with a single number is the number of rows.
+//!
+//! Without a header, a `.pts` has intensity, color, or both behind the points, an `.xyzn` normals and an `.xyzrgb` colors. In a
+//! `.pts` several scans may follow one another, each under its number of rows.
 
 use std::io::{self, Write};
 
 use isograd::{PointCloud, Real};
 
-use crate::columns::{PointTable, column_names, row};
+use crate::columns::{NORMAL, PointTable, column_names, row};
 use crate::error::{Error, Location};
 use crate::fields::Delimiter;
 use crate::format::Format;
@@ -22,12 +25,13 @@ use crate::number::Dtype;
 use crate::source::Input;
 
 /// Reads a table of numbers as a point cloud.
-pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
+pub(crate) fn read(input: &Input, format: Format) -> Result<Geometry, Error> {
     let byte_order_mark = b"\xef\xbb\xbf";
     let bytes = input.bytes.strip_prefix(byte_order_mark);
     let bytes = bytes.unwrap_or(input.bytes);
     let mut reader = Reader {
         input,
+        format,
         comment: (0, b""),
         declared: None,
         table: None,
@@ -45,6 +49,7 @@ pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
 /// State of the reader.
 struct Reader<'a> {
     input: &'a Input<'a>,
+    format: Format,
     /// The last comment and its line.
     comment: (usize, &'a [u8]),
     /// The number that stands alone in the first line, and the number of that line.
@@ -65,10 +70,15 @@ impl<'a> Reader<'a> {
         let memory = &self.input.memory;
         if let Some(table) = &mut self.table {
             let delimiter = *table.delimiter.get_or_insert(Delimiter::detect(line));
-            let row = delimiter.numbers(line, &mut self.row);
-            row.and_then(|()| table.push(memory, &self.row))
-                .map_err(here)?;
-            return Ok(());
+            delimiter.numbers(line, &mut self.row).map_err(here)?;
+            if self.format == Format::Pts
+                && let ([more], Some((count, _))) = (self.row.as_slice(), &mut self.declared)
+                && *count == table.rows.len() as f64
+            {
+                *count += more;
+                return Ok(());
+            }
+            return table.push(memory, &self.row).map_err(here);
         }
         let delimiter = Delimiter::detect(line);
         let parsed = delimiter.numbers(line, &mut self.row);
@@ -88,7 +98,7 @@ impl<'a> Reader<'a> {
             Some(by) => self
                 .with_header(by, self.comment.1)
                 .map_err(|problem| (self.comment.0, problem))?,
-            None => Table::new(self.input, None, self.row.len()).map_err(here)?,
+            None => Table::new(self.input, self.format, None, self.row.len()).map_err(here)?,
         };
         table.delimiter = Some(delimiter);
         table.push(memory, &self.row).map_err(here)?;
@@ -126,7 +136,7 @@ impl<'a> Reader<'a> {
         self.input.memory.reserve(9 * line.len())?;
         let names = delimiter.names(line)?;
         let width = names.len();
-        Table::new(self.input, Some(names), width)
+        Table::new(self.input, self.format, Some(names), width)
     }
 
     fn finish(self) -> Result<Geometry, Error> {
@@ -135,7 +145,7 @@ impl<'a> Reader<'a> {
             && count != rows as f64
         {
             let problem = format!(
-                "the first line declares {count} rows, but there are {rows}; the file is cut short or the count is wrong"
+                "the file declares {count} rows, but there are {rows}; the file is cut short or the count is wrong"
             );
             return Err(self.input.error(Location::Line(line), problem));
         }
@@ -152,10 +162,10 @@ impl<'a> Reader<'a> {
             None => None,
         };
         let Some(table) = table else {
-            return Ok(Geometry::from_points(Vec::new(), Dtype::Text, Format::Text));
+            return Ok(Geometry::from_points(Vec::new(), Dtype::Text, self.format));
         };
         table
-            .into_geometry(self.input)
+            .into_geometry(self.input, self.format)
             .map_err(|problem| self.input.error(Location::Whole, problem))
     }
 }
@@ -172,8 +182,25 @@ struct Table {
 
 impl Table {
     /// A table of `width` columns, with their names if there is a header.
-    fn new(input: &Input, names: Option<Vec<String>>, width: usize) -> Result<Self, String> {
+    fn new(
+        input: &Input,
+        format: Format,
+        names: Option<Vec<String>>,
+        width: usize,
+    ) -> Result<Self, String> {
         let wanted = &input.options.columns;
+        let is_plain = names.is_none() && wanted.points.is_none();
+        if is_plain && matches!(format, Format::Xyzn | Format::Xyzrgb) && width < 6 {
+            let vector = if format == Format::Xyzn {
+                "nx, ny and nz"
+            } else {
+                "r, g and b"
+            };
+            let name = format.name();
+            return Err(format!(
+                "the row has {width} numbers, and {name} has x, y, z, {vector}"
+            ));
+        }
         let xyz = match (&wanted.points, &names) {
             (Some(wanted), names) => names::choose(wanted, names.as_deref(), width)?,
             (None, Some(names)) => {
@@ -181,16 +208,18 @@ impl Table {
             }
             (None, None) => [0, 1, 2],
         };
-        let plain_six = width == 6 && names.is_none() && wanted.points.is_none();
+        let plain_six = is_plain && width == 6 && format == Format::Text;
         let normal = match (&wanted.normals, &names) {
             (Some(wanted), names) => Some(names::choose(wanted, names.as_deref(), width)?),
             (None, Some(names)) => names::find(names, Quantity::Normals),
-            (None, None) => plain_six.then_some([3, 4, 5]),
+            (None, None) => (plain_six || is_plain && format == Format::Xyzn).then_some([3, 4, 5]),
         };
         let may_be_colors = plain_six && wanted.normals.is_none();
         let names = names.unwrap_or_else(|| {
+            let known = attribute_names(format, width);
+            let name = |column: usize| known.get(column.wrapping_sub(4)).map(|&name| name.into());
             (1..=width)
-                .map(|column| format!("column_{column}"))
+                .map(|column| name(column).unwrap_or_else(|| format!("column_{column}")))
                 .collect()
         });
         // A column without a name is the index that some programs write.
@@ -224,11 +253,22 @@ impl Table {
         self.rows.push(memory, row)
     }
 
-    fn into_geometry(mut self, input: &Input) -> Result<Geometry, String> {
+    fn into_geometry(mut self, input: &Input, format: Format) -> Result<Geometry, String> {
         if self.may_be_colors {
             self.rows.reinterpret_normals_as_colors(&input.memory)?;
         }
-        Ok(self.rows.into_geometry(Dtype::Text, Format::Text))
+        Ok(self.rows.into_geometry(Dtype::Text, format))
+    }
+}
+
+/// Names of the columns behind x, y and z in a file of `width` columns without a header.
+fn attribute_names(format: Format, width: usize) -> &'static [&'static str] {
+    const ALL: &[&str] = &["intensity", "red", "green", "blue"];
+    match (format, width) {
+        (Format::Pts, 4) => &ALL[..1],
+        (Format::Pts, 6) | (Format::Xyzrgb, _) => &ALL[1..],
+        (Format::Pts, 7..) => ALL,
+        _ => &[],
     }
 }
 
@@ -240,7 +280,7 @@ pub(crate) fn write_cloud<T: Real>(
     delimiter: &str,
 ) -> io::Result<()> {
     let comment = if delimiter == "," { "" } else { "# " };
-    let names = column_names(cloud, char::is_ascii_alphanumeric)?;
+    let names = column_names(cloud, char::is_ascii_alphanumeric, &NORMAL, &[])?;
     writeln!(out, "{comment}{}", names.join(delimiter))?;
     for i in 0..cloud.len() {
         let row: Vec<String> = row(cloud, i).map(|value| format!("{value:?}")).collect();

@@ -56,10 +56,12 @@
 //! | [`distance`] | mesh → φ; queries at points; attributes on the surface |
 //! | [`sheet`] | open surface → φ and closed shell of a membrane |
 //! | [`differential`] | φ → gradient, normal and curvature |
+//! | [`clean`] | points → indices of those to keep: without duplicates and outliers, thinned |
 //! | [`gradcheck`] | comparison of the pullback with finite differences |
 #![warn(missing_docs)]
 
 mod backend;
+pub mod clean;
 pub mod data;
 pub mod differential;
 pub mod distance;
@@ -95,7 +97,7 @@ pub use pipeline::{
     AvailableMemory, CloudCotangent, Cotangent, Error, ExtensionCotangent, MemoryError,
     MemoryLimit, MemoryUse, Options, Orienter, ParseOptionError, Pipeline, PullbackError,
     Reconstruction, Reconstructor, RestoreError, Saved, Solve, SurfaceResolution, available_memory,
-    check_memory,
+    check_distance_memory, check_memory,
 };
 pub use real::Real;
 pub use report::{JsonReport, Report, Seconds, Stage, Verdict, Warning};

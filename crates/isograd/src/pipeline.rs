@@ -39,7 +39,8 @@ use crate::{Real, distance, isosurface, neighbors, normals, orient, poisson, spl
 pub use concrete::Pipeline;
 pub use cotangent::{CloudCotangent, Cotangent, ExtensionCotangent, PullbackError};
 pub use memory::{
-    AvailableMemory, MemoryError, MemoryLimit, MemoryUse, available_memory, check_memory,
+    AvailableMemory, MemoryError, MemoryLimit, MemoryUse, available_memory, check_distance_memory,
+    check_memory,
 };
 pub use options::{Error, Options};
 pub use orienter::Orienter;

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -64,7 +66,7 @@ def indices(values: object, name: str, shape: tuple[int | None, ...]) -> np.ndar
 
 
 def known(
-    cloud: np.ndarray, normals: object | None, sensors: object | None
+    cloud: np.ndarray, normals: object | None, sensors: Any
 ) -> tuple[np.ndarray | None, np.ndarray | None]:
     """``(N, 3)`` normals and ``(M, 3)`` sensors for a cloud, in its type; one sensor may be ``(3,)``.
 
@@ -77,6 +79,25 @@ def known(
         sensors = [sensors] if np.ndim(sensors) == 1 else sensors
         sensors = floats(sensors, "sensors", (None, 3), cloud.dtype)
     return normals, sensors
+
+
+def summary(record: object) -> str:
+    """Text of a named tuple or a dataclass, with the shape and type of each array in place of its values."""
+    values = (
+        {field.name: getattr(record, field.name) for field in fields(record)}
+        if is_dataclass(record)
+        else record._asdict()  # type: ignore[attr-defined]
+    )
+    texts = ", ".join(f"{name}={_short(value)}" for name, value in values.items())
+    return f"{type(record).__name__}({texts})"
+
+
+def _short(value: object) -> str:
+    if isinstance(value, np.ndarray):
+        return f"{value.shape} {value.dtype}"
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key!r}: {_short(entry)}" for key, entry in value.items()) + "}"
+    return repr(value)
 
 
 # DLPack device types with CPU memory: CPU, and memory shared with CUDA and ROCm devices.

@@ -3,7 +3,7 @@
 
 from collections.abc import Callable, Sequence
 from os import PathLike
-from typing import Any, TypeAlias, TypedDict, final
+from typing import Any, Literal, TypeAlias, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +18,17 @@ _Attributes: TypeAlias = list[tuple[str, int, _Floats]]
 
 __all__ = [
     "Extension",
+    "Isosurface",
     "Plan",
     "Result",
     "Shape",
     "__version__",
     "call_target",
     "check_grid",
+    "clean_points",
+    "extract_surface",
     "fit_grid",
+    "get_num_threads",
     "open_backend",
     "orient",
     "query_mesh",
@@ -33,7 +37,11 @@ __all__ = [
     "read_geometry",
     "run_command",
     "run_fit",
+    "sdf_of_mesh",
+    "sdf_of_mesh_pullback",
+    "set_num_threads",
     "shapes",
+    "write_bytes",
     "write_field",
     "write_mesh",
     "write_points",
@@ -80,8 +88,14 @@ class Result:
     def array(self, name: str) -> NDArray[Any]:
         """A new copy of one of the arrays, by name."""
 
+    def inputs(self) -> tuple[_Floats, _Floats | None, _Floats | None, _Attributes]:
+        """Points, normals, sensors and attributes of the cloud, as :meth:`Plan.reconstruct` takes them."""
+
     def iso_value(self) -> float:
         """The iso-value of the surface."""
+
+    def surface_shape(self) -> list[int]:
+        """Number of cells of the surface's grid along each axis."""
 
     def backend(self) -> str:
         """Name of the backend."""
@@ -89,11 +103,17 @@ class Result:
     def report(self) -> str:
         """The report as JSON."""
 
+    def attributes(self) -> list[tuple[str, NDArray[Any]]]:
+        """Attributes of the cloud: name and ``(N, components)`` values."""
+
+    def write_slices(self, path: _Path) -> None:
+        """Writes slices of φ and the spread of ``|∇φ|`` as PNG, as the command line does."""
+
     def pullback(
         self,
         bars: dict[str, _Floats],
         iso_value: float,
-        extensions: list[tuple[Extension, _Floats | None, _Floats | None]],
+        extensions: Sequence[tuple[Extension, NDArray[Any] | None, NDArray[Any] | None]],
     ) -> _Cotangents:
         """Cotangents of the inputs, by name, from those of the results, by name."""
 
@@ -111,8 +131,10 @@ class Plan:
         normals: _Floats | None,
         sensors: _Floats | None,
         attributes: _Attributes,
+        progress: Callable[[str], object] | None = None,
     ) -> Result:
-        """Reconstructs a cloud: ``points``, ``normals`` and ``sensors`` of one type."""
+        """Reconstructs a cloud: ``points``, ``normals`` and ``sensors`` of one type. ``progress`` is called with the name
+        of each stage, before it."""
 
     def take_note(self) -> str | None:
         """Why ``"auto"`` selected the CPU; once."""
@@ -139,6 +161,54 @@ def query_mesh_pullback(
     vertices: _Floats, faces: _Indices, queries: _Floats, distance_bar: _Floats
 ) -> list[_Floats]:
     """Cotangents of vertices and queries from those of the distances."""
+
+# Fields of meshes, and meshes of fields.
+
+_Grid: TypeAlias = tuple[_Vector, float, _Cells]
+
+def sdf_of_mesh(
+    vertices: _Floats, faces: _Indices, grid: _Grid, band: float | None
+) -> tuple[_Floats, _Indices, Literal["closed", "winding number"]]:
+    """φ ``(nx, ny, nz)``, the closest faces, and how the sign was found."""
+
+def sdf_of_mesh_pullback(
+    vertices: _Floats,
+    faces: _Indices,
+    grid: _Grid,
+    sdf: _Floats,
+    closest: _Indices,
+    sdf_bar: _Floats,
+) -> tuple[_Floats, _Vector, float]:
+    """Cotangents of vertices, lower corner and spacing."""
+
+@final
+class Isosurface:
+    """Surface of a field."""
+
+    def mesh(self) -> tuple[_Floats, _Indices]:
+        """Vertices and faces."""
+
+    def walls(self) -> list[list[bool]]:
+        """Whether the surface reaches the low and the high wall of each axis."""
+
+    def pullback(self, vertices_bar: _Floats) -> tuple[_Floats, float, _Vector, float, int]:
+        """Cotangents of field, level, lower corner and spacing; number of bounded derivatives."""
+
+def extract_surface(field: _Floats, grid: _Grid, level: float) -> Isosurface:
+    """Extracts the surface of a field."""
+
+# Clouds.
+
+class _Steps(TypedDict):
+    drop_not_finite: bool
+    duplicates: float | None
+    statistical: tuple[int, float] | None
+    radius: tuple[float, int] | None
+    voxel: float | None
+    poisson_disk: float | None
+
+def clean_points(points: _Floats, steps: _Steps) -> tuple[_Indices, list[tuple[str, int]]]:
+    """Indices of the samples kept, and the number that each step removed."""
 
 # Shapes.
 
@@ -188,6 +258,14 @@ def run_fit(
 
     ``options`` is a JSON text; ``target`` is φ, ``(vertices, faces)`` or points, according to its ``kind``."""
 
+# Threads.
+
+def set_num_threads(n: int) -> None:
+    """Starts ``n`` threads for all work that begins later."""
+
+def get_num_threads() -> int:
+    """Number of threads of the work. Starts none."""
+
 # XLA.
 
 def xla_targets() -> dict[str, object]:
@@ -233,7 +311,11 @@ def write_points(
 def write_mesh(path: _Path, vertices: _Floats, faces: _Indices) -> None:
     """Writes a mesh."""
 
+def write_bytes(path: _Path, content: bytes) -> None:
+    """Writes a file of these bytes; atomically."""
+
 def write_field(
     path: _Path, lower: _Vector, spacing: float, shape: _Cells, values: _Floats
 ) -> None:
     """Writes a field."""
+

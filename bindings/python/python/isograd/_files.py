@@ -1,4 +1,4 @@
-"""Readers and writers: PLY, XYZ, CSV, OBJ, STL, NPY, NPZ, VTP and VTI."""
+"""Readers and writers: PLY, PCD, LAS, PTS, XYZ, CSV, OBJ, OFF, STL, GLB, NPY, NPZ, VTP and VTI."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from . import _core
-from ._arrays import floats
+from . import _convert, _core
+from ._arrays import floats, summary
 from ._grid import Grid
 from ._mesh import Mesh, as_mesh
 from ._reconstruction import _attributes
@@ -29,6 +29,13 @@ class Cloud(NamedTuple):
     """``(N, 3)``, unchanged."""
     attributes: dict[str, np.ndarray]
     """``(N, components)`` by name."""
+
+    def __repr__(self) -> str:
+        return summary(self)
+
+    def save(self, path: Path) -> None:
+        """Writes points, normals and attributes as PLY, NPZ, XYZ or CSV, as the name ends; see :func:`write_points`."""
+        _convert.save_cloud(self, path)
 
 
 def _names(columns: Sequence[str | int] | None) -> list[str] | None:
@@ -82,7 +89,7 @@ def write_points(
     normals: ArrayLike | None = None,
     attributes: Mapping[str, ArrayLike] | None = None,
 ) -> None:
-    """Writes points (PLY, NPZ, XYZ or CSV); atomically."""
+    """Writes points (PLY, NPZ, PCD, XYZ or CSV); atomically."""
     cloud = floats(points, "points", (None, 3))
     if normals is not None:
         normals = floats(normals, "normals", cloud.shape, cloud.dtype)
@@ -90,7 +97,7 @@ def write_points(
 
 
 def write_mesh(path: Path, mesh: Mesh | tuple[ArrayLike, ArrayLike]) -> None:
-    """Writes a mesh (PLY, OBJ, STL or VTP); atomically."""
+    """Writes a mesh (PLY, OBJ, STL, OFF, GLB or VTP); atomically."""
     mesh = as_mesh(mesh)
     _core.write_mesh(os.fspath(path), mesh.vertices, mesh.faces)
 

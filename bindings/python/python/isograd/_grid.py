@@ -9,11 +9,14 @@ import numpy as np
 
 from . import _core
 from ._arrays import floats
+from ._inputs import read_input
 from ._numbers import number, whole
 from ._options import Outliers, OutliersLike, choice
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+    from numpy.typing import DTypeLike
+
+    from ._inputs import CloudLike
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ class Grid:
     @classmethod
     def fit(
         cls,
-        points: ArrayLike,
+        points: CloudLike,
         resolution: int | None = None,
         *,
         spacing: float | None = None,
@@ -56,7 +59,7 @@ class Grid:
         """A grid around a cloud.
 
         Args:
-            points: ``(N, 3)``.
+            points: ``(N, 3)``, or what else :func:`reconstruct` takes.
             resolution: cells on the longest side; 128 unless ``spacing`` is given.
             spacing: cell size, in the unit of the points, instead of a resolution.
             padding: distance to every wall, as a fraction of the longest side (at least 4 cells).
@@ -75,9 +78,9 @@ class Grid:
         if spacing is not None:
             spacing = number(spacing, "spacing")
         padding = number(padding, "padding")
-        outliers = choice(Outliers, outliers, "outliers")
-        cloud = floats(points, "points", (None, 3))
-        return cls(*_core.fit_grid(cloud, resolution, spacing, padding, outliers.value))
+        kept = choice(Outliers, outliers, "outliers")
+        cloud = floats(read_input(points).points, "points", (None, 3))
+        return cls(*_core.fit_grid(cloud, resolution, spacing, padding, kept.value))
 
     @property
     def upper(self) -> tuple[float, float, float]:
@@ -91,12 +94,17 @@ class Grid:
         x, y, z = (low + 0.5 * self.spacing for low in self.lower)
         return (x, y, z)
 
-    def centers(self, dtype: np.typing.DTypeLike = np.float64) -> np.ndarray:
-        """``(nx, ny, nz, 3)`` centers of all cells."""
-        axes = [
+    @property
+    def axes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Coordinates of the cell centers along each axis: ``(nx,)`` x, ``(ny,)`` y and ``(nz,)`` z."""
+        x, y, z = (
             low + self.spacing * (np.arange(n) + 0.5) for low, n in zip(self.lower, self.shape)
-        ]
-        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).astype(dtype)
+        )
+        return (x, y, z)
+
+    def centers(self, dtype: DTypeLike = np.float64) -> np.ndarray:
+        """``(nx, ny, nz, 3)`` centers of all cells."""
+        return np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1).astype(dtype)
 
 
 def _three(values: object, name: str) -> tuple[object, ...]:

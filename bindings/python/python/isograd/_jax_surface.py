@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import functools
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._options import check_fill
-from ._places import NO_FACE, Fill, Offset, are_centers, axes_at, band_width, is_many, on_grids, shaped
+from ._options import Fill, check_fill
+from ._places import NO_FACE, Offset, are_centers, axes_at, band_width, is_many, on_grids, shaped
 from ._xla import Plan, call, floats, like, pair, prepare
 
 if TYPE_CHECKING:
@@ -32,6 +32,34 @@ class Surface(NamedTuple):
     """``(*S, 3)``: the closest point of the surface; beyond the band the place itself."""
     values: jax.Array | None
     """``(*S, C)`` or ``S``: values at the closest point; 0 beyond the band. ``None`` if no values are given."""
+
+
+@overload
+def surface(
+    points: ArrayLike,
+    grid: Grid,
+    places: Grid | Offset | ArrayLike | None = None,
+    *,
+    values: ArrayLike | None = ...,
+    normals: ArrayLike | None = ...,
+    band: float | Literal["auto", "full"] = ...,
+    fill: Fill = ...,
+    options: Options | None = ...,
+) -> Surface: ...
+
+
+@overload
+def surface(
+    points: ArrayLike,
+    grid: Grid,
+    places: tuple[Offset, ...],
+    *,
+    values: ArrayLike | None = ...,
+    normals: ArrayLike | None = ...,
+    band: float | Literal["auto", "full"] = ...,
+    fill: Fill = ...,
+    options: Options | None = ...,
+) -> tuple[Surface, ...]: ...
 
 
 def surface(
@@ -85,7 +113,7 @@ def surface(
     positions, shapes = _positions(places, regular, points.dtype)
     # Without places, φ and the closest faces on the grid save the search.
     given = positions[:0] if are_centers(regular, grid) else positions
-    found = _surface(plan, (len(positions), grid.spacing), points, given, values, normals)
+    found: tuple[jax.Array, ...] = _surface(plan, (len(positions), grid.spacing), points, given, values, normals)
     found = _within(found, positions, width) if fill == "band" else found
     parts, start = [], 0
     for shape in shapes:
@@ -121,7 +149,7 @@ def positions_at(grid: Grid, offset: Offset, dtype: np.typing.DTypeLike) -> jax.
 
 
 def _positions(
-    places: object, parts: list[tuple[Grid, Offset]] | None, dtype: np.typing.DTypeLike
+    places: Any, parts: list[tuple[Grid, Offset]] | None, dtype: np.typing.DTypeLike
 ) -> tuple[jax.Array, list[tuple[int, ...]]]:
     """``(M, 3)`` positions of all places, and the shape of each part."""
     if parts is None:
@@ -131,15 +159,16 @@ def _positions(
     return jnp.concatenate(each), [grid.shape for grid, _ in parts]
 
 
-def _within(found: Surface, positions: jax.Array, width: float) -> Surface:
+def _within(found: tuple[jax.Array, ...], positions: jax.Array, width: float) -> tuple[jax.Array, ...]:
     """The results without those inside beyond the band."""
-    far = found.sdf < -width
+    sdf, normal, closest, values = found
+    far = sdf < -width
     row = far[:, None]
-    return Surface(
-        jnp.where(far, -width, found.sdf),
-        jnp.where(row, 0, found.normal),
-        jnp.where(row, positions, found.closest),
-        jnp.where(row, 0, found.values),
+    return (
+        jnp.where(far, -width, sdf),
+        jnp.where(row, 0, normal),
+        jnp.where(row, positions, closest),
+        jnp.where(row, 0, values),
     )
 
 
@@ -151,8 +180,9 @@ def _surface(
     places: jax.Array,
     values: jax.Array,
     normals: jax.Array | None,
-) -> Surface:
-    return _forward(plan, size, points, places, values, normals)[0]
+) -> tuple[jax.Array, ...]:
+    found: tuple[jax.Array, ...] = _forward(plan, size, points, places, values, normals)[0]
+    return found
 
 
 def _forward(
@@ -162,7 +192,7 @@ def _forward(
     places: jax.Array,
     values: jax.Array,
     normals: jax.Array | None,
-) -> tuple:
+) -> tuple[Any, ...]:
     count, _ = size
     scalar = jax.ShapeDtypeStruct((count,), points.dtype)
     vector = jax.ShapeDtypeStruct((count, 3), points.dtype)
@@ -171,23 +201,24 @@ def _forward(
     results = (scalar, vector, vector, rows, faces, vector, *plan.saved(points))
     arrays = (points, places, values, normals)
     sdf, normal, closest, at, *saved = call("isograd_surface", plan, results, *arrays)
-    return Surface(sdf, normal, closest, at), (arrays, sdf, normal, saved)
+    return (sdf, normal, closest, at), (arrays, sdf, normal, saved)
 
 
-def _pullback(plan: Plan, size: tuple[int, float], residuals: tuple, bars: Surface) -> tuple:
+def _pullback(plan: Plan, size: tuple[int, float], residuals: tuple[Any, ...], bars: tuple[jax.Array, ...]) -> tuple[Any, ...]:
     (points, places, values, normals), sdf, normal, saved = residuals
-    smallest = jnp.sqrt(jnp.finfo(sdf.dtype).eps) * size[1]
+    sdf_bar, normal_bar, closest_bar, values_bar = bars
+    smallest = jnp.sqrt(np.finfo(sdf.dtype).eps) * size[1]
     # n = (q − p) / φ, so that dn = (I − n nᵀ) (dq − dp) / φ.
-    turning = bars.normal - normal * jnp.sum(normal * bars.normal, axis=1, keepdims=True)
+    turning = normal_bar - normal * jnp.sum(normal * normal_bar, axis=1, keepdims=True)
     has_face = (saved[0] != np.uint32(NO_FACE))[:, None]
     apart = has_face & (jnp.abs(sdf) > smallest)[:, None]
     turning = jnp.where(apart, turning / jnp.where(apart, sdf[:, None], 1), 0)
     results = like(places, values, points, normals)
-    cotangents = (bars.sdf, bars.closest - turning, bars.values)
+    cotangents = (sdf_bar, closest_bar - turning, values_bar)
     arrays = (points, places, values, normal, *saved, *cotangents, normals)
     places_bar, values_bar, *cloud_bars = call("isograd_surface_pullback", plan, results, *arrays)
     if places.shape[0]:
-        places_bar = places_bar + turning + jnp.where(has_face, 0, bars.closest)
+        places_bar = places_bar + turning + jnp.where(has_face, 0, closest_bar)
     points_bar, normals_bar = pair(cloud_bars)
     return points_bar, places_bar, values_bar, normals_bar
 

@@ -5,80 +5,100 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from difflib import get_close_matches
 from enum import Enum
-from typing import Literal
+from typing import Literal, TypedDict, TypeVar
 
 from ._numbers import number
 
 
 class Orient(str, Enum):
-    """Methods that find the side of each normal."""
+    """Methods that find the side of each normal.
+
+    Attributes:
+        AUTO: from enclosure, sky, sheets and neighbors.
+        PARITY: by counting crossings along the normal, as in the paper.
+        GIVEN: the given normals, unchanged.
+        SIGNS: estimated directions, each on the side of the given normal.
+        SENSORS: estimated directions, each on the side of the sensor that saw its point.
+        PREVIOUS: in a plan: estimated directions, each on the side of the normal of the same point in the previous
+            call.
+    """
 
     AUTO = "auto"
-    """From enclosure, sky, sheets and neighbors."""
     PARITY = "parity"
-    """By counting crossings along the normal, as in the paper."""
     GIVEN = "given"
-    """The given normals, unchanged."""
     SIGNS = "signs"
-    """Estimated directions, each on the side of the given normal."""
     SENSORS = "sensors"
-    """Estimated directions, each on the side of the sensor that saw its point."""
     PREVIOUS = "previous"
-    """In a plan: estimated directions, each on the side of the normal of the same point in the previous call."""
 
 
 class Splat(str, Enum):
-    """Weights that spread a sample over the cells around it."""
+    """Weights that spread a sample over the cells around it.
+
+    Attributes:
+        BSPLINE: quadratic B-spline.
+        PAPER: the paper's weights.
+    """
 
     BSPLINE = "bspline"
-    """Quadratic B-spline."""
     PAPER = "paper"
-    """The paper's weights."""
 
 
 class Level(str, Enum):
-    """Value of the indicator at the surface."""
+    """Value of the indicator at the surface.
+
+    Attributes:
+        THIN: the value at the samples nearby. Parts thinner than a cell are made a cell thick, and the surface is
+            marched on half cells where samples are dense.
+        LOCAL: like ``THIN``, without both: thin parts may be cut off.
+        MEAN: the mean at all samples, as in the paper.
+    """
 
     THIN = "thin"
-    """The value at the samples nearby. Parts thinner than a cell are made a cell thick, and the surface is marched on half
-    cells where samples are dense."""
     LOCAL = "local"
-    """Like ``THIN``, without both: thin parts may be cut off."""
     MEAN = "mean"
-    """The mean at all samples, as in the paper."""
 
 
 class Solve(str, Enum):
-    """Cells at which the indicator is computed."""
+    """Cells at which the indicator is computed.
+
+    Attributes:
+        AUTO: all of the surface's cells up to 2²⁵ of them, else as ``SPARSE``.
+        DENSE: all of them.
+        SPARSE: those near the samples and the surface; coarse cells elsewhere.
+    """
 
     AUTO = "auto"
-    """All of the surface's cells up to 2²⁵ of them, else as ``SPARSE``."""
     DENSE = "dense"
-    """All of them."""
     SPARSE = "sparse"
-    """Those near the samples and the surface; coarse cells elsewhere."""
 
 
 class Walls(str, Enum):
-    """Condition of the indicator at the walls of the grid."""
+    """Condition of the indicator at the walls of the grid.
+
+    Attributes:
+        FREE: the surface may pass through a wall, at right angles: for half of a body that ends there.
+        CLOSED: the surface never reaches a wall.
+        AUTO: ``FREE`` if a sample lies within 3.5 cells of a wall, which is never so on a fitted grid, else ``CLOSED``.
+    """
 
     FREE = "free"
-    """The surface may pass through a wall, at right angles: for half of a body that ends there."""
     CLOSED = "closed"
-    """The surface never reaches a wall."""
     AUTO = "auto"
-    """``FREE`` if a sample lies within 3.5 cells of a wall, which is never so on a fitted grid, else ``CLOSED``."""
 
 
 class Outliers(str, Enum):
-    """Use of outliers: isolated samples that are further from the others than these extend."""
+    """Use of outliers: isolated samples that are further from the others than these extend.
+
+    Attributes:
+        IGNORE: left out, with a warning. Their gradients are 0.
+        KEEP: samples like all others.
+    """
 
     IGNORE = "ignore"
-    """Left out, with a warning. Their gradients are 0."""
     KEEP = "keep"
-    """Samples like all others."""
 
 
+Fill = Literal["inside", "band"]
 OrientLike = Orient | Literal["auto", "parity", "given", "signs", "sensors", "previous"]
 SplatLike = Splat | Literal["bspline", "paper"]
 LevelLike = Level | Literal["thin", "local", "mean"]
@@ -157,7 +177,27 @@ class Options:
             object.__setattr__(self, name, value)
 
 
-def resolve(options: Options | None, changes: dict[str, object]) -> Options:
+class OptionChanges(TypedDict, total=False):
+    """Fields of :class:`Options` as keyword arguments."""
+
+    radius: float | Literal["auto"]
+    orient: OrientLike
+    splat: SplatLike
+    area: bool
+    smoothing: float | Literal["auto"]
+    screening: float
+    level: LevelLike
+    surface: float | str
+    solve: SolveLike
+    walls: WallsLike
+    trim: float | Literal["auto", "off"]
+    sheet: float | Literal["off"]
+    outliers: OutliersLike
+    band: float | Literal["full"]
+    checks: bool
+
+
+def resolve(options: Options | None, changes: OptionChanges) -> Options:
     """``options``, or the defaults, with some fields changed.
 
     Raises:
@@ -194,23 +234,26 @@ def check_known(orient: OrientLike, normals: bool, sensors: bool = False) -> Non
             )
 
 
-def check_fill(fill: object, band: float | str = "full") -> str:
+def check_fill(fill: object, band: float | str = "full") -> Fill:
     """The region of extended values: ``"inside"`` or ``"band"``.
 
     Raises:
         ValueError: another name, or ``"inside"`` although φ has a ``band`` of its own.
     """
-    if not isinstance(fill, str) or fill not in ("inside", "band"):
+    if fill != "inside" and fill != "band":
         raise ValueError(f'fill is {fill!r}; give "inside" or "band"')
     if fill == "inside" and band != "full":
         raise ValueError(
             f"options.band is {band}, and the closest points of cells inside are unknown beyond it; "
             'give fill="band" or options with band="full"'
         )
-    return fill
+    return "inside" if fill == "inside" else "band"
 
 
-def choice(kind: type[Enum], value: object, name: str) -> Enum:
+E = TypeVar("E", bound=Enum)
+
+
+def choice(kind: type[E], value: object, name: str) -> E:
     """One of the values of ``kind``.
 
     Raises:

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from . import _core
-from ._arrays import floats, known
-from ._options import Options, Orient, OrientLike, check_known
+from ._inputs import read_input
+from ._options import Options, Orient, OrientLike
 from ._reconstruction import texts
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+
+    from ._inputs import CloudLike
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +41,7 @@ class Oriented:
 
 
 def orient(
-    points: ArrayLike,
+    points: CloudLike,
     *,
     normals: ArrayLike | None = None,
     sensors: ArrayLike | None = None,
@@ -49,9 +51,10 @@ def orient(
     """Outward unit normals of a cloud, and the confidence in the side of each.
 
     Args:
-        points: ``(N, 3)`` samples of a surface; float32 or float64 decides the type of the result.
-        normals: as :func:`reconstruct` takes them.
-        sensors: as :func:`reconstruct` takes them.
+        points: ``(N, 3)`` samples of a surface, or what else :func:`reconstruct` takes; float32 or float64 decides the
+            type of the result.
+        normals: as for :func:`reconstruct`.
+        sensors: as for :func:`reconstruct`.
         radius: of the neighborhoods, in the unit of the points, or ``"auto"``.
         orient: method that finds the sides; ``"previous"`` needs a plan, and is ``"auto"`` here.
 
@@ -59,9 +62,7 @@ def orient(
         TypeError, ValueError: invalid points; the message says what is wrong and what to do.
         KeyboardInterrupt: at once, on Ctrl-C.
     """
-    cloud = floats(points, "points", (None, 3))
     options = Options(radius=radius, orient=orient)
-    normals, sensors = known(cloud, normals, sensors)
-    check_known(options.orient, normals is not None, sensors is not None)
-    normals, confidence, report = _core.orient(cloud, normals, sensors, json.dumps(asdict(options)))
-    return Oriented(normals, confidence, json.loads(report))
+    cloud, given, places = read_input(points).arrays(normals, sensors, options.orient)
+    found, confidence, report = _core.orient(cloud, given, places, json.dumps(asdict(options)))
+    return Oriented(found, confidence, json.loads(report))

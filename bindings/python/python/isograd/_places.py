@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from ._numbers import number
 from ._options import length
 
 Offset = tuple[float, float, float]
-Fill = Literal["inside", "band"]
 CENTER: Offset = (0.5, 0.5, 0.5)
 NO_FACE = 0xFFFF_FFFF
 """Closest face of a place beyond the band."""
@@ -24,7 +23,9 @@ def band_width(band: object, grid: Grid, cells: float, *words: str) -> float:
         ValueError: neither a finite number above 0 nor one of the words.
     """
     width = length(band, "band", "auto", *words)
-    return {"auto": cells * grid.spacing, "full": np.inf}.get(width, width)
+    if isinstance(width, str):
+        return cells * grid.spacing if width == "auto" else np.inf
+    return width
 
 
 def axes_at(grid: Grid, offset: Offset, dtype: np.typing.DTypeLike) -> list[np.ndarray]:

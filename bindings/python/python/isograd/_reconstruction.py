@@ -4,89 +4,57 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from . import _core
-from ._arrays import floats, known
+from . import _convert, _core
+from ._arrays import floats
 from ._grid import Grid
+from ._inputs import read_input
 from ._mesh import Mesh
 from ._numbers import number
-from ._options import Options, check_fill, check_known, resolve
+from ._options import Options, check_fill, resolve
+from ._progress import Progress, observe
+from ._results import Extension, Gradients
 from ._settings import check_backend, encode, warn_caller, warn_note
+from ._stored import Stored, checksum, compute_again
 
 if TYPE_CHECKING:
+    import os
+
+    import open3d
+    import pyvista
+    import trimesh
+    import xarray
+    from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
+    from typing_extensions import Unpack
+
+    from ._inputs import CloudLike
+    from ._options import OptionChanges
+
+    from ._files import Cloud
 
 
 class ReconstructionWarning(UserWarning):
     """The verdict of a reconstruction is ``"check"`` or ``"bad"``; the message has the reasons and what to try."""
 
 
-@dataclass(frozen=True, eq=False)
-class Gradients:
-    """Cotangents of the inputs of a reconstruction: the derivative of a loss in each input.
+class Reconstruction(Stored):
+    """Reconstruction of a cloud. Arrays have the type of the points and are copies, which may be modified.
 
-    Attributes:
-        points: ``(N, 3)``.
-        normals: ``(N, 3)`` of the given normals; ``None`` where normals were estimated.
-        attributes: of each extended attribute, ``(N, components)``.
-        lower: of the grid's corner, at fixed points.
-        spacing: of the grid's cell size, at fixed points.
-        guarded: number of places where a derivative is undefined or unbounded and was replaced by a bounded one.
+    A pickle has the inputs, and the results that are small or were read before. All else, such as a pullback, is computed
+    again when it is needed. On a machine that would give other bits, and after ``orient="previous"``, this is a
+    ``RuntimeError``.
     """
 
-    points: np.ndarray
-    normals: np.ndarray | None
-    attributes: dict[str, np.ndarray]
-    lower: tuple[float, float, float]
-    spacing: float
-    guarded: int
-
-
-class Extension:
-    """An attribute of the samples, extended to the surface and to the cells inside and near it."""
-
-    def __init__(self, core: _core.Extension, name: str, grid: Grid) -> None:
-        self._core = core
-        self.name = name
-        """Name of the attribute."""
-        self.grid = grid
-        """The grid."""
-
-    @cached_property
-    def vertices(self) -> np.ndarray:
-        """``(V, components)`` at the vertices of the mesh (of ``closest_mesh``)."""
-        return self._core.array("vertices")
-
-    @cached_property
-    def cells(self) -> np.ndarray:
-        """``(B,)`` flat indices of the cells: ``numpy.unravel_index(cells, grid.shape)``."""
-        return self._core.array("cells")
-
-    @cached_property
-    def values(self) -> np.ndarray:
-        """``(B, components)`` at those cells."""
-        return self._core.array("values")
-
-    def dense(self, fill: float = 0.0) -> np.ndarray:
-        """``(nx, ny, nz, components)``, with ``fill`` at the other cells."""
-        components = self.values.shape[1]
-        out = np.full((*self.grid.shape, components), fill, dtype=self.values.dtype)
-        out.reshape(-1, components)[self.cells] = self.values
-        return out
-
-
-class Reconstruction:
-    """Reconstruction of a cloud. Arrays have the type of the points and are copies, which may be modified."""
-
     def __init__(
-        self, core: _core.Result, grid: Grid, options: Options, count: int, dtype: np.dtype
+        self, core: _core.Result, grid: Grid, options: Options, backend: str, count: int, dtype: np.dtype
     ) -> None:
         self._core = core
+        self._requested = backend
         self._count = count
         self.dtype = dtype
         """float32 or float64: the type of the points."""
@@ -95,9 +63,23 @@ class Reconstruction:
         self.options = options
         """The options of the reconstruction."""
 
+    def __getstate__(self) -> dict[str, Any]:
+        small = ("mesh", "normals", "confidence", "outliers", "iso_value", "surface_grid", "backend", "report")
+        state = self._state("sdf", *small)
+        if "_inputs" not in state:
+            state["_inputs"], state["_checksum"] = self._core.inputs(), checksum(self._core)
+        return state
+
+    @cached_property
+    def _core(self) -> _core.Result:
+        return compute_again(self, self.__dict__["_inputs"], self.__dict__["_checksum"])
+
     def __repr__(self) -> str:
         verdict = self.verdict or "not checked"
         return f"Reconstruction of {self._count} points on {self.grid.shape} cells, {self.dtype}: {verdict}"
+
+    def _repr_html_(self) -> str:
+        return _convert.reconstruction_html(self)
 
     @cached_property
     def sdf(self) -> np.ndarray:
@@ -115,8 +97,8 @@ class Reconstruction:
     @cached_property
     def surface_grid(self) -> Grid:
         """The grid that the surface was found on: that of :attr:`indicator`, unless the solve was sparse."""
-        shape = tuple(self._core.surface_shape())
-        return Grid(self.grid.lower, self.grid.spacing * self.grid.shape[0] / shape[0], shape)
+        nx, ny, nz = self._core.surface_shape()
+        return Grid(self.grid.lower, self.grid.spacing * self.grid.shape[0] / nx, (nx, ny, nz))
 
     @cached_property
     def iso_value(self) -> float:
@@ -154,6 +136,12 @@ class Reconstruction:
         return self._core.array("areas")
 
     @cached_property
+    def cloud(self) -> Cloud:
+        """The samples in their order, with :attr:`normals`, ``confidence`` and the given attributes: ``points.ply`` of the
+        command line."""
+        return _convert.cloud_of(self)
+
+    @cached_property
     def outliers(self) -> np.ndarray:
         """``(M,)`` uint32: indices of the outliers that were left out. Their normals, confidence, areas and gradients are 0."""
         return self._core.array("outliers")
@@ -168,7 +156,7 @@ class Reconstruction:
         """Settings, measurements, timings and warnings, with the names of the command line's ``report.json``."""
         return {"backend": self.backend, **json.loads(self._core.report())}
 
-    @property
+    @cached_property
     def backend(self) -> str:
         """Name of the backend: ``"cpu"``, or a backend and its device, such as ``"cuda: NVIDIA H100"``."""
         return self._core.backend()
@@ -176,7 +164,8 @@ class Reconstruction:
     @property
     def verdict(self) -> Literal["good", "check", "bad"] | None:
         """Whether the result can be trusted; ``None`` where nothing was checked (``checks=False``)."""
-        return self.report["verdict"]
+        verdict: Literal["good", "check", "bad"] | None = self.report["verdict"]
+        return verdict
 
     @property
     def warnings(self) -> list[str]:
@@ -190,6 +179,45 @@ class Reconstruction:
             reasons = "; ".join(f"{w['code']} (try: {w['try']})" for w in self.report["warnings"])
             message = f"the result is {self.verdict}: {reasons}. Numbers: result.report[\"warnings\"]; help: docs/bad-results.md"
             warn_caller(message, ReconstructionWarning)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes a result, as the name ends: φ (.vti, .npz), the mesh (.ply, .obj, .stl, .vtp), the report (.json) or
+        slices of φ (.png). Files are written atomically.
+
+        A folder, which exists or ends in ``/``, gets what ``isograd reconstruct -o`` writes: ``sdf.vti``, ``mesh.ply``,
+        ``points.ply``, ``report.json`` and ``slices.png``.
+
+        Raises:
+            ValueError: another ending.
+            FileNotFoundError, OSError: an error of the operating system.
+        """
+        _convert.save_reconstruction(self, path)
+
+    def plot(self, **arguments: Any) -> Figure:
+        """Slices of φ with the samples, by matplotlib: a figure, and arguments, of :func:`isograd.viz.slices`. For a view
+        in three dimensions, ``result.mesh.plot(points=result.cloud.points)``.
+
+        Raises:
+            ImportError: matplotlib is not installed.
+        """
+        return _convert.plot_reconstruction(self, **arguments)
+
+    def to_pyvista(self, *, cells: bool = False) -> pyvista.ImageData:
+        """φ for PyVista, named ``sdf``, as in the VTI file: values at points, which are the centers of the cells, so that
+        ``contour([0.0])`` works. With ``cells`` the box of the grid, with values in its cells."""
+        return _convert.to_image(self, bool(cells))
+
+    def to_xarray(self) -> xarray.DataArray:
+        """φ for xarray, named ``sdf``, with the centers of the cells as coordinates x, y and z."""
+        return _convert.to_xarray(self)
+
+    def to_trimesh(self) -> trimesh.Trimesh:
+        """:attr:`mesh` for trimesh, vertices and faces in this order."""
+        return self.mesh.to_trimesh()
+
+    def to_open3d(self) -> open3d.geometry.TriangleMesh:
+        """:attr:`mesh` for Open3D, with normals."""
+        return self.mesh.to_open3d()
 
     def extend(
         self, name: str, band: float, *, fill: Literal["inside", "band"] = "inside"
@@ -284,12 +312,19 @@ class Reconstruction:
 class Reconstructor:
     """A plan for one grid and one set of options: made once, used for every time step.
 
+    Copies and pickles are new plans, without earlier calls.
+
     Calls reuse its memory. It may be called from several threads at once; each call beyond the first then makes a plan
     of its own. With ``orient="previous"``, call it from one thread at a time: the result depends on the previous calls.
     """
 
     def __init__(
-        self, grid: Grid, options: Options | None = None, *, backend: str = "cpu", **changes: Any
+        self,
+        grid: Grid,
+        options: Options | None = None,
+        *,
+        backend: str = "cpu",
+        **changes: Unpack[OptionChanges],
     ) -> None:
         self.options = resolve(options, changes)
         """Options of the reconstruction."""
@@ -300,65 +335,101 @@ class Reconstructor:
         self._plan = _core.Plan(encode(grid, self.options, self.backend))
         warn_note(self._plan.take_note())
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(type(self), self.grid, self.options, backend=self.backend), ()
+
     def __call__(
         self,
-        points: ArrayLike,
+        points: CloudLike,
         *,
         normals: ArrayLike | None = None,
         sensors: ArrayLike | None = None,
         attributes: Mapping[str, ArrayLike] | None = None,
+        progress: Progress | bool | None = None,
     ) -> Reconstruction:
         """See :func:`reconstruct`."""
-        cloud = floats(points, "points", (None, 3))
-        normals, sensors = known(cloud, normals, sensors)
-        check_known(self.options.orient, normals is not None, sensors is not None)
-        core = self._plan.reconstruct(cloud, normals, sensors, _attributes(attributes, cloud))
-        warn_note(self._plan.take_note())
-        result = Reconstruction(core, self.grid, self.options, len(cloud), cloud.dtype)
+        result = self._run(points, normals, sensors, attributes, progress)
         result._warn()
         return result
 
     reconstruct = __call__
 
+    def _run(
+        self,
+        points: CloudLike,
+        normals: ArrayLike | None = None,
+        sensors: ArrayLike | None = None,
+        attributes: Mapping[str, ArrayLike] | None = None,
+        progress: Progress | bool | None = None,
+    ) -> Reconstruction:
+        """A reconstruction without a warning that its verdict is not good."""
+        given = read_input(points)
+        cloud, normals, sensors = given.arrays(normals, sensors, self.options.orient)
+        if attributes is None:
+            attributes = given.usable_attributes(len(cloud))
+        with observe(progress) as observer:
+            core = self._plan.reconstruct(cloud, normals, sensors, _attributes(attributes, cloud), observer)
+        warn_note(self._plan.take_note())
+        return Reconstruction(core, self.grid, self.options, self.backend, len(cloud), cloud.dtype)
+
 
 def reconstruct(
-    points: ArrayLike,
+    points: CloudLike,
     grid: Grid | None = None,
     *,
+    resolution: int | None = None,
+    spacing: float | None = None,
+    padding: float | None = None,
     normals: ArrayLike | None = None,
     sensors: ArrayLike | None = None,
     attributes: Mapping[str, ArrayLike] | None = None,
     options: Options | None = None,
     backend: str = "cpu",
-    **changes: Any,
+    progress: Progress | bool | None = None,
+    **changes: Unpack[OptionChanges],
 ) -> Reconstruction:
     """Reconstructs the signed distance field and the surface of a cloud.
 
     Args:
-        points: ``(N, 3)`` samples of the surface; float32 or float64 decides the type of all results.
+        points: ``(N, 3)`` samples of the surface; float32 or float64 decides the type of all results. Also the path of a
+            file (see :func:`read_points`), a :class:`Cloud`, :class:`Samples`, a point cloud of Open3D, trimesh, PyVista or
+            VTK, or a data frame with columns x, y and z; of a mesh, its vertices.
         grid: grid of φ; by default ``Grid.fit(points)``, with the given ``outliers``.
-        normals: ``(N, 3)`` outward normals, only with ``orient="given"`` or ``"signs"``.
+        resolution: of that fitted grid: cells on the longest side, by default 128.
+        spacing: of that fitted grid: cell size, in the unit of the points, instead of a resolution.
+        padding: of that fitted grid: see :meth:`Grid.fit`.
+        normals: ``(N, 3)`` outward normals, only with ``orient="given"`` or ``"signs"``. By default those that came with
+            the points, which other orientations ignore: the sides of a scan's normals are often arbitrary.
         sensors: positions of the sensors, only with ``orient="sensors"``: ``(N, 3)`` one for each point, ``(3,)`` one
             for all, or ``(M, 3)`` with another ``M`` where it is unknown which one saw a point.
         attributes: values of the samples, ``(N,)`` or ``(N, components)`` by name, for
-            :meth:`Reconstruction.extend`.
+            :meth:`Reconstruction.extend`. By default the numbers that came with the points.
         options: options of the reconstruction.
         backend: ``"cpu"``, ``"cuda"`` (``"cuda:1"`` is the second device), ``"vulkan"``, or
             ``"auto"``: a GPU if available, else the CPU with a ``RuntimeWarning`` that gives the reason.
+        progress: ``True`` for a bar on standard error (of tqdm, if it is installed), or a function that is called with the
+            name of each stage that begins and the fraction of the work before it, and last with ``"done"`` and 1.0. The
+            fractions are those of typical clouds: stages take fixed shares of the time. An exception ends the work.
         changes: single options by name, such as ``orient="given"``.
 
     Raises:
         TypeError, ValueError: invalid input; the message says what is wrong and what to do.
+        FileNotFoundError, OSError: a file that can't be read.
         RuntimeError: an unavailable backend.
         KeyboardInterrupt: at once, on Ctrl-C.
 
     Warns with :class:`ReconstructionWarning` unless the verdict is good.
     """
-    cloud = floats(points, "points", (None, 3))
+    cloud = read_input(points)
     options = resolve(options, changes)
-    grid = Grid.fit(cloud, outliers=options.outliers) if grid is None else grid
+    fitted: dict[str, Any] = {"resolution": resolution, "spacing": spacing, "padding": padding}
+    fitted = {name: value for name, value in fitted.items() if value is not None}
+    if grid is None:
+        grid = Grid.fit(cloud, outliers=options.outliers, **fitted)
+    elif fitted:
+        raise TypeError(f"grid and {' and '.join(fitted)} are given; leave out grid, or give Grid.fit(points, ...) with them")
     plan = Reconstructor(grid, options, backend=backend)
-    return plan(cloud, normals=normals, sensors=sensors, attributes=attributes)
+    return plan(cloud, normals=normals, sensors=sensors, attributes=attributes, progress=progress)
 
 
 def texts(report: dict[str, Any]) -> list[str]:

@@ -19,7 +19,7 @@ def encode(grid: Grid, options: Options | None = None, backend: str = "cpu") -> 
         TypeError: ``grid`` or ``options`` is of another type.
     """
     if not isinstance(grid, Grid):
-        raise TypeError(f"grid is a {type(grid).__name__}; give an isograd.Grid, such as Grid.fit(points)")
+        raise TypeError(f"grid is a {type(grid).__name__}; give an isograd.Grid, such as Grid.fit(points, 128)")
     options = Options() if options is None else options
     if not isinstance(options, Options):
         raise TypeError(f"options is a {type(options).__name__}; give an isograd.Options")

@@ -32,14 +32,16 @@ class Material(NamedTuple):
 
 def function(
     shape: Shape, coordinates: Coordinates, free: Sequence[str]
-) -> Callable[[ArrayLike, ArrayLike], Material]:
+) -> Callable[..., Material]:
     """See :meth:`isograd.Shape.jax`."""
     body = _Body(shape, coordinates, tuple(free))
     count = len(coordinates.patch)
 
-    def call(host: Callable[..., tuple[np.ndarray, ...]], shapes: list[tuple[int, ...]], *arrays: jax.Array):
+    def call(
+        host: Callable[..., tuple[np.ndarray, ...]], shapes: list[tuple[int, ...]], *arrays: jax.Array
+    ) -> list[jax.Array]:
         results = [jax.ShapeDtypeStruct(shape, arrays[0].dtype) for shape in shapes]
-        return jax.pure_callback(host, results, *arrays, vmap_method="sequential")
+        return list(jax.pure_callback(host, results, *arrays, vmap_method="sequential"))
 
     @jax.custom_vjp
     def material(values: jax.Array, time: jax.Array) -> Material:
@@ -81,8 +83,8 @@ class _Body:
         moved = {"time": float(time)} if self.moves else {}
         return self.shape.replace(**{name: float(value) for name, value in zip(self.free, values)}, **moved)
 
-    def forward(self, values: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, ...]:
-        time = np.float64(time)
+    def forward(self, values: np.ndarray, at_time: np.ndarray) -> tuple[np.ndarray, ...]:
+        time = float(at_time)
         points, normals = self.at(values, time).points_at(self.coordinates)
         velocity = np.zeros_like(points)
         for sign in (1, -1) if self.moves else ():
@@ -91,11 +93,12 @@ class _Body:
         return tuple(array.astype(np.asarray(values).dtype) for array in (points, normals, velocity))
 
     def pullback(
-        self, values: np.ndarray, time: np.ndarray, points_bar: np.ndarray, normals_bar: np.ndarray, velocity_bar: np.ndarray
+        self, values: np.ndarray, at_time: np.ndarray, points_bar: np.ndarray, normals_bar: np.ndarray, velocity_bar: np.ndarray
     ) -> tuple[np.ndarray, ...]:
         dtype = np.asarray(values).dtype
-        values, time, points_bar, normals_bar, velocity_bar = (
-            np.asarray(x, np.float64) for x in (values, time, points_bar, normals_bar, velocity_bar)
+        time = float(at_time)
+        values, points_bar, normals_bar, velocity_bar = (
+            np.asarray(x, np.float64) for x in (values, points_bar, normals_bar, velocity_bar)
         )
         found = np.zeros(len(self.free) + 1)
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
 from . import _core
-from ._arrays import floats, indices
+from ._arrays import floats, indices, summary
 from ._numbers import number, whole
 
 if TYPE_CHECKING:
@@ -26,6 +27,9 @@ class Coordinates(NamedTuple):
     uv: np.ndarray
     """``(N, 2)`` from 0 to 1."""
 
+    def __repr__(self) -> str:
+        return summary(self)
+
 
 class Samples(NamedTuple):
     """Samples of a shape."""
@@ -38,6 +42,9 @@ class Samples(NamedTuple):
     """``(N, 3)`` velocity of a moving shape; ``None`` for others."""
     coordinates: Coordinates
     """Surface coordinates of the samples."""
+
+    def __repr__(self) -> str:
+        return summary(self)
 
 
 class Parameter(NamedTuple):
@@ -53,7 +60,8 @@ class Parameter(NamedTuple):
 
 
 class Shape:
-    """A parametric shape: ``Shape("fish", width1=0.04)``. :func:`shapes` lists all.
+    """A parametric shape: ``Shape("fish", width1=0.04)``. :func:`shapes` lists all. Shapes of the same name and values are
+    equal.
 
     Raises:
         ValueError: an unknown shape or parameter, or a value out of range; the message lists the valid ones.
@@ -65,6 +73,17 @@ class Shape:
 
     def __repr__(self) -> str:
         return f"Shape({self.name!r})"
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Shape):
+            return NotImplemented
+        return self.name == other.name and self.values == other.values
+
+    def __hash__(self) -> int:
+        return hash((self.name, *self.values.items()))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(type(self), self.name, **self.values), ()
 
     @property
     def name(self) -> str:
@@ -135,7 +154,7 @@ class Shape:
         bar = floats(points_bar, "points_bar", (len(patch), 3))
         return dict(zip(self.values, self._core.pullback(patch, uv, bar)))
 
-    def jax(self, coordinates: Coordinates, free: Sequence[str] = ()) -> Callable[[ArrayLike, ArrayLike], Material]:
+    def jax(self, coordinates: Coordinates, free: Sequence[str] = ()) -> Callable[..., Material]:
         """A JAX function of the values of ``free`` parameters and the time: material points, normals and velocities.
 
         ``f(values, time)`` with ``(len(free),)`` values gives an ``isograd.jax.Material`` of three ``(N, 3)`` arrays, in

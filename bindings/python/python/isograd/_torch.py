@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+import functools
+import inspect
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from . import _settings
+from . import _core, _settings
 from ._grid import Grid
 from ._options import Options
 
@@ -15,6 +18,10 @@ try:
     from torch import Tensor
 except ImportError as error:
     raise ImportError(f"isograd.torch needs PyTorch ({error}); install it by `pip install torch`") from error
+
+__all__ = ["Tensor", "array", "call", "checked", "in_batches", "one_by_one", "prepare", "rows", "torch"]
+
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 # The text is the same whenever grid and options are: the compiler need not look inside.
@@ -49,6 +56,90 @@ def checked(values: Tensor, name: str, columns: int | None = 3) -> Tensor:
     return values
 
 
+def prepare(
+    points: Tensor, grid: Grid, normals: Tensor | None, options: Options | None, backend: str
+) -> tuple[Tensor, Tensor | None, str]:
+    """Points and normals as :func:`checked`, and grid, options and backend as one text.
+
+    Raises:
+        TypeError, ValueError, RuntimeError: as :func:`checked` and :func:`encode`.
+    """
+    points = checked(points, "points")
+    if normals is not None:
+        normals = checked(normals, "normals").to(points.dtype)
+    return points, normals, encode(grid, options, normals is not None, backend, points.dtype == torch.float64)
+
+
+def rows(values: Tensor | None, points: Tensor) -> tuple[Tensor, bool | None]:
+    """Values as ``(N, C)``, and whether they were ``(N,)``; ``(N, 0)`` and ``None`` for none.
+
+    Raises:
+        TypeError, ValueError: as :func:`checked`; another number of rows.
+    """
+    if values is None:
+        return points.new_empty((len(points), 0)), None
+    is_scalar = isinstance(values, Tensor) and values.ndim == 1
+    found = checked(values[:, None] if is_scalar else values, "values", None).to(points.dtype)
+    if len(found) != len(points) or found.shape[1] == 0:
+        raise ValueError(f"values has the shape {tuple(values.shape)} and must have one row for each point")
+    return found, is_scalar
+
+
+def in_batches(function: Function) -> Function:
+    """The function, also of a batch of clouds ``(B, N, 3)``: its results are then stacked. The other tensors are shared or,
+    with one axis more, of one cloud each; ``values`` are always of one cloud each."""
+    signature = inspect.signature(function)
+
+    @functools.wraps(function)
+    def apply(points: Tensor, *arguments: Any, **keywords: Any) -> Any:
+        if not isinstance(points, Tensor) or points.ndim != 3:
+            return function(points, *arguments, **keywords)
+        if len(points) == 0:
+            raise ValueError(f"points has the shape {tuple(points.shape)}; a batch has one cloud or more")
+        given = signature.bind(points, *arguments, **keywords).arguments
+        tensors = {name: value for name, value in given.items() if isinstance(value, Tensor)}
+        batch = {name: value for name, value in tensors.items() if value.ndim == 3 or name == "values"}
+        for name, value in batch.items():
+            if len(value) != len(points):
+                raise ValueError(f"{name} has the shape {tuple(value.shape)} in a batch of {len(points)} clouds")
+        shared = {name: value for name, value in given.items() if name not in batch}
+        clouds = [{name: value[i] for name, value in batch.items()} for i in range(len(points))]
+        return _stacked([function(**cloud, **shared) for cloud in clouds])
+
+    return cast(Function, apply)
+
+
+def _stacked(results: Sequence[Any]) -> Any:
+    """Results of the same structure, with all their tensors stacked."""
+    first = results[0]
+    if first is None:
+        return None
+    if not isinstance(first, Tensor):
+        parts = [_stacked(column) for column in zip(*results)]
+        return type(first)(*parts) if hasattr(first, "_fields") else tuple(parts)
+    if any(result.shape != first.shape for result in results):
+        raise ValueError("the surfaces of a batch differ in size: give max_vertices and max_faces")
+    return torch.stack(list(results))
+
+
+def call(
+    name: str,
+    inputs: Sequence[Tensor | None],
+    outputs: Sequence[Tensor],
+    settings: str,
+    band: float | None = None,
+    inside: bool = False,
+) -> None:
+    """Calls a target. PyTorch hardly supports uint32: faces are int32 with the same bits."""
+
+    def bits(tensor: Tensor) -> np.ndarray:
+        found = array(tensor)
+        return found.view(np.uint32) if found.dtype == np.int32 else found
+
+    given = [bits(tensor) for tensor in inputs if tensor is not None]
+    _core.call_target(name, given, [bits(tensor) for tensor in outputs], settings, band, inside)
+
+
 def one_by_one(operator: Any) -> Any:
     """A ``torch.vmap`` rule that calls an operator for one member of the batch after the other."""
 
@@ -56,7 +147,7 @@ def one_by_one(operator: Any) -> Any:
         if info.batch_size == 0:
             raise ValueError("vmap over an empty batch: give one cloud or more")
         calls = [
-            operator(*(x if axis is None else x.select(axis, i) for x, axis in zip(batch, axes)))
+            operator(*(x.select(axis, i) if isinstance(axis, int) else x for x, axis in zip(batch, axes)))
             for i in range(info.batch_size)
         ]
         outputs = tuple(torch.stack(output) for output in zip(*calls))
@@ -65,6 +156,7 @@ def one_by_one(operator: Any) -> Any:
     return apply
 
 
-def array(tensor: Tensor | None) -> np.ndarray | None:
+def array(tensor: Tensor) -> np.ndarray:
     """The values in C order; a copy only where the tensor has another order."""
-    return None if tensor is None else tensor.detach().resolve_neg().contiguous().numpy()
+    found: np.ndarray = tensor.detach().resolve_neg().contiguous().numpy()
+    return found

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-from typing import Any, Literal, NamedTuple, Optional
+from typing import Any, Literal, NamedTuple, Optional, overload
 
 import numpy as np
 
-from . import _core
 from ._grid import Grid
-from ._options import Options, check_fill
-from ._places import Fill, are_centers, axes_at, band_width, is_many, on_grids, shaped
+from ._options import Fill, Options, check_fill
+from ._places import Offset, are_centers, axes_at, band_width, is_many, on_grids, shaped
 from ._pure import grid_shape
-from ._torch import Tensor, array, checked, encode, one_by_one, torch
+from ._torch import Tensor, call, checked, in_batches, one_by_one, prepare, rows, torch
 
 
 class Surface(NamedTuple):
@@ -28,10 +27,39 @@ class Surface(NamedTuple):
     """``(*S, C)`` or ``S``: values at the closest point; 0 beyond the band. ``None`` if no values are given."""
 
 
+@overload
 def surface(
     points: Tensor,
     grid: Grid,
-    places: object = None,
+    places: Grid | Offset | Tensor | None = None,
+    *,
+    values: Tensor | None = ...,
+    normals: Tensor | None = ...,
+    band: float | Literal["auto", "full"] = ...,
+    fill: Fill = ...,
+    options: Options | None = ...,
+) -> Surface: ...
+
+
+@overload
+def surface(
+    points: Tensor,
+    grid: Grid,
+    places: tuple[Offset, ...],
+    *,
+    values: Tensor | None = ...,
+    normals: Tensor | None = ...,
+    band: float | Literal["auto", "full"] = ...,
+    fill: Fill = ...,
+    options: Options | None = ...,
+) -> tuple[Surface, ...]: ...
+
+
+@in_batches
+def surface(
+    points: Tensor,
+    grid: Grid,
+    places: Grid | Offset | tuple[Offset, ...] | Tensor | None = None,
     *,
     values: Tensor | None = None,
     normals: Tensor | None = None,
@@ -59,16 +87,13 @@ def surface(
         TypeError, ValueError, RuntimeError: as for :func:`isograd.torch.signed_distance`.
     """
     check_fill(fill)
-    points = checked(points, "points")
-    if normals is not None:
-        normals = checked(normals, "normals").to(points.dtype)
-    settings = encode(grid, options, normals is not None, "cpu", points.dtype == torch.float64)
+    points, normals, settings = prepare(points, grid, normals, options, "cpu")
     width = band_width(band, grid, 4, "full")
-    rows, is_scalar = _rows(values, points)
+    columns, is_scalar = rows(values, points)
     regular = on_grids(places, grid)
     positions, shapes = _positions(places, regular, points.dtype)
     given = positions[:0] if are_centers(regular, grid) else positions
-    found = _surface(points, given, rows, normals, settings, float(width), len(positions))[:4]
+    found = _surface(points, given, columns, normals, settings, float(width), len(positions))[:4]
     if fill == "band":
         far = found[0] < -width
         beyond = (torch.full_like(found[0], -width), torch.zeros_like(found[1]), positions, torch.zeros_like(found[3]))
@@ -77,17 +102,6 @@ def surface(
     split = zip(*(array.split(sizes) for array in found))
     parts = [Surface(*shaped(part, shape, is_scalar)) for part, shape in zip(split, shapes)]
     return tuple(parts) if is_many(places) else parts[0]
-
-
-def _rows(values: Tensor | None, points: Tensor) -> tuple[Tensor, bool | None]:
-    """Values as ``(N, C)``, and whether they were ``(N,)``; ``(N, 0)`` and ``None`` for none."""
-    if values is None:
-        return points.new_empty((len(points), 0)), None
-    is_scalar = isinstance(values, Tensor) and values.ndim == 1
-    rows = checked(values[:, None] if is_scalar else values, "values", None).to(points.dtype)
-    if len(rows) != len(points) or rows.shape[1] == 0:
-        raise ValueError(f"values has the shape {tuple(values.shape)} and must have one row for each point")
-    return rows, is_scalar
 
 
 def _positions(places: Any, regular: Any, dtype: Any) -> tuple[Tensor, list[tuple[int, ...]]]:
@@ -118,17 +132,6 @@ def _outputs(points: Tensor, values: Tensor, settings: str, count: int) -> tuple
     )
 
 
-def _call(name: str, inputs: list[Tensor | None], outputs: tuple[Tensor, ...], settings: str, band: float) -> None:
-    """Calls a target. PyTorch hardly supports uint32: faces are int32 with the same bits."""
-
-    def bits(tensor: Tensor) -> np.ndarray:
-        found = array(tensor)
-        return found.view(np.uint32) if found.dtype == np.int32 else found
-
-    given = [bits(tensor) for tensor in inputs if tensor is not None]
-    _core.call_target(name, given, [bits(tensor) for tensor in outputs], settings, band)
-
-
 @torch.library.custom_op("isograd::surface", mutates_args=(), device_types="cpu")
 def _surface(
     points: Tensor,
@@ -140,8 +143,8 @@ def _surface(
     count: int,
 ) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor, Tensor]:
     outputs = _outputs(points, values, settings, count)
-    _call("isograd_surface", [points, places, values, given], outputs, settings, band)
-    return outputs  # type: ignore[return-value]
+    call("isograd_surface", [points, places, values, given], outputs, settings, band)
+    return outputs  # pyright: ignore[reportReturnType]
 
 
 @_surface.register_fake
@@ -156,7 +159,7 @@ def _pullback(
     """Cotangents of places, values, points and, where they are given, normals."""
     points, places, values, *given = inputs
     outputs = tuple(torch.empty_like(a) for a in (places, values, points, *given))
-    _call("isograd_surface_pullback", [points, places, values, *saved, *bars, *given], outputs, settings, band)
+    call("isograd_surface_pullback", [points, places, values, *saved, *bars, *given], outputs, settings, band)
     return list(outputs)
 
 
@@ -174,9 +177,10 @@ def _save(ctx: Any, inputs: tuple[Any, ...], output: tuple[Tensor, ...]) -> None
     ctx.mark_non_differentiable(*rest)
 
 
-def _backward(ctx: Any, sdf_bar: Tensor, normal_bar: Tensor, closest_bar: Tensor, values_bar: Tensor, *_: Any) -> tuple:
+def _backward(ctx: Any, sdf_bar: Tensor, normal_bar: Tensor, closest_bar: Tensor, values_bar: Tensor, *_: Any) -> tuple[Any, ...]:
     inputs, saved = ctx.saved_tensors[: 3 + ctx.is_given], ctx.saved_tensors[3 + ctx.is_given :]
-    (points, places, *_), (sdf, normal, faces, *rest) = inputs, saved
+    points, places = inputs[:2]
+    sdf, normal, faces, *rest = saved
     spacing = json.loads(ctx.settings)["grid"]["spacing"]
     # n = (q − p) / φ, so that dn = (I − n nᵀ) (dq − dp) / φ.
     turning = normal_bar - normal * (normal * normal_bar).sum(dim=1, keepdim=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -44,7 +45,7 @@ def like(*arrays: jax.Array | None) -> tuple[jax.ShapeDtypeStruct, ...]:
     return tuple(jax.ShapeDtypeStruct(a.shape, a.dtype) for a in arrays if a is not None)
 
 
-def pair(bars: tuple[jax.Array, ...]) -> tuple[jax.Array, jax.Array | None]:
+def pair(bars: Sequence[jax.Array]) -> tuple[jax.Array, jax.Array | None]:
     """Cotangents of points and normals; ``None`` for normals that are not inputs."""
     return bars[0], bars[1] if len(bars) > 1 else None
 
@@ -116,18 +117,18 @@ def call(
 
     def by_callback(*arrays: jax.Array) -> tuple[jax.Array, ...]:
         callback = _Callback(name, results, plan)
-        return jax.pure_callback(callback, results, *arrays, vmap_method="broadcast_all")
+        return tuple(jax.pure_callback(callback, results, *arrays, vmap_method="broadcast_all"))
 
     def by_handler(*arrays: jax.Array) -> tuple[jax.Array, ...]:
         handler = jax.ffi.ffi_call(name, results, vmap_method="broadcast_all")
         return tuple(handler(*arrays, **attributes))
 
     def by_refusal(*arrays: jax.Array) -> tuple[jax.Array, ...]:
-        return jax.pure_callback(refuse, results, *arrays, vmap_method="broadcast_all")
+        return tuple(jax.pure_callback(refuse, results, *arrays, vmap_method="broadcast_all"))
 
     if not _has_handlers():
         return by_callback(*present)
-    return jax.lax.platform_dependent(*present, cpu=by_handler, default=by_refusal)
+    return tuple(jax.lax.platform_dependent(*present, cpu=by_handler, default=by_refusal))
 
 
 def refuse(*_arrays: ArrayLike) -> tuple[np.ndarray, ...]:

@@ -24,14 +24,14 @@ from __future__ import annotations
 import functools
 import json
 from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._options import Options, Orient, check_fill
-from ._jax_surface import Fill, Surface, sample_values, surface
+from ._options import Fill, Options, Orient, check_fill
+from ._jax_surface import Surface, sample_values, surface
 from ._places import band_width
 from ._shape_jax import Material
 from ._xla import Plan, call, floats, like, pair, prepare
@@ -83,12 +83,12 @@ def _distance(plan: Plan, points: jax.Array, normals: jax.Array | None) -> jax.A
     return sdf
 
 
-def _distance_forward(plan: Plan, points: jax.Array, normals: jax.Array | None) -> tuple:
+def _distance_forward(plan: Plan, points: jax.Array, normals: jax.Array | None) -> tuple[Any, ...]:
     saved = call("isograd_forward", plan, plan.saved(points), points, normals)
     return saved[0], (points, normals, saved)
 
 
-def _distance_pullback(plan: Plan, residuals: tuple, sdf_bar: jax.Array) -> tuple:
+def _distance_pullback(plan: Plan, residuals: tuple[Any, ...], sdf_bar: jax.Array) -> tuple[Any, ...]:
     points, normals, saved = residuals
     bars = call(
         "isograd_pullback", plan, like(points, normals), points, *saved, sdf_bar, normals
@@ -143,7 +143,7 @@ def _query(
 
 def _query_forward(
     plan: Plan, points: jax.Array, queries: jax.Array, normals: jax.Array | None
-) -> tuple:
+) -> tuple[Any, ...]:
     triangle = jax.ShapeDtypeStruct(queries.shape[:1], np.uint32)
     (vector,) = like(queries)
     results = (*_distances(queries), vector, triangle, vector, *plan.saved(points))
@@ -151,7 +151,7 @@ def _query_forward(
     return distance, (points, queries, normals, saved)
 
 
-def _query_pullback(plan: Plan, residuals: tuple, distance_bar: jax.Array) -> tuple:
+def _query_pullback(plan: Plan, residuals: tuple[Any, ...], distance_bar: jax.Array) -> tuple[Any, ...]:
     points, queries, normals, saved = residuals
     results = like(queries, points, normals)
     arrays = (points, queries, *saved, distance_bar, normals)
@@ -214,7 +214,8 @@ def mesh(
     """
     plan, points, normals = prepare(points, grid, normals, options, backend)
     sizes = (_size(max_vertices, "max_vertices"), _size(max_faces, "max_faces"))
-    vertices, faces, counts = _mesh(plan, sizes, points, normals)
+    found: Any = _mesh(plan, sizes, points, normals)
+    vertices, faces, counts = found
     return Mesh(vertices, faces, counts[0], counts[1])
 
 
@@ -233,13 +234,13 @@ def _mesh(
 
 def _mesh_forward(
     plan: Plan, sizes: tuple[int, int], points: jax.Array, normals: jax.Array | None
-) -> tuple:
+) -> tuple[Any, ...]:
     results = (*_surface(points, sizes), *plan.saved(points))
     found = call("isograd_mesh", plan, results, points, normals)
     return found[:3], (points, normals, found[3:])
 
 
-def _mesh_pullback(plan: Plan, sizes: tuple[int, int], residuals: tuple, bars: tuple) -> tuple:
+def _mesh_pullback(plan: Plan, sizes: tuple[int, int], residuals: tuple[Any, ...], bars: tuple[Any, ...]) -> tuple[Any, ...]:
     points, normals, saved = residuals
     arrays = (points, *saved, bars[0], normals)
     return pair(call("isograd_mesh_pullback", plan, like(points, normals), *arrays))
@@ -322,12 +323,13 @@ def extend(
     """
     plan, points, normals = prepare(points, grid, normals, options, backend)
     width = band_width(band, grid, 3)
-    fill = check_fill(fill, "full" if options is None else options.band)
-    plan = replace(plan, band=width, inside=fill == "inside")
+    is_inside = check_fill(fill, "full" if options is None else options.band) == "inside"
+    plan = replace(plan, band=width, inside=is_inside)
     if values is None:
         raise ValueError("values is None; give the values of the samples")
     values, is_scalar = sample_values(values, points)
-    field, sdf = _extend(plan, points, values, normals)
+    found: Any = _extend(plan, points, values, normals)
+    field, sdf = found
     return Extension(sdf, field[..., 0] if is_scalar else field)
 
 
@@ -335,19 +337,20 @@ def extend(
 def _extend(
     plan: Plan, points: jax.Array, values: jax.Array, normals: jax.Array | None
 ) -> tuple[jax.Array, jax.Array]:
-    return _extend_forward(plan, points, values, normals)[0]
+    field, sdf = _extend_forward(plan, points, values, normals)[0]
+    return field, sdf
 
 
 def _extend_forward(
     plan: Plan, points: jax.Array, values: jax.Array, normals: jax.Array | None
-) -> tuple:
-    field = jax.ShapeDtypeStruct((*plan.shape, values.shape[1]), points.dtype)
-    results = (field, *plan.saved(points))
+) -> tuple[Any, ...]:
+    shape = jax.ShapeDtypeStruct((*plan.shape, values.shape[1]), points.dtype)
+    results = (shape, *plan.saved(points))
     field, *saved = call("isograd_extend", plan, results, points, values, normals)
     return (field, saved[0]), (points, values, normals, saved)
 
 
-def _extend_pullback(plan: Plan, residuals: tuple, bars: tuple) -> tuple:
+def _extend_pullback(plan: Plan, residuals: tuple[Any, ...], bars: tuple[Any, ...]) -> tuple[Any, ...]:
     points, values, normals, saved = residuals
     results = like(values, points, normals)
     arrays = (points, values, *saved, *bars, normals)

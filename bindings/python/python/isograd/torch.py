@@ -1,9 +1,13 @@
-"""Signed distance of points for PyTorch: inside ``autograd``, ``vmap`` and ``torch.compile``.
+"""Signed distance and surface of points for PyTorch: the functions of ``isograd.jax``, inside ``autograd``, ``vmap`` and
+``torch.compile``.
 
 Tensors are on the CPU, and computations use their number type. With another ``backend``, points, φ and their cotangents
 are copied to the device and back at every call. The operators are registered with
-``torch.library`` as ``isograd::signed_distance`` and ``isograd::signed_distance_pullback``. ``torch.func.grad``
+``torch.library``, such as ``isograd::signed_distance`` and ``isograd::signed_distance_pullback``. ``torch.func.grad``
 does not support custom operators: call ``torch.autograd.grad``. Needs PyTorch 2.5.
+
+Of a batch of clouds ``(B, N, 3)`` the results are stacked. Normals, queries and positions are shared, or have the axis of
+the batch too; ``values`` always have it.
 """
 
 from __future__ import annotations
@@ -15,12 +19,14 @@ import numpy as np
 from . import _pure
 from ._grid import Grid
 from ._options import Options
-from ._torch import Tensor, array, checked, encode, one_by_one, torch
+from ._torch import Tensor, array, in_batches, one_by_one, prepare, torch
+from ._torch_mesh import Extension, Mesh, extend, mesh, orient, query
 from ._torch_surface import Surface, surface
 
-__all__ = ["Surface", "signed_distance", "surface"]
+__all__ = ["Extension", "Mesh", "Surface", "extend", "mesh", "orient", "query", "signed_distance", "surface"]
 
 
+@in_batches
 def signed_distance(
     points: Tensor,
     grid: Grid,
@@ -35,14 +41,16 @@ def signed_distance(
     neighbors, the sides of the normals, which face is closest to a cell, and with ``radius="auto"`` the radius.
 
     Args:
-        points: ``(N, 3)``, float32 or float64, on the CPU. float16 and bfloat16 become float32.
+        points: ``(N, 3)``, float32 or float64, on the CPU. float16 and bfloat16 become float32. A batch of clouds is
+            ``(B, N, 3)``: they are computed one after the other, and the results are stacked.
         grid: grid of φ.
-        normals: ``(N, 3)`` outward normals, for the orientations ``"given"`` and ``"signs"``.
+        normals: ``(N, 3)`` outward normals, for the orientations ``"given"`` and ``"signs"``; of a batch ``(B, N, 3)``, or
+            the same for all.
         options: options; ``checks`` has no effect, since there is no report.
         backend: as for :func:`isograd.reconstruct`. On a device the pullback reconstructs again.
 
     Returns:
-        ``grid.shape`` tensor of φ at the centers of the cells, in the unit of the points: negative inside.
+        ``(nx, ny, nz)`` or ``(B, nx, ny, nz)`` tensor of φ at the centers of the cells, in the unit of the points: negative inside.
 
     Raises:
         TypeError: no tensor, or integers or complex numbers.
@@ -50,12 +58,9 @@ def signed_distance(
             than two cells to a wall of the grid.
         RuntimeError: an unavailable backend.
     """
-    points = checked(points, "points")
-    if normals is not None:
-        normals = checked(normals, "normals").to(points.dtype)
-    double = points.dtype == torch.float64
-    settings = encode(grid, options, normals is not None, backend, double)
-    return _signed_distance(points, normals, settings)[0]
+    points, normals, settings = prepare(points, grid, normals, options, backend)
+    sdf: Tensor = _signed_distance(points, normals, settings)[0]
+    return sdf
 
 
 # Operators say Optional and not `| None`: PyTorch reads their annotations, in every version the former.
@@ -64,10 +69,9 @@ def _signed_distance(
     points: Tensor, given: Optional[Tensor], settings: str
 ) -> tuple[Tensor, Tensor, Tensor]:
     """φ, and what its pullback needs: closest faces and normals."""
-    sdf, closest, normals = _pure.forward(settings, array(points), array(given))
+    sdf, closest, normals = _pure.forward(settings, array(points), None if given is None else array(given))
     # PyTorch hardly supports uint32: the same bits as int32.
-    arrays = (sdf, closest.view(np.int32), normals)
-    return tuple(torch.from_numpy(a) for a in arrays)  # type: ignore[return-value]
+    return torch.from_numpy(sdf), torch.from_numpy(closest.view(np.int32)), torch.from_numpy(normals)
 
 
 @_signed_distance.register_fake
@@ -89,7 +93,7 @@ def _pullback(
 ) -> tuple[Tensor, Tensor]:
     """Cotangents of the points and of the given normals; the latter has no rows where none were given."""
     saved = (array(sdf), array(closest).view(np.uint32), array(normals))
-    bars = _pure.pullback(settings, array(points), array(given), saved, array(sdf_bar))
+    bars = _pure.pullback(settings, array(points), None if given is None else array(given), saved, array(sdf_bar))
     given_bar = torch.from_numpy(bars[1]) if len(bars) > 1 else points.new_empty((0, 3))
     return torch.from_numpy(bars[0]), given_bar
 

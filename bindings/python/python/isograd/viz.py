@@ -5,13 +5,15 @@ Both libraries come with ``pip install isograd[viz]``; each is imported by the f
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ._arrays import floats
+from ._convert import require, to_polydata
 from ._grid import Grid
+from ._measure import check_faces
 from ._mesh import Mesh, as_mesh
 
 if TYPE_CHECKING:
@@ -62,10 +64,21 @@ def slices(
         ImportError: matplotlib is not installed.
         TypeError, ValueError: a field of another shape than the grid, or ``at`` outside of it.
     """
-    try:
-        from matplotlib import pyplot
-    except ImportError as error:
-        raise ImportError(f"isograd.viz.slices needs matplotlib ({error}); `pip install isograd[viz]`") from error
+    pyplot = require("matplotlib.pyplot", "isograd.viz.slices", "isograd[viz]")
+    return draw_slices(pyplot.figure, phi, grid, at, points, limit, title, label)
+
+
+def draw_slices(
+    new_figure: Callable[..., Figure],
+    phi: ArrayLike,
+    grid: Grid,
+    at: Sequence[float] | None = None,
+    points: ArrayLike | None = None,
+    limit: float | None = None,
+    title: str | None = None,
+    label: str = "φ",
+) -> Figure:
+    """:func:`slices` on a figure of ``pyplot.figure``, or of ``Figure``, which ``pyplot`` does not know."""
     if not isinstance(grid, Grid):
         raise TypeError(f"grid is a {type(grid).__name__}; give an isograd.Grid")
     field = np.ma.masked_invalid(floats(phi, "phi", grid.shape))
@@ -74,29 +87,32 @@ def slices(
     planes = [field.take(cell[axis], axis=axis) for axis in range(3)]
     limit = _limit(planes, limit)
 
-    figure, row = pyplot.subplots(1, 3, layout="constrained", **_layout(grid))
+    size, widths = _layout(grid)
+    figure = new_figure(layout="constrained", figsize=size)
+    row = figure.subplots(1, 3, width_ratios=widths)
+    images = []
     for axis, (axes, plane) in enumerate(zip(row, planes)):
-        image = _draw_slice(axes, plane, grid, axis, limit)
+        images.append(_draw_slice(axes, plane, grid, axis, limit))
         place = grid.origin[axis] + grid.spacing * cell[axis]
         axes.set_title(f"{AXES[axis]} = {place:.4g}")
         if dots is not None:
             near = dots[np.abs(dots[:, axis] - place) <= 0.5 * grid.spacing]
-            axes.plot(*_across(near.T, axis), ".", color=POINT_COLOR, markersize=1.5)
-    figure.colorbar(image, ax=row, label=label, shrink=0.8)
+            axes.plot(*_across(list(near.T), axis), ".", color=POINT_COLOR, markersize=1.5)
+    figure.colorbar(images[-1], ax=row, label=label, shrink=0.8)
     if title is not None:
         figure.suptitle(title)
     return figure
 
 
-def _layout(grid: Grid) -> dict[str, Any]:
-    """Size of the figure in inches and shares of its width, so that the slices are of one scale."""
+def _layout(grid: Grid) -> tuple[tuple[float, float], list[float]]:
+    """Size of the figure in inches and widths of the slices, so that they are of one scale."""
     sides = [grid.spacing * n for n in grid.shape]
     widths = [_across(sides, axis)[0] for axis in range(3)]
     height = max(_across(sides, axis)[1] for axis in range(3))
     scale = min(10.0 / sum(widths), 6.0 / height)
     # Room for the labels; no panel is too narrow for its title.
     widths = [max(scale * width, 1.2) for width in widths]
-    return {"figsize": (sum(widths) + 3.0, max(scale * height, 1.0) + 1.4), "width_ratios": widths}
+    return (sum(widths) + 3.0, max(scale * height, 1.0) + 1.4), widths
 
 
 def _cell(grid: Grid, at: Sequence[float] | None) -> list[int]:
@@ -132,9 +148,7 @@ def _draw_slice(axes: Axes, plane: np.ma.MaskedArray, grid: Grid, axis: int, lim
         plane.T, cmap="RdBu_r", vmin=-limit, vmax=limit, origin="lower", extent=(left, right, bottom, top)
     )
     if plane.count() and plane.min() < 0.0 < plane.max() and min(plane.shape) > 1:
-        first, second = (
-            low + grid.spacing * (np.arange(n) + 0.5) for low, n in zip((left, bottom), plane.shape)
-        )
+        first, second = _across(grid.axes, axis)
         axes.contour(first, second, plane.T, levels=[0.0], colors="black", linewidths=1.0, zorder=3)
     across, up = _across(AXES, axis)
     axes.set(xlabel=across, ylabel=up)
@@ -149,7 +163,7 @@ def scene(
     values: ArrayLike | None = None,
     label: str = "value",
     opacity: float = 1.0,
-    off_screen: bool = False,
+    off_screen: bool | None = None,
 ) -> pyvista.Plotter:
     """A surface in three dimensions, with the points that it was reconstructed from.
 
@@ -160,7 +174,7 @@ def scene(
         values: ``(V,)`` at the vertices, as colors.
         label: of these colors.
         opacity: of the surface: 0 for nothing, 1 for solid.
-        off_screen: draw without a window, for ``plotter.screenshot("scene.png")``.
+        off_screen: draw without a window, for ``plotter.screenshot("scene.png")``; by default ``pyvista.OFF_SCREEN``.
 
     Returns:
         A plotter: ``plotter.show()`` opens it, ``plotter.close()`` frees it.
@@ -169,10 +183,7 @@ def scene(
         ImportError: PyVista is not installed.
         TypeError, ValueError: arrays of another type or shape, or a mesh without faces.
     """
-    try:
-        import pyvista
-    except ImportError as error:
-        raise ImportError(f"isograd.viz.scene needs PyVista ({error}); `pip install isograd[viz]`") from error
+    library = require("pyvista", "isograd.viz.scene", "isograd[viz]")
     mesh = _drawable(as_mesh(mesh))
     colors = None if values is None else floats(values, "values", (len(mesh.vertices),))
     dots = None if points is None else floats(points, "points", (None, 3))
@@ -180,8 +191,8 @@ def scene(
     if not 0.0 <= opacity <= 1.0:
         raise ValueError(f"opacity is {opacity!r}; give 0 to 1")
 
-    plotter = pyvista.Plotter(off_screen=off_screen)
-    surface = pyvista.PolyData.from_regular_faces(mesh.vertices, mesh.faces.astype(np.int64))
+    plotter = library.Plotter(off_screen=off_screen)
+    surface = to_polydata(mesh)
     if colors is None:
         plotter.add_mesh(surface, color=SURFACE_COLOR, opacity=opacity, smooth_shading=True)
     else:
@@ -193,7 +204,7 @@ def scene(
             few = slice(None, None, -(-len(dots) // MOST_ARROWS))
             length = ARROW_LENGTH * surface.length
             plotter.add_arrows(dots[few], arrows[few], mag=length, color=POINT_COLOR, show_scalar_bar=False)
-    plotter.show_axes()
+    plotter.show_axes()  # pyright: ignore[reportCallIssue]
     return plotter
 
 
@@ -201,8 +212,7 @@ def _drawable(mesh: Mesh) -> Mesh:
     """The mesh, after the checks that VTK leaves out."""
     if len(mesh.faces) == 0:
         raise ValueError("the mesh has no faces, so there is nothing to draw")
-    if int(mesh.faces.max()) >= len(mesh.vertices):
-        raise ValueError(f"a face has the corner {mesh.faces.max()}, but there are {len(mesh.vertices)} vertices")
+    check_faces(mesh.vertices, mesh.faces)
     if not np.isfinite(mesh.vertices).all():
         raise ValueError("the mesh has vertices that are not finite")
     return mesh

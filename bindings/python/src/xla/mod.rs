@@ -19,7 +19,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::backend::Failure;
-use crate::background;
+use crate::{background, threads};
 use buffers::{Array, Batch, Call, Data, DataMut};
 use common::Float;
 
@@ -36,10 +36,10 @@ trait Target {
 
     /// The function of a batch, in the number type of its first input.
     fn run_batch(batch: Batch<'_>) -> Result<(), Failure> {
-        match batch.is_double() {
+        threads::install(|| match batch.is_double() {
             true => batch.for_each(Self::run::<f64>),
             false => batch.for_each(Self::run::<f32>),
-        }
+        })
     }
 }
 

@@ -43,7 +43,7 @@ pub struct Fit {
         help_heading = "Variables"
     )]
     pub only: Vec<String>,
-    /// Random start: each value is multiplied or divided by up to 1 + SPREAD
+    /// Random start: each value is multiplied or divided by a factor of up to 1 + SPREAD
     #[arg(long, value_name = "SPREAD", value_parser = not_negative, help_heading = "Variables")]
     pub random_start: Option<f64>,
     /// Seed of the samples and of the random start
@@ -62,7 +62,7 @@ pub struct Fit {
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..),
         help_heading = "Variables")]
     pub resample: Option<u32>,
-    /// Weight of the smoothness of the points' displacement [default: 0.01]
+    /// Weight of the smoothness of the points' displacement, without unit [default: 0.01]
     #[arg(long, value_name = "W|off", value_parser = off_or, conflicts_with = "shape",
         help_heading = "Variables")]
     pub smoothness: Option<f64>,

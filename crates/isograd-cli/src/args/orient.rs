@@ -19,9 +19,10 @@ pub struct OrientArgs {
     pub radius: Radius,
     /// Method that finds the side of each normal: auto (from enclosure and neighbors), parity (count of crossings, as
     /// in the paper), given (the cloud's own normals), signs (estimated directions on the side of the cloud's own
-    /// normals), sensors (estimated directions on the side of the sensors) or previous (auto, for a single cloud)
-    #[arg(long, value_name = "METHOD", default_value = "auto")]
-    pub orient: Method,
+    /// normals), sensors (estimated directions on the side of the sensors) or previous (those of the frame before, in a
+    /// --sequence; else auto) [default: auto; with --sequence: previous]
+    #[arg(long, value_name = "METHOD")]
+    pub orient: Option<Method>,
     /// Position of a sensor, in the cloud's unit; more than one where it is unknown which one saw a point. Replaces the
     /// columns sensor_x, sensor_y and sensor_z of the cloud
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
@@ -44,11 +45,12 @@ impl OrientArgs {
             let message = format!("{name} is not used without --orient {needed}");
             Err(Error::Usage(message))
         };
-        if !self.sensor.is_empty() && self.orient != Method::Sensors {
+        let method = self.method();
+        if !self.sensor.is_empty() && method != Method::Sensors {
             return unused("--sensor", "sensors");
         }
         let has_parity = self.parity_gamma.is_some() || self.parity_tolerance.is_some();
-        if has_parity && !matches!(self.orient, Method::Parity(_)) {
+        if has_parity && !matches!(method, Method::Parity(_)) {
             return unused("--parity-gamma or --parity-tolerance", "parity");
         }
         Ok(())
@@ -56,8 +58,9 @@ impl OrientArgs {
 
     /// The method, with the options of parity.
     pub fn method(&self) -> Method {
-        let Method::Parity(default) = self.orient else {
-            return self.orient;
+        let method = self.orient.unwrap_or_default();
+        let Method::Parity(default) = method else {
+            return method;
         };
         Method::Parity(ParityOptions {
             gamma: self.parity_gamma.unwrap_or(default.gamma),
@@ -66,6 +69,11 @@ impl OrientArgs {
                 .map_or(default.tolerance, |n| n as usize),
             ..default
         })
+    }
+
+    /// Whether the method takes normals of the cloud into account.
+    pub fn uses_normals(&self) -> bool {
+        matches!(self.method(), Method::Given | Method::Signs)
     }
 
     /// The cloud, with the sensors of the command line in place of its own where there are any.
@@ -90,7 +98,7 @@ impl OrientArgs {
 pub struct OrientCloud {
     /// The cloud, in any format that `reconstruct` reads
     pub cloud: PathBuf,
-    /// Where to write the points with normals and confidence: .ply, .npz, .xyz, .csv or .txt
+    /// Where to write the points with normals and confidence: .ply, .npz, .pcd, .xyz, .csv or .txt; `-` is standard output (PLY)
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
     /// Numbers, times and warnings: .json

@@ -13,9 +13,9 @@ use isograd::{
 
 use super::{OrientArgs, finite, not_negative, positive};
 
-/// Arguments of the grid.
+/// Arguments of the cells of a grid.
 #[derive(Debug, Args)]
-pub struct GridArgs {
+pub struct CellArgs {
     /// Cells on the longest side [default: 128]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=65535),
         conflicts_with = "spacing", help_heading = "Grid")]
@@ -26,11 +26,19 @@ pub struct GridArgs {
     /// Padding on every side, as a fraction of the longest side [default: 0.1]
     #[arg(long, value_name = "FRACTION", value_parser = not_negative, help_heading = "Grid")]
     pub padding: Option<f64>,
-    /// Corners of the grid, instead of the padded bounds of the cloud
+    /// Corners of the grid, in the cloud's unit, instead of the padded bounds of the cloud
     #[arg(long, num_args = 6, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"],
         allow_negative_numbers = true, value_parser = finite, conflicts_with = "padding",
         help_heading = "Grid")]
     pub bounds: Option<Vec<f64>>,
+}
+
+/// Arguments of the grid of a cloud.
+#[derive(Debug, Args)]
+pub struct GridArgs {
+    /// Its cells.
+    #[command(flatten)]
+    pub cells: CellArgs,
     /// Use of outliers, isolated samples that are further from the others than these extend: ignore (left out, with a
     /// warning) or keep
     #[arg(
@@ -58,7 +66,7 @@ pub struct MethodArgs {
     /// Width of the smoothing of the indicator, in cells of the surface; auto: 0.8 of the distance between samples
     #[arg(long, value_name = "CELLS|auto", default_value = "auto")]
     pub smoothing: Smoothing,
-    /// Strength of the pull of the indicator to one value at the samples; 1 to 4 are usual, 0 is off
+    /// Strength of the pull of the indicator to one value at the samples, without unit; 1 to 4 are usual, 0 is off
     #[arg(long, value_name = "ALPHA", default_value = "0", value_parser = not_negative)]
     pub screening: f64,
     /// Value of the indicator at the surface: thin (that at the samples nearby; parts thinner than a cell are made about a
@@ -94,11 +102,13 @@ pub struct MethodArgs {
 impl GridArgs {
     /// The grid: between `--bounds`, or around `cloud`.
     pub fn grid<T: Real>(&self, cloud: &PointCloud<T>) -> Result<Grid<T>, GridError> {
-        self.grid_with(cloud, self.outliers)
+        self.cells.grid(cloud, self.outliers)
     }
+}
 
-    /// Like [`Self::grid`], with another use of outliers.
-    pub fn grid_with<T: Real>(
+impl CellArgs {
+    /// The grid: between `--bounds`, or around `cloud`, with this use of outliers.
+    pub fn grid<T: Real>(
         &self,
         cloud: &PointCloud<T>,
         outliers: Outliers,

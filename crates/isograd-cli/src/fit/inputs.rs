@@ -160,13 +160,12 @@ fn target(args: &args::Fit, variables: &Variables) -> Result<Target, Error> {
 }
 
 fn has_grid(args: &args::Fit) -> bool {
-    let args::GridArgs {
+    let args::CellArgs {
         resolution,
         spacing,
         padding,
         bounds,
-        outliers: _,
-    } = &args.grid;
+    } = &args.grid.cells;
     resolution.is_some() || spacing.is_some() || padding.is_some() || bounds.is_some()
 }
 
@@ -189,6 +188,7 @@ fn grid(
     }
     let all = PointCloud::new(points).map_err(Error::input(path))?;
     args.grid
-        .grid_with(&all, outliers)
+        .cells
+        .grid(&all, outliers)
         .map_err(Error::input(path))
 }

@@ -97,8 +97,9 @@ fn a_flat_cloud_is_no_panic() {
 fn folders_and_missing_files_are_named() {
     let sandbox = Sandbox::new();
     std::fs::create_dir(sandbox.path("folder.ply")).expect("creates");
-    sandbox.says("1 reconstruct folder.ply | folder.ply is a folder");
-    sandbox.says("1 reconstruct none.ply | none.ply | check the path");
+    sandbox
+        .says("1 reconstruct folder.ply -o out | folder.ply: the folder has no file with points");
+    sandbox.says("1 reconstruct none.ply -o out | none.ply | check the path");
     sandbox.says("1 info none.ply | none.ply");
     sandbox.says("1 query none.ply --at none.xyz -o a.ply | none.ply");
 }
@@ -158,13 +159,13 @@ fn help_and_version_end_with_0() {
 #[test]
 fn grids_that_no_memory_holds_are_refused() {
     let sandbox = Sandbox::with("sample sphere -n 500 -o a.ply");
-    sandbox.says("1 reconstruct a.ply --resolution 65535 | coarser");
+    sandbox.says("1 reconstruct a.ply --resolution 65535 -o out | coarser");
     // 69 GiB.
     if isograd::available_memory().is_some_and(|free| free < 64e9) {
-        sandbox.says("1 reconstruct a.ply --resolution 1600 | a.ply | iB are free ( | use a lower resolution");
+        sandbox.says("1 reconstruct a.ply --resolution 1600 -o out | a.ply | iB are free ( | use a lower resolution");
     }
-    sandbox.says("1 reconstruct a.ply --spacing 1e-30 | a.ply");
-    sandbox.says("1 reconstruct a.ply --bounds 0 0 0 0 1 1 | enclose no volume");
+    sandbox.says("1 reconstruct a.ply --spacing 1e-30 -o out | a.ply");
+    sandbox.says("1 reconstruct a.ply --bounds 0 0 0 0 1 1 -o out | enclose no volume");
 }
 
 #[test]

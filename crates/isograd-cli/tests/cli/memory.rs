@@ -74,7 +74,7 @@ fn too_little_address_space_is_an_error_of_every_command() {
 #[test]
 fn the_limit_that_is_too_small_is_named() {
     let sandbox = Sandbox::with("sample sphere -n 500 -o a.ply -q");
-    let (_, run) = limited(&sandbox, "reconstruct a.ply --resolution 500", 1000);
+    let (_, run) = limited(&sandbox, "reconstruct a.ply -o out --resolution 500", 1000);
     run.says(
         1,
         &[

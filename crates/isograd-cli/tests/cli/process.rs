@@ -73,7 +73,7 @@ fn each_signal_ends_with_128_and_its_number() {
 fn a_signal_that_was_ignored_at_the_start_stays_ignored() {
     let sandbox = Sandbox::new();
     let mut command = Command::new("bash");
-    let script = "trap '' HUP; exec \"$0\" reconstruct -";
+    let script = "trap '' HUP; exec \"$0\" reconstruct - -o out";
     command.args(["-c", script, env!("CARGO_BIN_EXE_isograd")]);
     let child = waiting(command);
     assert_eq!(status_line(&child, "SigIgn:") & 1, 1);
@@ -149,8 +149,8 @@ fn control_characters_from_files_do_not_reach_the_terminal() {
     sandbox.write("b.ply", header);
     for arguments in [
         &["info", name][..],
-        &["reconstruct", name],
-        &["reconstruct", "a.ply", name],
+        &["reconstruct", name, "-o", "out"],
+        &["reconstruct", "none.ply", "-o", "out", name],
         &["reconstruct", "a.ply", "--mesh", name],
         &["info", "b.ply"],
     ] {
@@ -190,7 +190,7 @@ fn lines_are_cut_at_500_characters() {
 #[test]
 fn no_more_threads_are_started_than_are_useful() {
     let sandbox = Sandbox::new();
-    let child = waiting(sandbox.command("reconstruct - --threads 1024"));
+    let child = waiting(sandbox.command("reconstruct - -o out --threads 1024"));
     let threads = || {
         let tasks = std::fs::read_dir(format!("/proc/{}/task", child.id()));
         tasks.expect("it runs").count()

@@ -8,4 +8,4 @@ mod read;
 mod write;
 
 pub(crate) use read::read;
-pub(crate) use write::{write_cloud, write_mesh};
+pub(crate) use write::{write_cloud, write_mesh, write_surface};

@@ -1,7 +1,7 @@
 //! The data of a PLY file.
 
 use super::header::{Element, Encoding, Header, Kind, Property};
-use crate::columns::{PointTable, find_columns};
+use crate::columns::{NORMAL, PointTable, find_columns};
 use crate::error::{Error, Location};
 use crate::format::Format;
 use crate::geometry::{Geometry, triangulate};
@@ -247,7 +247,7 @@ fn point_table(input: &Input, element: &Element) -> Result<(PointTable, Dtype), 
         let problem = "element 'vertex' lacks one of the properties x, y, z";
         return Err(input.error(Location::Whole, problem));
     };
-    let normal = find_columns(&names, ["nx", "ny", "nz"]);
+    let normal = find_columns(&names, NORMAL);
     let dtype = scalar(&element.properties[xyz[0]]).map_or(Dtype::Integer, Number::dtype);
     let table = PointTable::new(input, &names, xyz, normal, element.count);
     let table = table.map_err(|problem| input.error(Location::Whole, problem))?;

@@ -7,7 +7,9 @@ mod data;
 mod image;
 mod poly;
 mod stream;
+mod write_poly;
 mod xml;
 
 pub(crate) use image::{read as read_field, write as write_field};
-pub(crate) use poly::{read as read_geometry, write as write_mesh};
+pub(crate) use poly::read as read_geometry;
+pub(crate) use write_poly::{write_mesh, write_surface};

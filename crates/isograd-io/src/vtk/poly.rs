@@ -1,14 +1,11 @@
 //! PolyData: points with their data, polygons and strips.
 
 use std::collections::HashMap;
-use std::io::{self, Write};
 
 use isograd::data::Attribute;
-use isograd::{Mesh, Real};
 
 use super::data::{DataArray, VtkFile};
 use super::xml::Node;
-use crate::bytes::{scalar_name, size, write_reals};
 use crate::error::Error;
 use crate::format::Format;
 use crate::geometry::{Geometry, triangulate};
@@ -206,43 +203,4 @@ fn read_cells(
         begin = end;
     }
     Ok(())
-}
-
-/// Writes a mesh as raw appended arrays, vertices of type `T`.
-pub(crate) fn write<T: Real>(out: &mut impl Write, mesh: &Mesh<T>) -> io::Result<()> {
-    let (vertices, faces) = (mesh.vertices().len(), mesh.faces().len());
-    let lengths = [vertices * 3 * size::<T>(), faces * 3 * 8, faces * 8];
-    // Each array is preceded by its length in 8 bytes.
-    let offsets = [0, lengths[0] + 8, lengths[0] + lengths[1] + 16];
-    let real = scalar_name::<T>(["Float32", "Float64"]);
-    write!(
-        out,
-        r#"<?xml version="1.0"?>
-<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">
-  <PolyData>
-    <Piece NumberOfPoints="{vertices}" NumberOfVerts="0" NumberOfLines="0" NumberOfStrips="0" NumberOfPolys="{faces}">
-      <Points>
-        <DataArray type="{real}" Name="Points" NumberOfComponents="3" format="appended" offset="{}"/>
-      </Points>
-      <Polys>
-        <DataArray type="Int64" Name="connectivity" format="appended" offset="{}"/>
-        <DataArray type="Int64" Name="offsets" format="appended" offset="{}"/>
-      </Polys>
-    </Piece>
-  </PolyData>
-  <AppendedData encoding="raw">
-_"#,
-        offsets[0], offsets[1], offsets[2]
-    )?;
-    out.write_all(&(lengths[0] as u64).to_le_bytes())?;
-    write_reals(out, mesh.vertices().iter().flatten().copied())?;
-    out.write_all(&(lengths[1] as u64).to_le_bytes())?;
-    for corner in mesh.faces().iter().flatten() {
-        out.write_all(&i64::from(*corner).to_le_bytes())?;
-    }
-    out.write_all(&(lengths[2] as u64).to_le_bytes())?;
-    for face in 1..=faces as i64 {
-        out.write_all(&(3 * face).to_le_bytes())?;
-    }
-    out.write_all(b"\n  </AppendedData>\n</VTKFile>\n")
 }

@@ -164,7 +164,7 @@ fn attributes_can_be_left_out_but_for_sensors() {
         attributes: Attributes::Sensors,
         ..ReadOptions::default()
     };
-    for name in ["a.ply", "a.npz", "a.csv", "a.xyz"] {
+    for name in ["a.ply", "a.npz", "a.csv", "a.xyz", "a.pcd"] {
         let bytes = files::written(name, |path| isograd_io::write_cloud(path, &cloud));
         let format = Format::from_path(name.as_ref()).expect("known");
         let file = options.parse_geometry(&source(name, bytes), format);
@@ -187,7 +187,7 @@ fn more_columns_than_readers_accept_are_not_written() {
     let cloud = PointCloud::<f32>::new(vec![[0.0; 3]]).expect("finite");
     let cloud = cloud.with_attribute(attribute).expect("right length");
     let folder = tempfile::tempdir().expect("temporary folder");
-    for name in ["a.ply", "a.csv"] {
+    for name in ["a.ply", "a.csv", "a.pcd"] {
         let error = isograd_io::write_cloud(&folder.path().join(name), &cloud);
         let message = error.expect_err(name).to_string();
         assert!(

@@ -127,7 +127,7 @@ proptest! {
 
     #[test]
     fn meshes((vertices, faces) in mesh()) {
-        for name in ["m.ply", "m.obj", "m.vtp"] {
+        for name in ["m.ply", "m.obj", "m.off", "m.vtp"] {
             mesh_comes_back::<f32>(name, &vertices, &faces);
             mesh_comes_back::<f64>(name, &vertices, &faces);
         }
@@ -137,7 +137,7 @@ proptest! {
     #[test]
     fn clouds(rows in prop::collection::vec((vector(), vector()), 1..20)) {
         let (points, normals): (Vec<_>, Vec<_>) = rows.into_iter().unzip();
-        for name in ["c.ply", "c.npz", "c.xyz", "c.csv"] {
+        for name in ["c.ply", "c.npz", "c.xyz", "c.csv", "c.pcd"] {
             cloud_comes_back::<f32>(name, &points, &normals);
             cloud_comes_back::<f64>(name, &points, &normals);
         }
@@ -170,14 +170,14 @@ fn attributes_of_several_components_stay_together_in_npz() {
 fn points_a_million_away_with_extent_one_keep_every_bit() {
     let point = |i: f64| [1e6 + (i * 0.37).sin(), -1e6 + i / 50.0, 1e6 + 1e-9 * i];
     let points: Vec<[f64; 3]> = (0..50).map(|i| point(f64::from(i))).collect();
-    for name in ["c.ply", "c.npz", "c.xyz"] {
+    for name in ["c.ply", "c.npz", "c.xyz", "c.pcd"] {
         cloud_comes_back::<f64>(name, &points, &points);
     }
 }
 
 #[test]
 fn the_same_data_give_the_same_bytes() {
-    for name in ["a.npz", "a.ply"] {
+    for name in ["a.npz", "a.ply", "a.pcd"] {
         let cloud = files::cloud::<f32>();
         let bytes = || files::written(name, |path| isograd_io::write_cloud(path, &cloud));
         assert_eq!(bytes(), bytes());

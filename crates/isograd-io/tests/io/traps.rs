@@ -268,7 +268,8 @@ fn empty_file_folder_and_missing_file() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let error = |path: &Path| isograd_io::read_geometry(path).expect_err("refused");
     for name in [
-        "a.ply", "a.xyz", "a.obj", "a.stl", "a.npy", "a.npz", "a.vtp",
+        "a.ply", "a.xyz", "a.obj", "a.stl", "a.npy", "a.npz", "a.vtp", "a.pcd", "a.pts", "a.off",
+        "a.glb", "a.las",
     ] {
         let path = folder.path().join(name);
         std::fs::write(&path, b"").expect("writes");
@@ -315,10 +316,10 @@ fn a_full_disk_is_reported_by_every_writer() {
         files::cloud::<f32>(),
         files::field::<f64>(),
     );
-    let meshes =
-        ["m.ply", "m.obj", "m.stl", "m.vtp"].map(|name| isograd_io::write_mesh(&full(name), &mesh));
-    let clouds =
-        ["c.ply", "c.npz", "c.xyz"].map(|name| isograd_io::write_cloud(&full(name), &cloud));
+    let meshes = ["m.ply", "m.obj", "m.stl", "m.off", "m.glb", "m.vtp"]
+        .map(|name| isograd_io::write_mesh(&full(name), &mesh));
+    let clouds = ["c.ply", "c.npz", "c.xyz", "c.pcd"]
+        .map(|name| isograd_io::write_cloud(&full(name), &cloud));
     let fields = ["f.vti", "f.npz"].map(|name| isograd_io::write_field(&full(name), &field));
     for result in meshes.into_iter().chain(clouds).chain(fields) {
         let message = result.expect_err("full").to_string();

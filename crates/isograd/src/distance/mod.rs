@@ -4,6 +4,7 @@
 //! Mesh and signs → `φ(q) = σ(q) · min_y |q − y|` over all points `y` of the mesh, in the user's unit, negative
 //! inside. [`lattice::forward`] fills a grid: the distance is exact, faces, edges and corners alike, and the
 //! sign is that of `χ − c` at the same cell, so it cannot disagree with the field that made the mesh.
+//! [`lattice::forward_of_mesh`] does so for any mesh: there the sign is that of the winding number.
 //! [`Query`] computes distance, gradient and closest point at any point; where no lattice gives the sign, it
 //! is that of the angle-weighted pseudonormal of the closest feature (J. A. Bærentzen and H. Aanæs, *Signed
 //! distance computation using the angle weighted pseudonormal*, IEEE TVCG 11, 2005).
@@ -36,11 +37,12 @@ mod query_pullback;
 pub(crate) mod samples;
 mod tangent;
 pub mod triangle;
+mod winding;
 
 #[cfg(test)]
 mod tests;
 
-pub use lattice::{Band, NO_TRIANGLE, Scratch};
+pub use lattice::{Band, NO_TRIANGLE, Scratch, Sign};
 use query::corners_agree;
 pub use query::{Hit, Query};
 pub use query_pullback::pull_hits;

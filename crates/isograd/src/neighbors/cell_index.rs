@@ -260,16 +260,22 @@ impl<T: Real> CellIndex<T> {
 
     /// Whether any point is within `radius` of `query`, or at it.
     pub fn any_within(&self, query: [T; 3], radius: T) -> bool {
+        self.count_within(query, radius, 1) > 0
+    }
+
+    /// Number of points within `radius` of `query` (at the radius itself included), or `most` if there are more.
+    pub fn count_within(&self, query: [T; 3], radius: T, most: usize) -> usize {
         let limit = radius * radius;
-        let found = std::cell::Cell::new(false);
+        let count = std::cell::Cell::new(0);
         self.walk(
-            &mut |node| !found.get() && node.distance_squared(query) <= limit,
+            &mut |node| count.get() < most && node.distance_squared(query) <= limit,
             &mut |cell| {
-                let mut points = cell.map(|position| self.point(position));
-                found.set(points.any(|point| distance_squared(point, query) <= limit));
+                let points = cell.map(|position| self.point(position));
+                let within = points.filter(|&point| distance_squared(point, query) <= limit);
+                count.set(count.get() + within.count());
             },
         );
-        found.get()
+        count.get().min(most)
     }
 
     pub(super) fn root(&self) -> Place {

@@ -1,5 +1,7 @@
 //! Attributes of the samples on the reconstructed surface and round it.
 
+use std::borrow::Cow;
+
 use super::Reconstruction;
 use crate::data::{Attribute, PointCloud};
 use crate::distance::extend::{Error, Extension, Region, Residual, Samples, Scratch, Surface};
@@ -63,6 +65,19 @@ impl<T: Real> Reconstruction<T> {
             residual,
             extension,
         )
+    }
+
+    /// An attribute of the reconstructed samples at the vertices of [`mesh`](Self::mesh): `(V, components)`, row by row.
+    /// Unlike [`extend`](Self::extend) also for a trimmed mesh and for the shell of a sheet.
+    ///
+    /// # Errors
+    /// As [`extend`](Self::extend).
+    pub fn vertex_values(&self, attribute: &Attribute<T>) -> Result<Vec<T>, Error> {
+        let used = match self.selection.is_all() {
+            true => Cow::Borrowed(attribute),
+            false => Cow::Owned(self.selection.attribute(attribute)),
+        };
+        distance::extend::at_vertices(self.samples(), &used, self.mesh())
     }
 
     pub(super) fn samples(&self) -> Samples<'_, T> {

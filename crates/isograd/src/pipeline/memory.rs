@@ -123,6 +123,17 @@ pub fn check_memory<T: Real>(grid: &Grid<T>) -> Result<(), Error> {
     Ok(check(MemoryUse::Grid(grid.shape()), needed, free)?)
 }
 
+/// Checks that the [distance of a mesh](crate::distance::lattice::forward_of_mesh) and the closest faces at every cell of `grid` fit into
+/// the free memory, where that is known.
+///
+/// # Errors
+/// The memory that it needs, and the memory that is free.
+pub fn check_distance_memory<T: Real>(grid: &Grid<T>) -> Result<(), MemoryError> {
+    let cells: f64 = grid.shape().iter().map(|&n| n as f64).product();
+    let needed = cells * (size_of::<T>() + size_of::<u32>()) as f64;
+    check(MemoryUse::Grid(grid.shape()), needed, free)
+}
+
 /// Checks that the stages get memory for `points` samples and, in the first call of a plan, for what else they need on
 /// its grid. From previous calls the plan holds memory for `held` samples.
 ///

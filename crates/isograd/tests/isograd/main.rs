@@ -10,4 +10,5 @@ mod sparse_solve;
 mod surface_resolution;
 mod thin_parts;
 mod torus_accuracy;
+mod vertex_values;
 mod warnings;

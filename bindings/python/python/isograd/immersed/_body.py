@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from .._jax_surface import Offset, Surface, positions_at, surface
+from .._jax_surface import Surface, positions_at, surface
+from .._places import Offset
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -53,14 +54,12 @@ def staggered(
     Raises:
         TypeError, ValueError, jax.errors.JaxRuntimeError: as for :func:`isograd.jax.surface`.
     """
-    found = surface(points, grid, tuple(offsets), values=velocity, **arguments)
-    return _body(found)
+    return _body(surface(points, grid, tuple(offsets), values=velocity, **arguments))
 
 
 def collocated(points: ArrayLike, velocity: ArrayLike, grid: Grid, **arguments: Any) -> Body:
     """The body of a moving cloud at the cell centers, where all components are; arguments as for :func:`staggered`."""
-    found = surface(points, grid, values=velocity, **arguments)
-    return _body((found,) * 3)
+    return _body((surface(points, grid, values=velocity, **arguments),) * 3)
 
 
 def _body(found: Sequence[Surface]) -> Body:

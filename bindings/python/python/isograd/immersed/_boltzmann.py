@@ -40,7 +40,7 @@ def links(sdf: jax.Array, directions: ArrayLike, normal: jax.Array | None = None
     wanted = np.asarray(directions)
     if wanted.ndim != 2 or wanted.shape[1] != 3 or (wanted != np.round(wanted)).any():
         raise ValueError(f"directions has the shape {wanted.shape} and must be (K, 3) whole numbers")
-    parts = [_along(sdf, tuple(int(c) for c in direction), normal, spacing) for direction in wanted]
+    parts = [_along(sdf, (int(i), int(j), int(k)), normal, spacing) for i, j, k in wanted]
     fraction, is_cut = (jnp.stack(part, axis=-1) for part in zip(*parts))
     return Links(fraction, is_cut)
 
@@ -55,10 +55,10 @@ def _along(
     fraction = start / (start - end)
     if normal is not None:
         way = spacing * jnp.asarray(direction, sdf.dtype)
-        slopes = [
+        first, last = (
             jnp.where(is_cut, jnp.sum(_neighbor(normal, by, 0) * way, axis=-1), -2) for by in ((0, 0, 0), direction)
-        ]
-        fraction = _root(start, end, *slopes, fraction)
+        )
+        fraction = _root(start, end, first, last, fraction)
     return jnp.where(is_cut, fraction, 1), is_cut
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
+import numpy as np
 
 if TYPE_CHECKING:
     import jax
@@ -67,7 +68,7 @@ def apertures(sdf: jax.Array, normal: jax.Array, spacing: float, axis: int) -> j
 
 def _widths(sdf: jax.Array, normal: jax.Array, spacing: float) -> tuple[jax.Array, jax.Array]:
     """Extents of φ along each axis of the box, ascending, and φ at its highest corner, in units of their sum."""
-    smallest = jnp.finfo(sdf.dtype).eps ** (1 / 3)
+    smallest = np.finfo(sdf.dtype).eps ** (1 / 3)
     extent = jnp.abs(normal) * spacing
     largest = jnp.maximum(jnp.max(extent, axis=-1, keepdims=True), smallest * spacing)
     extent = jnp.sort(jnp.maximum(extent, smallest * largest), axis=-1)

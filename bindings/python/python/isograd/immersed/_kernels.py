@@ -92,7 +92,8 @@ def _slopes(field: jax.Array, spacing: float, boundary: Boundary) -> list[jax.Ar
     if boundary == "periodic":
         return [(jnp.roll(field, -1, axis) - jnp.roll(field, 1, axis)) / (2 * spacing) for axis in range(3)]
     if boundary == "edge":
-        return [jnp.gradient(field, spacing, axis=axis) for axis in range(3)]
+        slopes = jnp.gradient(field, spacing, axis=(0, 1, 2))
+        return list(slopes)
     raise ValueError(f'boundary is {boundary!r}; give "edge" or "periodic"')
 
 

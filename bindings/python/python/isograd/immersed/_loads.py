@@ -45,7 +45,7 @@ def loads(
     dt: float,
     inner: tuple[Sequence[jax.Array], Sequence[jax.Array]] | None = None,
     positions: Sequence[jax.Array] | None = None,
-    center: ArrayLike = (0.0, 0.0, 0.0),
+    center: ArrayLike | tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Loads:
     """Force, torque and power of the fluid on the body over a step, divided by the density of the fluid.
 
@@ -68,10 +68,10 @@ def loads(
         density = [d + (after - before) / dt for d, before, after in zip(density, *inner)]
     volume = spacing**3
     force = jnp.stack([jnp.sum(d) for d in density]) * volume
-    power = sum(jnp.sum(d * v[..., k]) for k, (d, v) in enumerate(zip(density, body.velocity)))
+    powers = [jnp.sum(d * v[..., k]) for k, (d, v) in enumerate(zip(density, body.velocity))]
     torque = None
     if positions is not None:
         axes = jnp.eye(3, dtype=force.dtype)
         arms = [jnp.tensordot(d, x - jnp.asarray(center), axes=d.ndim) for d, x in zip(density, positions)]
-        torque = sum(jnp.cross(arm, axis) for arm, axis in zip(arms, axes)) * volume
-    return Loads(force, torque, power * volume)
+        torque = sum([jnp.cross(arm, axis) for arm, axis in zip(arms, axes)], jnp.zeros(3, force.dtype)) * volume
+    return Loads(force, torque, sum(powers, jnp.zeros((), force.dtype)) * volume)

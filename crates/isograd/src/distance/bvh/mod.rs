@@ -16,7 +16,7 @@ pub(super) use node::Region;
 /// Triangles in a leaf.
 pub(super) const LEAF: usize = 4;
 /// Children of a node.
-const WIDTH: usize = 8;
+pub(super) const WIDTH: usize = 8;
 /// Points that traverse the tree together.
 pub(super) const LANES: usize = 8;
 
@@ -93,6 +93,11 @@ impl Bvh {
     /// Number of triangles.
     pub(super) fn len(&self) -> usize {
         self.keys.len()
+    }
+
+    /// Cells of the Morton curve per unit of length; 0 for a mesh without extent.
+    pub(super) fn per_unit(&self) -> f64 {
+        self.per_unit
     }
 
     /// The largest absolute coordinate of the mesh.

@@ -61,6 +61,28 @@ pub fn forward<T: Real>(
     Ok(())
 }
 
+/// Extends an attribute of the samples to the vertices of a mesh near them, which need not be the surface that φ is the
+/// distance to: `(V, components)`, row by row, in the unit of the attribute.
+///
+/// # Errors
+/// [`Error::Samples`], [`Error::NotFinite`] and [`Error::Area`].
+pub fn at_vertices<T: Real>(
+    samples: Samples<'_, T>,
+    attribute: &Attribute<T>,
+    mesh: &Mesh<T>,
+) -> Result<Vec<T>, Error> {
+    check_samples(samples, attribute)?;
+    let mut values = Vec::new();
+    extend_to_vertices(
+        samples,
+        attribute,
+        mesh,
+        &mut Residual::default(),
+        &mut values,
+    );
+    Ok(values)
+}
+
 pub(super) fn check_samples<T: Real>(
     samples: Samples<'_, T>,
     attribute: &Attribute<T>,

@@ -68,7 +68,7 @@ mod shares;
 mod tests;
 
 pub use fit::Fit;
-pub use forward::{Scratch, forward};
+pub use forward::{Scratch, at_vertices, forward};
 pub use pullback::{Cotangent, Inputs, pullback};
 
 use super::NO_TRIANGLE;

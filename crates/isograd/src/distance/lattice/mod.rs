@@ -7,6 +7,7 @@ mod block;
 mod cull;
 mod facet;
 mod kernels;
+mod of_mesh;
 mod packet;
 mod pullback;
 mod sides;
@@ -25,6 +26,7 @@ use super::pseudonormals::Pseudonormals;
 use crate::data::cells::Cells;
 use crate::{Field, Grid, Mesh, Real};
 use block::{BLOCK, Block};
+pub use of_mesh::{Sign, forward_of_mesh};
 pub use pullback::{PullbackScratch, pullback};
 use sides::Sides;
 use sites::Sites;
@@ -40,6 +42,17 @@ pub enum Band {
     /// Up to this distance from the surface, in the cloud's unit. Elsewhere `φ` is plus or minus this distance, with
     /// the correct sign, and there is no closest triangle ([`NO_TRIANGLE`]).
     Within(f64),
+}
+
+impl Band {
+    /// Its width; infinite for the full field.
+    fn width(self) -> Result<f64, Error> {
+        match self {
+            Self::Full => Ok(f64::INFINITY),
+            Self::Within(width) if width > 0.0 && width.is_finite() => Ok(width),
+            Self::Within(width) => Err(Error::Band { width }),
+        }
+    }
 }
 
 /// Entry of `closest` beyond the band.
@@ -59,6 +72,17 @@ pub struct Scratch<T> {
     distance: Vec<T>,
     closest: Vec<u32>,
     workspaces: Pool,
+}
+
+impl<T: Real> Scratch<T> {
+    /// Builds the tree of a mesh, and what culling needs on a grid.
+    fn prepare(&mut self, mesh: &Mesh<T>, grid: &Grid<T>) -> Result<(), Error> {
+        self.bvh.rebuild(mesh)?;
+        let magnitude = magnitude(grid).max(self.bvh.magnitude());
+        let spacing = grid.spacing().f64();
+        self.sites.rebuild(mesh, &self.bvh, spacing, magnitude);
+        Ok(())
+    }
 }
 
 impl<T> Scratch<T> {
@@ -105,11 +129,7 @@ pub(crate) fn forward_on<T: Real>(
     closest: &mut Vec<u32>,
 ) -> Result<(), Error> {
     let grid = *phi.grid();
-    let width = match band {
-        Band::Full => f64::INFINITY,
-        Band::Within(width) if width > 0.0 && width.is_finite() => width,
-        Band::Within(width) => return Err(Error::Band { width }),
-    };
+    let width = band.width()?;
     // Beyond the blocks of χ sides come from cells of the band, where this has no gaps.
     let h = grid.spacing().f64();
     let fills = !chi.is_whole() && width.is_finite() && width > spread::MARGIN * h;
@@ -117,15 +137,45 @@ pub(crate) fn forward_on<T: Real>(
         true => width,
         false => f64::INFINITY,
     };
-    scratch.bvh.rebuild(mesh)?;
-    let magnitude = magnitude(&grid).max(scratch.bvh.magnitude());
-    scratch
-        .sites
-        .rebuild(mesh, &scratch.bvh, grid.spacing().f64(), magnitude);
+    scratch.prepare(mesh, &grid)?;
     let pseudonormals = std::mem::take(&mut scratch.pseudonormals);
     let sides = Sides::new(mesh, chi, c, &grid, pseudonormals);
-    closest.resize(grid.cells(), NO_TRIANGLE);
+    for_each_wave(mesh, reach, scratch, phi, closest, |wave, phi, closest| {
+        let inside = |i: usize, face: u32| sides.is_inside(wave.first + i, face);
+        match chi.is_whole() {
+            true => wave.write(spread::each(inside), phi, closest),
+            false => wave.write(spread::along(inside, h), phi, closest),
+        }
+        if reach > width {
+            clamp(T::of(width), phi, closest);
+        }
+    });
+    scratch.pseudonormals = sides.into_pseudonormals();
+    if fills {
+        spread::fill(grid.shape(), phi.values_mut(), closest);
+    }
+    Ok(())
+}
 
+/// Distances of a wave of blocks, before they have signs.
+struct Wave<'a, T> {
+    grid: &'a Grid<T>,
+    scratch: &'a Scratch<T>,
+    /// Place in the field of its first cell.
+    first: usize,
+}
+
+/// Computes unsigned distances up to `reach` wave by wave; `write(wave, φ, closest)` writes each to its part of the field.
+fn for_each_wave<T: Real>(
+    mesh: &Mesh<T>,
+    reach: f64,
+    scratch: &mut Scratch<T>,
+    phi: &mut Field<T>,
+    closest: &mut Vec<u32>,
+    write: impl Fn(&Wave<'_, T>, &mut [T], &mut [u32]),
+) {
+    let grid = *phi.grid();
+    closest.resize(grid.cells(), NO_TRIANGLE);
     let plane = grid.strides()[0];
     let planes_per_wave = wave_planes(grid.shape());
     let waves = phi.values_mut().chunks_mut(planes_per_wave * plane);
@@ -134,20 +184,13 @@ pub(crate) fn forward_on<T: Real>(
         let planes = wave * planes_per_wave..wave * planes_per_wave + phi.len() / plane;
         let first = planes.start * plane;
         solve_wave(&grid, mesh, planes, reach, scratch);
-        let inside = |i: usize, face: u32| sides.is_inside(first + i, face);
-        match chi.is_whole() {
-            true => write_wave(&grid, scratch, spread::each(inside), phi, closest),
-            false => write_wave(&grid, scratch, spread::along(inside, h), phi, closest),
-        }
-        if reach > width {
-            clamp(T::of(width), phi, closest);
-        }
+        let wave = Wave {
+            grid: &grid,
+            scratch,
+            first,
+        };
+        write(&wave, phi, closest);
     }
-    scratch.pseudonormals = sides.into_pseudonormals();
-    if fills {
-        spread::fill(grid.shape(), phi.values_mut(), closest);
-    }
-    Ok(())
 }
 
 /// Limits φ to a band; cells beyond it have no closest face.
@@ -220,27 +263,29 @@ fn magnitude<T: Real>(grid: &Grid<T>) -> f64 {
     corners.fold(0.0, |m, x| m.max(x.f64().abs()))
 }
 
-/// Writes the results of a wave in the order of the field; `sign(i, φ, closest)` gives the distances of a row that begins
-/// at place `i` of the wave their signs.
-fn write_wave<T: Real>(
-    grid: &Grid<T>,
-    scratch: &Scratch<T>,
-    sign: impl Fn(usize, &mut [T], &[u32]) + Sync,
-    phi: &mut [T],
-    closest: &mut [u32],
-) {
-    let [_, ny, nz] = grid.shape();
-    let across = [ny.div_ceil(BLOCK), nz.div_ceil(BLOCK)];
-    let rows = phi.par_chunks_mut(nz).zip(closest.par_chunks_mut(nz));
-    rows.enumerate().for_each(|(row, (phi, closest))| {
-        let (i, j) = (row / ny, row % ny);
-        let first_block = (i / BLOCK * across[0] + j / BLOCK) * across[1];
-        let runs = phi.chunks_mut(BLOCK).zip(closest.chunks_mut(BLOCK));
-        for (run, (phi, closest)) in runs.enumerate() {
-            let from = (((first_block + run) * BLOCK + i % BLOCK) * BLOCK + j % BLOCK) * BLOCK;
-            phi.copy_from_slice(&scratch.distance[from..from + phi.len()]);
-            closest.copy_from_slice(&scratch.closest[from..from + closest.len()]);
-        }
-        sign(row * nz, phi, closest);
-    });
+impl<T: Real> Wave<'_, T> {
+    /// Writes the results in the order of the field; `sign(i, φ, closest)` gives the distances of a row that begins
+    /// at place `i` of the wave their signs.
+    fn write(
+        &self,
+        sign: impl Fn(usize, &mut [T], &[u32]) + Sync,
+        phi: &mut [T],
+        closest: &mut [u32],
+    ) {
+        let scratch = self.scratch;
+        let [_, ny, nz] = self.grid.shape();
+        let across = [ny.div_ceil(BLOCK), nz.div_ceil(BLOCK)];
+        let rows = phi.par_chunks_mut(nz).zip(closest.par_chunks_mut(nz));
+        rows.enumerate().for_each(|(row, (phi, closest))| {
+            let (i, j) = (row / ny, row % ny);
+            let first_block = (i / BLOCK * across[0] + j / BLOCK) * across[1];
+            let runs = phi.chunks_mut(BLOCK).zip(closest.chunks_mut(BLOCK));
+            for (run, (phi, closest)) in runs.enumerate() {
+                let from = (((first_block + run) * BLOCK + i % BLOCK) * BLOCK + j % BLOCK) * BLOCK;
+                phi.copy_from_slice(&scratch.distance[from..from + phi.len()]);
+                closest.copy_from_slice(&scratch.closest[from..from + closest.len()]);
+            }
+            sign(row * nz, phi, closest);
+        });
+    }
 }

@@ -84,7 +84,7 @@ fn carry(known: &[bool], mut fill: impl FnMut(usize, usize)) -> bool {
 
 /// Gives a distance its sign. Inside it is below 0 even on the surface.
 #[inline(always)]
-fn put<T: Real>(is_inside: bool, phi: &mut T) {
+pub(super) fn put<T: Real>(is_inside: bool, phi: &mut T) {
     if is_inside {
         *phi = -phi.max(T::min_positive_value());
     }

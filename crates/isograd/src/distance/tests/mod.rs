@@ -2,6 +2,7 @@
 
 mod interpolate;
 mod lattice;
+mod of_mesh;
 mod query;
 mod query_pullback;
 mod samples;
