@@ -30,7 +30,7 @@ impl Stop {
     }
 }
 
-/// What the thread of the work sends.
+/// Message of the worker thread.
 enum Event<M, R> {
     Message(M),
     /// The result, or the message of a panic.

@@ -3,11 +3,19 @@
 use isograd::{Grid, Outliers, PointCloud, Resolution};
 use pyo3::prelude::*;
 
-use crate::arrays;
+use crate::arrays::{self, Number};
 use crate::errors::value;
 
 /// Lower corner, spacing and shape.
-type Parts = ([f64; 3], f64, [usize; 3]);
+pub type Parts = ([f64; 3], f64, [usize; 3]);
+
+/// A grid in the number type of the arrays.
+///
+/// # Errors
+/// Cells that the number type does not resolve.
+pub fn grid<T: Number>((lower, spacing, shape): Parts) -> PyResult<Grid<T>> {
+    Grid::new(lower.map(T::of), T::of(spacing), shape).map_err(value)
+}
 
 /// Raises ValueError if the grid is invalid.
 #[pyfunction]

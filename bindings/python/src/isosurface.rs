@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use crate::arrays::{self, Dtype, Either, Number};
 use crate::background;
 use crate::errors::value;
-use crate::sdf_grid::{GridParts, grid};
+use crate::grid::{Parts, grid};
 
 /// A field and its surface in one of the two number types.
 #[pyclass(frozen)]
@@ -28,11 +28,7 @@ type Cotangents<'py> = (Bound<'py, PyAny>, f64, [f64; 3], f64, usize);
 
 /// Extracts the surface of a field at a level.
 #[pyfunction]
-pub fn extract_surface(
-    field: &Bound<'_, PyAny>,
-    grid: GridParts,
-    level: f64,
-) -> PyResult<Isosurface> {
+pub fn extract_surface(field: &Bound<'_, PyAny>, grid: Parts, level: f64) -> PyResult<Isosurface> {
     Ok(Isosurface(match arrays::dtype(field, "field")? {
         Dtype::F32 => Either::F32(extract(field, grid, level)?),
         Dtype::F64 => Either::F64(extract(field, grid, level)?),
@@ -41,7 +37,7 @@ pub fn extract_surface(
 
 fn extract<T: Number>(
     values: &Bound<'_, PyAny>,
-    parts: GridParts,
+    parts: Parts,
     level: f64,
 ) -> PyResult<Arc<Extracted<T>>> {
     let py = values.py();

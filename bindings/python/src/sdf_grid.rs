@@ -2,15 +2,13 @@
 
 use isograd::distance::lattice::{PullbackScratch, Scratch, forward_of_mesh, pullback};
 use isograd::distance::{Band, Error, NO_TRIANGLE};
-use isograd::{Field, Grid, check_distance_memory};
+use isograd::{Field, check_distance_memory};
 use pyo3::prelude::*;
 
 use crate::arrays::{self, Dtype, Number};
 use crate::background;
 use crate::errors::value;
-
-/// Lower corner, spacing and shape.
-pub type GridParts = ([f64; 3], f64, [usize; 3]);
+use crate::grid::{Parts, grid};
 
 /// φ, the closest face of each cell, and how the sign was found.
 type Distances<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, &'static str);
@@ -18,21 +16,13 @@ type Distances<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, &'static str);
 /// Cotangents of the vertices, and of the corner and the spacing of the grid.
 type Cotangents<'py> = (Bound<'py, PyAny>, [f64; 3], f64);
 
-/// A grid in the number type of the arrays.
-///
-/// # Errors
-/// Cells that the number type does not resolve.
-pub fn grid<T: Number>((lower, spacing, shape): GridParts) -> PyResult<Grid<T>> {
-    Grid::new(lower.map(T::of), T::of(spacing), shape).map_err(value)
-}
-
 /// Distances in the type of the vertices, up to `band` or everywhere.
 #[pyfunction]
 #[pyo3(signature = (vertices, faces, grid, band))]
 pub fn sdf_of_mesh<'py>(
     vertices: &Bound<'py, PyAny>,
     faces: &Bound<'py, PyAny>,
-    grid: GridParts,
+    grid: Parts,
     band: Option<f64>,
 ) -> PyResult<Distances<'py>> {
     match arrays::dtype(vertices, "vertices")? {
@@ -44,7 +34,7 @@ pub fn sdf_of_mesh<'py>(
 fn forward<'py, T: Number>(
     vertices: &Bound<'py, PyAny>,
     faces: &Bound<'py, PyAny>,
-    parts: GridParts,
+    parts: Parts,
     band: Option<f64>,
 ) -> PyResult<Distances<'py>> {
     let py = vertices.py();
@@ -71,7 +61,7 @@ fn forward<'py, T: Number>(
 pub fn sdf_of_mesh_pullback<'py>(
     vertices: &Bound<'py, PyAny>,
     faces: &Bound<'py, PyAny>,
-    grid: GridParts,
+    grid: Parts,
     sdf: &Bound<'py, PyAny>,
     closest: &Bound<'py, PyAny>,
     sdf_bar: &Bound<'py, PyAny>,
@@ -86,7 +76,7 @@ pub fn sdf_of_mesh_pullback<'py>(
 fn backward<'py, T: Number>(
     vertices: &Bound<'py, PyAny>,
     faces: &Bound<'py, PyAny>,
-    parts: GridParts,
+    parts: Parts,
     [sdf, closest, sdf_bar]: [&Bound<'py, PyAny>; 3],
 ) -> PyResult<Cotangents<'py>> {
     let py = vertices.py();

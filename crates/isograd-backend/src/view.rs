@@ -131,10 +131,10 @@ impl<'a, T: Number> View<'a, T> {
         }
     }
 
-    /// An attribute on the surface and round it, and what its pullback needs: see [`Reconstruction::extend_with_residual`].
+    /// An attribute on the surface and around it, and the residual for its pullback: see [`Reconstruction::extend_with_residual`].
     ///
     /// # Errors
-    /// What the stage or the device says.
+    /// Errors of the stage or the device.
     pub fn extend(
         self,
         attribute: &Attribute<T>,
@@ -150,7 +150,7 @@ impl<'a, T: Number> View<'a, T> {
     /// An attribute at the vertices of [`mesh`](Self::mesh), row by row: see [`Reconstruction::vertex_values`].
     ///
     /// # Errors
-    /// What the stage or the device says.
+    /// Errors of the stage or the device.
     pub fn vertex_values(self, attribute: &Attribute<T>) -> Result<Vec<T>, Error> {
         match self.0 {
             Of::Cpu(of) => Ok(of.vertex_values(attribute)?),

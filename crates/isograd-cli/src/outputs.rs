@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use isograd_io::atomic::is_standard_output;
-use isograd_io::{FIELD_EXTENSIONS, MESH_EXTENSIONS, check_output};
+use isograd_io::{FIELD_EXTENSIONS, MESH_EXTENSIONS, check_output, has_extension};
 use serde::Serialize;
 
 use crate::args;
@@ -171,8 +171,7 @@ pub fn check_extension(path: &Path, endings: &[&str]) -> Result<(), Error> {
     if is_standard_output(path) {
         return reserve_stdout(path, endings == ["json"]);
     }
-    let known = |e: &str| endings.iter().any(|ending| e.eq_ignore_ascii_case(ending));
-    if path.extension().and_then(|e| e.to_str()).is_some_and(known) {
+    if has_extension(path, endings) {
         return Ok(());
     }
     Err(Error::Usage(format!(

@@ -209,13 +209,15 @@ impl<'a> Job<'a> {
         note: Option<&str>,
         progress: &mut Progress,
     ) -> Result<Option<Verdict>, Error> {
-        let grid = self.grid(&self.cloud::<T>()?)?;
+        let cloud = self.cloud::<T>()?;
+        let grid = self.grid(&cloud)?;
         let orient = self.args.method.normals.method();
         let mut plan = plan(self.args, self.cloud, grid, orient, progress)?;
-        self.with_plan(&mut plan, &grid, note, progress)
+        self.with_plan(&mut plan, &cloud, &grid, note, progress)
     }
 
-    fn cloud<T: Real>(&self) -> Result<PointCloud<T>, Error> {
+    /// The cloud, with the sensors of the command line.
+    pub fn cloud<T: Real>(&self) -> Result<PointCloud<T>, Error> {
         let cloud = self.geometry.cloud();
         let cloud = cloud.and_then(|cloud| self.args.method.normals.with_sensors(cloud));
         cloud.map_err(Error::input(self.cloud))
@@ -226,23 +228,23 @@ impl<'a> Job<'a> {
         grid.map_err(Error::input(self.cloud))
     }
 
-    /// Reconstructs the cloud with a plan for `grid`, writes the outputs and returns the verdict. `note` tells why the
+    /// Reconstructs [`cloud`](Self::cloud) with a plan for `grid`, writes the outputs and returns the verdict. `note` tells why the
     /// number type is not the one asked for.
     pub fn with_plan<T: Number>(
         &self,
         plan: &mut Plan<T>,
+        cloud: &PointCloud<T>,
         grid: &Grid<T>,
         note: Option<&str>,
         progress: &mut Progress,
     ) -> Result<Option<Verdict>, Error> {
-        let cloud = self.cloud::<T>()?;
         progress.expect(prediction::seconds(cloud.len(), grid.cells()));
         let mut observer = |stage: Stage| {
             progress.step(stage.name());
             ControlFlow::Continue(())
         };
         let result = plan
-            .reconstruct_observed(&cloud, &mut observer)
+            .reconstruct_observed(cloud, &mut observer)
             .and_then(|view| {
                 if view.backend() != "cpu" {
                     // On a device the checks run with the report.
@@ -253,7 +255,7 @@ impl<'a> Job<'a> {
             .map_err(Error::input(self.cloud))?;
         progress.warn_of(result.report);
         progress.step("write");
-        self.write(&cloud, &result, note, progress)?;
+        self.write(cloud, &result, note, progress)?;
         progress.finish_cloud();
         self.summarize(progress, &result);
         Ok(result.report.verdict())

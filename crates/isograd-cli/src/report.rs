@@ -49,7 +49,7 @@ pub enum Normals {
 }
 
 impl Normals {
-    /// Those of a file, for a method of orientation.
+    /// Normals of a file, for a method of orientation.
     pub fn of(geometry: &Geometry, args: &OrientArgs) -> Self {
         let is_zero = |normal: &[f64; 3]| *normal == [0.0; 3];
         match &geometry.normals {

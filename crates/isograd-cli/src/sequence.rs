@@ -110,7 +110,8 @@ impl<T: Number> Sequence<T> {
     fn step(&mut self, job: &Job, progress: &mut Progress) -> Result<Option<Verdict>, Error> {
         self.check_points(job)?;
         let note = self.note.as_deref();
-        let verdict = job.with_plan(&mut self.plan, &self.grid, note, progress)?;
+        let cloud = job.cloud()?;
+        let verdict = job.with_plan(&mut self.plan, &cloud, &self.grid, note, progress)?;
         let first = || (job.points(), file_name(job.cloud));
         self.first.get_or_insert_with(first);
         Ok(verdict)

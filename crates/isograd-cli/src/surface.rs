@@ -6,7 +6,7 @@ use isograd::distance::extend;
 use isograd::{Attribute, Mesh, PointCloud, PointCloudError, Real};
 use isograd_backend::{Number, View};
 use isograd_io::atomic::is_standard_output;
-use isograd_io::{SURFACE_EXTENSIONS, byte_colors, is_sensor};
+use isograd_io::{SURFACE_EXTENSIONS, byte_colors, has_extension, is_sensor};
 
 use crate::error::Error;
 use crate::progress::Progress;
@@ -76,11 +76,5 @@ fn with_values<T: Real>(
 }
 
 fn holds_attributes(path: &Path) -> bool {
-    let extension = path.extension().and_then(|e| e.to_str());
-    let holds = |e: &str| {
-        SURFACE_EXTENSIONS
-            .iter()
-            .any(|known| e.eq_ignore_ascii_case(known))
-    };
-    is_standard_output(path) || extension.is_some_and(holds)
+    is_standard_output(path) || has_extension(path, SURFACE_EXTENSIONS)
 }

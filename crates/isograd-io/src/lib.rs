@@ -88,5 +88,5 @@ pub use read::{Content, parse_field, parse_geometry, read, read_field, read_geom
 pub use source::Source;
 pub use write::{
     CLOUD_EXTENSIONS, FIELD_EXTENSIONS, MESH_EXTENSIONS, SURFACE_EXTENSIONS, check_output,
-    write_cloud, write_field, write_mesh, write_surface,
+    has_extension, write_cloud, write_field, write_mesh, write_surface,
 };

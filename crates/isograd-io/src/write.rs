@@ -98,6 +98,12 @@ pub fn write_cloud<T: Real>(path: &Path, cloud: &PointCloud<T>) -> Result<(), Er
     }
 }
 
+/// Whether the extension of a name is among `extensions`, in upper or lower case.
+pub fn has_extension(path: &Path, extensions: &[&str]) -> bool {
+    let known = |e: &str| extensions.iter().any(|known| e.eq_ignore_ascii_case(known));
+    path.extension().and_then(|e| e.to_str()).is_some_and(known)
+}
+
 /// Checks before a long computation that its output can be written.
 ///
 /// # Errors
@@ -107,8 +113,7 @@ pub fn check_output(path: &Path, extensions: &[&str]) -> Result<(), Error> {
     if atomic::is_standard_output(path) {
         return Ok(());
     }
-    let known = |e: &str| extensions.iter().any(|known| e.eq_ignore_ascii_case(known));
-    if !path.extension().and_then(|e| e.to_str()).is_some_and(known) {
+    if !has_extension(path, extensions) {
         return Err(wrong_extension(path, extensions));
     }
     let file = path.display().to_string();

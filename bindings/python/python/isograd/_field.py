@@ -9,7 +9,7 @@ import numpy as np
 
 from . import _core
 from ._arrays import floats
-from ._grid import Grid
+from ._grid import Grid, as_grid
 from ._mesh import Mesh, as_mesh
 from ._numbers import number
 
@@ -81,7 +81,7 @@ def sdf_grid(
             a mesh without faces, a band that is not a positive length, or a grid that memory can't hold.
         KeyboardInterrupt: at once, on Ctrl-C.
     """
-    mesh, grid = as_mesh(mesh), _as_grid(grid)
+    mesh, grid = as_mesh(mesh), as_grid(grid)
     width = None if band is None else number(band, "band")
     sdf, closest, sign = _core.sdf_of_mesh(mesh.vertices, mesh.faces, _parts(grid), width)
     return SdfGrid(sdf, closest, sign, mesh, grid)
@@ -143,18 +143,12 @@ def isosurface(field: ArrayLike, grid: Grid, level: float = 0.0) -> Isosurface:
             nowhere below the level, or everywhere.
         KeyboardInterrupt: at once, on Ctrl-C.
     """
-    grid = _as_grid(grid)
+    grid = as_grid(grid)
     values = floats(field, "field", grid.shape)
     value = number(level, "level")
     found = _core.extract_surface(values, _parts(grid), value)
     walls = [(bool(low), bool(high)) for low, high in found.walls()]
     return Isosurface(Mesh(*found.mesh()), grid, value, (walls[0], walls[1], walls[2]), found)
-
-
-def _as_grid(grid: object) -> Grid:
-    if isinstance(grid, Grid):
-        return grid
-    raise TypeError(f"grid is a {type(grid).__name__}; give an isograd.Grid")
 
 
 def _parts(grid: Grid) -> tuple[tuple[float, float, float], float, tuple[int, int, int]]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from . import _core
 from ._arrays import floats
-from ._grid import Grid
+from ._grid import Grid, as_grid
 from ._mesh import Mesh
 from ._numbers import number, whole
 from ._options import Options, length
@@ -129,8 +129,7 @@ def fit(
 
 
 def _target(target: object, grid: Grid, kind: str | None) -> tuple[str, list[np.ndarray]]:
-    if not isinstance(grid, Grid):
-        raise TypeError(f"grid is a {type(grid).__name__}; give an isograd.Grid")
+    as_grid(grid)
     if isinstance(target, Mesh):
         vertices = floats(target.vertices, "vertices", (None, 3), np.float64)
         return "mesh", [vertices, target.faces]

@@ -116,3 +116,14 @@ def _three(values: object, name: str) -> tuple[object, ...]:
     if len(found) != 3:
         raise ValueError(f"{name} is {values!r}; give three numbers, one for each axis")
     return found
+
+
+def as_grid(grid: object) -> Grid:
+    """The grid itself.
+
+    Raises:
+        TypeError: another type.
+    """
+    if isinstance(grid, Grid):
+        return grid
+    raise TypeError(f"grid is a {type(grid).__name__}; give an isograd.Grid")

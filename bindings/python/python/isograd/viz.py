@@ -12,7 +12,7 @@ import numpy as np
 
 from ._arrays import floats
 from ._convert import require, to_polydata
-from ._grid import Grid
+from ._grid import Grid, as_grid
 from ._measure import check_faces
 from ._mesh import Mesh, as_mesh
 
@@ -79,8 +79,7 @@ def draw_slices(
     label: str = "φ",
 ) -> Figure:
     """:func:`slices` on a figure of ``pyplot.figure``, or of ``Figure``, which ``pyplot`` does not know."""
-    if not isinstance(grid, Grid):
-        raise TypeError(f"grid is a {type(grid).__name__}; give an isograd.Grid")
+    as_grid(grid)
     field = np.ma.masked_invalid(floats(phi, "phi", grid.shape))
     cell = _cell(grid, at)
     dots = None if points is None else floats(points, "points", (None, 3))

@@ -14,7 +14,7 @@ use super::{ReadingArgs, Running, STATUS, not_negative, positive};
 pub struct Clean {
     /// The cloud, in any format that `reconstruct` reads
     pub cloud: PathBuf,
-    /// Output, the points that are kept: .ply, .npz, .xyz, .csv or .txt
+    /// Output, the points that are kept: .ply, .npz, .pcd, .xyz, .csv or .txt
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
     /// Remove all but one of the points within DISTANCE of each other, in the cloud's unit; 0: of equal points

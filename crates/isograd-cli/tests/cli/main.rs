@@ -21,6 +21,7 @@ mod real_verdicts;
 mod reconstruct;
 mod sandbox;
 mod several;
+mod shared_data;
 mod tools;
 #[cfg(unix)]
 mod writing;

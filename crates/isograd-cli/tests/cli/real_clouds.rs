@@ -2,13 +2,15 @@
 //!
 //! `cargo test -p isograd-cli --test cli real_clouds -- --nocapture` prints the table.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use isograd::distance::Query;
 use isograd::orient::Method;
 use isograd::{Grid, Mesh, Options, PointCloud, Reconstructor, Resolution};
 use isograd_element::vector;
 use isograd_io::{read_geometry, read_mesh};
+
+use crate::shared_data;
 
 const CLOUDS: [&str; 10] = [
     "airliner",
@@ -27,16 +29,6 @@ const CELLS: usize = 192;
 const THICK: f64 = 3.0;
 /// Of all samples, one in this many is looked at.
 const STRIDE: usize = 7;
-
-/// The data, or `None` after saying that the test is skipped.
-fn data() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    if !folder.is_dir() {
-        println!("SKIPPED: ../shared/data is absent");
-        return None;
-    }
-    Some(folder)
-}
 
 /// Mean and 99th percentile.
 fn summary(mut distances: Vec<f64>) -> (f64, f64) {
@@ -123,7 +115,9 @@ fn errors(folder: &Path, name: &str, orientation: Method) -> Errors {
 
 #[test]
 fn ten_real_clouds_give_closed_surfaces_near_the_truth() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = shared_data::folder() else {
+        return;
+    };
     println!(
         "cells at {CELLS}: surface to truth, and samples on thick parts to surface (mean, p99)"
     );
@@ -144,7 +138,9 @@ fn ten_real_clouds_give_closed_surfaces_near_the_truth() {
 
 #[test]
 fn true_normals_give_a_surface_within_a_fortieth_of_a_cell() {
-    let Some(folder) = data() else { return };
+    let Some(folder) = shared_data::folder() else {
+        return;
+    };
     for name in ["spot_cow", "blub_fish", "aorta", "wingnut"] {
         let Errors { made, found } = errors(&folder, name, Method::Given);
         println!(

@@ -2,27 +2,12 @@
 //!
 //! `cargo test -p isograd-cli --test cli real_gradients -- --nocapture` prints the table.
 
-use std::path::{Path, PathBuf};
-
 use isograd::{Cotangent, Grid, Options, Pipeline, PointCloud, Reconstructor, Resolution};
 use isograd_io::read_geometry;
 
-const CELLS: usize = 96;
+use crate::shared_data;
 
-/// All clouds, or none after saying that the test is skipped.
-fn clouds() -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let Ok(entries) = std::fs::read_dir(folder) else {
-        println!("SKIPPED: ../shared/data is absent");
-        return Vec::new();
-    };
-    let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
-    let is_cloud = |path: &PathBuf| path.to_string_lossy().ends_with(".points.ply");
-    let mut clouds: Vec<PathBuf> = paths.filter(is_cloud).collect();
-    clouds.sort();
-    assert!(clouds.len() >= 10, "{clouds:?}");
-    clouds
-}
+const CELLS: usize = 96;
 
 /// Largest component of the cotangent of any point for `Σ φ²/2h²`, and how many places were guarded.
 fn largest<T: Pipeline>(points: &[[f64; 3]]) -> (f64, usize) {
@@ -53,7 +38,7 @@ fn largest<T: Pipeline>(points: &[[f64; 3]]) -> (f64, usize) {
 
 #[test]
 fn gradients_of_all_clouds_are_finite() {
-    for path in clouds() {
+    for path in shared_data::clouds() {
         let name = path
             .file_name()
             .expect("a name")

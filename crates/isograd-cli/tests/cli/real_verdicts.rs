@@ -2,13 +2,15 @@
 //!
 //! `cargo test -p isograd-cli --test cli real_verdicts -- --nocapture` prints the table.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use isograd::distance::Query;
 use isograd::isosurface::Level;
 use isograd::{Grid, Mesh, Options, PointCloud, Reconstructor, Report, Resolution, Verdict};
 use isograd_element::vector;
 use isograd_io::{read_geometry, read_mesh};
+
+use crate::shared_data;
 
 const CELLS: usize = 48;
 /// Of all samples, one in this many is used.
@@ -17,21 +19,6 @@ const STRIDE: usize = 3;
 const PLACES: usize = 5000;
 /// Share of a surface that may be further from the other than the limit.
 const TOLERATED: f64 = 0.01;
-
-/// All clouds, or none after saying that the test is skipped.
-fn clouds() -> Vec<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let Ok(entries) = std::fs::read_dir(folder) else {
-        println!("SKIPPED: ../shared/data is absent");
-        return Vec::new();
-    };
-    let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
-    let is_cloud = |path: &PathBuf| path.to_string_lossy().ends_with(".points.ply");
-    let mut clouds: Vec<PathBuf> = paths.filter(is_cloud).collect();
-    clouds.sort();
-    assert!(clouds.len() >= 10, "{clouds:?}");
-    clouds
-}
 
 /// Places on a mesh, evenly spread over its area.
 fn places(mesh: &Mesh<f64>) -> Vec<[f64; 3]> {
@@ -130,7 +117,7 @@ fn verdicts_agree_with_the_truth() {
         "cloud, level: verdict, and share of the true surface that is 1 and 2 cells away, and the reverse"
     );
     let mut failures = Vec::new();
-    for path in clouds() {
+    for path in shared_data::clouds() {
         for level in [Level::Local, Level::Thin] {
             failures.extend(wrong(&path, level));
         }

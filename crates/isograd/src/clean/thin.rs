@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{Error, POSITIVE, by_place, check_length, checked, indices, largest};
+use super::{Error, by_place, check_length, checked, indices, largest};
 use crate::Real;
 use crate::neighbors::CellIndex;
 use crate::vector::{add, norm_squared, scale, sub};
@@ -95,14 +95,7 @@ fn nearest_to_mean(points: &[[f64; 3]], members: &[u32]) -> u32 {
 /// # Errors
 /// A point that is not finite or out of range, or a distance that is not a positive, finite length.
 pub fn poisson_disk<T: Real>(points: &[[T; 3]], distance: f64) -> Result<Vec<u32>, Error> {
-    if !(distance > 0.0 && distance.is_finite()) {
-        let (name, value) = ("the distance between samples", distance);
-        return Err(Error::Option {
-            name,
-            value,
-            expected: POSITIVE,
-        });
-    }
+    check_length("the distance between samples", distance)?;
     let points = checked(points)?;
     let index = CellIndex::new(&points);
     let compare = by_place(&points);

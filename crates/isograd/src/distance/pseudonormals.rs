@@ -26,7 +26,7 @@ impl Pseudonormals {
         new
     }
 
-    /// Those of another mesh, in the same memory.
+    /// Replaces them by the pseudonormals of another mesh, in the same memory.
     pub(super) fn rebuild<T: Real>(&mut self, mesh: &Mesh<T>) {
         self.faces.fill_with_faces(mesh);
     }

@@ -51,13 +51,7 @@ pub(crate) fn count<T: Real>(
     samples: Samples<'_, T>,
 ) -> Result<Counts, Error> {
     let mut own = Bvh::default();
-    let bvh = match built {
-        Some(scratch) => &scratch.bvh,
-        None => {
-            own.rebuild(mesh)?;
-            &own
-        }
-    };
+    let bvh = tree_of(mesh, built, &mut own)?;
     let order = morton_order(bvh, samples.points);
     let surface = Surface {
         mesh,
@@ -98,6 +92,21 @@ impl Counts {
     }
 }
 
+/// The tree of `mesh`: the one in `built`, if given, or a new one in `own`.
+fn tree_of<'a, T: Real>(
+    mesh: &Mesh<T>,
+    built: Option<&'a Scratch<T>>,
+    own: &'a mut Bvh,
+) -> Result<&'a Bvh, Error> {
+    match built {
+        Some(scratch) => Ok(&scratch.bvh),
+        None => {
+            own.rebuild(mesh)?;
+            Ok(own)
+        }
+    }
+}
+
 /// For each point the face of `mesh` closest to it; `NO_TRIANGLE` for one that is not finite. The tree in `built`, if
 /// given, must be the one of this mesh.
 ///
@@ -109,13 +118,7 @@ pub(crate) fn nearest_faces<T: Real>(
     points: &[[T; 3]],
 ) -> Result<Vec<u32>, Error> {
     let mut own = Bvh::default();
-    let bvh = match built {
-        Some(scratch) => &scratch.bvh,
-        None => {
-            own.rebuild(mesh)?;
-            &own
-        }
-    };
+    let bvh = tree_of(mesh, built, &mut own)?;
     let mut faces = nearest_triangles(bvh, points);
     faces.par_iter_mut().for_each(|place| {
         *place = match *place {

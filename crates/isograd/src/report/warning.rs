@@ -264,7 +264,7 @@ fn cause(reason: Reason) -> &'static str {
     }
 }
 
-/// What helps; how to give more is the same for all.
+/// Remedy for doubtful signs.
 fn doubtful_remedy(reason: Reason) -> &'static str {
     match reason {
         Reason::Thin => {

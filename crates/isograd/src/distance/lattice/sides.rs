@@ -15,7 +15,7 @@ pub(super) struct Sides<'a, T> {
     mesh: &'a Mesh<T>,
     /// The grid of φ, unless `χ` has a value at each of its cells.
     between: Option<Grid<T>>,
-    /// Those of the mesh, where they are needed.
+    /// Pseudonormals of the mesh, where they are needed.
     pseudonormals: Pseudonormals,
 }
 
