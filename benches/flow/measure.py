@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 from isograd import immersed
-from swim import Swim, Tunnel
+from swim import AMPLITUDE, SPEED, Swim, Tunnel
 
 import flow_sphere
 
@@ -27,25 +27,26 @@ def sphere():
     """Drag at Re 100: cells a diameter, points, duration."""
     rows = []
     for n, count, duration in ((10, 500, 12), (10, 1000, 12), (16, 500, 4), (16, 2000, 4)):
-        from_cloud, from_closed_form = flow_sphere.main(n, count, duration)
+        from_cloud, from_closed_form = flow_sphere.main(Tunnel, n, count, duration)
         rows.append({"cells": n, "points": count, "duration": duration, "cloud": from_cloud, "exact": from_closed_form})
     return rows
 
 
-def oscillation(n=16, count=2000, steps=160):
+def oscillation(n=16, count=2000, steps=160, surfaces=("2x", "4x")):
     """Force on a sphere that moves along a line askew to the grid, beside that of its closed form."""
     grid = isograd.Grid((0.0, 0.0, 0.0), 1 / n, (4 * n, 3 * n, 3 * n))
     tunnel = Tunnel(grid, 0.01, 0.3 / n)
     cloud = isograd.sample("sphere", count, layout="even", dtype=np.float32).points
     cloud = jnp.asarray(0.5 * cloud / np.linalg.norm(cloud, axis=1, keepdims=True))
-    way, rate, options = jnp.array([0.24, 0.28, 0.155]), 0.4 * np.pi, isograd.Options(orient="signs", surface="2x")
+    way, rate = jnp.array([0.24, 0.28, 0.155]), 0.4 * np.pi
 
     def center(t):
         return jnp.array([1.4, 1.513, 1.493]) + way * jnp.sin(rate * t), way * rate * jnp.cos(rate * t)
 
-    def sampled(t):
+    def sampled(t, surface):
         place, velocity = center(t)
         velocity = jnp.broadcast_to(velocity, cloud.shape)
+        options = isograd.Options(orient="signs", surface=surface)
         return immersed.staggered(cloud + place, velocity, grid, normals=2 * cloud, options=options)
 
     def exact(t):
@@ -60,10 +61,13 @@ def oscillation(n=16, count=2000, steps=160):
         _, (found, _) = jax.lax.scan(lambda s, t: tunnel.step(s, body(t)), tunnel.start(), times)
         return np.asarray(found)[20:]
 
-    ours, wanted = (force(body) for body in (sampled, exact))
-    error = np.sqrt(np.mean((ours - wanted) ** 2)) / wanted[:, 1].std()
-    return {"cells": n, "points": count, "mean": float(ours[:, 0].mean() / wanted[:, 0].mean() - 1), "error": float(error),
-            "noise": float(noise(ours).max() / noise(wanted).max())}
+    wanted, rows = force(exact), []
+    for surface in surfaces:
+        ours = force(lambda t: sampled(t, surface))
+        error = np.sqrt(np.mean((ours - wanted) ** 2)) / wanted[:, 1].std()
+        rows.append({"surface": surface, "mean": float(ours[:, 0].mean() / wanted[:, 0].mean() - 1), "error": float(error),
+                     "noise": float(noise(ours).max() / noise(wanted).max())})
+    return {"cells": n, "points": count, "rows": rows}
 
 
 def noise(force):
@@ -74,7 +78,7 @@ def noise(force):
 def fish(n=40):
     """Forces of the swimming fish over a period with default settings, and with more samples and finer surfaces."""
     rows = []
-    for count, surface in ((4000, "2x"), (16000, "2x"), (64000, "4x")):
+    for count, surface in ((4000, "2x"), (16000, "2x"), (4000, "4x"), (16000, "4x"), (64000, "4x")):
         swim = Swim(n, count, lengths=(2, 1, 1), surface=surface)
         steps = round(swim.fish.values["period"] / swim.tunnel.dt)
         _, force = jax.jit(swim.roll)(swim.tunnel.start(), *swim.motion(1, steps))
@@ -84,9 +88,28 @@ def fish(n=40):
     return rows
 
 
-def cost(n=40, count=4000, steps=8):
+def strouhal(n=32, count=4000, duration=2.5, numbers=(0.6, 1.2, 1.8, 2.4)):
+    """Mean force on the fish against its Strouhal number, which the period of the tail sets, and where the force is 0."""
+    rows = []
+    for number in numbers:
+        period = 2 * AMPLITUDE / (number * SPEED)
+        swim = Swim(n, count, lengths=(2, 1, 1), courant=0.25 / max(1, np.pi * number), period=period)
+        steps, periods = round(period / swim.tunnel.dt), round(duration / period)
+        state, roll = swim.tunnel.start(), jax.jit(swim.roll)
+        for k in range(max(2, periods)):
+            state, force = roll(state, *swim.motion(1 + k * steps, steps))
+        rows.append({"strouhal": number, "force": float(force[:, 0].mean()), "steps": steps * max(2, periods)})
+        print(rows[-1], flush=True)
+    return {"cells": n, "points": count, "rows": rows}
+
+
+def cost():
     """Seconds of a step, of its geometry, and of the gradient through all steps; bytes with and without checkpoints."""
-    swim = Swim(n, count, lengths=(2, 1, 1))
+    return [cost_of(count) for count in (1000, 4000)]
+
+
+def cost_of(count, n=40, steps=8):
+    swim = Swim(n, count, lengths=(2.4, 1, 1))
     points, normals = map(jnp.asarray, swim.motion(1, steps))
     start = swim.tunnel.start()
 
@@ -150,13 +173,13 @@ def gradient(n=24, count=3000, steps=200):
 
 def ways(swim, steps, points):
     """Motions of all points at all times: by parameters, and random smooth ones of the body."""
-    for name in ("width2", "height6", "amplitude"):
+    for name in (*FREE, "amplitude"):
         by = 1e-4 * swim.fish.values[name]
         ends = [swim.motion(1, steps, {name: swim.fish.values[name] + s * by})[0].astype(float) for s in (-1, 1)]
         yield name, (ends[1] - ends[0]) / (2 * by)
     random = np.random.default_rng(1)
     rest = points[0] - swim.place
-    for k in range(2):
+    for k in range(20):
         waves, phases = random.normal(size=(3, 3, 3)) * 4, random.uniform(0, 2 * np.pi, (3, 3))
         yield f"random {k + 1}", np.broadcast_to(np.sin(np.einsum("nj,kaj->nka", rest, waves) + phases).sum(1), points.shape)
 
@@ -194,7 +217,7 @@ def optimization(n=24, count=3000, steps=200, iterations=12):
     return {"cells": n, "points": count, "steps": steps, "rows": rows}
 
 
-CASES = {function.__name__: function for function in (sphere, oscillation, fish, cost, gradient, optimization)}
+CASES = {function.__name__: function for function in (sphere, oscillation, fish, strouhal, cost, gradient, optimization)}
 
 
 def store(name, found):

@@ -12,7 +12,7 @@ from isograd import immersed
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "bindings/python/examples"))
 from flow_host.jax_cfd_tunnel import Tunnel  # noqa: E402
 
-SPEED, REYNOLDS = 0.8, 300
+SPEED, REYNOLDS, AMPLITUDE = 0.8, 300, 0.1
 # Corners of the cells around the fish, from its nose in lengths: what it sweeps, and a margin of more than the band.
 LOW, HIGH = np.array([-0.15, -0.3, -0.25]), np.array([1.15, 0.3, 0.25])
 
@@ -20,16 +20,16 @@ LOW, HIGH = np.array([-0.15, -0.3, -0.25]), np.array([1.15, 0.3, 0.25])
 class Swim:
     """A fish of length 1 in a tunnel of `lengths`, with `n` cells a length, float32 throughout."""
 
-    def __init__(self, n=40, count=4000, lengths=(3, 1, 1), surface="2x", **shape):
-        self.grid = isograd.Grid((0.0, 0.0, 0.0), 1 / n, tuple(n * length for length in lengths))
-        self.tunnel = Tunnel(self.grid, 1 / REYNOLDS, 0.25 / n, speed=SPEED)
-        self.fish = isograd.Shape("fish", **{"amplitude": 0.1, **shape})
+    def __init__(self, n=40, count=4000, lengths=(3, 1, 1), surface="2x", courant=0.25, **shape):
+        self.grid = isograd.Grid((0.0, 0.0, 0.0), 1 / n, tuple(round(n * length) for length in lengths))
+        self.tunnel = Tunnel(self.grid, 1 / REYNOLDS, courant / n, speed=SPEED)
+        self.fish = isograd.Shape("fish", **{"amplitude": AMPLITUDE, **shape})
         self.coordinates = self.fish.sample(count).coordinates  # the same material points at all times
         self.place = np.array([0.4, lengths[1] / 2, lengths[2] / 2])
         low, high = (np.round((self.place + sweep) * n).astype(int) for sweep in (LOW, HIGH))
         self.window = isograd.Grid(tuple(low / n), 1 / n, tuple(map(int, high - low)))
         spacing = 2 * np.sqrt(self.fish.area / count)
-        self.options = isograd.Options(orient="signs", surface=surface, radius=max(0.05, 2 * spacing))
+        self.options = isograd.Options(orient="signs", surface=surface, radius=2 * spacing)
 
     def times(self, first, steps):
         """Times of the points of `steps` steps, one before and one after them included."""

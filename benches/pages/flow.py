@@ -11,15 +11,21 @@ def context(data: dict) -> dict:
     found = {"data": data}
     if "sphere" in data:
         found["sphere"] = sphere(data["sphere"])
+    if "oscillation" in data:
+        found["oscillation"] = oscillation(data["oscillation"]["rows"])
+    if "strouhal" in data:
+        rows = data["strouhal"]["rows"]
+        found |= {"strouhal": strouhal(rows), "zero": significant(zero(rows), 2)}
     if "fish" in data:
         found["fish"] = fish(data["fish"])
     if "gradient" in data:
-        found["gradient"] = gradient(data["gradient"]["rows"])
+        rows = data["gradient"]["rows"]
+        largest = max(abs(row["difference"]) for row in rows)
+        ratios = [row["pullback"] / row["difference"] for row in rows if abs(row["difference"]) > 0.05 * largest]
+        found |= {"gradient": gradient(rows), "relevant": len(ratios), "agreeing": sum(r > 0 for r in ratios)}
+        found["close"] = sum(abs(r - 1) < 0.25 for r in ratios)
     if "cost" in data:
-        cost = data["cost"]
-        found["share"] = cost["geometry"] / cost["forward"]
-        found["backward"] = cost["checkpointed"]["seconds"] / cost["forward"]
-        found["megabytes"] = [cost[name]["bytes"] / 2**20 for name in ("checkpointed", "stored")]
+        found["cost"] = cost(data["cost"])
     if "optimization" in data:
         drags = [row["drag"] for row in data["optimization"]["rows"]]
         found |= {"fall": 1 - drags[-1] / drags[0], "iterations": len(drags) - 1}
@@ -39,6 +45,27 @@ def sphere(rows: list[dict]) -> str:
         for row in rows
     ]
     return table(["sphere at Re 100"], columns, cells)
+
+
+def oscillation(rows: list[dict]) -> str:
+    cells = [
+        [row["surface"], percent(row["mean"]), number(100 * row["error"]), number(row["noise"])] for row in rows
+    ]
+    return table(["surface"], ["mean force, difference in %", "error of the force, %", "noise, ratio"], cells)
+
+
+def strouhal(rows: list[dict]) -> str:
+    cells = [[f"{row['strouhal']:.1f}", significant(row["force"], 3)] for row in rows]
+    return table(["St"], ["mean force along the flow"], cells)
+
+
+def zero(rows: list[dict]) -> float:
+    """The Strouhal number of zero force, by linear interpolation between the two around it."""
+    for low, high in zip(rows, rows[1:]):
+        if low["force"] > 0 >= high["force"]:
+            share = low["force"] / (low["force"] - high["force"])
+            return low["strouhal"] + share * (high["strouhal"] - low["strouhal"])
+    raise ValueError("the force does not change its sign")
 
 
 def fish(rows: list[dict]) -> str:
@@ -69,6 +96,20 @@ def gradient(rows: list[dict]) -> str:
         for row in rows
     ]
     return table(["motion"], ["pullback", "difference", "ratio", "share of the largest"], cells)
+
+
+def cost(rows: list[dict]) -> str:
+    columns = ["geometry, %", "forward and backward, ratio", "memory, MiB", "without checkpoints, MiB"]
+    cells = [
+        [
+            f"{thousands(row['points'])} points",
+            number(100 * row["geometry"] / row["forward"]),
+            number(row["checkpointed"]["seconds"] / row["forward"]),
+            *(number(row[name]["bytes"] / 2**20) for name in ("checkpointed", "stored")),
+        ]
+        for row in rows
+    ]
+    return table(["samples"], columns, cells)
 
 
 def draw(data: dict, folder) -> None:

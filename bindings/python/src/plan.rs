@@ -13,6 +13,7 @@ use crate::background::{self, Stop};
 use crate::errors::value;
 use crate::result::{Reconstruction, ReconstructionArrays};
 use crate::settings::Settings;
+use crate::threads::{self, Threads};
 
 /// A plan for one grid and one set of options, in either number type.
 #[pyclass(frozen)]
@@ -22,6 +23,7 @@ pub struct Plan {
     double: Mutex<Option<isograd_backend::Plan<f64>>>,
     /// Why `auto` selected the CPU.
     note: Mutex<Option<String>>,
+    threads: Threads,
 }
 
 /// Name, components and values of an attribute, as `isograd.Reconstructor` passes it.
@@ -30,13 +32,15 @@ pub type AttributeArray<'py> = (String, usize, Bound<'py, PyAny>);
 #[pymethods]
 impl Plan {
     #[new]
-    fn new(py: Python<'_>, settings: &str) -> PyResult<Self> {
+    #[pyo3(signature = (settings, threads=None))]
+    fn new(py: Python<'_>, settings: &str, threads: Option<usize>) -> PyResult<Self> {
         let settings = Settings::parse(settings).map_err(value)?;
         settings.grid::<f64>().map_err(value)?;
         let plan = Self {
             single: Mutex::default(),
             double: Mutex::default(),
             note: Mutex::default(),
+            threads: threads.map(|n| threads::start(py, n)).transpose()?,
             settings,
         };
         if plan.settings.backend != Backend::Cpu {
@@ -95,7 +99,7 @@ impl Plan {
         observe: impl FnMut(Stage) -> PyResult<()>,
     ) -> PyResult<Reconstruction<T>> {
         let idle = lock(place).take();
-        let settings = self.settings.clone();
+        let (settings, threads) = (self.settings.clone(), self.threads.clone());
         let work = move |stop: &Stop, report: &(dyn Fn(Stage) + Sync)| {
             let mut plan = match idle {
                 Some(plan) => plan,
@@ -108,8 +112,13 @@ impl Plan {
                     ControlFlow::Continue(())
                 }
             };
-            let result = plan.make(&cloud, &mut observer);
-            Ok::<_, Failure>((plan, result.map(|result| Reconstruction { cloud, result })))
+            let made = threads::install_on(threads.as_ref(), || plan.make(&cloud, &mut observer));
+            let result = made.map(|result| Reconstruction {
+                cloud,
+                result,
+                threads,
+            });
+            Ok::<_, Failure>((plan, result))
         };
         let (plan, result) = background::run_with_messages(py, work, observe)??;
         self.store(place, plan);

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use isograd::distance::extend::{self, Region};
 use isograd::{CloudCotangent, Cotangent, ExtensionCotangent, JsonReport, PointCloud, Real};
 use isograd_backend::Made;
+use isograd_cli::SurfaceError;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -15,6 +16,7 @@ use crate::backend::Failure;
 use crate::background;
 use crate::errors::{file, value};
 use crate::plan::AttributeArray;
+use crate::threads::{self, Threads};
 
 /// A cloud and its reconstruction.
 pub struct Reconstruction<T: Number> {
@@ -22,6 +24,8 @@ pub struct Reconstruction<T: Number> {
     pub cloud: PointCloud<T>,
     /// The reconstruction.
     pub result: Made<T>,
+    /// Threads of all that is computed from it.
+    pub threads: Threads,
 }
 
 /// A reconstruction in one of the two number types.
@@ -101,6 +105,23 @@ impl ReconstructionArrays {
                 Ok::<_, Failure>(isograd_cli::write_slices(&path, this.result.view().sdf()?))
             })?;
             written?.map_err(file)
+        })
+    }
+
+    /// Writes the mesh with the attributes of the cloud, as the command line does. Returns why attributes were left out.
+    fn write_mesh(&self, py: Python<'_>, path: PathBuf) -> PyResult<Vec<String>> {
+        each!(&self.0, this => {
+            let this = this.clone();
+            let written = background::run(py, move |_| {
+                let view = this.result.view();
+                isograd_cli::write_surface(&path, view, view.mesh()?, &this.cloud)
+            })?;
+            match written {
+                Ok(omitted) => Ok(omitted.warnings),
+                Err(SurfaceError::File(error)) => Err(file(error)),
+                Err(SurfaceError::Result(error)) => Err(Failure::from(error).into()),
+                Err(error) => Err(value(error)),
+            }
         })
     }
 
@@ -305,7 +326,9 @@ fn pullback<'py, T: ExtensionType>(
         extensions: extended_bars,
     };
     let this = this.clone();
-    let out = background::run(py, move |_| bars.pullback(&this))?;
+    let out = background::run(py, move |_| {
+        threads::install_on(this.threads.as_ref(), || bars.pullback(&this))
+    })?;
     out_dict(py, &out?)
 }
 

@@ -15,7 +15,7 @@ import isograd
 
 ROOT = pathlib.Path(__file__).parents[3]
 PAGES = ["README.md", "docs/python.md", "docs/differentiable.md", "docs/coming-from.md", "docs/flow.md", "docs/datasets.md"]
-OPTIONAL = {"jax", "matplotlib", "open3d", "optax", "pyvista", "rtree", "torch", "trimesh", "warp", "xarray"}
+OPTIONAL = {"h5py", "jax", "matplotlib", "open3d", "optax", "pyvista", "rtree", "torch", "trimesh", "warp", "xarray"}
 
 
 class Page:

@@ -20,11 +20,11 @@ def test_there_are_examples_and_they_are_short():
 
 
 def imported(path):
-    """Libraries that an example imports, also by modules in folders beside it."""
+    """Libraries that an example imports, also by modules beside it."""
     found = set()
-    for name in re.findall(r"^(?:import|from) (\w+)", path.read_text(), re.MULTILINE):
-        beside = sorted((path.parent / name).glob("*.py"))
-        found |= set().union(*map(imported, beside)) if beside else {name}
+    for name in re.findall(r"^ *(?:import|from) ([\w.]+)", path.read_text(), re.MULTILINE):
+        beside = path.parent / (name.replace(".", "/") + ".py")
+        found |= imported(beside) if beside.exists() else {name.partition(".")[0]}
     return found
 
 

@@ -1,6 +1,7 @@
 """Progress, and the number of threads."""
 
 import os
+import pickle
 import subprocess
 import sys
 
@@ -70,6 +71,18 @@ def test_the_number_of_threads_changes_no_bit():
         isograd.set_num_threads(before)
 
 
+def test_a_call_and_a_plan_have_threads_of_their_own():
+    before, expected = isograd.get_num_threads(), isograd.reconstruct(POINTS, GRID)
+    plan = pickle.loads(pickle.dumps(isograd.Reconstructor(GRID, threads=np.int64(3))))
+    for result in (isograd.reconstruct(POINTS, GRID, threads=1), plan(POINTS)):
+        assert (result.sdf == expected.sdf).all()
+        assert (result.pullback(result.sdf).points == expected.pullback(expected.sdf).points).all()
+    assert plan.threads == 3 and isograd.get_num_threads() == before
+    for bad in (0, 1.5, "4"):
+        with pytest.raises(ValueError, match="threads is"):
+            isograd.reconstruct(POINTS, GRID, threads=bad)
+
+
 def test_the_environment_sets_the_number_of_threads():
     code = "import isograd; print(isograd.get_num_threads())"
     environment = {**os.environ, "RAYON_NUM_THREADS": "5"}
@@ -78,13 +91,16 @@ def test_the_environment_sets_the_number_of_threads():
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="threads as on Linux")
-def test_work_runs_on_so_many_threads():
-    code = """
-import os, isograd
-isograd.set_num_threads(3)
-points = isograd.sample("sphere", 1500).points
-isograd.reconstruct(points, resolution=20)
-names = [open(f"/proc/self/task/{task}/comm").read() for task in os.listdir("/proc/self/task")]
+@pytest.mark.parametrize(("before", "argument"), [("isograd.set_num_threads(3)", ""), ("", ", threads=3")])
+def test_work_runs_on_so_many_threads(before, argument):
+    code = f"""
+import os, isograd, numpy
+{before}
+points = numpy.random.default_rng(1).normal(size=(1500, 3))
+points /= numpy.linalg.norm(points, axis=1, keepdims=True)
+result = isograd.reconstruct(points, resolution=20{argument})
+result.pullback(result.sdf)
+names = [open(f"/proc/self/task/{{task}}/comm").read() for task in os.listdir("/proc/self/task")]
 print(len(names) - 1)
 """
     environment = {**os.environ, "RAYON_NUM_THREADS": "7", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}

@@ -43,6 +43,8 @@ use error::Error;
 use memory::Allocator;
 use streams::to_stderr;
 
+pub use surface::{Error as SurfaceError, Omitted, write as write_surface};
+
 /// Counts allocated bytes for the peak memory in reports.
 #[global_allocator]
 static ALLOCATOR: Allocator = Allocator;

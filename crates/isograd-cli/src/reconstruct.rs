@@ -261,6 +261,28 @@ impl<'a> Job<'a> {
         Ok(result.report.verdict())
     }
 
+    fn write_mesh<T: Number>(
+        &self,
+        path: &Path,
+        cloud: &PointCloud<T>,
+        result: &Results<'_, T>,
+        progress: &mut Progress,
+    ) -> Result<(), Error> {
+        let omitted = surface::write(path, result.view, result.mesh, cloud);
+        let omitted = omitted.map_err(|error| match error {
+            surface::Error::File(error) => Error::File(error),
+            error => Error::input(path)(error),
+        })?;
+        if let Some(note) = &omitted.note {
+            progress.note("attributes", note);
+        }
+        for warning in &omitted.warnings {
+            progress.warn(warning);
+        }
+        progress.wrote(path);
+        Ok(())
+    }
+
     fn write<T: Number>(
         &self,
         cloud: &PointCloud<T>,
@@ -272,8 +294,7 @@ impl<'a> Job<'a> {
         let outputs = self.outputs;
         outputs.create_folder()?;
         if let Some(path) = &outputs.mesh {
-            surface::write(path, result.view, result.mesh, cloud, progress)?;
-            progress.wrote(path);
+            self.write_mesh(path, cloud, result, progress)?;
         }
         if let Some(path) = &outputs.sdf {
             isograd_io::write_field(path, result.sdf)?;

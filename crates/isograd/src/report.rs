@@ -7,6 +7,7 @@ mod warning;
 use rayon::prelude::*;
 
 use crate::differential::{Eikonal, EikonalOptions, eikonal};
+use crate::isosurface::Level;
 use crate::isosurface::measure::Measures;
 use crate::orient::doubt::Doubt;
 use crate::{Field, Real};
@@ -116,6 +117,8 @@ pub struct Report {
     pub doubt: Doubt,
     /// Condition of the indicator at the walls of the grid: `free` or `closed`.
     pub walls: &'static str,
+    /// How the level of the surface was chosen.
+    pub level: Level,
     /// The level `c` of the surface `χ = c`.
     pub iso_value: f64,
     /// Distance of the trim, and number of faces that it removed.

@@ -9,6 +9,8 @@ from jax_cfd.base import advection, boundaries, diffusion, grids, pressure
 class Tunnel:
     """Flow at speed 1 along x in a periodic box, whose last part restores the inflow: a projection method in two stages."""
 
+    offsets = ((1.0, 0.5, 0.5), (0.5, 1.0, 0.5), (0.5, 0.5, 1.0))
+
     def __init__(self, grid, viscosity, dt, speed=1.0):
         domain = tuple(zip(grid.lower, grid.upper))
         self.cells, self.grid = grid, grids.Grid(grid.shape, domain=domain)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _core, _measure
+from ._settings import warn_caller
 
 if TYPE_CHECKING:
     import open3d
@@ -77,7 +78,8 @@ def save_reconstruction(result: Reconstruction, path: Path) -> None:
         result._core.write_slices(name)
     else:
         try:
-            result.mesh.save(name)
+            for omitted in result._core.write_mesh(name):
+                warn_caller(omitted, UserWarning)
         except ValueError as error:
             raise ValueError(
                 f"{error} for the mesh, {' or '.join(FIELD_SUFFIXES)} for φ, .json for the report or .png for slices; "
@@ -86,7 +88,7 @@ def save_reconstruction(result: Reconstruction, path: Path) -> None:
 
 
 def _save_folder(result: Reconstruction, folder: pathlib.Path) -> None:
-    """Writes what ``isograd reconstruct -o`` writes, with the same names; the mesh without attributes."""
+    """Writes what ``isograd reconstruct -o`` writes, with the same names."""
     if folder.exists() and not folder.is_dir():
         raise NotADirectoryError(f"{folder} is a file; give a folder")
     folder.mkdir(parents=True, exist_ok=True)

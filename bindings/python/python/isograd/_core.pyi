@@ -109,6 +109,10 @@ class Result:
     def write_slices(self, path: _Path) -> None:
         """Writes slices of φ and the spread of ``|∇φ|`` as PNG, as the command line does."""
 
+    def write_mesh(self, path: _Path) -> list[str]:
+        """Writes the mesh with the attributes of the cloud, as the command line does. Returns why attributes were left
+        out."""
+
     def pullback(
         self,
         bars: dict[str, _Floats],
@@ -124,7 +128,7 @@ class Result:
 class Plan:
     """A plan for one grid and one set of options, in either number type."""
 
-    def __new__(cls, settings: str) -> Plan: ...
+    def __new__(cls, settings: str, threads: int | None = None) -> Plan: ...
     def reconstruct(
         self,
         points: _Floats,

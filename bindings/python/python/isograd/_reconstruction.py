@@ -20,6 +20,7 @@ from ._progress import Progress, observe
 from ._results import Extension, Gradients
 from ._settings import check_backend, encode, warn_caller, warn_note
 from ._stored import Stored, checksum, compute_again
+from ._threads import check_threads
 
 if TYPE_CHECKING:
     import os
@@ -182,7 +183,7 @@ class Reconstruction(Stored):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes a result, as the name ends: φ (.vti, .npz), the mesh (.ply, .obj, .stl, .vtp), the report (.json) or
-        slices of φ (.png). Files are written atomically.
+        slices of φ (.png). Files are written atomically. In PLY and VTP the mesh has the attributes of the cloud.
 
         A folder, which exists or ends in ``/``, gets what ``isograd reconstruct -o`` writes: ``sdf.vti``, ``mesh.ply``,
         ``points.ply``, ``report.json`` and ``slices.png``.
@@ -324,6 +325,7 @@ class Reconstructor:
         options: Options | None = None,
         *,
         backend: str = "cpu",
+        threads: int | None = None,
         **changes: Unpack[OptionChanges],
     ) -> None:
         self.options = resolve(options, changes)
@@ -332,11 +334,13 @@ class Reconstructor:
         """The grid of all results."""
         self.backend = check_backend(backend)
         """The requested backend."""
-        self._plan = _core.Plan(encode(grid, self.options, self.backend))
+        self.threads = None if threads is None else check_threads(threads, "threads")
+        """Number of threads of its own, for results and their pullbacks; ``None`` for those of :func:`set_num_threads`."""
+        self._plan = _core.Plan(encode(grid, self.options, self.backend), self.threads)
         warn_note(self._plan.take_note())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return partial(type(self), self.grid, self.options, backend=self.backend), ()
+        return partial(type(self), self.grid, self.options, backend=self.backend, threads=self.threads), ()
 
     def __call__(
         self,
@@ -386,6 +390,7 @@ def reconstruct(
     options: Options | None = None,
     backend: str = "cpu",
     progress: Progress | bool | None = None,
+    threads: int | None = None,
     **changes: Unpack[OptionChanges],
 ) -> Reconstruction:
     """Reconstructs the signed distance field and the surface of a cloud.
@@ -410,6 +415,8 @@ def reconstruct(
         progress: ``True`` for a bar on standard error (of tqdm, if it is installed), or a function that is called with the
             name of each stage that begins and the fraction of the work before it, and last with ``"done"`` and 1.0. The
             fractions are those of typical clouds: stages take fixed shares of the time. An exception ends the work.
+        threads: number of threads of this call, and of the pullback of its result; by default that of
+            :func:`set_num_threads`. Results have the same bits for any number.
         changes: single options by name, such as ``orient="given"``.
 
     Raises:
@@ -428,7 +435,7 @@ def reconstruct(
         grid = Grid.fit(cloud, outliers=options.outliers, **fitted)
     elif fitted:
         raise TypeError(f"grid and {' and '.join(fitted)} are given; leave out grid, or give Grid.fit(points, ...) with them")
-    plan = Reconstructor(grid, options, backend=backend)
+    plan = Reconstructor(grid, options, backend=backend, threads=threads)
     return plan(cloud, normals=normals, sensors=sensors, attributes=attributes, progress=progress)
 
 

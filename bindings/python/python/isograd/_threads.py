@@ -14,10 +14,19 @@ def set_num_threads(n: int) -> None:
         ValueError: no whole number of 1 or more.
         RuntimeError: so many threads can't be started.
     """
-    found = whole(n, "n")
+    _core.set_num_threads(check_threads(n, "n"))
+
+
+def check_threads(threads: int, name: str) -> int:
+    """The number of threads.
+
+    Raises:
+        TypeError, ValueError: no whole number of 1 or more.
+    """
+    found = whole(threads, name)
     if found < 1:
-        raise ValueError(f"n is {found}; give 1 thread or more")
-    _core.set_num_threads(found)
+        raise ValueError(f"{name} is {found}; give 1 thread or more")
+    return found
 
 
 def get_num_threads() -> int:

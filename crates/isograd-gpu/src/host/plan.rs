@@ -166,6 +166,7 @@ impl<T: Number> Plan<T> {
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
     ) -> Result<(Reconstruction<T>, RadiiAndSigns<T>), Error> {
         let (held, mut report) = (begun.held.clone(), begun.report.clone());
+        report.level = self.options.level;
         let mut clock = Clock::new();
         let mut stage_before = Stage::Normals;
         let mut timed = |stage| {

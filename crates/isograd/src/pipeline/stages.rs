@@ -129,6 +129,7 @@ impl<T: Real> Reconstructor<T> {
             return Err(Error::ClosedScreening(options.screening));
         }
         report.walls = if closed { "closed" } else { "free" };
+        report.level = options.level;
         report.surface_spacing = grid.spacing().f64();
         if octaves > 0 {
             return self.splat_in_blocks(grid, octaves, closed);

@@ -4,6 +4,7 @@ use serde::{Serialize, Serializer};
 
 use super::{Report, Stage, Verdict, Warning};
 use crate::differential::Spread;
+use crate::isosurface::Level;
 use crate::isosurface::measure::Measures;
 use crate::orient::doubt::{Doubt, Reason};
 
@@ -182,18 +183,22 @@ impl JsonReport {
             surface: None,
             seconds: seconds(report, &[Stage::Normals, Stage::Orient, Stage::Checks]),
             verdict: report.verdict(),
-            warnings: report.reasons().into_iter().map(JsonWarning::new).collect(),
+            warnings: report
+                .reasons()
+                .into_iter()
+                .map(|warning| JsonWarning::new(warning, report.level))
+                .collect(),
         }
     }
 }
 
 impl JsonWarning {
-    fn new(warning: &Warning) -> Self {
+    fn new(warning: &Warning, level: Level) -> Self {
         Self {
             code: warning.code(),
             severity: warning.severity(),
             text: warning.to_string(),
-            remedy: warning.remedy(),
+            remedy: warning.remedy(level),
             numbers: warning.clone(),
         }
     }

@@ -65,7 +65,7 @@ impl Report {
         let verdict = self.verdict().map_or("not checked", Verdict::name);
         let reasons = self.reasons().into_iter();
         let reasons: Vec<String> = reasons
-            .map(|warning| format!("{} (try: {})", warning.code(), warning.remedy()))
+            .map(|warning| format!("{} (try: {})", warning.code(), warning.remedy(self.level)))
             .collect();
         match reasons.is_empty() {
             true => verdict.into(),

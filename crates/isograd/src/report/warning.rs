@@ -5,6 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::{TOLERATED_SHARE, Verdict};
+use crate::isosurface::Level;
 use crate::orient::doubt::{Doubt, Reason};
 
 /// A reason is named where it stands for one in this many of the doubtful samples.
@@ -130,15 +131,16 @@ impl Warning {
         if is_bad { Verdict::Bad } else { Verdict::Check }
     }
 
-    /// Options to try, named as in Python and, in parentheses, on the command line.
-    pub fn remedy(&self) -> &'static str {
+    /// Options to try with a surface at this level, named as in Python and, in parentheses, on the command line.
+    pub fn remedy(&self, level: Level) -> &'static str {
         match self {
             Self::Outliers { .. } => {
                 "outliers=\"keep\" (--outliers keep) if they are part of the shape"
             }
-            Self::Thin { .. } => {
-                "more cells (resolution, --resolution) if these parts matter; with another level, level=\"thin\" (--level thin), which keeps them whole"
+            Self::Thin { .. } if level != Level::Thin => {
+                "level=\"thin\" (--level thin), which keeps them whole, or more cells (resolution, --resolution)"
             }
+            Self::Thin { .. } => "more cells (resolution, --resolution) if these parts matter",
             Self::Sparse { .. } => "fewer cells (resolution, --resolution) or more samples",
             Self::Open { .. } => {
                 "samples in the gaps; sheet=THICKNESS (--sheet) for a membrane or sail; trim=\"auto\" (--trim auto) for a mesh without what was guessed"
@@ -149,14 +151,18 @@ impl Warning {
             Self::ThinSheet { .. } => {
                 "a larger thickness (sheet, --sheet) or smaller cells (surface, --surface)"
             }
-            Self::Fragments { .. } => {
-                "more cells (resolution, --resolution) or more samples there; with another level, level=\"thin\" (--level thin)"
+            Self::Fragments { .. } if level != Level::Thin => {
+                "level=\"thin\" (--level thin), more cells (resolution, --resolution) or more samples there"
             }
+            Self::Fragments { .. } => "more cells (resolution, --resolution) or more samples there",
             Self::InsideOut { .. } => {
                 "orient=\"auto\" (--orient auto), or normals that point outward"
             }
+            Self::Missed { .. } if level != Level::Thin => {
+                "level=\"thin\" (--level thin), more cells (resolution, --resolution), fewer outliers, or known normals (orient, --orient)"
+            }
             Self::Missed { .. } => {
-                "more cells (resolution, --resolution), fewer outliers, or known normals (orient, --orient); with another level, level=\"thin\" (--level thin)"
+                "more cells (resolution, --resolution), fewer outliers, or known normals (orient, --orient)"
             }
             Self::DoubtfulSigns { doubt } => doubtful_remedy(main_reason(doubt)),
             Self::Guarded { .. } => {
@@ -325,7 +331,10 @@ mod tests {
         assert_eq!(all.each_ref().map(Warning::code), Warning::CODES);
         for warning in all {
             // The line of a verdict has 500 characters.
-            assert!((10..160).contains(&warning.remedy().len()), "{warning}");
+            for level in [Level::Thin, Level::Local] {
+                let length = warning.remedy(level).len();
+                assert!((10..160).contains(&length), "{warning}");
+            }
             assert!(warning.severity() > Verdict::Good && warning.to_string().len() > 20);
         }
     }

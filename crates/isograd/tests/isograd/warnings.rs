@@ -114,7 +114,7 @@ fn doubtful_signs_come_with_their_reason_and_a_remedy() {
         Warning::DoubtfulSigns { doubt } => {
             assert_eq!(doubt, &report.doubt);
             assert!(doubt.share_of(Reason::Open) > 0.95, "{doubt:?}");
-            Some((warning.to_string(), warning.remedy()))
+            Some((warning.to_string(), warning.remedy(report.level)))
         }
         _ => None,
     });
