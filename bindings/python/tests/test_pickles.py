@@ -90,6 +90,15 @@ def test_normals_and_sensors_are_kept():
             assert bits(gradients[0].normals) == bits(gradients[1].normals)
 
 
+def test_a_mesh_without_attributes_is_saved_without_a_second_computation(tmp_path, monkeypatch):
+    result = isograd.reconstruct(POINTS, GRID)
+    other = pickled(result)
+    result.save(tmp_path / "result.ply")
+    monkeypatch.setattr("isograd._stored._core.Plan", None)
+    other.save(tmp_path / "other.ply")
+    assert (tmp_path / "other.ply").read_bytes() == (tmp_path / "result.ply").read_bytes()
+
+
 def test_arrays_that_were_read_need_no_second_computation(monkeypatch):
     result = reconstructed()
     areas = result.areas

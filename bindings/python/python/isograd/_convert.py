@@ -78,13 +78,23 @@ def save_reconstruction(result: Reconstruction, path: Path) -> None:
         result._core.write_slices(name)
     else:
         try:
-            for omitted in result._core.write_mesh(name):
-                warn_caller(omitted, UserWarning)
+            _save_surface(result, name)
         except ValueError as error:
             raise ValueError(
                 f"{error} for the mesh, {' or '.join(FIELD_SUFFIXES)} for φ, .json for the report or .png for slices; "
                 "for all of them give a folder, which exists or ends in /"
             ) from None
+
+
+def _save_surface(result: Reconstruction, path: str) -> None:
+    """Writes the mesh, with the attributes of the cloud where the format holds them."""
+    inputs = result.__dict__.get("_inputs")
+    if inputs is not None and not inputs[-1]:
+        # A reconstruction that was unpickled has its mesh, and is not computed again for attributes that it lacks.
+        result.mesh.save(path)
+        return
+    for omitted in result._core.write_mesh(path):
+        warn_caller(omitted, UserWarning)
 
 
 def _save_folder(result: Reconstruction, folder: pathlib.Path) -> None:
