@@ -49,7 +49,9 @@ def main():
     folder = Path(options.folder or tempfile.mkdtemp()).resolve()
     folder.mkdir(parents=True, exist_ok=True)
     cluster = distributed.LocalCluster(
-        n_workers=options.workers, threads_per_worker=1, dashboard_address=None
+        n_workers=options.workers,
+        threads_per_worker=1,
+        dashboard_address=None,  # pyright: ignore[reportArgumentType]
     )
     with cluster, distributed.Client(cluster):
         parts = min(options.clouds, 16 * options.workers)
