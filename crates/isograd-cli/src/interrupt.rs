@@ -11,6 +11,8 @@ const CTRL_C: u8 = 130;
 static DEFERRED: AtomicBool = AtomicBool::new(false);
 /// Whether a stop was requested.
 static REQUESTED: AtomicBool = AtomicBool::new(false);
+/// Whether the program is being ended by a signal.
+static STOPPING: AtomicBool = AtomicBool::new(false);
 /// Exit status of the last signal.
 static STATUS: AtomicU8 = AtomicU8::new(CTRL_C);
 
@@ -63,9 +65,17 @@ fn stop(status: u8) {
         to_stderr("stopping after this epoch; once more to stop at once");
         return;
     }
+    STOPPING.store(true, Ordering::SeqCst);
     isograd_io::atomic::remove_unfinished();
     to_stderr("stopped");
     std::process::exit(status.into());
+}
+
+/// Waits for the end if a signal is ending the program: writes fail then, and the status is that of the signal.
+pub fn wait_if_stopping() {
+    while STOPPING.load(Ordering::SeqCst) {
+        std::thread::park();
+    }
 }
 
 /// While this value exists, the first signal only makes [`Deferred::is_requested`] true.

@@ -70,6 +70,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let result = dispatch(&cli.command);
     // An error of the work comes first.
     let printed = streams::finish();
+    interrupt::wait_if_stopping();
     result.and(printed).map_or_else(report, |()| 0)
 }
 

@@ -170,7 +170,7 @@ impl Output {
             return Ok(());
         };
         if let Ok(old) = fs::metadata(target) {
-            fs::set_permissions(temporary, old.permissions())?;
+            self.writer.get_ref().set_permissions(old.permissions())?;
         }
         sync(self.writer.get_ref())?;
         // The lock is held during the rename: a file is either finished or removed.

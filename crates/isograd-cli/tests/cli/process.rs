@@ -1,10 +1,14 @@
 //! The program among others: signals, standard output, threads, and what it prints to a terminal.
 
 use std::fs::OpenOptions;
+use std::io::Write;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use crate::sandbox::{Run, Sandbox};
+
+/// Bytes that a pipe holds on Linux.
+const PIPE_SIZE: usize = 1 << 16;
 
 /// A sandbox with a small cloud.
 fn sandbox() -> Sandbox {
@@ -19,10 +23,15 @@ fn status_line(child: &Child, name: &str) -> u64 {
 }
 
 /// A child that waits for its standard input, and handles or ignores SIGHUP, SIGINT and SIGTERM.
-fn waiting(mut command: Command) -> Child {
+fn waiting(command: Command) -> Child {
+    waiting_with(command, Stdio::piped())
+}
+
+/// Like [`waiting`], with this standard error.
+fn waiting_with(mut command: Command, stderr: Stdio) -> Child {
     const SIGNALS: u64 = 1 | 1 << 1 | 1 << 14;
     command.stdin(Stdio::piped()).stdout(Stdio::null());
-    let child = command.stderr(Stdio::piped()).spawn().expect("starts");
+    let child = command.stderr(stderr).spawn().expect("starts");
     let is_ready = |masks: [u64; 2]| (masks[0] | masks[1]) & SIGNALS == SIGNALS;
     while !is_ready(["SigCgt:", "SigIgn:"].map(|name| status_line(&child, name))) {
         std::thread::sleep(Duration::from_millis(5));
@@ -67,6 +76,24 @@ fn each_signal_ends_with_128_and_its_number() {
         assert_eq!(stopped(child, signal), Some(status));
     }
     assert!(sandbox.files().is_empty());
+}
+
+#[test]
+fn work_that_ends_after_a_signal_leaves_the_status_to_it() {
+    let sandbox = Sandbox::new();
+    // Standard error is full, so the thread of signals waits before it ends the program, and the work ends first.
+    let (mut reader, mut writer) = std::io::pipe().expect("a pipe");
+    writer.write_all(&[b'.'; PIPE_SIZE]).expect("writes");
+    let mut child = waiting_with(sandbox.command("info -"), writer.into());
+    kill(&child, "-TERM");
+    let mut input = child.stdin.take().expect("piped");
+    // Time for the signal, without which the test passes in any case.
+    std::thread::sleep(Duration::from_millis(100));
+    input.write_all(b"0 0 0\n1 0 0\n0 1 0\n").expect("writes");
+    drop(input);
+    std::thread::sleep(Duration::from_millis(300));
+    std::io::copy(&mut reader, &mut std::io::sink()).expect("reads");
+    assert_eq!(child.wait().expect("it ends").code(), Some(143));
 }
 
 #[test]
