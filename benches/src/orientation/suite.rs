@@ -252,7 +252,7 @@ impl Suite {
                 parts::union(&parts::bundle(gap), SAMPLES, 33)
             });
         }
-        for seed in 1..=3 {
+        for seed in 1..=6 {
             let bracket = move || parts::union(&parts::bracket(seed), 30_000, seed);
             self.add(Family::Parts, format!("bracket {seed}"), bracket);
             self.add(Family::Parts, format!("bracket {seed} holes"), move || {

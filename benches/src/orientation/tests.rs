@@ -60,3 +60,9 @@ fn noise_that_is_small_beside_the_body_turns_few_signs() {
     let failed = too_many_wrong(&["torus noise 0.01", "knot noise 0.01", "car noise 0.005"]);
     assert!(failed.is_empty(), "{failed:?}");
 }
+
+#[test]
+fn patches_beside_holes_and_between_touching_bodies_are_right() {
+    let failed = too_many_wrong(&["bracket 1 holes", "bracket 4 holes", "tubes 0.01"]);
+    assert!(failed.is_empty(), "{failed:?}");
+}

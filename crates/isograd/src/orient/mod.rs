@@ -15,6 +15,8 @@
 //!   samples, which holds along a sheet, around an edge, and across a thin body or a narrow gap. Belief propagation
 //!   on the neighbor graph spreads this evidence. Points that agree form domains; between domains that contradict
 //!   each other the *winding number* decides: with the correct signs it is ½ on the surface.
+//!   Where signs within a domain contradict the couplings, as along the border of a patch beside a hole, it is cut
+//!   into segments, and these are decided between in the same way.
 //!   Thin bodies and narrow gaps are locally the same; where that matters, both interpretations are solved, and
 //!   the winding number selects one. Time and memory are `O(N log N)`, regardless of outliers.
 //! - [`Method::Parity`]: the paper's method as printed (its §2.2), with its hyperparameters.

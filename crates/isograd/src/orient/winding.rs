@@ -84,15 +84,25 @@ impl Misfit {
         let (probes, weights) = probes(&members, in_one);
         let windings = numbers(graph, place, domains, &probes);
         let count = domains.count;
-        let (mut gram, mut pull) = (vec![0.0; count * count], vec![0.0; count]);
-        for (weight, winding) in weights.iter().zip(windings.chunks_exact(count.max(1))) {
+        let weighted = || weights.iter().zip(windings.chunks_exact(count.max(1)));
+        let mut pull = vec![0.0; count];
+        for (weight, winding) in weighted() {
             for a in 0..count {
                 pull[a] += weight * winding[a];
-                for b in 0..count {
-                    gram[a * count + b] += weight * winding[a] * winding[b];
-                }
             }
         }
+        let mut gram = vec![0.0; count * count];
+        let rows = gram.par_chunks_mut((ROWS * count).max(1)).enumerate();
+        rows.for_each(|(chunk, rows)| {
+            for (weight, winding) in weighted() {
+                for (a, row) in (chunk * ROWS..).zip(rows.chunks_exact_mut(count)) {
+                    let own = weight * winding[a];
+                    for (sum, other) in row.iter_mut().zip(winding) {
+                        *sum += own * other;
+                    }
+                }
+            }
+        });
         Self {
             gram,
             pull,
@@ -118,6 +128,9 @@ fn probes(members: &[Vec<u32>], samples: usize) -> (Vec<u32>, Vec<f64>) {
     }
     (probes, weights)
 }
+
+/// Rows of the matrix of a cost that one task computes.
+const ROWS: usize = 16;
 
 /// Samples that are summed side by side, and blocks that are summed in single precision.
 const WIDTH: usize = 16;

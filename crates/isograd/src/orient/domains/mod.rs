@@ -8,13 +8,15 @@ use super::signs::{Domains, Place};
 use super::winding::Misfit;
 use crate::vector;
 
+mod segments;
+
 /// Neighbors whose coupling is at least this strong belong to one domain if their beliefs agree.
 const STRONG: f32 = 0.5;
 
 /// Fewest points of a domain whose winding number is computed, and the largest number of such domains: the
 /// others have too little surface to matter.
 const SMALLEST: usize = 12;
-const MOST_DOMAINS: usize = 256;
+const MOST_DOMAINS: usize = 512;
 
 /// A domain is overruled if the beliefs against its signs outweigh those for them by this factor.
 const MOSTLY: f64 = 3.0;
@@ -112,6 +114,9 @@ impl DomainSigns {
         self.apply(&outcome);
         self.find_overruled(domains, belief);
         self.turn_from_centroids(graph, &outcome, |p| place.user(p));
+        if winding > 0.0 {
+            self.correct_patches(graph, evidence, winding, place);
+        }
     }
 
     fn join_agreeing(&mut self, graph: &Graph, belief: &[f32]) {
