@@ -87,10 +87,11 @@ fn work_that_ends_after_a_signal_leaves_the_status_to_it() {
     let mut child = waiting_with(sandbox.command("info -"), writer.into());
     kill(&child, "-TERM");
     let mut input = child.stdin.take().expect("piped");
-    // Time for the signal, without which the test passes in any case.
-    std::thread::sleep(Duration::from_millis(100));
+    // Nothing shows when the thread has woken up; if the work ended before that, its status would count.
+    std::thread::sleep(Duration::from_secs(1));
     input.write_all(b"0 0 0\n1 0 0\n0 1 0\n").expect("writes");
     drop(input);
+    // Time for the work to end, without which the test passes in any case.
     std::thread::sleep(Duration::from_millis(300));
     std::io::copy(&mut reader, &mut std::io::sink()).expect("reads");
     assert_eq!(child.wait().expect("it ends").code(), Some(143));

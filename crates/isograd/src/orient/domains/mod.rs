@@ -27,6 +27,9 @@ const SWEEPS: usize = 20;
 /// A belief below this is none.
 const NEGLIGIBLE: f32 = 1e-2;
 
+/// Weights of the ties of each node to others; a tie stands at both of its ends.
+type Ties = Vec<BTreeMap<u32, f64>>;
+
 /// Turns beliefs into one sign for each point; all in sorted order.
 #[derive(Clone, Debug, Default)]
 pub(super) struct DomainSigns {
@@ -105,18 +108,31 @@ impl DomainSigns {
         self.join_agreeing(graph, belief);
         self.join_undecided(graph, belief);
         let domains = self.number_domains();
-        let mut ties = self.ties(graph, evidence, domains);
-        if winding > 0.0 {
-            self.add_winding(graph, place, winding, &mut ties);
-        }
-        let mut outcome = contract(ties.clone());
-        improve(&ties, &mut outcome);
+        let (_, outcome) = self.solve(graph, evidence, domains, winding, place);
         self.apply(&outcome);
         self.find_overruled(domains, belief);
         self.turn_from_centroids(graph, &outcome, |p| place.user(p));
         if winding > 0.0 {
             self.correct_patches(graph, evidence, winding, place);
         }
+    }
+
+    /// Ties of the domains, and the cluster and sign of each that satisfy them best.
+    fn solve(
+        &self,
+        graph: &Graph,
+        evidence: &[f32],
+        domains: usize,
+        winding: f64,
+        place: &impl Place,
+    ) -> (Ties, Vec<(u32, f32)>) {
+        let mut ties = self.ties(graph, evidence, domains);
+        if winding > 0.0 {
+            self.add_winding(graph, place, winding, &mut ties);
+        }
+        let mut outcome = contract(ties.clone());
+        improve(&ties, &mut outcome);
+        (ties, outcome)
     }
 
     fn join_agreeing(&mut self, graph: &Graph, belief: &[f32]) {
@@ -158,28 +174,20 @@ impl DomainSigns {
         }
     }
 
-    /// Numbers the domains 0, 1, … and takes each point's sign relative to the root of its domain.
+    /// Numbers the domains and takes each point's sign relative to the root of its domain.
     fn number_domains(&mut self) -> usize {
-        let mut count = 0;
-        self.domain.clear();
-        self.sign.clear();
-        for p in 0..self.domains.parent.len() as u32 {
-            let (root, sign) = self.domains.root(p);
-            // A root comes before all others of its domain.
-            let number = if root == p {
-                count
-            } else {
-                self.domain[root as usize]
-            };
-            count += u32::from(root == p);
-            self.domain.push(number);
-            self.sign.push(sign);
-        }
-        count as usize
+        let (domains, sign) = (&mut self.domains, &mut self.sign);
+        sign.clear();
+        let points = domains.parent.len() as u32;
+        number(&mut self.domain, points, |p| {
+            let (root, relative) = domains.root(p);
+            sign.push(relative);
+            root
+        })
     }
 
     /// Sums of couplings between domains, and of evidence for each of them (the tie to node `domains`).
-    fn ties(&self, graph: &Graph, evidence: &[f32], domains: usize) -> Vec<BTreeMap<u32, f64>> {
+    fn ties(&self, graph: &Graph, evidence: &[f32], domains: usize) -> Ties {
         let ground = domains as u32;
         let mut ties = vec![BTreeMap::new(); domains + 1];
         let mut tie = |a: u32, b: u32, weight: f32| {
@@ -207,13 +215,7 @@ impl DomainSigns {
     }
 
     /// Adds the ties of the winding number, of the larger domains and between them.
-    fn add_winding(
-        &self,
-        graph: &Graph,
-        place: &impl Place,
-        winding: f64,
-        ties: &mut [BTreeMap<u32, f64>],
-    ) {
+    fn add_winding(&self, graph: &Graph, place: &impl Place, winding: f64, ties: &mut Ties) {
         let ground = ties.len() - 1;
         let large = self.large_domains(ground);
         let mut row = vec![Domains::NONE; ground];
@@ -309,9 +311,25 @@ impl DomainSigns {
     }
 }
 
+/// Numbers sets of points 0, 1, … in `domain`, from the root of each point, and returns how many there are.
+fn number(domain: &mut Vec<u32>, points: u32, mut root: impl FnMut(u32) -> u32) -> usize {
+    let mut count = 0;
+    domain.clear();
+    for p in 0..points {
+        // A root comes before all others of its set.
+        let root = root(p);
+        domain.push(match root == p {
+            true => count,
+            false => domain[root as usize],
+        });
+        count += u32::from(root == p);
+    }
+    count as usize
+}
+
 /// Turns single nodes as long as that satisfies more of their ties: a contraction can't take back what it
 /// has joined.
-fn improve(ties: &[BTreeMap<u32, f64>], outcome: &mut [(u32, f32)]) {
+fn improve(ties: &Ties, outcome: &mut [(u32, f32)]) {
     let ground = outcome.len() - 1;
     for _ in 0..SWEEPS {
         for a in 0..ground {
@@ -329,7 +347,7 @@ fn improve(ties: &[BTreeMap<u32, f64>], outcome: &mut [(u32, f32)]) {
 ///
 /// Source: greedy additive edge contraction, M. Keuper et al., "Efficient decomposition of image and
 /// mesh graphs by lifted multicuts" (2015), here with signs in place of cuts.
-pub(super) fn contract(mut ties: Vec<BTreeMap<u32, f64>>) -> Vec<(u32, f32)> {
+pub(super) fn contract(mut ties: Ties) -> Vec<(u32, f32)> {
     let mut parent: Vec<(u32, f32)> = (0..ties.len() as u32).map(|a| (a, 1.0)).collect();
     // Magnitudes are positive, so their bits are ordered as they are.
     let entry = |a: u32, b: u32, w: f64| (w.abs().to_bits(), Reverse((a.min(b), a.max(b))));

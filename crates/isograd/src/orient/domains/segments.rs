@@ -6,10 +6,8 @@
 //! the winding number decide between them as between domains: first large segments, then smaller ones. Signs change
 //! only if that is clearly better by the sum of all three.
 
-use std::collections::BTreeMap;
-
 use super::super::regions::root;
-use super::{DomainSigns, Graph, Place, STRONG, contract, improve};
+use super::{DomainSigns, Graph, Place, STRONG, Ties, number};
 
 /// A segment holds at most one sample in so many, first and then.
 const SHARES: [usize; 3] = [50, 200, 500];
@@ -47,10 +45,7 @@ impl DomainSigns {
         let mut least = self.sign.len().isqrt();
         for share in SHARES {
             let segments = self.cut(graph, (self.sign.len() / share).max(FEW));
-            let mut ties = self.ties(graph, evidence, segments);
-            self.add_winding(graph, place, winding, &mut ties);
-            let mut outcome = contract(ties.clone());
-            improve(&ties, &mut outcome);
+            let (ties, outcome) = self.solve(graph, evidence, segments, winding, place);
             if !self.turn_segments(&ties, &outcome, least) {
                 return;
             }
@@ -93,28 +88,12 @@ impl DomainSigns {
                 }
             }
         }
-        let mut segments = 0;
-        self.domain.clear();
-        for p in 0..n as u32 {
-            // A root comes before all others of its segment.
-            let root = root(&mut parent, p);
-            self.domain.push(match root == p {
-                true => segments,
-                false => self.domain[root as usize],
-            });
-            segments += u32::from(root == p);
-        }
-        segments as usize
+        number(&mut self.domain, n as u32, |p| root(&mut parent, p))
     }
 
     /// Turns the segments whose sign in `outcome` is −1, relative to the evidence, if these are at least so many samples
     /// and that gains enough; returns whether it does.
-    fn turn_segments(
-        &mut self,
-        ties: &[BTreeMap<u32, f64>],
-        outcome: &[(u32, f32)],
-        least: usize,
-    ) -> bool {
+    fn turn_segments(&mut self, ties: &Ties, outcome: &[(u32, f32)], least: usize) -> bool {
         let (ground, sign) = outcome[outcome.len() - 1];
         let is_turned: Vec<bool> = outcome
             .iter()
@@ -261,15 +240,8 @@ mod tests {
         assert!(cap > 500, "{cap}");
         scene.correct();
         assert_eq!(scene.wrong(), 0);
-        assert_eq!(
-            scene
-                .signs
-                .overruled
-                .iter()
-                .filter(|&&turned| turned)
-                .count(),
-            cap
-        );
+        let turned = scene.signs.overruled.iter().filter(|&&turned| turned);
+        assert_eq!(turned.count(), cap);
         assert!(scene.total() > before + GAIN * cap as f64);
     }
 
