@@ -172,6 +172,7 @@ fn phi_and_its_gradient_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Dev
             let bars = plan.pullback(result, &cotangent).unwrap();
             [&bars.points, &bars.grid].map(|bar| device.download(bar).unwrap())
         };
+        let mut of_all = None;
         for given in cotangents() {
             let expected = expected.pullback(&only(&bars.on_cpu(), given));
             let expected = expected.unwrap();
@@ -188,13 +189,16 @@ fn phi_and_its_gradient_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Dev
             println!("{given:?}: x̄ and that of the grid {errors:?}");
             let most = errors.into_iter().fold(0.0, f64::max);
             assert!(most < 10.0 * tolerance, "{name} {given:?}: {most:e}");
+            if given == [true; 6] {
+                of_all = Some([of_points, of_grid]);
+            }
         }
 
         // The next step of a body that has not moved: the same bits, sides told by the normals before.
         let held = held.facing(result.normals.clone()).unwrap();
         let again = plan.reconstruct(&points, &held).unwrap();
         assert_eq!(device.download(&again.sdf).unwrap(), found);
-        assert_eq!(pull(&again, [true; 6]), pull(&result, [true; 6]));
+        assert_eq!(Some(pull(&again, [true; 6])), of_all);
     }
 }
 

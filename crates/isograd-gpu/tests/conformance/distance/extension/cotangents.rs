@@ -118,7 +118,7 @@ fn cotangents_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
             let on_device = scene.upload(device, &attribute);
             let made = on_device.extend(device, 3.0).unwrap();
             let of_cpu = downloaded(device, scene.grid().shape(), &made);
-            for bars in Bars::all(&of_cpu.0) {
+            for (case, bars) in Bars::all(&of_cpu.0).into_iter().enumerate() {
                 let (found, guarded) = pull(device, &on_device, &made, &bars);
                 let (expected, wanted) = pull_on_cpu(&scene, &attribute, &of_cpu, &bars);
                 println!("{}, {components} in {}:", scene.name, T::NAME);
@@ -134,8 +134,11 @@ fn cotangents_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
                     // Whether samples in one place coincide to the last bit, rounding says.
                     assert_eq!(guarded, wanted);
                 }
-                let again = pull(device, &on_device, &made, &bars);
-                assert!(again == (found, guarded), "other bits the second time");
+                // Of all cotangents, which go through every kernel.
+                if case == 0 {
+                    let again = pull(device, &on_device, &made, &bars);
+                    assert!(again == (found, guarded), "other bits the second time");
+                }
             }
         }
     }
