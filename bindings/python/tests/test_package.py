@@ -50,10 +50,13 @@ def test_ctrl_c_ends_the_command(tmp_path):
     cloud = tmp_path / "sphere.ply"
     assert run("sample", "sphere", "-n", 20_000, "-o", cloud).returncode == 0
     command = [*COMMAND, "reconstruct", cloud, "--sdf", tmp_path / "sdf.vti", "--resolution", "400", "-v"]
+    # A process in the background, or under nohup, starts with this signal ignored, and so would its child.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         # The first line comes after the signal handler.
         process.stderr.readline()
         time.sleep(0.1)
         process.send_signal(signal.SIGINT)
         assert process.wait() == 130
+    signal.signal(signal.SIGINT, before)
     assert [path.name for path in tmp_path.iterdir()] == ["sphere.ply"]
