@@ -16,6 +16,7 @@ mod pages;
 mod peers;
 mod pictures;
 mod process;
+mod programs;
 mod python;
 mod readme;
 mod steps;

@@ -111,8 +111,8 @@ fn install_source_distribution(target: &Path) -> Result<(), Obstacle> {
     ];
     clean.install(&[&archive], &settings)?;
     let mut script = Command::new(&clean.python);
-    process::run(script.args(["-c", SCRIPT]).current_dir(&folder))?;
-    process::run(&mut clean.module("isograd", &["--version"]))?;
+    environment::capture(script.args(["-c", SCRIPT]).current_dir(&folder))?;
+    environment::capture(&mut clean.module("isograd", &["--version"]))?;
     Ok(())
 }
 

@@ -29,6 +29,15 @@ pub fn run(scope: Scope, tally: &mut Tally) -> Outcome<Vec<String>> {
     }
 }
 
+/// Installs what the tests need, if it is not there. What can't be installed, [`run`] reports.
+pub fn install(scope: Scope) {
+    let target = Workspace::load().map(|workspace| workspace.target);
+    let environment = target.ok().and_then(|target| environment(&target).ok());
+    if let (Some(environment), Scope::All) = (environment, scope) {
+        let _ = add_torch(&environment);
+    }
+}
+
 /// Returns a line for each part that is missing.
 fn test_package(scope: Scope, tally: &mut Tally) -> Result<Vec<String>, Obstacle> {
     let workspace = Workspace::load()?;
@@ -41,9 +50,16 @@ fn test_package(scope: Scope, tally: &mut Tally) -> Result<Vec<String>, Obstacle
     let packages = target.join("xtask/python/packages");
     assemble_package(&environment, &target.join("debug"), &packages)?;
     let mut pytest = environment.module("pytest", &["-q", "-rs", "--color=no"]);
+    // Two processes: XLA compiles on one core. Tests of a file share random numbers and caches, and run in their order.
+    pytest.args(["--numprocesses", "2", "--dist", "loadfile"]);
+    pytest.arg("--no-loadscope-reorder");
     pytest.args(["-p", "no:cacheprovider"]).arg(tests_folder());
     pytest.env("PYTHONPATH", packages);
     pytest.env("ISOGRAD_PROGRAM", workspace.program());
+    // Less time of XLA's compiler, most of what these tests spend; what it computes is not ours to test.
+    if std::env::var_os("XLA_FLAGS").is_none() {
+        pytest.env("XLA_FLAGS", "--xla_backend_optimization_level=0");
+    }
     // Packages that draw must not look for a screen.
     pytest.env("MPLBACKEND", "Agg").env_remove("DISPLAY");
     process::run_by_line(&mut pytest, |line| {

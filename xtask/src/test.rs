@@ -1,6 +1,7 @@
 //! `cargo xtask test [--all]`: everything a change must pass, cheapest first.
 
 use std::process::Command;
+use std::thread;
 
 use crate::examples;
 use crate::fuzz;
@@ -10,6 +11,7 @@ use crate::nvrtc::Nvrtc;
 use crate::packages;
 use crate::pages;
 use crate::process::{self, Outcome};
+use crate::programs;
 use crate::python;
 use crate::readme;
 use crate::steps::Steps;
@@ -105,25 +107,40 @@ pub fn lint() -> Outcome {
 
 fn run_steps(scope: Scope, steps: &mut Steps, tally: &mut Tally) -> Outcome {
     lint_steps(scope, steps)?;
-    steps.step("docs", || docs(scope))?;
-    steps.step("build", || scope.build())?;
+    thread::scope(|threads| {
+        // Installing packages waits for the network, and uses one core.
+        threads.spawn(|| python::install(scope));
+        steps.step("docs", || docs(scope))?;
+        steps.step("build", || scope.build())
+    })?;
     let nvrtc = (scope == Scope::All).then(Nvrtc::fetch).and_then(|nvrtc| {
         nvrtc
             .inspect_err(|reason| println!("PTX tests are skipped: {reason}"))
             .ok()
     });
-    steps.step("tests", || tests(scope, tally, "--tests", nvrtc.as_ref()))?;
-    steps.step("doc tests", || tests(scope, tally, "--doc", None))?;
+    steps.step("tests", || tests(scope, tally, nvrtc.as_ref()))?;
+    steps.step("doc tests", || doc_tests(scope, tally))?;
     steps.step("Python", || python::run(scope, tally))?;
     steps.step("examples", examples::run)?;
     steps.step("README commands", readme::run)?;
-    if scope == Scope::All {
+    match scope {
+        Scope::Default => Ok(()),
+        Scope::All => steps_of_packages(steps),
+    }
+}
+
+fn steps_of_packages(steps: &mut Steps) -> Outcome {
+    thread::scope(|threads| {
+        // Its build is silent, has a folder of its own, and the others use one core most of the time.
+        let distribution = threads.spawn(packages::source_distribution);
         steps.step("fuzz", fuzz::short)?;
         steps.step("pages", pages::check)?;
         steps.step("crates", packages::crates)?;
-        steps.step("source distribution", packages::source_distribution)?;
-    }
-    Ok(())
+        steps.step("source distribution", || {
+            let result = distribution.join();
+            result.unwrap_or_else(|_| Err("it panicked".to_owned()))
+        })
+    })
 }
 
 fn lint_steps(scope: Scope, steps: &mut Steps) -> Outcome {
@@ -151,23 +168,30 @@ fn docs(scope: Scope) -> Outcome<Vec<String>> {
     Ok(Vec::new())
 }
 
-/// Runs tests to the end, failures or not, and returns the `SKIPPED` lines of this call.
-fn tests(
-    scope: Scope,
-    tally: &mut Tally,
-    targets: &str,
-    nvrtc: Option<&Nvrtc>,
-) -> Outcome<Vec<String>> {
+/// Runs test programs, and returns the `SKIPPED` lines of this call.
+fn tests(scope: Scope, tally: &mut Tally, nvrtc: Option<&Nvrtc>) -> Outcome<Vec<String>> {
+    let before = tally.skipped_lines().len();
+    let prepare = |program: &mut Command| {
+        if let Some(nvrtc) = nvrtc {
+            nvrtc.set_paths(program);
+        }
+    };
+    let mut command = scope.cargo_built("test");
+    programs::run(command.arg("--tests"), prepare, |line| read(tally, line))?;
+    Ok(tally.skipped_lines().split_off(before))
+}
+
+/// The same for doc tests.
+fn doc_tests(scope: Scope, tally: &mut Tally) -> Outcome<Vec<String>> {
     let before = tally.skipped_lines().len();
     let mut command = scope.cargo_built("test");
-    command.args(["--no-fail-fast", targets, "--", "--show-output"]);
-    if let Some(nvrtc) = nvrtc {
-        nvrtc.set_paths(&mut command);
-    }
-    process::run_by_line(&mut command, |line| {
-        if tally.read(line) {
-            println!("{line}");
-        }
-    })?;
+    command.args(["--no-fail-fast", "--doc", "--", "--show-output"]);
+    process::run_by_line(&mut command, |line| read(tally, line))?;
     Ok(tally.skipped_lines().split_off(before))
+}
+
+fn read(tally: &mut Tally, line: &str) {
+    if tally.read(line) {
+        println!("{line}");
+    }
 }
