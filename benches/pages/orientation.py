@@ -33,6 +33,8 @@ def context(data: dict) -> dict:
     return {
         "rows": rows,
         "families": families,
+        "confidence": confidence_table(data["classes"], rows),
+        "sure": sure(rows),
         "solved_limit": SOLVED,
         "solved": {m: sum(row[m]["wrong"] <= SOLVED for row in rows) for m in METHODS},
         "has_real": any(row["family"] == "real" for row in rows),
@@ -42,6 +44,43 @@ def context(data: dict) -> dict:
         "worst_step": share(max(step["wrong"] for step in steps)),
         "turned": max(step["turned"] for step in following),
         "time": significant(statistics.median_high(step["time"] for step in following), 2),
+    }
+
+
+def by_confidence(rows: list[dict]) -> np.ndarray:
+    """Evaluated and wrong signs of all these clouds, in each class of confidence."""
+    return np.sum([row["auto"]["by_confidence"] for row in rows], axis=0)
+
+
+def is_noisy(row: dict) -> bool:
+    return row["auto"]["lower_bound"] is not None
+
+
+def confidence_table(classes: list[float], rows: list[dict]) -> str:
+    groups = [[row for row in rows if not is_noisy(row)], [row for row in rows if is_noisy(row)]]
+    counts = [by_confidence(rows) for rows in groups]
+    bounds = [*classes[1:], None]
+    cells = []
+    for k, (low, high) in enumerate(zip(classes, bounds)):
+        name = f"at least {low:g}" if high is None else f"{low:g} to {high:g}"
+        cells.append([name])
+        for count in counts:
+            number, wrong = count[k]
+            cells[-1] += [f"{100 * number / count[:, 0].sum():.2f}", significant(100 * wrong / number, 2) if wrong else "0"]
+    columns = ["clean: signs, %", "wrong of these, %", "noisy: signs, %", "wrong of these, %"]
+    return table(["confidence"], columns, cells)
+
+
+def sure(rows: list[dict]) -> dict:
+    """Of the signs of the highest class, and of the wrong ones, what the text says."""
+    counts = by_confidence(rows)
+    worst = max(rows, key=lambda row: row["auto"]["by_confidence"][-1][1])
+    return {
+        "share": f"{100 * counts[-1, 0] / counts[:, 0].sum():.0f}",
+        "wrong": significant(100 * counts[-1, 1] / counts[-1, 0], 2),
+        "caught": f"{100 * counts[0, 1] / counts[:, 1].sum():.0f}",
+        "worst": worst["cloud"],
+        "most": worst["auto"]["by_confidence"][-1][1],
     }
 
 

@@ -14,6 +14,9 @@ use super::body::{Body, Clean};
 /// Smallest absolute cosine between an axis and the true normal for its sign to be evaluated: 60 degrees.
 const EVALUATED: f64 = 0.5;
 
+/// Lower bounds of classes of confidence.
+pub const CLASSES: [f64; 6] = [0.0, 0.1, 0.25, 0.5, 0.75, 0.9];
+
 /// Errors of one method on one cloud, in percent and degrees.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Errors {
@@ -35,6 +38,8 @@ pub struct Errors {
     pub reasons: Vec<(&'static str, f64)>,
     /// Doubtful ones among the wrong signs, in percent; absent if no sign is wrong.
     pub caught: Option<f64>,
+    /// Number of the evaluated signs, and of the wrong ones among them, for each of [`CLASSES`].
+    pub by_confidence: Vec<[usize; 2]>,
 }
 
 /// Result of one method on one cloud.
@@ -154,6 +159,18 @@ impl Signs {
         }
     }
 
+    /// Numbers of evaluated and of wrong signs in each class of confidence.
+    fn by_confidence(&self, confidence: &[f32]) -> Vec<[usize; 2]> {
+        let mut counts = vec![[0; 2]; CLASSES.len()];
+        for (column, indices) in [&self.evaluated, &self.wrong].into_iter().enumerate() {
+            for &i in indices {
+                let class = CLASSES.partition_point(|&low| low <= f64::from(confidence[i]));
+                counts[class.max(1) - 1][column] += 1;
+            }
+        }
+        counts
+    }
+
     /// Wrong signs, in percent of those evaluated.
     pub fn percent(&self) -> f64 {
         percent(self.wrong.len(), self.evaluated.len())
@@ -187,6 +204,7 @@ fn evaluate(body: &Body, prepared: &Prepared, out: &Orientation<f32>) -> Errors 
             .map(|reason| (reason.name(), 100.0 * doubt.share_of(reason)))
             .to_vec(),
         caught: (!wrong.is_empty()).then(|| percent(caught, wrong.len())),
+        by_confidence: signs.by_confidence(&out.confidence),
     }
 }
 
@@ -250,6 +268,7 @@ mod tests {
             wrong,
             evaluated,
             caught,
+            by_confidence,
             ..
         } = measured.errors;
         assert!(
@@ -257,6 +276,12 @@ mod tests {
             "{wrong} {evaluated}"
         );
         assert_eq!(caught, Some(0.0));
+        // Half of the signs are known, and a fifth of those wrong; all are sure.
+        let [sure, rest] = [by_confidence[5], by_confidence[0]];
+        assert!(
+            sure[0] > 900 && sure[1] * 5 > sure[0] * 9 / 10 && rest == [0, 0],
+            "{by_confidence:?}"
+        );
         assert!(measured.errors.axis_median < 3.0);
     }
 }

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use crate::differential::{Eikonal, EikonalOptions, eikonal};
 use crate::isosurface::Level;
 use crate::isosurface::measure::Measures;
-use crate::orient::doubt::Doubt;
+use crate::orient::doubt::{Doubt, Region};
 use crate::{Field, Real};
 
 pub use json::JsonReport;
@@ -115,6 +115,8 @@ pub struct Report {
     pub confidence_median: f64,
     /// How many signs are doubtful, and why.
     pub doubt: Doubt,
+    /// Regions of doubtful samples, largest first.
+    pub doubtful_regions: Vec<Region>,
     /// Condition of the indicator at the walls of the grid: `free` or `closed`.
     pub walls: &'static str,
     /// How the level of the surface was chosen.

@@ -25,9 +25,10 @@ class Oriented:
 
     Attributes:
         normals: ``(N, 3)`` unit vectors.
-        confidence: ``(N,)`` confidence in the side of each, 0 to 1.
+        confidence: ``(N,)`` confidence in the side of each, 0 to 1: below 0.1 it is doubtful, from 0.9 on sure.
         report: numbers, with the names of :attr:`Reconstruction.report`; ``report["orientation"]["doubtful"]`` has
-            the shares of the points whose side is doubtful, by reason.
+            the shares of the points whose side is doubtful, by reason, and ``["regions"]`` the largest regions of
+            such points: their number of samples, reason, and bounding box (``low``, ``high``).
     """
 
     normals: np.ndarray

@@ -57,7 +57,10 @@ fn the_folder_gets_its_five_files_and_the_report_its_fields() {
         "radius sample_spacing neighbours guarded",
     );
     assert_keys(&report["normals"]["neighbours"], "min median max");
-    assert_keys(&report["orientation"], "method flipped confidence doubtful");
+    assert_keys(
+        &report["orientation"],
+        "method flipped confidence doubtful regions",
+    );
     assert_keys(&report["orientation"]["confidence"], "p05 median");
     assert_keys(
         &report["orientation"]["doubtful"],

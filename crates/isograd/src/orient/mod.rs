@@ -55,6 +55,7 @@
 
 mod auto;
 mod clusters;
+mod confidence;
 mod coupling;
 mod disc;
 mod domains;

@@ -4,6 +4,7 @@
 //! locally. Where it matters both interpretations are solved, and the winding number of the whole selects one, unless
 //! there are sensors.
 
+use super::confidence;
 use super::domains::DomainSigns;
 use super::graph::Graph;
 use crate::vector;
@@ -97,6 +98,7 @@ pub struct Signs {
     evidence: Vec<f32>,
     belief: Vec<f32>,
     best: Solution,
+    confidence: Vec<f32>,
 }
 
 /// One way of orienting the whole cloud.
@@ -126,16 +128,16 @@ impl Signs {
             signs.domains.run(graph, observed, winding, place);
         };
         solve(self, Interpretation::Careful);
-        if sensors || !ambiguous {
-            self.keep();
-            return;
-        }
-        let careful = self.domains.misfit(graph, place);
         self.keep();
-        solve(self, Interpretation::Bold);
-        if self.domains.misfit(graph, place) < careful {
-            self.keep();
+        if ambiguous && !sensors {
+            let careful = self.domains.misfit(graph, place);
+            solve(self, Interpretation::Bold);
+            if self.domains.misfit(graph, place) < careful {
+                self.keep();
+            }
         }
+        let Solution { sign, belief, .. } = &self.best;
+        confidence::measure(graph, sign, belief, &mut self.confidence);
     }
 
     fn keep(&mut self) {
@@ -156,7 +158,7 @@ impl Signs {
     /// There is no such sample.
     pub fn verdict(&self, p: usize) -> Verdict {
         let sign = self.best.sign[p];
-        let confidence = (sign * self.best.belief[p]).max(0.0);
+        let confidence = self.confidence[p];
         let is_clear = sign * self.best.evidence[p] >= CLEAR;
         let by = match (confidence > 0.0, is_clear) {
             (true, true) => Decision::Evidence,

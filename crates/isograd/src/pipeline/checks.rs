@@ -9,7 +9,7 @@ use crate::isosurface::measure::{self, Measures};
 use crate::isosurface::trim::{self, Trim};
 use crate::neighbors::Neighborhoods;
 use crate::orient::Orientation;
-use crate::orient::doubt::{self, Doubt};
+use crate::orient::doubt::{self, Doubt, Region};
 use crate::orient::rim;
 use crate::report::{Report, TOLERATED_SHARE, Warning};
 use crate::{Field, Real, distance, vector};
@@ -131,10 +131,11 @@ impl Report {
         let rims = rim::rims(points, &orientation.normals, neighborhoods);
         let reasons = doubt::reasons_beside(&rims, points, orientation, neighborhoods);
         self.doubt = Doubt::count(points.len(), &reasons);
+        self.doubtful_regions = doubt::regions(points, &reasons, neighborhoods);
         let warnings = &mut self.warnings;
         if !is_sheet {
             warnings.extend(open(&rims, self.guessed));
-            warnings.extend(doubtful_signs(self.doubt));
+            warnings.extend(doubtful_signs(self.doubt, self.doubtful_regions.first()));
         }
         warnings.extend(guarded(self.guarded, points.len()));
     }
@@ -178,8 +179,11 @@ fn sparse(sample_spacing: f64, spacing: f64) -> Option<Warning> {
 }
 
 /// Signs that are little more than a guess.
-fn doubtful_signs(doubt: Doubt) -> Option<Warning> {
-    (doubt.share() > TOLERATED_SHARE).then_some(Warning::DoubtfulSigns { doubt })
+fn doubtful_signs(doubt: Doubt, largest: Option<&Region>) -> Option<Warning> {
+    (doubt.share() > TOLERATED_SHARE).then_some(Warning::DoubtfulSigns {
+        doubt,
+        largest: largest.copied(),
+    })
 }
 
 /// A closed surface of negative volume.

@@ -6,7 +6,7 @@ use super::{Report, Stage, Verdict, Warning};
 use crate::differential::Spread;
 use crate::isosurface::Level;
 use crate::isosurface::measure::Measures;
-use crate::orient::doubt::{Doubt, Reason};
+use crate::orient::doubt::{Doubt, Reason, Region};
 
 /// A [`Report`] as it is serialized; `None` fields are left out.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -70,6 +70,7 @@ struct Orientation {
     flipped: usize,
     confidence: Confidence,
     doubtful: Doubt,
+    regions: Vec<Region>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -179,6 +180,7 @@ impl JsonReport {
                     median: report.confidence_median,
                 },
                 doubtful: report.doubt,
+                regions: report.doubtful_regions.clone(),
             },
             surface: None,
             seconds: seconds(report, &[Stage::Normals, Stage::Orient, Stage::Checks]),

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::{TOLERATED_SHARE, Verdict};
 use crate::isosurface::Level;
-use crate::orient::doubt::{Doubt, Reason};
+use crate::orient::doubt::{Doubt, Reason, Region};
 
 /// A reason is named where it stands for one in this many of the doubtful samples.
 const SMALLEST_REASON: usize = 10;
@@ -73,6 +73,8 @@ pub enum Warning {
         /// How many, and why.
         #[serde(rename = "doubtful")]
         doubt: Doubt,
+        /// The largest region of them.
+        largest: Option<Region>,
     },
     /// Normals are not defined by their neighbors.
     Guarded {
@@ -164,7 +166,7 @@ impl Warning {
             Self::Missed { .. } => {
                 "more cells (resolution, --resolution), fewer outliers, or known normals (orient, --orient)"
             }
-            Self::DoubtfulSigns { doubt } => doubtful_remedy(main_reason(doubt)),
+            Self::DoubtfulSigns { doubt, .. } => doubtful_remedy(doubt.main_reason()),
             Self::Guarded { .. } => {
                 "a larger radius (--radius), more samples, or known normals (orient=\"given\", --orient given)"
             }
@@ -221,7 +223,9 @@ impl fmt::Display for Warning {
                 percent(*share),
                 percent(*far)
             ),
-            Self::DoubtfulSigns { doubt } => f.write_str(&doubtful_signs(doubt)),
+            Self::DoubtfulSigns { doubt, largest } => {
+                f.write_str(&doubtful_signs(doubt, largest.as_ref()))
+            }
             Self::Guarded { samples } => write!(
                 f,
                 "{samples} samples have no well-defined normal (a corner, a line or an isolated point)"
@@ -234,8 +238,8 @@ impl fmt::Display for Warning {
     }
 }
 
-/// Number and reasons of doubtful signs.
-fn doubtful_signs(doubt: &Doubt) -> String {
+/// Number, reasons and place of doubtful signs.
+fn doubtful_signs(doubt: &Doubt, largest: Option<&Region>) -> String {
     let mut text = format!(
         "the side of the surface is doubtful for {} of the samples",
         percent(doubt.share())
@@ -250,13 +254,14 @@ fn doubtful_signs(doubt: &Doubt) -> String {
             cause(reason)
         );
     }
+    if let Some(region) = largest {
+        let [x, y, z] = region.center();
+        text += &format!(
+            "; the largest region has {} samples round ({x:.4}, {y:.4}, {z:.4})",
+            region.samples
+        );
+    }
     text
-}
-
-/// The most frequent reason.
-fn main_reason(doubt: &Doubt) -> Reason {
-    let reasons = doubt.by_frequency();
-    reasons.first().copied().unwrap_or(Reason::Unexplained)
 }
 
 /// Why samples are doubtful.
@@ -313,7 +318,10 @@ mod tests {
             },
             Warning::InsideOut { volume: -1.0 },
             Warning::TouchesWall,
-            Warning::DoubtfulSigns { doubt },
+            Warning::DoubtfulSigns {
+                doubt,
+                largest: None,
+            },
             Warning::Fragments {
                 fragments: 1,
                 pieces: 2,

@@ -1,6 +1,7 @@
 //! Hashes of φ, mesh, normals and gradients of four clouds, recorded once: no change of structure may change a bit.
 //! Recorded again when the automatic radius became the median over all points instead of 1,024 of them, when the confidence
-//! of `auto` came from confirmed sheets, and for the plate when samples of thin parts were moved apart.
+//! of `auto` came from confirmed sheets and when it was calibrated, and for the plate when samples of thin parts were moved
+//! apart.
 //!
 //! The clouds are made with the four operations and square roots alone. The stages also use functions of the C library,
 //! whose last bit is not the same everywhere: the test runs where a hash of those is the recorded one, and is skipped
@@ -262,14 +263,14 @@ const RECORDED: [[[u64; 5]; 2]; 5] = [
             0x73e1701fc8902dd5,
             0xb0c209cf5ecea35f,
             0x9e3280704ec80706,
-            0x91e108f9238ebc11,
+            0x0d1c874b72e4fb39,
             0x9f91b81e624486ba,
         ],
         [
             0x856408b95f263e3a,
             0x5ec050bdd9afd4d5,
             0x0cd86b2b32bad919,
-            0x3af7526a6360c8da,
+            0xc8b7eafa7b6504c6,
             0xb9b3daf3e42e45d6,
         ],
     ],
@@ -278,14 +279,14 @@ const RECORDED: [[[u64; 5]; 2]; 5] = [
             0xefbe5a92321129f2,
             0xb3fd8f7515c9e0fd,
             0x245db8a9fdfda689,
-            0xeed57f3b200d4048,
+            0x938c65a4f6af70fa,
             0xe03c5b6dd5b9b3a0,
         ],
         [
             0x534e5d63da01b9d2,
             0xd562ddee8ea62202,
             0xa09ed30913a6e079,
-            0x2fba966a54370adc,
+            0xb9df406997f4a54e,
             0x7ed42c8a47e02890,
         ],
     ],
@@ -326,14 +327,14 @@ const RECORDED: [[[u64; 5]; 2]; 5] = [
             0xe8aafe28c6c6a803,
             0x35711806b711e961,
             0xd8fffe3c88364574,
-            0x91e108f9238ebc11,
+            0x0d1c874b72e4fb39,
             0xa82bed8aa58ce6a2,
         ],
         [
             0x4b5d510b2b6afeec,
             0x0e3edc968cdd1c1e,
             0xdb50342468cd486f,
-            0x3af7526a6360c8da,
+            0xc8b7eafa7b6504c6,
             0x316a6b97dba01093,
         ],
     ],

@@ -111,7 +111,7 @@ fn doubtful_signs_come_with_their_reason_and_a_remedy() {
     let mut sheet = || [random.next(), random.next(), 0.0];
     let report = report((0..4_000).map(|_| sheet()).collect(), 48);
     let text = report.warnings.iter().find_map(|warning| match warning {
-        Warning::DoubtfulSigns { doubt } => {
+        Warning::DoubtfulSigns { doubt, .. } => {
             assert_eq!(doubt, &report.doubt);
             assert!(doubt.share_of(Reason::Open) > 0.95, "{doubt:?}");
             Some((warning.to_string(), warning.remedy(report.level)))

@@ -13,22 +13,25 @@
 //! - *open* again: doubtful samples without a reason of their own lead from it to a rim or hole;
 //! - else it is *unexplained*.
 //!
-//! A share of the points by reason says what to do about it; no result depends on it.
+//! A share of the points by reason says what to do about it, and [`regions`] where; no result depends on them.
 //!
 //! # Residual, Pullback, Not differentiable
 //! None: a reason is a name.
 
 mod patch;
+mod region;
 #[cfg(test)]
 mod tests;
 
 use rayon::prelude::*;
+use serde::{Serialize, Serializer};
 
 use super::rim::rims;
 use super::{DOUBTFUL, Orientation};
 use crate::Real;
 use crate::neighbors::Neighborhoods;
 use patch::{Cloud, Patch};
+pub use region::{Region, regions};
 
 /// Nearest samples that are this many times as far apart as those of the cloud are sparse.
 const SPARSE: f64 = 2.0;
@@ -73,6 +76,12 @@ impl Reason {
             Self::Noisy => "noisy",
             Self::Unexplained => "unexplained",
         }
+    }
+}
+
+impl Serialize for Reason {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(self.name())
     }
 }
 
@@ -122,6 +131,12 @@ impl Doubt {
         found.retain(|&reason| self.of(reason) > 0);
         found.sort_by_key(|&reason| std::cmp::Reverse(self.of(reason)));
         found
+    }
+
+    /// The most frequent reason; unexplained, if there is none.
+    pub fn main_reason(&self) -> Reason {
+        let reasons = self.by_frequency();
+        reasons.first().copied().unwrap_or(Reason::Unexplained)
     }
 }
 
