@@ -1,0 +1,245 @@
+//! The winding number of samples as a sum over clusters of them.
+//!
+//! A cluster far from a place acts as one sample with the sum of all moments. Samples nearby are summed one by one.
+//!
+//! Source: J. Barnes, P. Hut, "A hierarchical O(N log N) force-calculation algorithm" (1986), for the clusters.
+
+use std::f32::consts::PI;
+
+use crate::vector;
+
+/// A sample nearer than this share of the spacing counts as if it were so far: it lies on the same sheet, and
+/// only its noise would speak.
+const SOFT: f32 = 0.3;
+
+/// A sample as a piece of surface; lengths in sample spacings.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Dipole {
+    position: [f32; 3],
+    /// Area times normal over 4π.
+    moment: [f32; 3],
+}
+
+impl Dipole {
+    /// A sample with its outward unit normal.
+    pub(super) fn new(position: [f32; 3], normal: [f32; 3], area: f32) -> Self {
+        Self {
+            position,
+            moment: normal.map(|n| n * area / (4.0 * PI)),
+        }
+    }
+}
+
+/// Samples that are summed side by side.
+const WIDTH: usize = 16;
+
+/// Positions and moments of some samples, coordinate by coordinate; moments of 0 fill it up.
+type Block = [[f32; WIDTH]; 6];
+
+/// Samples of the smallest clusters, at most.
+const LEAF: usize = 4 * WIDTH;
+
+/// A cluster acts as one sample from this many times its radius on.
+const FAR: f32 = 4.0;
+
+/// A cluster of samples, and the one that stands for them from afar.
+#[derive(Clone, Copy, Debug)]
+struct Cluster {
+    whole: Dipole,
+    /// Square of the distance from which on it stands for them.
+    far: f32,
+    /// Its blocks, from the first to before the last; none, if its parts come after it.
+    blocks: [u32; 2],
+    /// The cluster after it and its parts.
+    next: u32,
+}
+
+/// The samples of a domain: clusters, each before its two halves.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tree {
+    blocks: Vec<Block>,
+    clusters: Vec<Cluster>,
+}
+
+impl Tree {
+    /// The tree of samples, in any order.
+    pub(super) fn new(mut dipoles: Vec<Dipole>) -> Self {
+        let mut tree = Self::default();
+        if !dipoles.is_empty() {
+            tree.add(&mut dipoles);
+        }
+        tree
+    }
+
+    fn add(&mut self, dipoles: &mut [Dipole]) {
+        let (whole, radius) = combined(dipoles);
+        let (place, first) = (self.clusters.len(), self.blocks.len());
+        self.clusters.push(Cluster {
+            whole,
+            far: (FAR * radius).powi(2),
+            blocks: [first as u32; 2],
+            next: 0,
+        });
+        if dipoles.len() > LEAF {
+            let (low, high) = halves(dipoles);
+            self.add(low);
+            self.add(high);
+        } else {
+            self.blocks.extend(blocks(dipoles));
+            self.clusters[place].blocks[1] = self.blocks.len() as u32;
+        }
+        self.clusters[place].next = self.clusters.len() as u32;
+    }
+
+    /// The winding number at a place; off by up to 1 % where clusters stand for their samples.
+    #[inline(always)]
+    pub(super) fn winding_number(&self, at: [f32; 3]) -> f64 {
+        let mut total = 0.0;
+        let mut c = 0;
+        while let Some(cluster) = self.clusters.get(c) {
+            let [x, y, z] = [0, 1, 2].map(|a| cluster.whole.position[a] - at[a]);
+            let square = x * x + y * y + z * z;
+            if square > cluster.far {
+                let [mx, my, mz] = cluster.whole.moment;
+                let square = softened(square);
+                total += f64::from(share(x * mx + y * my + z * mz, square, square.sqrt()));
+                c = cluster.next as usize;
+                continue;
+            }
+            let [first, last] = cluster.blocks.map(|b| b as usize);
+            total += near(&self.blocks[first..last], at);
+            c += 1;
+        }
+        total
+    }
+}
+
+/// The lower and the upper half of samples, along the axis in which they extend furthest.
+fn halves(dipoles: &mut [Dipole]) -> (&mut [Dipole], &mut [Dipole]) {
+    let extent = |a: usize| {
+        let places = dipoles.iter().map(|d| d.position[a]);
+        let (low, high) = places.fold((f32::MAX, f32::MIN), |(l, h), x| (l.min(x), h.max(x)));
+        high - low
+    };
+    let extents = [0, 1, 2].map(extent);
+    let axis = (0..3).max_by(|&a, &b| extents[a].total_cmp(&extents[b]));
+    let (axis, middle) = (axis.unwrap_or(0), dipoles.len() / 2);
+    dipoles.select_nth_unstable_by(middle, |a, b| a.position[axis].total_cmp(&b.position[axis]));
+    dipoles.split_at_mut(middle)
+}
+
+/// The sum of the moments, at the mean of the positions weighted by them, and how far the farthest sample is from there.
+fn combined(dipoles: &[Dipole]) -> (Dipole, f32) {
+    let (mut moment, mut position, mut total) = ([0.0; 3], [0.0; 3], 0.0);
+    for dipole in dipoles {
+        let size = vector::norm(vector::to_f64(dipole.moment));
+        moment = vector::add(moment, vector::to_f64(dipole.moment));
+        position = vector::add(
+            position,
+            vector::scale(vector::to_f64(dipole.position), size),
+        );
+        total += size;
+    }
+    // Without moments any place will do.
+    let start = vector::to_f64(dipoles[0].position);
+    let position = if total > 0.0 {
+        vector::scale(position, 1.0 / total)
+    } else {
+        start
+    };
+    let offsets = dipoles
+        .iter()
+        .map(|d| vector::sub(vector::to_f64(d.position), position));
+    let radius = offsets.map(vector::norm).fold(0.0, f64::max);
+    let whole = Dipole {
+        position: vector::of_f64(position),
+        moment: vector::of_f64(moment),
+    };
+    (whole, radius as f32)
+}
+
+fn blocks(dipoles: &[Dipole]) -> Vec<Block> {
+    let block = |chunk: &[Dipole]| {
+        let mut block = [[0.0; WIDTH]; 6];
+        for (l, dipole) in chunk.iter().enumerate() {
+            for a in 0..3 {
+                block[a][l] = dipole.position[a];
+                block[3 + a][l] = dipole.moment[a];
+            }
+        }
+        block
+    };
+    dipoles.chunks(WIDTH).map(block).collect()
+}
+
+/// The sum over all samples of some blocks.
+#[inline(always)]
+fn near(blocks: &[Block], at: [f32; 3]) -> f64 {
+    let mut sums = [0.0f32; WIDTH];
+    for [px, py, pz, mx, my, mz] in blocks {
+        for l in 0..WIDTH {
+            let (x, y, z) = (px[l] - at[0], py[l] - at[1], pz[l] - at[2]);
+            let square = softened(x * x + y * y + z * z);
+            sums[l] += share(x * mx[l] + y * my[l] + z * mz[l], square, square.sqrt());
+        }
+    }
+    sums.iter().map(|&s| f64::from(s)).sum()
+}
+
+/// The square of the distance that counts, in squares of the spacing.
+#[inline(always)]
+fn softened(square: f32) -> f32 {
+    square + SOFT * SOFT
+}
+
+/// The share of a sample whose moment (area times outward normal, over 4π) is `along` its offset from the place, by
+/// the softened square of their distance and its root.
+#[inline(always)]
+fn share(along: f32, square: f32, root: f32) -> f32 {
+    along / (square * root)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::shapes::sphere;
+    use super::*;
+
+    #[test]
+    fn the_sums_are_those_of_one_sample_after_the_other() {
+        let (points, normals) = sphere(1003, [1.0, 2.0, 3.0], 9.0, 5);
+        let samples = points.iter().zip(&normals);
+        let dipole = |(&x, &n): (&[f64; 3], &[f64; 3])| {
+            Dipole::new(vector::of_f64(x), vector::of_f64(n), 1.0)
+        };
+        let ball: Vec<Dipole> = samples.map(dipole).collect();
+        let one = |d: &Dipole, at: [f32; 3]| {
+            let r = vector::to_f64(vector::sub(d.position, at));
+            let square = vector::norm_squared(r) + f64::from(SOFT * SOFT);
+            vector::dot(r, vector::to_f64(d.moment)) / square.powf(1.5)
+        };
+        // Inside, outside, close to the surface.
+        for at in [
+            [1.0, 2.0, 3.0],
+            [3.0, -1.0, 4.0],
+            [1.0, 2.0, 11.9],
+            [30.0, 0.0, 0.0f32],
+        ] {
+            let plain: f64 = ball.iter().map(|d| one(d, at)).sum();
+            let sum = Tree::new(ball.clone()).winding_number(at);
+            // Clusters of at most a quarter of their distance, in single precision.
+            assert!(
+                (sum - plain).abs() < 0.01 * plain.abs() + 1e-3,
+                "{sum} {plain}"
+            );
+            // One cluster, whose samples are summed one by one.
+            let few = &ball[..LEAF];
+            let plain: f64 = few.iter().map(|d| one(d, at)).sum();
+            let sum = Tree::new(few.to_vec()).winding_number(at);
+            let is_far = at[0] > 20.0;
+            assert!(
+                (sum - plain).abs() < if is_far { 1e-3 } else { 1e-5 },
+                "{sum} {plain}"
+            );
+        }
+    }
+}
