@@ -181,7 +181,7 @@ fn tests(scope: Scope, tally: &mut Tally, nvrtc: Option<&Nvrtc>) -> Outcome<Vec<
     Ok(tally.skipped_lines().split_off(before))
 }
 
-/// The same for doc tests.
+/// Runs doc tests, and returns the `SKIPPED` lines of this call.
 fn doc_tests(scope: Scope, tally: &mut Tally) -> Outcome<Vec<String>> {
     let before = tally.skipped_lines().len();
     let mut command = scope.cargo_built("test");

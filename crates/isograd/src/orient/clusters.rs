@@ -2,7 +2,7 @@
 
 use super::fill::Lattice;
 use super::graph::Graph;
-use super::regions::root;
+use super::regions::{join, root};
 use super::signs::Place;
 use crate::vector;
 
@@ -165,8 +165,7 @@ impl Clusters {
             for (&q, &d) in graph.near[p].iter().zip(&graph.offset[p]).take(LINKED) {
                 let limit = LINK * graph.reach[p].max(graph.reach[q as usize]);
                 if vector::norm(d) <= limit {
-                    let (a, b) = (root(&mut self.parent, p as u32), root(&mut self.parent, q));
-                    self.parent[a.max(b) as usize] = a.min(b);
+                    join(&mut self.parent, p as u32, q);
                 }
             }
         }

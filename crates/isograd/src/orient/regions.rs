@@ -62,8 +62,7 @@ impl Regions {
     }
 
     fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (root(&mut self.region, a), root(&mut self.region, b));
-        self.region[a.max(b) as usize] = a.min(b);
+        join(&mut self.region, a, b);
     }
 
     /// Turns roots into numbers 0, 1, 2, … in the order of their first run.
@@ -80,6 +79,12 @@ impl Regions {
             };
         }
     }
+}
+
+/// Joins the sets of `a` and `b`; the lower root stays.
+pub(super) fn join(parent: &mut [u32], a: u32, b: u32) {
+    let (a, b) = (root(parent, a), root(parent, b));
+    parent[a.max(b) as usize] = a.min(b);
 }
 
 /// The root of `a`, with the path to it halved.

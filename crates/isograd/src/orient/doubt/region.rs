@@ -5,8 +5,9 @@ use std::cmp::Reverse;
 use serde::Serialize;
 
 use super::{Doubt, Reason};
+use crate::data::bounds;
 use crate::neighbors::Neighborhoods;
-use crate::orient::regions::root;
+use crate::orient::regions::{join, root};
 use crate::{Real, vector};
 
 /// Fewest samples of a region.
@@ -47,8 +48,7 @@ pub fn regions<T: Real>(
         let (center, radius) = (points[i as usize], neighborhoods.radius[i as usize]);
         neighborhoods.index.for_each_within(center, radius, |j, _| {
             if let Ok(b) = reasons.binary_search_by_key(&(j as u32), |r| r.0) {
-                let (a, b) = (root(&mut parent, a), root(&mut parent, b as u32));
-                parent[a.max(b) as usize] = a.min(b);
+                join(&mut parent, a, b as u32);
             }
         });
     }
@@ -68,12 +68,9 @@ pub fn regions<T: Real>(
 
 fn region<T: Real>(points: &[[T; 3]], members: &[(u32, Reason)]) -> Region {
     let doubt = Doubt::count(members.len(), members);
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for &(i, _) in members {
-        let point = vector::to_f64(points[i as usize]);
-        low = [0, 1, 2].map(|a| low[a].min(point[a]));
-        high = [0, 1, 2].map(|a| high[a].max(point[a]));
-    }
+    let places = members.iter().map(|&(i, _)| points[i as usize]);
+    let places: Vec<[f64; 3]> = places.map(vector::to_f64).collect();
+    let (low, high) = bounds(&places).unwrap_or_default();
     Region {
         samples: members.len(),
         reason: doubt.main_reason(),
