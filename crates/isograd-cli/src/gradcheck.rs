@@ -180,9 +180,13 @@ fn line(row: &Row) -> String {
         true => format!("{:.4}", row.large_ratio()),
         false => "≈ 0".into(),
     };
+    let neighborhoods = match neighborhoods {
+        0 => String::new(),
+        changed => format!("{changed} neighborhoods, "),
+    };
     let unsmooth = if row.small.is_smooth() { "" } else { " *" };
     format!(
-        "{:<14} {:>12.5e} {:>12.5e} {:>9.1e} {:>12.5e} {ratio:>7}   {neighborhoods} neighborhoods, {normals} normals, {edges} edges{unsmooth}",
+        "{:<14} {:>12.5e} {:>12.5e} {:>9.1e} {:>12.5e} {ratio:>7}   {neighborhoods}{normals} normals, {edges} edges{unsmooth}",
         row.motion.name(),
         row.pullback,
         row.small.value,

@@ -4,13 +4,39 @@
 #[cfg(cube)]
 use cubecl::prelude::*;
 
-use super::Element;
+use super::{Element, select};
 
-/// `w = 1/(r + ε)`: weight of a sample at distance `r` in the covariance.
+/// `s = t²(3 − 2t)` with `t` from 1 down to 0 at the distance `r = 1`, and the `steepness` by which it falls.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn weight<F: Element>(r: F, epsilon: F) -> F {
-    F::new(1.0) / (r + epsilon)
+fn taper<F: Element>(r: F, steepness: F) -> F {
+    let t = rim::<F>(r, steepness);
+    t * t * (F::new(3.0) - F::new(2.0) * t)
+}
+
+/// `t`: 1 inside the rim, 0 from the radius on.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+fn rim<F: Element>(r: F, steepness: F) -> F {
+    let t = (F::new(1.0) - r) * steepness;
+    let below = select(t < F::new(1.0), t, F::new(1.0));
+    select(below > F::new(0.0), below, F::new(0.0))
+}
+
+/// `w = s/(r + ε)`: weight of a sample at distance `r`, in radii, in the covariance.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn weight<F: Element>(r: F, epsilon: F, steepness: F) -> F {
+    taper::<F>(r, steepness) / (r + epsilon)
+}
+
+/// `−dw/dr`.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn weight_fall<F: Element>(r: F, epsilon: F, steepness: F) -> F {
+    let t = rim::<F>(r, steepness);
+    let fall = F::new(6.0) * t * (F::new(1.0) - t) * steepness;
+    (taper::<F>(r, steepness) / (r + epsilon) + fall) / (r + epsilon)
 }
 
 /// `(1 − q)²`, with `q = r²/R²`: contribution of a neighbor to the crowding of a sample.
@@ -35,12 +61,12 @@ pub fn roughness<F: Element>(first: F, value: F) -> F {
     first * value / ((value - first) * (value - first))
 }
 
-/// `w² (g·e)(n·e)/r`: factor of the offset in its cotangent, 0 at distance 0.
+/// `−w' (g·e)(n·e)/r`: factor of the offset in its cotangent, 0 at distance 0.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn radial<F: Element>(w: F, ge: F, ne: F, r: F) -> F {
+pub fn radial<F: Element>(fall: F, ge: F, ne: F, r: F) -> F {
     if r > F::new(0.0) {
-        w * w * ge * ne / r
+        fall * ge * ne / r
     } else {
         F::new(0.0)
     }

@@ -132,10 +132,10 @@ impl<T: Pipeline> Reconstructor<T> {
         self.run_all(cloud, None, observer)
     }
 
-    /// Runs all stages but the checks with the radii and the signs of the normals of `held`, a reconstruction of as many
-    /// points, and with its resolution of the surface and its automatic smoothing unless that is a function of the areas. This is the map that
-    /// [`Reconstruction::pullback`] differentiates, for comparisons with finite differences. Neighborhoods are
-    /// those of the moved points: a sample that enters or leaves one still makes the normal jump.
+    /// Runs all stages but the checks with the signs of the normals of `held`, a reconstruction of as many points, with its
+    /// isolated samples and its widening of neighborhoods, and with its resolution of the surface and its automatic smoothing
+    /// unless that is a function of the areas. This is the map that [`Reconstruction::pullback`] differentiates, for
+    /// comparisons with finite differences.
     ///
     /// # Errors
     /// As [`reconstruct`](Self::reconstruct).

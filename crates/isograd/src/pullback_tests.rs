@@ -12,7 +12,7 @@ use crate::{Real, distance, normals, poisson, vector};
 /// Truncation is of the square of the step, rounding of its inverse.
 const STEP: f64 = 1e-5;
 
-/// A torus' neighborhoods, and those of moved points with the same radii.
+/// A torus' neighborhoods, and those of moved points.
 struct Near {
     points: Vec<[f64; 3]>,
     held: Neighborhoods<f64>,
@@ -56,6 +56,31 @@ fn areas<T: Real>(near: &Neighborhoods<T>) -> Vec<T> {
     areas
 }
 
+/// From axes to points, radii included.
+fn axes_pullback<T: Real>(
+    near: &Neighborhoods<T>,
+    residual: &normals::Residual<T>,
+    axes_bar: &[[T; 3]],
+) -> Vec<[T; 3]> {
+    let mut bar = vec![[T::zero(); 3]; axes_bar.len()];
+    let mut radii = Default::default();
+    let scratch = &mut Default::default();
+    let guarded = normals::pullback(near, residual, axes_bar, scratch, &mut bar, &mut radii);
+    assert_eq!(guarded, residual.guarded());
+    neighbors::pullback(near, &radii, &mut bar);
+    bar
+}
+
+/// From areas to points, radii included.
+fn areas_pullback<T: Real>(near: &Neighborhoods<T>, areas_bar: &[T]) -> Vec<[T; 3]> {
+    let mut bar = vec![[T::zero(); 3]; areas_bar.len()];
+    let mut radii = Default::default();
+    let (areas, scratch) = (areas(near), &mut Default::default());
+    splat::area::pullback(near, &areas, areas_bar, scratch, &mut bar, &mut radii);
+    neighbors::pullback(near, &radii, &mut bar);
+    bar
+}
+
 #[test]
 fn axes_and_areas_with_grown_radii() {
     let near = Near::torus();
@@ -66,18 +91,15 @@ fn axes_and_areas_with_grown_radii() {
     let u = numbers(n, &mut random);
     let step = STEP * near.held.common_radius * 1e-2;
 
-    let mut bar = vec![[0.0; 3]; n];
     let residual = axes(&near.held);
-    let guarded = normals::pullback(&near.held, &residual, &w, &mut Default::default(), &mut bar);
-    assert_eq!(guarded, 0);
+    let bar = axes_pullback(&near.held, &residual, &w);
     assert_adjoint("axes", inner(&bar, &v), step, |s| {
-        let at = axes(&near.moved(&v, s)).normals;
-        inner(&at, &w)
+        let mut at = normals::Residual::default();
+        normals::hold(&near.moved(&v, s), &residual, &mut at);
+        inner(&at.normals, &w)
     });
 
-    let mut bar = vec![[0.0; 3]; n];
-    let found = areas(&near.held);
-    splat::area::pullback(&near.held, &found, &u, &mut Default::default(), &mut bar);
+    let bar = areas_pullback(&near.held, &u);
     assert_adjoint("areas", inner(&bar, &v), step, |s| {
         product(&areas(&near.moved(&v, s)), &u)
     });
@@ -97,8 +119,7 @@ fn axes_from_wider_neighborhoods() {
     let n = near.points.len();
     let (v, w) = (vectors(n, &mut random), vectors(n, &mut random));
     let step = STEP * near.held.common_radius * 1e-2;
-    let mut bar = vec![[0.0; 3]; n];
-    normals::pullback(&near.held, &residual, &w, &mut Default::default(), &mut bar);
+    let bar = axes_pullback(&near.held, &residual, &w);
     assert_adjoint("axes", inner(&bar, &v), step, |s| {
         let mut at = normals::Residual::default();
         normals::hold(&near.moved(&v, s), &residual, &mut at);
@@ -119,15 +140,13 @@ fn degenerate<T: Real>() {
         neighbors::forward(&points, Radius::Auto, &mut near).expect("a valid cloud");
         let n = points.len();
         let residual = axes(&near);
-        let mut bar = vec![[T::zero(); 3]; n];
         let ones = vec![[T::one(), T::of(-0.3), T::of(0.7)]; n];
-        let guarded = normals::pullback(&near, &residual, &ones, &mut Default::default(), &mut bar);
-        assert_eq!(guarded, residual.guarded(), "{name}");
-        let areas = areas(&near);
-        let units = vec![T::one(); n];
-        splat::area::pullback(&near, &areas, &units, &mut Default::default(), &mut bar);
-        let bad = bar.iter().position(|&b| !vector::is_finite(b));
-        assert_eq!(bad, None, "{name}");
+        let of_axes = axes_pullback(&near, &residual, &ones);
+        let of_areas = areas_pullback(&near, &vec![T::one(); n]);
+        for bar in [of_axes, of_areas] {
+            let bad = bar.iter().position(|&b| !vector::is_finite(b));
+            assert_eq!(bad, None, "{name}");
+        }
     }
 }
 

@@ -26,7 +26,8 @@ impl<T: Real + Number> Normals<T> {
             points: folder.read_rows("points")?,
             radius: match folder.radius() {
                 0.0 => Radius::Auto,
-                radius => Radius::Fixed(radius),
+                // The weights that Warp's kernels have.
+                radius => Radius::Cut(radius),
             },
             neighborhoods: Neighborhoods::default(),
             residual: normals::Residual::default(),

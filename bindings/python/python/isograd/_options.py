@@ -112,7 +112,8 @@ class Options:
     """Parameters of the reconstruction. The command line has the same names and units.
 
     Attributes:
-        radius: neighborhood radius of the normals, in the unit of the points, or ``"auto"``.
+        radius: neighborhood radius of the normals, in the unit of the points, or ``"auto"``. ``"cut:R"`` is a radius with
+            the paper's weights, which end at it with a jump.
         orient: method that finds the side of each normal; see :class:`Orient`.
         splat: weights that spread a sample over the cells around it; see :class:`Splat`.
         area: whether a sample is weighted by the area that it stands for.
@@ -137,7 +138,7 @@ class Options:
         ValueError: a value outside its range.
     """
 
-    radius: float | Literal["auto"] = "auto"
+    radius: float | str = "auto"
     orient: OrientLike = Orient.AUTO
     splat: SplatLike = Splat.BSPLINE
     area: bool = True
@@ -155,7 +156,7 @@ class Options:
 
     def __post_init__(self) -> None:
         checked = {
-            "radius": length(self.radius, "radius", "auto"),
+            "radius": _radius(self.radius),
             "orient": choice(Orient, self.orient, "orient"),
             "splat": choice(Splat, self.splat, "splat"),
             "area": bool(self.area),
@@ -180,7 +181,7 @@ class Options:
 class OptionChanges(TypedDict, total=False):
     """Fields of :class:`Options` as keyword arguments."""
 
-    radius: float | Literal["auto"]
+    radius: float | str
     orient: OrientLike
     splat: SplatLike
     area: bool
@@ -289,6 +290,17 @@ def _surface(value: object) -> float | str:
     raise ValueError(
         f'surface is {value!r}; give "grid", "auto", a cell size above 0, or a factor from "1x" to "64x"'
     )
+
+
+def _radius(value: object) -> float | str:
+    is_cut = isinstance(value, str) and value.startswith("cut:")
+    try:
+        length(float(str(value)[4:]) if is_cut else value, "radius", "auto")
+    except ValueError:
+        raise ValueError(
+            f'radius is {value!r}; give a finite number above 0, "auto", or "cut:" and the number for the paper\'s weights'
+        ) from None
+    return value if isinstance(value, str) else number(value, "radius")
 
 
 def length(value: object, name: str, *words: str) -> float | str:

@@ -262,7 +262,7 @@ class Reconstruction(Stored):
             iso_value: in the level.
             extensions: triples of an :class:`Extension` and its derivatives in ``vertices`` and ``values``, or ``None``.
 
-        Neighborhoods, signs of normals, signs of cells and closest faces are held constant.
+        Signs of normals, signs of cells and closest faces are held constant.
 
         Raises:
             TypeError, ValueError: an array of another type or shape, or one that is not finite.

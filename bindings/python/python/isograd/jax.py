@@ -54,8 +54,8 @@ def signed_distance(
 ) -> jax.Array:
     """The signed distance φ of the surface through ``points``, at the cell centers of ``grid``.
 
-    Differentiable in ``points``, and in ``normals`` with ``orient="given"``. Held constant: which samples are
-    neighbors, the sides of the normals, which face is closest to a cell; so φ jumps where these change.
+    Differentiable in ``points``, and in ``normals`` with ``orient="given"``. Held constant: the sides of
+    the normals, where a change makes φ jump, and which face is closest to a cell.
 
     Args:
         points: ``(N, 3)``, at least 2 cells off the walls of the grid.

@@ -37,8 +37,8 @@ def signed_distance(
 ) -> Tensor:
     """φ: the signed distance to the surface through the points.
 
-    Differentiable once in ``points``, and in ``normals`` with ``orient="given"``. Held constant: which points are
-    neighbors, the sides of the normals, which face is closest to a cell, and with ``radius="auto"`` the radius.
+    Differentiable once in ``points``, and in ``normals`` with ``orient="given"``. Held constant: the sides of
+    the normals, where a change makes φ jump, and which face is closest to a cell.
 
     Args:
         points: ``(N, 3)``, float32 or float64, on the CPU. float16 and bfloat16 become float32. A batch of clouds is

@@ -14,8 +14,8 @@ use crate::error::Error;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Method")]
 pub struct OrientArgs {
-    /// Neighborhood radius of the normals, in the cloud's unit
-    #[arg(long, value_name = "R|auto", default_value = "auto")]
+    /// Neighborhood radius of the normals, in the cloud's unit; cut:R for the paper's weights, which end at it with a jump
+    #[arg(long, value_name = "R|auto|cut:R", default_value = "auto")]
     pub radius: Radius,
     /// Method that finds the side of each normal: auto (from enclosure and neighbors), parity (count of crossings, as
     /// in the paper), given (the cloud's own normals), signs (estimated directions on the side of the cloud's own

@@ -28,6 +28,11 @@ pub enum Error {
         "the walls are 'closed', which a device does not have: give 'free' or 'auto', or compute on the CPU"
     )]
     Walls,
+    /// The paper's weights of normals.
+    #[error(
+        "a device does not have the weights of a radius 'cut:{0}': give the radius alone, or compute on the CPU"
+    )]
+    Radius(f64),
     /// Trimmed surfaces and sheets.
     #[error("a device has neither trim nor sheet: give 'off' for both, or compute on the CPU")]
     Open,

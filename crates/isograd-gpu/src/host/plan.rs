@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use isograd::isosurface::trim::Trim;
+use isograd::neighbors::Radius;
 use isograd::orient::Method;
 use isograd::poisson::Walls;
 use isograd::sheet::Sheet;
@@ -44,6 +45,9 @@ impl<T: Number> Plan<T> {
         }
         if options.walls == Walls::Closed {
             return Err(Error::Walls);
+        }
+        if let Radius::Cut(radius) = options.radius {
+            return Err(Error::Radius(radius));
         }
         if options.trim != Trim::Off || options.sheet != Sheet::Off {
             return Err(Error::Open);

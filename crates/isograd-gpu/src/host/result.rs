@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use isograd::distance::extend::{self, Extension, Region};
 use isograd::isosurface::measure;
-use isograd::neighbors::{Neighborhoods, Radii};
+use isograd::neighbors::{Neighborhoods, Radii, RadiiCotangent, Radius};
 use isograd::orient::Orientation;
 use isograd::{
     Attribute, CloudCotangent, Cotangent, Field, Grid, Mesh, Options, PointCloud, Report,
@@ -23,6 +23,7 @@ pub struct Reconstruction<T: Number> {
     result: pipeline::Reconstruction<T>,
     grid: Grid<T>,
     checks: bool,
+    radius: Radius,
     selection: Selection,
     /// The report, without what needs copies of results.
     begun: Report,
@@ -99,6 +100,7 @@ impl<T: Number> Reconstruction<T> {
             result,
             grid,
             checks: options.checks,
+            radius: options.radius,
             selection: Selection::default(),
             begun,
             held,
@@ -161,16 +163,21 @@ impl<T: Number> Reconstruction<T> {
         Ok(self.device.indices(&self.result.turned)?[0] as usize)
     }
 
-    /// The neighborhoods, on the CPU.
+    /// The neighborhoods, on the CPU: those of these points, or with radii of an earlier step.
     fn neighborhoods(&self) -> Result<&Neighborhoods<T>, Error> {
         once(&self.copies.neighborhoods, || {
             let points = self.vectors(&self.result.points)?;
+            let mut found = Neighborhoods::default();
+            if !self.held.has_moved {
+                isograd::neighbors::forward(&points, self.radius, &mut found)
+                    .map_err(isograd::Error::from)?;
+                return Ok(found);
+            }
             let radii = Radii {
                 each: &self.device.numbers(&self.held.area_radii)?,
                 common: self.held.common_radius,
                 spacing: self.held.spacing,
             };
-            let mut found = Neighborhoods::default();
             isograd::neighbors::with_radii(&points, radii, &mut found)
                 .map_err(isograd::Error::from)?;
             Ok(found)
@@ -242,7 +249,7 @@ impl<T: Number> Reconstruction<T> {
 
     /// Pulls cotangents of any of the results, and of what was extended, back to the points, the attributes and the
     /// grid, on the device, as [`isograd::Reconstruction::pullback`] does. Of the samples whose axis is guarded all are
-    /// counted, those without a cotangent too.
+    /// counted, those without a cotangent too. Radii that are those of an earlier step are constant.
     ///
     /// # Errors
     /// Errors of the device; a cotangent of another length, or that is not finite; an extension of another result.
@@ -250,12 +257,21 @@ impl<T: Number> Reconstruction<T> {
         let vertices = self.result.surface.vertices.len() / 3;
         cotangent.check([self.grid.cells(); 2], vertices, self.points())?;
         let mut found = match self.selection.is_all() {
-            true => self.device.pullback(&self.result, cotangent)?,
-            false => self.selection.pull(cotangent, |cotangent| {
-                self.device.pullback(&self.result, cotangent)
-            })?,
+            true => self.pull_used(cotangent)?,
+            false => (self.selection).pull(cotangent, |cotangent| self.pull_used(cotangent))?,
         };
         found.guarded += self.begun.guarded;
+        Ok(found)
+    }
+
+    /// To the samples that are used.
+    fn pull_used(&self, cotangent: &Cotangent<'_, T>) -> Result<CloudCotangent<T>, Error> {
+        let (mut found, radii) = self.device.pullback(&self.result, cotangent)?;
+        if !self.held.has_moved {
+            let near = self.neighborhoods()?;
+            let radii = RadiiCotangent::of(near, &radii);
+            isograd::neighbors::pullback(near, &radii, &mut found.points);
+        }
         Ok(found)
     }
 

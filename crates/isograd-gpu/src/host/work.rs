@@ -51,12 +51,12 @@ pub trait Work<T: Scalar>: Send + Sync {
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
     ) -> Result<Reconstruction<T>, Error>;
 
-    /// Cotangents in the host's memory to such cotangents.
+    /// Cotangents in the host's memory to such cotangents, at fixed radii, and to the `(N,)` radii, times these.
     fn pullback(
         &self,
         result: &Reconstruction<T>,
         cotangent: &Cotangent<'_, T>,
-    ) -> Result<CloudCotangent<T>, Error>;
+    ) -> Result<(CloudCotangent<T>, Vec<T>), Error>;
 
     /// An attribute on the surface and round it.
     fn extend(
@@ -239,7 +239,7 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
         &self,
         result: &Reconstruction<T>,
         bars: &Cotangent<'_, T>,
-    ) -> Result<CloudCotangent<T>, Error> {
+    ) -> Result<(CloudCotangent<T>, Vec<T>), Error> {
         let device = self.device();
         let vectors = |given: Option<&[[T; 3]]>| upload(device, given.map(<[_]>::as_flattened));
         let level = (bars.iso_value != T::of(0.0)).then_some([bars.iso_value]);
@@ -276,7 +276,7 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
             None => Vec::new(),
         };
         let attributes = found.attributes.iter().map(|of| device.download(of));
-        Ok(CloudCotangent {
+        let of_cloud = CloudCotangent {
             points: vectors_of(&device.download(&found.points)?),
             normals,
             attributes: attributes.collect::<Result<_, _>>()?,
@@ -285,7 +285,8 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
                 spacing: grid[3],
             },
             guarded,
-        })
+        };
+        Ok((of_cloud, device.download(&found.radii)?))
     }
 
     fn extend(

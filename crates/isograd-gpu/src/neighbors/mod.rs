@@ -3,7 +3,7 @@
 //! # Map
 //! Points `(N, 3)` and a radius `R_i > 0` for each → what finds the neighborhoods
 //! `N_i = {j : |x_j − x_i| ≤ R_i}`, and the centers `{i : j ∈ N_i}` that have a point as a neighbor. Radii are
-//! chosen on the CPU ([`isograd::neighbors`]) or here ([`radius`]), and held constant by pullbacks.
+//! chosen on the CPU ([`isograd::neighbors`]) or here ([`radius`]).
 //!
 //! Points are sorted along a Z-order curve and cut into leaves of eight; boxes round four leaves, round four of
 //! those, and so on, are a tree, which every unit walks from the root in the same order. Memory is a small
@@ -21,7 +21,6 @@
 //! None. Those of the stages gather: a node is visited where the radius at hand or the largest one below the
 //! node reaches the other, so that one walk meets both `N_k` and all centers of `k`.
 
-mod median;
 mod nearest;
 mod order;
 pub mod radius;

@@ -2,22 +2,22 @@
 //!
 //! # Map
 //! Points `(N, 3)` and a [`Radius`] → `R_i`: a radius common to all points, given or automatic, which grows where
-//! fewer than 8 samples are within it. The automatic one is that of the CPU but for the rounding of distances.
+//! few samples are within it. The automatic one is that of the CPU but for the rounding of distances.
 //!
 //! # Pullback
-//! None: every pullback holds the radii constant.
+//! None on the device. Those of normals and areas return the cotangents of the radii, and
+//! [`isograd::neighbors::pullback`] takes them to the points.
 
 use cubecl::prelude::*;
 use isograd::neighbors::rule::{
     self, AUTO_NEIGHBORS, FEWEST_NEIGHBORS, FEWEST_POINTS, GROWTH_MARGIN,
 };
 use isograd::neighbors::{Error as Refused, Radius};
-use isograd_element::vector;
 
 use super::nearest::reaches;
 use super::{
     BLOCK, NeighborhoodArrays, Neighborhoods, end_of_leaf, first_of_leaf, forward as sort_points,
-    is_isolated, median, next_leaf, with_radii,
+    is_isolated, next_leaf, with_radii,
 };
 use crate::device::{check_length, launch};
 use crate::primitives::ends::ends;
@@ -59,8 +59,8 @@ pub struct Census {
     pub isolated: Buffer<u32>,
 }
 
-/// The radii of `(N, 3)` points. Waits for the device: the checks of the points, their box and the automatic radius
-/// come to the host, ten numbers in all.
+/// The radii of `(N, 3)` points. Waits for the device: the checks of the points, their box and a distance for each point
+/// come to the host.
 ///
 /// # Errors
 /// What [`isograd::neighbors::forward`] says of the same points; [`crate::Error::Length`] where they are not whole;
@@ -138,12 +138,8 @@ fn automatic<R: Runtime, T: Scalar>(
     let n = neighborhoods.len();
     let points = &neighborhoods.points;
     let squares = reaches(device, neighborhoods, points, AUTO_NEIGHBORS.min(n))?;
-    let [low, high] = bounds.map(vector::to_f64);
-    let largest = vector::norm_squared(vector::sub(high, low));
-    let square = isograd::Real::f64(median::of_positive(device, &squares, largest)?);
-    // The root of a number in single precision, taken in double, rounds to the same one.
-    let median = (square > 0.0).then(|| <T as isograd::Real>::of(square.sqrt()));
-    Ok(rule::automatic(median, n, bounds))
+    let found = rule::middle_half(&device.download(&squares)?, &mut Vec::new());
+    Ok(rule::automatic(found.map(|(_, mean)| mean), n, bounds))
 }
 
 /// The common radius, or what reaches the 8th sample with a margin, in input order.
@@ -184,13 +180,8 @@ fn grow_radii<F: Float + CubeElement>(
     margin: F,
 ) {
     if ABSOLUTE_POS < places.len() {
-        let square = squares[ABSOLUTE_POS];
-        let mut radius = common;
-        if square > common * common {
-            radius = max(common, margin * F::sqrt(square));
-        }
         let place = places[ABSOLUTE_POS] as usize;
-        radii[place] = radius;
+        radii[place] = max(common, margin * F::sqrt(squares[ABSOLUTE_POS]));
     }
 }
 

@@ -48,6 +48,12 @@ pub(super) fn epsilon<F: Float>() -> F {
     F::new(1.0) / F::new(5.0)
 }
 
+/// How steeply weights fall at the radius, as on the CPU.
+#[cube]
+pub(super) fn steepness<F: Float>() -> F {
+    F::new(5.0)
+}
+
 /// Sums and numbers of all neighborhoods. Each leaf is summed by itself, and sums of leaves are added up, so
 /// that rounding stays small where many points are close.
 #[cube(launch)]
@@ -97,7 +103,7 @@ pub(super) fn moments_within<F: Float + CubeElement>(
             let offset = Vector3::<F>::at(&near.tree.points, j).sub(center);
             if offset.dot(offset) <= radius * radius {
                 let d = offset.scale(F::new(1.0) / radius);
-                let w = weight::<F>(F::sqrt(d.dot(d)), epsilon::<F>());
+                let w = weight::<F>(F::sqrt(d.dot(d)), epsilon::<F>(), steepness::<F>());
                 add_moments::<F>(d, w, &mut of_leaf);
                 count += 1u32;
             }

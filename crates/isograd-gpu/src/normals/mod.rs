@@ -16,7 +16,7 @@
 //! as a center, with the radius of each center. No atomics.
 //!
 //! # Not differentiable
-//! The neighborhoods, the radii, the sign. Where `λ₂ − λ₁` is at most `10⁻³ λ₃`, the pullback bounds
+//! By how much neighborhoods are widened, and the sign. Where `λ₂ − λ₁` is at most `10⁻³ λ₃`, the pullback bounds
 //! `1/(λ₁ − λ_k)`: [`Residual::guarded`].
 
 mod forward;

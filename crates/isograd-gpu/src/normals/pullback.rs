@@ -5,7 +5,7 @@
 
 use cubecl::prelude::*;
 
-use super::forward::epsilon;
+use super::forward::{epsilon, steepness};
 use super::{CENTROID, Residual, SMALLEST_GAP, TANGENT, VALUES, WEIGHT};
 use crate::device::{check_length, launch};
 use crate::element::plane;
@@ -14,23 +14,24 @@ use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Cotangents `(N, 3)` of the points for the cotangents `normals_bar` `(N, 3)` of the axes, with the sign that
-/// [`forward`](super::forward) gave them; their part along the axis drops out. Both in input order.
+/// [`forward`](super::forward) gave them; their part along the axis drops out. And `R_i R̄_i` `(N,)` of the radii. All in
+/// input order.
 pub fn pullback<R: Runtime, T: Scalar>(
     device: &Device<R>,
     residual: &Residual<T>,
     normals_bar: &Buffer<T>,
-) -> Result<Buffer<T>, Error> {
+) -> Result<(Buffer<T>, Buffer<T>), Error> {
     let near = &residual.neighborhoods;
     let n = near.len();
     check_length("normals_bar", normals_bar, 3 * n)?;
-    let points_bar = device.empty(3 * n)?;
+    let (points_bar, radii_bar) = (device.empty(3 * n)?, device.empty(n)?);
     if n == 0 {
-        return Ok(points_bar);
+        return Ok((points_bar, radii_bar));
     }
     let centers: Buffer<T> = device.empty(CENTER * n)?;
     launch!(device, n, BLOCK => fill_centers<T>(residual.planes, near.places, normals_bar, centers));
-    launch!(device, n, BLOCK => gather<T>(near, centers, points_bar));
-    Ok(points_bar)
+    launch!(device, n, BLOCK => gather<T>(near, centers, points_bar, radii_bar));
+    Ok((points_bar, radii_bar))
 }
 
 /// Numbers that a center hands out by: `ĝ/Ŵ`, `n` and `m̂`.
@@ -57,11 +58,12 @@ impl<F: Float> Center<F> {
     /// `d̄` in units of the radius, for an offset `d̂` from the center.
     fn offset_bar(self, d: Vector3<F>) -> Vector3<F> {
         let r = F::sqrt(d.dot(d));
-        let w = plane::weight::<F>(r, epsilon::<F>());
+        let w = plane::weight::<F>(r, epsilon::<F>(), steepness::<F>());
+        let fall = plane::weight_fall::<F>(r, epsilon::<F>(), steepness::<F>());
         let e = d.sub(self.mean);
         let ge = self.g.dot(e);
         let ne = self.n.dot(e);
-        let radial = plane::radial::<F>(w, ge, ne, r);
+        let radial = plane::radial::<F>(fall, ge, ne, r);
         Vector3::<F> {
             x: plane::offset_bar::<F>(w, self.g.x, ne, self.n.x, ge, radial, d.x),
             y: plane::offset_bar::<F>(w, self.g.y, ne, self.n.y, ge, radial, d.y),
@@ -115,12 +117,14 @@ fn slope<F: Float>(gap: F, largest: F, weight: F) -> F {
     select(extends, F::new(-1.0) / divisor, F::new(0.0))
 }
 
-/// Cotangent of each point: the sum over the centers that it is a neighbor of, less the sum over its own neighbors.
+/// Cotangent of each point: the sum over the centers that it is a neighbor of, less the sum over its own neighbors. And
+/// of each radius.
 #[cube(launch)]
 fn gather<F: Float + CubeElement>(
     near: &NeighborhoodArrays<F>,
     centers: &Array<F>,
     points_bar: &mut Array<F>,
+    radii_bar: &mut Array<F>,
 ) {
     let n = near.radii.len();
     if ABSOLUTE_POS < n {
@@ -131,6 +135,7 @@ fn gather<F: Float + CubeElement>(
         let mut x = F::new(0.0);
         let mut y = F::new(0.0);
         let mut z = F::new(0.0);
+        let mut along = F::new(0.0);
         let mut node = next_leaf::<F>(&near.tree, point, radius, 0usize, true);
         while node < near.tree.links.len() {
             let first = first_of_leaf(&near.tree.links, node);
@@ -138,7 +143,9 @@ fn gather<F: Float + CubeElement>(
                 let offset = Vector3::<F>::at(&near.tree.points, j).sub(point);
                 let square = offset.dot(offset);
                 if square <= radius * radius {
-                    let out = own.offset_bar(offset.scale(inverse));
+                    let unit = offset.scale(inverse);
+                    let out = own.offset_bar(unit);
+                    along += out.dot(unit);
                     x -= out.x * inverse;
                     y -= out.y * inverse;
                     z -= out.z * inverse;
@@ -155,6 +162,8 @@ fn gather<F: Float + CubeElement>(
             node = next_leaf::<F>(&near.tree, point, radius, node + 1, true);
         }
         let sum = Vector3::<F> { x, y, z };
-        sum.write(points_bar, near.places[ABSOLUTE_POS] as usize);
+        let place = near.places[ABSOLUTE_POS] as usize;
+        sum.write(points_bar, place);
+        radii_bar[place] = -along;
     }
 }

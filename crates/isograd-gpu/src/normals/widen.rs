@@ -12,7 +12,7 @@ use crate::primitives::flags;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
-/// The radii `(N,)` within which axes are to be found, in input order: those of the residual, and wider ones where
+/// The radii `(N,)` within which axes are to be found, in input order: those of the residual, widened where
 /// neighborhoods are rough and wider ones far less so. For automatic radii; one that the user gave stays.
 ///
 /// Only points that are still rough are tried again: their list stays on the device.
@@ -22,22 +22,25 @@ pub fn widen<R: Runtime, T: Scalar>(
 ) -> Result<Buffer<T>, Error> {
     let near = &residual.neighborhoods;
     let n = near.len();
-    let (roughness, widened): (Buffer<T>, Buffer<T>) = (device.empty(n)?, device.empty(n)?);
+    let (roughness, factors): (Buffer<T>, Buffer<T>) = (device.empty(n)?, device.empty(n)?);
+    let widened: Buffer<T> = device.empty(n)?;
     if n == 0 {
         return Ok(widened);
     }
-    launch!(device, n, BLOCK => begin_widening<T>(residual.planes, near.radii, roughness, widened));
+    let limits = [ROUGH, GAIN, RIM].concat();
+    let limits: Vec<T> = limits.into_iter().map(<T as isograd::Real>::of).collect();
+    let limits = device.upload(&limits)?;
+    launch!(device, n, BLOCK => begin_widening<T>(residual.planes, roughness, factors));
     for step in STEPS {
         let rough: Buffer<u32> = device.empty(n)?;
-        launch!(device, n, BLOCK => flag_rough<T>(
-            roughness, rough, <T as isograd::Real>::of(ROUGH),
-        ));
+        launch!(device, n, BLOCK => flag_rough<T>(roughness, rough, limits));
         let listed = flags::list(device, &rough)?;
         launch!(device, n, BLOCK => try_wider<T>(
-            near, listed.indices, listed.sums, roughness, widened, <T as isograd::Real>::of(step),
-            <T as isograd::Real>::of(GAIN), <T as isograd::Real>::of(RIM * RIM),
+            near, listed.indices, listed.sums, roughness, factors, limits,
+            <T as isograd::Real>::of(step),
         ));
     }
+    launch!(device, n, BLOCK => finish_widening<T>(near.radii, factors, widened));
     scatter(device, &widened, &near.places)
 }
 
@@ -62,13 +65,8 @@ fn share<F: Float>(first: F, value: F) -> F {
 }
 
 #[cube(launch)]
-fn begin_widening<F: Float>(
-    planes: &Array<F>,
-    radii: &Array<F>,
-    rough: &mut Array<F>,
-    widened: &mut Array<F>,
-) {
-    let n = radii.len();
+fn begin_widening<F: Float>(planes: &Array<F>, rough: &mut Array<F>, factors: &mut Array<F>) {
+    let n = rough.len();
     if ABSOLUTE_POS < n {
         let values = Vector3::<F> {
             x: planes[VALUES * n + ABSOLUTE_POS],
@@ -76,45 +74,64 @@ fn begin_widening<F: Float>(
             z: planes[(VALUES + 2) * n + ABSOLUTE_POS],
         };
         rough[ABSOLUTE_POS] = roughness::<F>(values);
-        widened[ABSOLUTE_POS] = radii[ABSOLUTE_POS];
+        factors[ABSOLUTE_POS] = F::new(1.0);
     }
 }
 
 #[cube(launch)]
-fn flag_rough<F: Float + CubeElement>(rough: &Array<F>, flags: &mut Array<u32>, most: F) {
+fn finish_widening<F: Float>(radii: &Array<F>, factors: &Array<F>, widened: &mut Array<F>) {
+    if ABSOLUTE_POS < widened.len() {
+        widened[ABSOLUTE_POS] = factors[ABSOLUTE_POS] * radii[ABSOLUTE_POS];
+    }
+}
+
+#[cube(launch)]
+fn flag_rough<F: Float + CubeElement>(rough: &Array<F>, flags: &mut Array<u32>, limits: &Array<F>) {
     if ABSOLUTE_POS < flags.len() {
-        let is_rough = rough[ABSOLUTE_POS] > most;
+        let is_rough = rough[ABSOLUTE_POS] > limits[0];
         flags[ABSOLUTE_POS] = select(is_rough, 1u32, 0u32);
     }
 }
 
-/// One unit tries one of the listed points, of which the last of `sums` says how many there are.
+/// 1 up to the limit at an index, 0 from the next one on.
+#[cube]
+fn falling<F: Float + CubeElement>(x: F, limits: &Array<F>, #[comptime] index: usize) -> F {
+    let (from, to) = (limits[index], limits[index + 1]);
+    let share = (to - x) / (to - from);
+    let below = select(share < F::new(1.0), share, F::new(1.0));
+    select(below > F::new(0.0), below, F::new(0.0))
+}
+
+/// One unit tries one of the listed points, of which the last of `sums` says how many there are. `limits` are those of
+/// the roughness, of the gain and of the one-sidedness.
 #[cube(launch)]
 fn try_wider<F: Float + CubeElement>(
     near: &NeighborhoodArrays<F>,
     listed: &Array<u32>,
     sums: &Array<u32>,
     rough: &mut Array<F>,
-    widened: &mut Array<F>,
+    factors: &mut Array<F>,
+    limits: &Array<F>,
     step: F,
-    gain: F,
-    rim_squared: F,
 ) {
     let count = sums[sums.len() - 1];
     if ABSOLUTE_POS < count as usize {
         let at = listed[ABSOLUTE_POS] as usize;
         let center = Vector3::<F>::at(&near.tree.points, at);
-        let radius = step * near.radii[at];
         let mut sums = Array::<F>::new(MOMENTS);
-        moments_within::<F>(near, center, radius, &mut sums);
+        moments_within::<F>(near, center, step * near.radii[at], &mut sums);
         let fit = fit::<F>(&sums, 0usize, 1usize);
         let second = fit.eigen.second.dot(fit.centroid);
         let third = fit.eigen.third.dot(fit.centroid);
-        let is_at_rim = second * second + third * third > rim_squared;
-        let found = roughness::<F>(fit.eigen.values);
-        if found <= gain * rough[at] && !is_at_rim {
-            rough[at] = found;
-            widened[at] = radius;
+        let one_sided = F::sqrt(second * second + third * third);
+        let wider = roughness::<F>(fit.eigen.values);
+        let own = rough[at];
+        let share = (F::new(1.0) - falling::<F>(own, limits, 0usize))
+            * falling::<F>(wider / own, limits, 2usize)
+            * falling::<F>(one_sided, limits, 4usize);
+        if share > F::new(0.0) {
+            rough[at] = share * wider + (F::new(1.0) - share) * own;
+            factors[at] = share * step + (F::new(1.0) - share) * factors[at];
         }
     }
 }

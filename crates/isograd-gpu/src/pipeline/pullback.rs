@@ -71,8 +71,10 @@ impl<T> Cotangent<'_, T> {
 /// Cotangents of what a reconstruction was made from.
 #[derive(Clone, Debug)]
 pub struct CloudCotangent<T> {
-    /// `(N, 3)` of the points.
+    /// `(N, 3)` of the points, at fixed radii.
     pub points: Buffer<T>,
+    /// `(N,)` of the radii, times these, for [`isograd::neighbors::pullback`].
+    pub radii: Buffer<T>,
     /// `(N, 3)` of the given normals; none where the normals were found.
     pub normals: Option<Buffer<T>>,
     /// Of each extended attribute, `(N, components)`, in the order of [`Cotangent::extensions`].
@@ -123,6 +125,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             [one] => Some(one.clone()),
             all => Some(flags::sum_of_all(device, &all.iter().collect::<Vec<_>>())?),
         };
+        let radii = zeros(device, result.areas.len())?;
         let given = match &residuals.normals {
             Source::Axes {
                 axes,
@@ -130,18 +133,21 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
                 residual,
             } => {
                 let axes_bar = held::turn(device, &bars.normals, axes, outward)?;
-                let by_axes = normals::pullback(device, residual, &axes_bar)?;
+                let (by_axes, of_radii) = normals::pullback(device, residual, &axes_bar)?;
                 add(device, &by_axes, &bars.points)?;
+                add(device, &of_radii, &radii)?;
                 None
             }
             Source::Given(given) => Some(orient::given::pullback(device, given, &bars.normals)?),
         };
         if let Some(areas) = &residuals.areas {
-            let by_areas = area::pullback(device, areas, &bars.areas)?;
+            let (by_areas, of_radii) = area::pullback(device, areas, &bars.areas)?;
             add(device, &by_areas, &bars.points)?;
+            add(device, &of_radii, &radii)?;
         }
         Ok(CloudCotangent {
             points: bars.points,
+            radii,
             normals: given,
             attributes: extended.attributes,
             grid: bars.grid,

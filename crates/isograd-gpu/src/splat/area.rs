@@ -11,7 +11,7 @@
 //! As printed there; [`pullback`] gathers, with the radius of each center.
 //!
 //! # Not differentiable
-//! The radii and what is isolated, which are held constant.
+//! What is isolated, which is held constant.
 
 use cubecl::prelude::*;
 
@@ -53,27 +53,28 @@ pub fn forward<R: Runtime, T: Scalar>(
     Ok((areas, residual))
 }
 
-/// Cotangents `(N, 3)` of the points from those of the areas, `areas_bar` `(N,)`. Both in input order.
+/// Cotangents `(N, 3)` of the points from those of the areas, `areas_bar` `(N,)`, and `R_i R̄_i` `(N,)` of the radii. All
+/// in input order.
 pub fn pullback<R: Runtime, T: Scalar>(
     device: &Device<R>,
     residual: &Residual<T>,
     areas_bar: &Buffer<T>,
-) -> Result<Buffer<T>, Error> {
+) -> Result<(Buffer<T>, Buffer<T>), Error> {
     let near = &residual.neighborhoods;
     let n = near.len();
     check_length("areas_bar", areas_bar, n)?;
-    let points_bar = device.empty(3 * n)?;
+    let (points_bar, radii_bar) = (device.empty(3 * n)?, device.empty(n)?);
     if n == 0 {
-        return Ok(points_bar);
+        return Ok((points_bar, radii_bar));
     }
     let factors: Buffer<T> = device.empty(n)?;
     launch!(device, n => fill_factors<T>(
         residual.areas, near.radii, near.places, areas_bar, factors, T::FRAC_1_PI(),
     ));
     launch!(device, n => gather<T>(
-        near, factors, points_bar,
+        near, residual.areas, areas_bar, factors, points_bar, radii_bar,
     ));
-    Ok(points_bar)
+    Ok((points_bar, radii_bar))
 }
 
 /// The mean of areas `(N,)` that are not 0, and how many those are: [`isograd::splat::area::mean`]. Waits for the
@@ -167,12 +168,15 @@ fn fill_factors<F: Float + CubeElement>(
 }
 
 /// `−Σ_c [f_k (1 − r²/R_k²) + f_c (1 − r²/R_c²)] d_c`, each where the radius reaches: what point `k` gets as a
-/// center, and as a neighbor of the others.
+/// center, and as a neighbor of the others. And `2 a_k ā_k − Σ_c f_k (1 − r²/R_k²) r²`.
 #[cube(launch)]
 fn gather<F: Float + CubeElement>(
     near: &NeighborhoodArrays<F>,
+    areas: &Array<F>,
+    areas_bar: &Array<F>,
     factors: &Array<F>,
     points_bar: &mut Array<F>,
+    radii_bar: &mut Array<F>,
 ) {
     let n = near.radii.len();
     if ABSOLUTE_POS < n {
@@ -182,14 +186,16 @@ fn gather<F: Float + CubeElement>(
         let mut x = F::new(0.0);
         let mut y = F::new(0.0);
         let mut z = F::new(0.0);
+        let mut along = F::new(0.0);
         let mut node = next_leaf::<F>(&near.tree, point, radius, 0usize, true);
         while node < near.tree.links.len() {
             let first = first_of_leaf(&near.tree.links, node);
             for j in first..end_of_leaf(first, n) {
                 let offset = Vector3::<F>::at(&near.tree.points, j).sub(point);
                 let square = offset.dot(offset);
-                let factor =
-                    own * rise::<F>(square, radius) + factors[j] * rise::<F>(square, near.radii[j]);
+                let as_center = own * rise::<F>(square, radius);
+                along += as_center * square;
+                let factor = as_center + factors[j] * rise::<F>(square, near.radii[j]);
                 x -= factor * offset.x;
                 y -= factor * offset.y;
                 z -= factor * offset.z;
@@ -197,7 +203,9 @@ fn gather<F: Float + CubeElement>(
             node = next_leaf::<F>(&near.tree, point, radius, node + 1, true);
         }
         let sum = Vector3::<F> { x, y, z };
-        sum.write(points_bar, near.places[ABSOLUTE_POS] as usize);
+        let place = near.places[ABSOLUTE_POS] as usize;
+        sum.write(points_bar, place);
+        radii_bar[place] = F::new(2.0) * areas[place] * areas_bar[place] - along;
     }
 }
 

@@ -1,6 +1,6 @@
 //! Clouds that stages of points are tried on, and what the CPU finds in them.
 
-use isograd::neighbors::{self, Radius};
+use isograd::neighbors::{self, RadiiCotangent, Radius};
 use isograd::{Real, normals};
 use isograd_gpu::neighbors::Neighborhoods;
 use isograd_gpu::{Buffer, Device, Scalar};
@@ -45,6 +45,27 @@ impl<T: Scalar> Cloud<T> {
         let near = isograd_gpu::neighbors::forward(device, &self.upload(device), &radii).unwrap();
         let axes = device.upload(self.axes.normals.as_flattened()).unwrap();
         (near, axes)
+    }
+}
+
+impl<T: Scalar> Cloud<T> {
+    /// Compares cotangents of points, at fixed radii and with what the radii mean for them, with those of the CPU.
+    pub fn compare_pullbacks<R: Runtime>(
+        &self,
+        device: &Device<R>,
+        (points, radii): (Buffer<T>, Buffer<T>),
+        (mut expected, expected_radii): (Vec<[T; 3]>, RadiiCotangent),
+        tolerance: f64,
+    ) {
+        let mut found = device.download(&points).unwrap().as_chunks().0.to_vec();
+        let fixed = relative(found.as_flattened(), expected.as_flattened());
+        let radii = RadiiCotangent::of(&self.near, &device.download(&radii).unwrap());
+        neighbors::pullback(&self.near, &radii, &mut found);
+        neighbors::pullback(&self.near, &expected_radii, &mut expected);
+        let error = relative(found.as_flattened(), expected.as_flattened());
+        let (name, number) = (self.name, T::NAME);
+        println!("{name}, {number}: pullback within {fixed:.1e}, with radii {error:.1e}");
+        assert!(fixed.max(error) <= tolerance, "{name}: {fixed:e} {error:e}");
     }
 }
 

@@ -179,6 +179,6 @@ fn heaps_take_no_quadratic_time_and_two_runs_give_the_same_bits<R: Runtime>(devi
     };
     let (common, each) = run();
     assert_eq!((common, each.clone()), run());
-    // The median is that of the two points that are not in the heap: the distance of the farther one from it.
-    assert!(common > 1.7e6 && each.iter().all(|&radius| radius == common));
+    // The mean over the two points that are not in the heap.
+    assert!(common > 1.3e6 && each.iter().all(|&radius| radius >= common && radius < 2e6));
 }

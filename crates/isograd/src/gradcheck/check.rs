@@ -8,6 +8,7 @@ use crate::data::LatticeEdge;
 use crate::distance::lattice::NO_TRIANGLE;
 use crate::distance::triangle::closest_point;
 use crate::isosurface::Level;
+use crate::neighbors::Radius;
 use crate::splat::Weights;
 use crate::vector::{dot, norm, sub};
 use crate::{CloudCotangent, Cotangent, Error, Mesh, PointCloud, Reconstruction, Reconstructor};
@@ -95,7 +96,7 @@ impl<'a> Check<'a> {
     }
 
     /// The central difference over a step in cells, and each cell's part in it, without the cells `ridges`. A
-    /// step with radii and signs held adds to these.
+    /// step with signs held adds to these.
     fn difference(
         &mut self,
         motion: Motion,
@@ -153,7 +154,10 @@ impl<'a> Check<'a> {
             parts: self.functional.parts(result.sdf()),
             edges,
             between: places.map(|x| x.map(between)).collect(),
-            counts: [result.neighbor_counts(), result.axis_counts()].concat(),
+            counts: match options.radius {
+                Radius::Cut(_) => [result.neighbor_counts(), result.axis_counts()].concat(),
+                Radius::Auto | Radius::Fixed(_) => Vec::new(),
+            },
             normals: result.normals().to_vec(),
             surface: held.then(|| (result.closest_mesh().clone(), result.closest().to_vec())),
         })
@@ -196,6 +200,7 @@ struct Side {
     edges: Vec<LatticeEdge>,
     /// Between which of the planes that have to do with [`Difference::crossings`] each point lies.
     between: Vec<[i64; 3]>,
+    /// Of samples in neighborhoods, where their weights jump.
     counts: Vec<u32>,
     normals: Vec<[f64; 3]>,
     /// Of small steps, the mesh and the closest face of each cell.

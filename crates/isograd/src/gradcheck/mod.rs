@@ -7,14 +7,14 @@
 //! [direction](Motion), whose longest vector has length 1, and three derivatives of `L` are taken:
 //!
 //! - by [pullback](crate::Reconstruction::pullback);
-//! - by central differences over a step so small that no neighborhood and no sign changes, with the radii
-//!   and signs [held](crate::Reconstructor::reconstruct_held): what the pullback is the derivative of, so both agree to
+//! - by central differences over a small step, with the signs and the widening of neighborhoods
+//!   [held](crate::Reconstructor::reconstruct_held): what the pullback is the derivative of, so both agree to
 //!   many digits;
 //! - by central differences over a step of half a cell either way, with nothing held: what an optimizer sees
 //!   that takes real steps.
 //!
-//! Where the last two part, [`Row::parting`] says by how much, where most of it comes from, and how many
-//! neighborhoods and signs changed on the way.
+//! Where the last two part, [`Row::parting`] says where most of it comes from, and [`Difference`] how many signs changed
+//! on the way.
 
 mod check;
 mod functional;
@@ -80,7 +80,8 @@ pub struct Difference {
     pub step: f64,
     /// Its value, per unit length of that motion.
     pub value: f64,
-    /// Points whose number of neighbors changed.
+    /// Points whose number of neighbors changed, with [`Radius::Cut`](crate::neighbors::Radius::Cut): their weights
+    /// jump. 0 with other radii.
     pub neighborhoods: usize,
     /// Points whose normal changed sides.
     pub normals: usize,
@@ -118,7 +119,7 @@ pub struct Row {
     /// The same if every part of the surface moved outwards by a unit length: where the derivative is a small
     /// share of it, the motion is along the surface, or contributions cancel, and the ratios say little.
     pub scale: f64,
-    /// Over a small step, radii and signs held.
+    /// Over a small step, signs held.
     pub small: Difference,
     /// Over a large step, nothing held.
     pub large: Difference,

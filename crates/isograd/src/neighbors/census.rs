@@ -1,6 +1,7 @@
 //! What the samples within a radius add up to: how many there are, and how crowded they stand.
 
 use super::candidates::{Candidates, LANES, Lanes, sum_lanes};
+use super::rule::GROWTH_MARGIN;
 use crate::Real;
 use crate::element::plane;
 
@@ -8,6 +9,8 @@ use crate::element::plane;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Census<T> {
     pub count: u32,
+    /// Those within `R` over [`GROWTH_MARGIN`].
+    pub well_within: u32,
     /// `Σ_j (1 − r_j²/R²)²`: the count, with samples near the radius counting less. The areas are made of
     /// it (`splat::area`); here, beside the count, it costs next to nothing.
     pub crowd: T,
@@ -17,17 +20,24 @@ impl<T: Real> Census<T> {
     /// Over candidates that hold all samples within the radius.
     pub(crate) fn of(arch: pulp::Arch, center: [T; 3], radius: T, near: &Candidates<T>) -> Self {
         let (counts, crowds) = crate::simd::vectorized!(arch, sum(center, radius, near));
+        let [count, well_within] = counts.map(|counts| counts.into_iter().sum());
         Self {
-            count: counts.into_iter().sum(),
+            count,
+            well_within,
             crowd: sum_lanes(crowds),
         }
     }
 }
 
 #[inline(always)]
-fn sum<T: Real>(center: [T; 3], radius: T, near: &Candidates<T>) -> ([u32; LANES], [T; LANES]) {
+fn sum<T: Real>(
+    center: [T; 3],
+    radius: T,
+    near: &Candidates<T>,
+) -> ([[u32; LANES]; 2], [T; LANES]) {
     let scale = inverse_square(radius);
-    let (mut counts, mut crowds) = ([0; LANES], [T::zero(); LANES]);
+    let well = T::of(1.0 / (GROWTH_MARGIN * GROWTH_MARGIN));
+    let (mut counts, mut crowds) = ([[0; LANES]; 2], [T::zero(); LANES]);
     near.for_each_lanes(
         radius,
         #[inline(always)]
@@ -35,7 +45,8 @@ fn sum<T: Real>(center: [T; 3], radius: T, near: &Candidates<T>) -> ([u32; LANES
             let d2 = distances_squared(center, lanes);
             for l in 0..LANES {
                 let within = d2[l] <= lanes.limit[l];
-                counts[l] += u32::from(within);
+                counts[0][l] += u32::from(within);
+                counts[1][l] += u32::from(d2[l] <= well * lanes.limit[l]);
                 crowds[l] += if within {
                     plane::crowd(d2[l] * scale)
                 } else {

@@ -9,7 +9,8 @@ use rayon::prelude::*;
 
 use super::candidates::Candidates;
 use super::radius::Neighborhoods;
-use crate::parallel::CHUNK;
+use super::radius_pullback::RadiiCotangent;
+use crate::parallel::{self, CHUNK};
 use crate::{Real, vector};
 
 impl<T: Real> Neighborhoods<T> {
@@ -19,18 +20,18 @@ impl<T: Real> Neighborhoods<T> {
         self.radius[i] > self.common_radius
     }
 
-    /// Adds to `(N, 3)` `points_bar`, in input order, what `gather(sorted position, point, candidates)`
-    /// returns for every point. The candidates hold all points within the common radius, each with its
-    /// `values`, arrays in sorted order.
+    /// Adds to `(N, 3)` `points_bar`, in input order, the first three numbers that `gather(sorted position, point,
+    /// candidates)` returns for every point, and returns the sum of the fourth: `Σ ⟨d̄_j, d_j⟩` of the point as a center.
+    /// The candidates hold all points within the common radius, each with its `values`, arrays in sorted order.
     pub(crate) fn add_gathered<const M: usize>(
         &self,
         values: [&[T]; M],
-        sorted: &mut Vec<[T; 3]>,
+        sorted: &mut Vec<[T; 4]>,
         points_bar: &mut [[T; 3]],
-        gather: &(impl Fn(usize, [T; 3], &Candidates<T, M>) -> [T; 3] + Sync),
-    ) {
+        gather: &(impl Fn(usize, [T; 3], &Candidates<T, M>) -> [T; 4] + Sync),
+    ) -> f64 {
         let index = &self.index;
-        sorted.resize(index.len(), [T::zero(); 3]);
+        sorted.resize(index.len(), [T::zero(); 4]);
         index.for_each_cell(
             self.common_radius,
             values,
@@ -45,27 +46,39 @@ impl<T: Real> Neighborhoods<T> {
         points_bar
             .par_iter_mut()
             .zip(self.position())
-            .for_each(|(bar, &position)| *bar = vector::add(*bar, sorted[position as usize]));
+            .for_each(|(bar, &position)| {
+                let [x, y, z, _] = sorted[position as usize];
+                *bar = vector::add(*bar, [x, y, z]);
+            });
+        let [sum] = parallel::sum_array(index.len(), |position| [sorted[position][3].f64()]);
+        sum
     }
 
     /// Adds to `(N, 3)` `points_bar` what the centers contribute whose `radius` is above the common one:
-    /// `offset_bar(center, neighbor, offset)` is `d̄_j`, not called for the center itself.
+    /// `offset_bar(center, neighbor, offset)` is `d̄_j`, not called for the center itself. And to `radii_bar` what
+    /// `radius_bar(center, Σ ⟨d̄_j, d_j⟩)`, `R_i R̄_i`, says of each of them.
     pub(crate) fn add_from_wide(
         &self,
         radius: &[T],
         points_bar: &mut [[T; 3]],
+        radii_bar: &mut RadiiCotangent,
         offset_bar: &(impl Fn(usize, usize, [T; 3]) -> [T; 3] + Sync),
+        radius_bar: &(impl Fn(usize, f64) -> f64 + Sync),
     ) {
         let wide = (0..radius.len()).filter(|&i| radius[i] > self.common_radius);
         let wide: Vec<usize> = wide.collect();
         // Rounds of a fixed number of centers, so that the lists stay short.
         for round in wide.chunks(4 * CHUNK) {
-            let lists: Vec<Vec<(u32, [T; 3])>> = round
+            let lists: Vec<(Vec<(u32, [T; 3])>, Vec<f64>)> = round
                 .par_chunks(CHUNK / 8)
                 .map(|centers| self.contributions(radius, centers, offset_bar))
                 .collect();
-            for (j, bar) in lists.into_iter().flatten() {
+            let (points, sums): (Vec<_>, Vec<_>) = lists.into_iter().unzip();
+            for (j, bar) in points.into_iter().flatten() {
                 points_bar[j as usize] = vector::add(points_bar[j as usize], bar);
+            }
+            for (&i, sum) in round.iter().zip(sums.into_iter().flatten()) {
+                radii_bar.add(self, i, radius_bar(i, sum));
             }
         }
     }
@@ -75,21 +88,24 @@ impl<T: Real> Neighborhoods<T> {
         radius: &[T],
         centers: &[usize],
         offset_bar: &impl Fn(usize, usize, [T; 3]) -> [T; 3],
-    ) -> Vec<(u32, [T; 3])> {
-        let mut list = Vec::new();
+    ) -> (Vec<(u32, [T; 3])>, Vec<f64>) {
+        let (mut list, mut sums) = (Vec::new(), Vec::new());
         for &i in centers {
             let center = self.index.point(self.position()[i] as usize);
-            let mut total = [T::zero(); 3];
+            let (mut total, mut sum) = ([T::zero(); 3], 0.0);
             self.index.for_each_within(center, radius[i], |j, _| {
                 if j != i {
                     let point = self.index.point(self.position()[j] as usize);
-                    let bar = offset_bar(i, j, vector::sub(point, center));
+                    let offset = vector::sub(point, center);
+                    let bar = offset_bar(i, j, offset);
                     total = vector::sub(total, bar);
+                    sum += vector::dot(bar, offset).f64();
                     list.push((j as u32, bar));
                 }
             });
             list.push((i as u32, total));
+            sums.push(sum);
         }
-        list
+        (list, sums)
     }
 }

@@ -3,7 +3,7 @@
 //! # Map
 //! Points `(N, 3)` → a radius `R_i` per point and the neighborhoods `N_i = {j : |x_j − x_i| ≤ R_i}`,
 //! each of which contains `i`. The radius is common to all points (given, or chosen so that a sample
-//! has about 24 neighbors), and grows where fewer than 8 samples are within it:
+//! has about 24 neighbors), and grows where few samples are within it:
 //! `R_i = max(R, 1.05 · distance to the 8th neighbor)`, counting `i` itself. With 10:1 density a
 //! common radius would leave one or two. A sample whose neighbors do not have it as theirs is marked as
 //! isolated.
@@ -12,12 +12,12 @@
 //! [`Neighborhoods`] is its own residual: the tree and the radii.
 //!
 //! # Pullback
-//! None: neighborhoods are sets, and the radii are held constant by every pullback that uses them. What
-//! those pullbacks share, sums over all centers that have a point as a neighbor, is in `gather.rs`.
+//! Radii are distances between samples, or means of such: [`pullback`] takes their cotangents, which the pullbacks of
+//! normals and areas return, to the points. What those pullbacks share, sums over all centers that have a point as a
+//! neighbor, is in `gather.rs`.
 //!
 //! # Not differentiable
-//! A sample that enters or leaves a neighborhood, and the choice of the radius (the automatic one is continuous in the
-//! points; no pullback follows it). `j ∈ N_i` and
+//! Which sample is the 8th or the 24th, and which points are isolated. Radii are continuous where these change. `j ∈ N_i` and
 //! `i ∈ N_j` are the same where both radii are the common one, not where one has grown.
 
 mod candidates;
@@ -29,6 +29,7 @@ mod nearest;
 #[cfg(test)]
 mod order_tests;
 mod radius;
+mod radius_pullback;
 pub mod rule;
 #[cfg(test)]
 pub(crate) mod tests;
@@ -39,3 +40,4 @@ pub(crate) use cells::Search;
 pub(crate) use census::Census;
 pub use radius::{Error, Neighborhoods, Radii, Radius, forward, with_radii};
 pub(crate) use radius::{Found, forward_with, hold};
+pub use radius_pullback::{RadiiCotangent, pullback};

@@ -15,13 +15,16 @@ const SMALLEST_MUTUAL_SHARE: f64 = 0.125;
 /// How large a neighborhood is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Radius {
-    /// 1.001 times the median, over all points, of the distance to the 24th sample: half the points have more
-    /// neighbors than that, half fewer. Independent of the order of the points, and continuous in them unless 24 come to
+    /// 1.001 times the mean of the distance to the 24th sample over the middle half of the points, those with neither the
+    /// smallest nor the largest distances. Independent of the order of the points, and continuous in them unless 24 come to
     /// lie in one place.
     #[default]
     Auto,
     /// This length, in the unit of the points.
     Fixed(f64),
+    /// This length, and weights of normals that end at it with a jump, as the paper's do. A normal then jumps where a
+    /// sample enters or leaves its neighborhood.
+    Cut(f64),
 }
 
 /// Why there are no neighborhoods.
@@ -89,6 +92,10 @@ pub struct Neighborhoods<T> {
     pub(crate) crowd: Vec<T>,
     /// See [`Self::spacing`].
     spacing: T,
+    /// Squares of the distances to the 24th sample, in sorted order.
+    pub(super) reach: Vec<T>,
+    /// The least and the largest of them that the automatic radius depends on.
+    pub(super) middle: Option<[T; 2]>,
     /// In sorted order: scratch.
     sorted: Vec<Found<T, ()>>,
     /// Input index → sorted position.
@@ -122,13 +129,14 @@ impl<T: Real> Neighborhoods<T> {
         let needed = size_of_val(self.radius.as_slice())
             + size_of_val(self.count.as_slice())
             + size_of_val(self.crowd.as_slice())
+            + size_of_val(self.reach.as_slice())
             + size_of_val(self.isolated.as_slice())
             + size_of_val(self.position.as_slice());
         [tree + needed, work + size_of_val(self.sorted.as_slice())]
     }
 
     /// Typical distance between neighboring samples, in the unit of the points: the side of the square
-    /// that one sample has to itself on the surface, at the median, `√(π/24)` of the automatic radius.
+    /// that one sample has to itself on the surface, in the middle, `√(π/24)` of the automatic radius.
     pub fn spacing(&self) -> T {
         self.spacing
     }
@@ -215,7 +223,7 @@ pub(crate) fn forward_with<T: Real, U: Copy + Default + Send + Sync>(
     check(points)?;
     out.index.rebuild(points);
     check_extent(&out.index)?;
-    let automatic = automatic_radius(&out.index, &mut out.crowd);
+    let automatic = automatic_radius(out);
     out.spacing = rule::spacing(automatic, points.len());
     out.rule = radius;
     out.common_radius = rule::common(radius, automatic)?;
@@ -224,8 +232,8 @@ pub(crate) fn forward_with<T: Real, U: Copy + Default + Send + Sync>(
     Ok(())
 }
 
-/// The neighborhoods of moved points with the radii of `held`, and what was isolated there: what pullbacks
-/// hold constant. Counts are those of the moved points.
+/// The neighborhoods of moved points, with the samples isolated that were isolated in `held`: what pullbacks hold
+/// constant.
 ///
 /// # Errors
 /// As [`forward`], and [`Error::TooFew`] where there are fewer points than before.
@@ -234,13 +242,12 @@ pub(crate) fn hold<T: Real>(
     held: &Neighborhoods<T>,
     out: &mut Neighborhoods<T>,
 ) -> Result<(), Error> {
-    let radii = Radii {
-        each: &held.radius,
-        common: held.common_radius,
-        spacing: held.spacing,
-    };
-    count_within(points, radii, out)?;
-    out.rule = held.rule;
+    if points.len() < held.radius.len() {
+        return Err(Error::TooFew {
+            points: points.len(),
+        });
+    }
+    forward(points, held.rule, out)?;
     out.isolated.clone_from(&held.isolated);
     Ok(())
 }
@@ -317,8 +324,14 @@ fn check_extent<T: Real>(index: &CellIndex<T>) -> Result<(), Error> {
     rule::check_extent(index.len(), index.bounds().into())
 }
 
-/// By the median over all points of the distance to the 24th sample; `squares` is scratch.
-fn automatic_radius<T: Real>(index: &CellIndex<T>, squares: &mut Vec<T>) -> T {
+/// By the distances to the 24th sample, which stay in `out`.
+fn automatic_radius<T: Real>(out: &mut Neighborhoods<T>) -> T {
+    let Neighborhoods {
+        index,
+        reach: squares,
+        crowd: scratch,
+        ..
+    } = out;
     let n = index.len();
     let reach = |distances: &mut Vec<T>, position: usize| {
         index.reach_squared(index.point(position), AUTO_NEIGHBORS, distances)
@@ -327,13 +340,9 @@ fn automatic_radius<T: Real>(index: &CellIndex<T>, squares: &mut Vec<T>) -> T {
     positions
         .map_init(Vec::new, reach)
         .collect_into_vec(squares);
-    squares.retain(|&square| square > T::zero());
-    let middle = squares.len() / 2;
-    let median = (!squares.is_empty()).then(|| {
-        let order = |a: &T, b: &T| a.f64().total_cmp(&b.f64());
-        squares.select_nth_unstable_by(middle, order).1.sqrt()
-    });
-    rule::automatic(median, n, index.bounds().into())
+    let found = rule::middle_half(squares, scratch);
+    out.middle = found.map(|(middle, _)| middle);
+    rule::automatic(found.map(|(_, mean)| mean), n, out.index.bounds().into())
 }
 
 /// Writes radius, census and sum of every point: the common radius where it holds enough samples.
@@ -349,7 +358,7 @@ fn grow<T: Real, U: Copy + Default + Send + Sync>(
         for (position, found) in cell.zip(sorted) {
             let point = index.point(position);
             let census = Census::of(arch, point, common, candidates);
-            *found = if census.count as usize >= FEWEST_NEIGHBORS.min(n) {
+            *found = if census.well_within as usize >= FEWEST_NEIGHBORS.min(n) {
                 Found {
                     radius: common,
                     census,

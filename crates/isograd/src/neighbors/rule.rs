@@ -1,5 +1,7 @@
 //! Rules for the choice of radii, shared with neighbor searches on other devices.
 
+use rayon::prelude::*;
+
 use super::radius::{Error, Radius};
 use crate::{Real, vector};
 
@@ -9,26 +11,62 @@ pub const FEWEST_POINTS: usize = 4;
 /// Fewest samples in a neighborhood, its center included: a plane through fewer is mostly chance.
 pub const FEWEST_NEIGHBORS: usize = 8;
 
-/// By how much a grown radius passes the neighbor that it has to reach, so that this one gets some of
-/// a weight that falls to 0 at the radius.
+/// By how much a radius passes the 8th sample at least, so that this one gets some of a weight that falls to 0 at
+/// the radius.
 pub const GROWTH_MARGIN: f64 = 1.05;
 
 /// Samples that the automatic radius holds at the median, the center included.
 pub const AUTO_NEIGHBORS: usize = 24;
 
-/// By how much the automatic radius passes the median: else one sample would lie exactly on the radius of
-/// another, and the least motion would change their neighborhoods.
+/// By how much the automatic radius passes the mean: else samples of a lattice would lie exactly on the radius of
+/// others, and rounding would tell their neighborhoods apart.
 pub const AUTO_MARGIN: f64 = 1.001;
 
-/// The automatic radius, where `median` is that over all points of the distance to the 24th sample. Points on which 24
-/// samples lie do not count; where there are only such, there is no median, and the samples are spread evenly over the extent
-/// instead. `bounds` are the low and the high corner of the box round all `points`.
-pub fn automatic<T: Real>(median: Option<T>, points: usize, bounds: [[T; 3]; 2]) -> T {
+/// Share of its radius over which the weight of a neighbor in a normal falls to 0.
+const RIM: f64 = 0.2;
+
+/// Steepness of a weight that falls at the radius itself.
+const CUT: f64 = 1e30;
+
+/// One over the share of the radius over which the weights of normals fall to 0.
+pub fn steepness(radius: Radius) -> f64 {
+    match radius {
+        Radius::Auto | Radius::Fixed(_) => 1.0 / RIM,
+        Radius::Cut(_) => CUT,
+    }
+}
+
+/// The automatic radius, where `mean` is that of the distance to the 24th sample over the middle half of all points:
+/// see [`middle_half`]. Where there is none, the samples are spread evenly over the extent instead. `bounds` are the low and the
+/// high corner of the box round all `points`.
+pub fn automatic<T: Real>(mean: Option<T>, points: usize, bounds: [[T; 3]; 2]) -> T {
     let [low, high] = bounds;
-    match median {
-        Some(median) => median * T::of(AUTO_MARGIN),
+    match mean {
+        Some(mean) => mean * T::of(AUTO_MARGIN),
         None => vector::norm(vector::sub(high, low)) / T::of_usize(points).sqrt(),
     }
+}
+
+/// The least and the largest of the middle half of the positive ones among these squares, and the mean of the roots
+/// between them; nothing where none is positive. Zeros are of points on which 24 samples lie.
+pub fn middle_half<T: Real>(squares: &[T], scratch: &mut Vec<T>) -> Option<([T; 2], T)> {
+    scratch.clear();
+    scratch.extend(squares.iter().filter(|&&square| square > T::zero()));
+    let (n, quarter) = (scratch.len(), scratch.len() / 4);
+    if n == 0 {
+        return None;
+    }
+    let order = |a: &T, b: &T| a.f64().total_cmp(&b.f64());
+    let (_, &mut least, above) = scratch.select_nth_unstable_by(quarter, order);
+    let largest = match n - 1 - 2 * quarter {
+        0 => least,
+        last => *above.select_nth_unstable_by(last - 1, order).1,
+    };
+    let middle = &mut scratch[quarter..n - quarter];
+    // In an order that does not depend on that of the points.
+    middle.par_sort_unstable_by(order);
+    let sum: f64 = middle.iter().map(|square| square.f64().sqrt()).sum();
+    Some(([least, largest], T::of(sum / middle.len() as f64)))
 }
 
 /// Typical distance between neighboring samples; see [`Neighborhoods::spacing`](super::Neighborhoods::spacing).
@@ -43,7 +81,7 @@ pub fn spacing<T: Real>(automatic: T, points: usize) -> T {
 pub fn common<T: Real>(rule: Radius, automatic: T) -> Result<T, Error> {
     match rule {
         Radius::Auto => Ok(automatic.max(smallest())),
-        Radius::Fixed(radius) => {
+        Radius::Fixed(radius) | Radius::Cut(radius) => {
             let rounded = T::of(radius);
             if rounded >= smallest() && (rounded * rounded).is_finite() {
                 Ok(rounded)

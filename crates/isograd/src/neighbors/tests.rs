@@ -191,11 +191,7 @@ fn radii_grow_to_the_eighth_sample_and_counts_agree_with_brute_force() {
                 let all = by_distance(&points, point);
                 let within = |r: f64| all.iter().filter(|a| a.1 <= r * r).count();
                 let eighth = all[8.min(all.len()) - 1].1.sqrt();
-                let expected = if within(common) < 8.min(all.len()) {
-                    common.max(1.05 * eighth)
-                } else {
-                    common
-                };
+                let expected = common.max(1.05 * eighth);
                 assert_eq!(found.radius[i], expected, "{name}, {radius:?}, point {i}");
                 assert_eq!(
                     found.count[i] as usize,

@@ -5,7 +5,9 @@ use rayon::prelude::*;
 
 use super::{Plane, Residual, widen};
 use crate::element::{eigen::eigen, plane};
-use crate::neighbors::{self, Candidates, Found, LANES, Lanes, Neighborhoods, Radius, sum_lanes};
+use crate::neighbors::{
+    self, Candidates, Found, LANES, Lanes, Neighborhoods, Radius, rule, sum_lanes,
+};
 use crate::parallel::CHUNK;
 use crate::{Real, simd, vector};
 
@@ -25,24 +27,24 @@ pub fn forward<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residual<T>)
     widen::choose(neighborhoods, out);
 }
 
-/// The axes of moved points, in neighborhoods as wide as those of `held`: what the pullback holds constant.
-/// `neighborhoods` are those of the moved points, as many as before, with the radii of before.
+/// The axes of moved points, in neighborhoods wider than their own by the factors of `held`: what the pullback holds
+/// constant. `neighborhoods` are those of the moved points, as many as before.
 pub(crate) fn hold<T: Real>(
     neighborhoods: &Neighborhoods<T>,
     held: &Residual<T>,
     out: &mut Residual<T>,
 ) {
     find_in_own(neighborhoods, out);
-    widen::repeat(neighborhoods, &held.radius, out);
+    widen::repeat(neighborhoods, &held.widening, out);
 }
 
 /// Axes in the neighborhoods as they are.
 fn find_in_own<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residual<T>) {
-    let arch = Arch::new();
+    let (arch, rule) = (Arch::new(), neighborhoods.rule);
     out.sorted
         .resize(neighborhoods.index.len(), Found::default());
     neighborhoods.for_each_neighborhood(&mut out.sorted, &|center, radius, candidates| {
-        Found::only(moments(arch, center, radius, candidates))
+        Found::only(moments(arch, rule, center, radius, candidates))
     });
     find_all_planes(neighborhoods, arch, out);
 }
@@ -64,7 +66,7 @@ pub fn forward_with_neighborhoods<T: Real>(
         radius,
         neighborhoods,
         sorted,
-        &|center, radius, candidates| moments(arch, center, radius, candidates),
+        &|center, within, candidates| moments(arch, radius, center, within, candidates),
     )?;
     find_all_planes(neighborhoods, arch, out);
     widen::choose(neighborhoods, out);
@@ -76,18 +78,23 @@ pub(super) type Moments<T> = [T; 10];
 
 pub(super) fn moments<T: Real>(
     arch: Arch,
+    rule: Radius,
     center: [T; 3],
     radius: T,
     candidates: &Candidates<T>,
 ) -> Moments<T> {
-    let epsilon = T::of(EPSILON) * radius;
+    let scales = [
+        T::one() / radius,
+        T::of(EPSILON),
+        T::of(rule::steepness(rule)),
+    ];
     let sums = simd::vectorized!(arch, {
         let mut sums = [[T::zero(); LANES]; 10];
         candidates.for_each_lanes(
             radius,
             #[inline(always)]
             |lanes| {
-                let terms = moment_terms(center, epsilon, lanes);
+                let terms = moment_terms(center, scales, lanes);
                 for (sum, term) in sums.iter_mut().zip(&terms) {
                     for l in 0..LANES {
                         sum[l] += term[l];
@@ -100,14 +107,18 @@ pub(super) fn moments<T: Real>(
     sums.map(sum_lanes)
 }
 
-/// `w`, `w d` and `w d dᵀ` of each lane; all 0 outside the radius.
+/// `w`, `w d` and `w d dᵀ` of each lane; all 0 outside the radius. `scales` are `1/R`, `ε/R` and the steepness.
 #[inline(always)]
-fn moment_terms<T: Real>(center: [T; 3], epsilon: T, lanes: &Lanes<T>) -> [[T; LANES]; 10] {
+fn moment_terms<T: Real>(
+    center: [T; 3],
+    [inverse, epsilon, steepness]: [T; 3],
+    lanes: &Lanes<T>,
+) -> [[T; LANES]; 10] {
     let mut terms = [[T::zero(); LANES]; 10];
     for l in 0..LANES {
         let [x, y, z] = [0, 1, 2].map(|a| lanes.point[a][l] - center[a]);
         let d2 = x * x + y * y + z * z;
-        let weight = plane::weight(d2.sqrt(), epsilon);
+        let weight = plane::weight(d2.sqrt() * inverse, epsilon, steepness) * inverse;
         let w = if d2 <= lanes.limit[l] {
             weight
         } else {
@@ -137,6 +148,8 @@ fn moment_terms<T: Real>(center: [T; 3], epsilon: T, lanes: &Lanes<T>) -> [[T; L
 fn find_all_planes<T: Real>(neighborhoods: &Neighborhoods<T>, arch: Arch, out: &mut Residual<T>) {
     let n = neighborhoods.index.len();
     out.radius.clone_from(&neighborhoods.radius);
+    out.widening.clear();
+    out.widening.resize(n, T::one());
     out.count.clone_from(&neighborhoods.count);
     out.normals.resize(n, [T::zero(); 3]);
     out.planes.resize(n, Plane::default());

@@ -2,12 +2,16 @@
 //!
 //! # Map
 //! Points `(N, 3)` and their neighborhoods `N_i` → unit vectors `(N, 3)` along the surface normal,
-//! after the paper's section on normal estimation. With `d_j = x_j − x_i`, `r_j = |d_j|` and
-//! `w_j = 1/(r_j + ε)`,
+//! after the paper's section on normal estimation. With `d_j = x_j − x_i`, `r_j = |d_j|`,
+//! `t_j = min(1, 5 (1 − r_j/R_i))` and `w_j = t_j² (3 − 2 t_j)/(r_j + ε)`,
 //! `W = Σ w_j`, `m = Σ w_j d_j / W`, `C = Σ w_j d_j d_jᵀ / W − m mᵀ`,
 //! and the normal `n = v₁` is the eigenvector of `C` for its smallest eigenvalue, `λ₁ ≤ λ₂ ≤ λ₃`. All is
 //! relative to `x_i`, so a cloud far from the origin loses nothing. The sign of `n` is arbitrary, but
 //! always the same: its component of largest magnitude is positive. Orientation is the next stage.
+//!
+//! The paper's weight is `1/(r_j + ε)` up to `R_i`, where it ends with a jump, and a normal jumps where a sample enters or
+//! leaves its neighborhood ([`Radius::Cut`](crate::neighbors::Radius::Cut) selects it). The factor makes the weight fall to
+//! 0 over the last fifth of the radius.
 //!
 //! `ε = R_i/5`. The paper asks for a small constant; but a tiny one gives the sample itself nearly all of
 //! the weight, so that its own noise tilts the plane. Mean error of the axes in degrees, uniform random
@@ -21,7 +25,7 @@
 //! | cube, no noise | 5.99 | 5.94 | 5.63 | 5.19 | 5.19 | 5.27 | 5.38 |
 //!
 //! Where samples scatter about their plane by a large part of the radius, from noise or because they lie on
-//! both sides of a thin body, neighborhoods of up to `2√2 R_i` are tried, and the axis is that of the first
+//! both sides of a thin body, neighborhoods of up to `3.1 R_i` are tried, and the radius grows towards that of the first
 //! that is far less rough than those before it ([`Residual::radius`]; a radius that the caller has given
 //! stays). Mean error of the axes in degrees, with the same radius given and with the automatic one:
 //!
@@ -45,17 +49,20 @@
 //! ```text
 //! g   = Σ_{k=2,3} v_k (v_k·n̄) / (λ₁ − λ_k)
 //! B   = (g nᵀ + n gᵀ)/2
-//! d̄_j = (2 w_j/W) B (d_j − m) − (w_j²/W) [(d_j − m)ᵀ B (d_j − m) − ⟨B, C⟩] d_j/r_j   (0 where r_j = 0)
-//! x̄_j += d̄_j,   x̄_i −= Σ_j d̄_j
+//! d̄_j = (2 w_j/W) B (d_j − m) + (w_j'/W) [(d_j − m)ᵀ B (d_j − m) − ⟨B, C⟩] d_j/r_j   (0 where r_j = 0)
+//! x̄_j += d̄_j,   x̄_i −= Σ_j d̄_j,   R_i R̄_i = −Σ_j ⟨d̄_j, d_j⟩
 //! ```
 //! `⟨B, C⟩ = gᵀ C n = 0`, because `C n = λ₁ n` and `g` is normal to `n`. Both terms are gathered: over
 //! `N_i`, and over all `i` with `j ∈ N_i`: [`pullback`].
 //!
 //! # Not differentiable
-//! The neighborhoods and radii (held constant, `ε` with them; the choice of a wider one too), and the sign. Where `λ₂ − λ₁` is at most
+//! By how much a neighborhood is wider than its own radius (a continuous function of the points, held constant), and the
+//! sign. Where `λ₂ − λ₁` is at most
 //! `10⁻³ λ₃` (a line, an isolated point, a corner as thick as it is wide) the axis itself is ill defined:
 //! such a plane is marked [`Plane::guarded`], and the pullback bounds `1/(λ₁ − λ_k)` there.
 
+#[cfg(test)]
+mod continuity_tests;
 mod forward;
 mod pullback;
 #[cfg(test)]
@@ -90,8 +97,10 @@ pub struct Plane<T> {
 pub struct Residual<T> {
     /// Unit normals, each with its component of largest magnitude positive.
     pub normals: Vec<[T; 3]>,
-    /// The radius within which each was found: `R_i`, or up to `2√2 R_i`.
+    /// The radius within which each was found: `R_i`, or up to `3.1 R_i`.
     pub radius: Vec<T>,
+    /// That radius over `R_i`.
+    pub widening: Vec<T>,
     /// Number of samples within that radius, the point itself included.
     pub count: Vec<u32>,
     /// The plane round each point.
@@ -110,6 +119,7 @@ impl<T> Residual<T> {
     pub(crate) fn bytes(&self) -> [usize; 2] {
         let needed = size_of_val(self.normals.as_slice())
             + size_of_val(self.radius.as_slice())
+            + size_of_val(self.widening.as_slice())
             + size_of_val(self.count.as_slice())
             + size_of_val(self.planes.as_slice());
         [needed, size_of_val(self.sorted.as_slice())]
@@ -119,6 +129,7 @@ impl<T> Residual<T> {
     pub fn clear(&mut self) {
         self.normals.clear();
         self.radius.clear();
+        self.widening.clear();
         self.count.clear();
         self.planes.clear();
     }

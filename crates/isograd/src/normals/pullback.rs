@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::forward::{EPSILON, SMALLEST_GAP};
 use super::{Plane, Residual};
 use crate::element::plane;
-use crate::neighbors::{Candidates, LANES, Neighborhoods};
+use crate::neighbors::{Candidates, LANES, Neighborhoods, RadiiCotangent, rule};
 use crate::vector::{add, dot, norm, scale};
 use crate::{Real, vector};
 
@@ -22,20 +22,22 @@ pub struct Scratch<T> {
     slopes: Vec<[T; 3]>,
     /// [`VALUES`] of every point in the order of the cells; `ĝ` is 0 there where the radius is wider.
     values: [Vec<T>; VALUES],
-    sorted: Vec<[T; 3]>,
+    sorted: Vec<[T; 4]>,
 }
 
 /// Adds to the `(N, 3)` `points_bar` what the cotangents `normals_bar` `(N, 3)` of the axes (with the sign
 /// that [`Residual::normals`] has) mean for the points. Returns how many guarded planes met a cotangent that
 /// is not zero: their derivative was bounded.
 ///
-/// `neighborhoods` and `residual` are those of [`forward`](super::forward); all in input order.
+/// `neighborhoods` and `residual` are those of [`forward`](super::forward); all in input order. What the radii get is
+/// added to `radii_bar`.
 pub fn pullback<T: Real>(
     neighborhoods: &Neighborhoods<T>,
     residual: &Residual<T>,
     normals_bar: &[[T; 3]],
     scratch: &mut Scratch<T>,
     points_bar: &mut [[T; 3]],
+    radii_bar: &mut RadiiCotangent,
 ) -> usize {
     let Scratch {
         slopes,
@@ -47,25 +49,40 @@ pub fn pullback<T: Real>(
     samples.map(slope).collect_into_vec(slopes);
     sort_values(neighborhoods, residual, slopes, values);
     let (arch, radius) = (pulp::Arch::new(), neighborhoods.common_radius);
+    let steepness = T::of(rule::steepness(neighborhoods.rule));
     let values = values.each_ref().map(|v| &v[..]);
-    neighborhoods.add_gathered(
+    let common = neighborhoods.add_gathered(
         values,
         sorted,
         points_bar,
         &|position, point, candidates| {
             let own = values.map(|v| v[position]);
-            crate::simd::vectorized!(arch, gather(point, &own, radius, candidates))
+            crate::simd::vectorized!(arch, gather(point, &own, radius, steepness, candidates))
         },
     );
+    // A normal has no unit: it stays if the offsets and the radius are scaled alike.
+    radii_bar.add_common(-common);
     let slopes = &*slopes;
-    neighborhoods.add_from_wide(&residual.radius, points_bar, &|i, _, offset| {
+    let offset_bar = |i: usize, _, offset| {
         let radius = residual.radius[i];
-        let plane = &residual.planes[i];
-        let mean = scale(plane.centroid, T::one() / radius);
+        let center = Center {
+            g: slopes[i],
+            n: residual.normals[i],
+            mean: scale(residual.planes[i].centroid, T::one() / radius),
+        };
         let unit = scale(offset, T::one() / radius);
-        let bar = offset_bar(slopes[i], residual.normals[i], mean, unit, norm(unit));
-        scale(bar, T::one() / radius)
-    });
+        scale(
+            center.offset_bar(unit, norm(unit), steepness),
+            T::one() / radius,
+        )
+    };
+    neighborhoods.add_from_wide(
+        &residual.radius,
+        points_bar,
+        radii_bar,
+        &offset_bar,
+        &|_, sum| -sum,
+    );
     let guarded =
         |(plane, bar): &(&Plane<T>, &[T; 3])| plane.guarded && bar.iter().any(|&x| x != T::zero());
     residual
@@ -117,32 +134,52 @@ fn sort_values<T: Real>(
     });
 }
 
-/// `d̄` in units of the radius, for an offset `d̂` of length `r̂ > 0` from the center:
-/// `ŵ (g (n·e) + n (g·e)) − ŵ² (g·e)(n·e) d̂/r̂` with `e = d̂ − m̂` and `g` standing for `ĝ/Ŵ`.
-#[inline(always)]
-fn offset_bar<T: Real>(g: [T; 3], n: [T; 3], mean: [T; 3], d: [T; 3], r: T) -> [T; 3] {
-    let w = plane::weight(r, T::of(EPSILON));
-    let e = [d[0] - mean[0], d[1] - mean[1], d[2] - mean[2]];
-    let (ge, ne) = (dot(g, e), dot(n, e));
-    let radial = plane::radial(w, ge, ne, r);
-    [0, 1, 2].map(
-        #[inline(always)]
-        |a| plane::offset_bar(w, g[a], ne, n[a], ge, radial, d[a]),
-    )
+/// The center of a neighborhood: `ĝ/Ŵ`, `n` and `m̂`.
+struct Center<T> {
+    g: [T; 3],
+    n: [T; 3],
+    mean: [T; 3],
 }
 
-/// Cotangent of a point as a neighbor of the others, minus its cotangents as a center.
+impl<T: Real> Center<T> {
+    #[inline(always)]
+    fn of(v: &[T; VALUES]) -> Self {
+        Self {
+            g: [v[0], v[1], v[2]],
+            n: [v[3], v[4], v[5]],
+            mean: [v[6], v[7], v[8]],
+        }
+    }
+
+    /// `d̄` in units of the radius, for an offset `d̂` of length `r̂ > 0` from the center:
+    /// `ŵ (g (n·e) + n (g·e)) + ŵ' (g·e)(n·e) d̂/r̂` with `e = d̂ − m̂` and `g` standing for `ĝ/Ŵ`.
+    #[inline(always)]
+    fn offset_bar(&self, d: [T; 3], r: T, steepness: T) -> [T; 3] {
+        let Self { g, n, mean } = self;
+        let w = plane::weight(r, T::of(EPSILON), steepness);
+        let fall = plane::weight_fall(r, T::of(EPSILON), steepness);
+        let e = [d[0] - mean[0], d[1] - mean[1], d[2] - mean[2]];
+        let (ge, ne) = (dot(*g, e), dot(*n, e));
+        let radial = plane::radial(fall, ge, ne, r);
+        [0, 1, 2].map(
+            #[inline(always)]
+            |a| plane::offset_bar(w, g[a], ne, n[a], ge, radial, d[a]),
+        )
+    }
+}
+
+/// Cotangent of a point as a neighbor of the others, minus its cotangents as a center; and `Σ ⟨d̄_j, d_j⟩` of these.
 #[inline(always)]
 fn gather<T: Real>(
     center: [T; 3],
     own: &[T; VALUES],
     radius: T,
+    steepness: T,
     candidates: &Candidates<T, VALUES>,
-) -> [T; 3] {
+) -> [T; 4] {
     let inverse = T::one() / radius;
-    let parts = |v: &[T; VALUES]| [[v[0], v[1], v[2]], [v[3], v[4], v[5]], [v[6], v[7], v[8]]];
-    let [own_g, own_n, own_mean] = parts(own);
-    let mut sums = [[T::zero(); LANES]; 3];
+    let own = Center::of(own);
+    let mut sums = [[T::zero(); LANES]; 4];
     candidates.for_each_lanes(
         radius,
         #[inline(always)]
@@ -159,16 +196,20 @@ fn gather<T: Real>(
                 );
                 let r = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
                 let back = [-d[0], -d[1], -d[2]];
-                let v = |m: usize| lanes.values[m][l];
-                let out = offset_bar(own_g, own_n, own_mean, d, r);
-                let [g, n, mean] = [[v(0), v(1), v(2)], [v(3), v(4), v(5)], [v(6), v(7), v(8)]];
-                let into = offset_bar(g, n, mean, back, r);
+                let out = own.offset_bar(d, r, steepness);
+                let other = Center::of(&std::array::from_fn(
+                    #[inline(always)]
+                    |m| lanes.values[m][l],
+                ));
+                let into = other.offset_bar(back, r, steepness);
                 let counts = d2 <= lanes.limit[l];
                 for a in 0..3 {
                     sums[a][l] += if counts { into[a] - out[a] } else { T::zero() };
                 }
+                sums[3][l] += if counts { dot(out, d) } else { T::zero() };
             }
         },
     );
-    sums.map(|sum| sum.into_iter().sum::<T>() * inverse)
+    let [x, y, z, along] = sums.map(|sum| sum.into_iter().sum::<T>());
+    [x * inverse, y * inverse, z * inverse, along]
 }

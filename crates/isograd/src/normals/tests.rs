@@ -26,12 +26,20 @@ fn members<T: Real>(points: &[[T; 3]], i: usize, radius: T) -> Vec<(usize, [f64;
     within.map(|(j, d)| (j, vector::to_f64(d))).collect()
 }
 
+/// `w` and `−dw/dr` as the module's page prints them.
+fn weight(r: f64, radius: f64) -> (f64, f64) {
+    let t = (5.0 * (1.0 - r / radius)).clamp(0.0, 1.0);
+    let (s, fall) = (t * t * (3.0 - 2.0 * t), 30.0 * t * (1.0 - t) / radius);
+    let w = 1.0 / (r + EPSILON * radius);
+    (s * w, fall * w + s * w * w)
+}
+
 /// `W`, `m` and `C` as the module's page prints them.
 fn covariance(members: &[(usize, [f64; 3])], radius: f64) -> (f64, [f64; 3], [f64; 6]) {
     let weighted = || {
         members
             .iter()
-            .map(|&(_, d)| (1.0 / (vector::norm(d) + EPSILON * radius), d))
+            .map(|&(_, d)| (weight(vector::norm(d), radius).0, d))
     };
     let total: f64 = weighted().map(|(w, _)| w).sum();
     let m = [0, 1, 2].map(|a| weighted().map(|(w, d)| w * d[a]).sum::<f64>() / total);
@@ -229,9 +237,9 @@ fn pullback(
         if r == 0.0 {
             return [0.0; 3];
         }
-        let w = 1.0 / (r + EPSILON * radius);
+        let (w, fall) = weight(r, radius);
         let image = b(from_mean);
-        let radial = w * w / plane.weight * vector::dot(from_mean, image) / r;
+        let radial = fall / plane.weight * vector::dot(from_mean, image) / r;
         vector::sub(
             vector::scale(image, 2.0 * w / plane.weight),
             vector::scale(d, radial),

@@ -20,20 +20,19 @@ use crate::neighbors::{Candidates, Census, Found as Sum, Neighborhoods, Radius, 
 use crate::{Real, simd, vector};
 
 /// Radii that are tried one after the other, in `R_i`.
-pub const STEPS: [f64; 3] = [
-    std::f64::consts::SQRT_2,
-    2.0,
-    2.0 * std::f64::consts::SQRT_2,
-];
+pub const STEPS: [f64; 3] = [1.55, 2.2, 3.1];
 
-/// Roughness up to which an axis is left alone: with 24 samples, it is off by 4 degrees.
-pub const ROUGH: f64 = 0.12;
+/// Roughness up to which an axis is left alone, and from which a wider neighborhood is taken: with 24 samples, it is
+/// off by 4 degrees at 0.12. A share of the widening is taken between the two numbers, here and below, so that
+/// axes are continuous in the points.
+pub const ROUGH: [f64; 2] = [0.1, 0.14];
 
-/// A wider neighborhood is taken where its roughness is at most this share of the one at hand.
-pub const GAIN: f64 = 0.5;
+/// Roughness, as a share of the one at hand, up to which a wider neighborhood is taken, and from which it is not.
+pub const GAIN: [f64; 2] = [0.4, 0.6];
 
-/// A neighborhood whose centroid is off its middle by this share of the radius is one-sided.
-pub const RIM: f64 = 0.2;
+/// A neighborhood whose centroid is off its middle by this share of the radius is one-sided: up to which a wider one
+/// is taken, and from which it is not.
+pub const RIM: [f64; 2] = [0.17, 0.23];
 
 /// Points of one task.
 const TASK: usize = 256;
@@ -42,6 +41,8 @@ const TASK: usize = 256;
 #[derive(Clone, Copy, Debug)]
 struct Found<T> {
     position: u32,
+    /// Of the point's own radius.
+    factor: T,
     radius: T,
     count: u32,
     normal: [T; 3],
@@ -52,7 +53,7 @@ struct Found<T> {
 /// given stays.
 pub(super) fn choose<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residual<T>) {
     if neighborhoods.rule == Radius::Auto {
-        let is_wanted = |i: usize| roughness(&out.planes[i]) > ROUGH;
+        let is_wanted = |i: usize| roughness(&out.planes[i]) > ROUGH[0];
         let positions = positions(neighborhoods, is_wanted);
         let planes = &out.planes;
         let found = in_tasks(&positions, |task| smoothest(neighborhoods, planes, task));
@@ -60,20 +61,20 @@ pub(super) fn choose<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residu
     }
 }
 
-/// Replaces the axes of the samples whose radius is above that of their neighborhood by those within the radius.
+/// Replaces the axes of samples by those in neighborhoods wider than their own by a factor above 1.
 pub(super) fn repeat<T: Real>(
     neighborhoods: &Neighborhoods<T>,
-    radius: &[T],
+    widening: &[T],
     out: &mut Residual<T>,
 ) {
-    let positions = positions(neighborhoods, |i| radius[i] > neighborhoods.radius[i]);
+    let positions = positions(neighborhoods, |i| widening[i] > T::one());
+    let order = neighborhoods.index.order();
     let found = in_tasks(&positions, |task| {
-        find(
-            neighborhoods,
-            task,
-            |i| radius[i],
-            &mut Candidates::default(),
-        )
+        let wide = task
+            .iter()
+            .map(|&p| (p, widening[order[p as usize] as usize]));
+        let wide: Vec<(u32, T)> = wide.collect();
+        find(neighborhoods, &wide, &mut Candidates::default())
     });
     write(neighborhoods, found, out);
 }
@@ -90,14 +91,19 @@ fn roughness<T: Real>(plane: &Plane<T>) -> f64 {
     }
 }
 
-/// Whether the samples found lie mostly on one side of the one in their middle, as at the rim of a plate, whose face
-/// is another than that of the plate.
-fn is_at_rim<T: Real>(found: &Found<T>) -> bool {
+/// How far the samples found lie on one side of the one in their middle, in radii; much at the rim of a plate, whose
+/// face is another than that of the plate.
+fn one_sidedness<T: Real>(found: &Found<T>) -> f64 {
     let lateral = found
         .plane
         .tangents
         .map(|t| vector::dot(t, found.plane.centroid).f64());
-    lateral[0].hypot(lateral[1]) > RIM * found.radius.f64()
+    lateral[0].hypot(lateral[1]) / found.radius.f64()
+}
+
+/// 1 up to the first number, 0 from the second on.
+fn falling(x: f64, [from, to]: [f64; 2]) -> f64 {
+    ((to - x) / (to - from)).clamp(0.0, 1.0)
 }
 
 /// Sorted positions of the points that are wanted, by input index.
@@ -119,63 +125,96 @@ fn in_tasks<T: Real>(
     tasks.flat_map_iter(run).collect()
 }
 
-/// For each point of a task that has one: the least rough of the wider neighborhoods.
+/// How far a neighborhood is widened.
+struct Widening<T> {
+    position: u32,
+    roughness: f64,
+    /// Of the radius.
+    factor: f64,
+    /// What was found with that factor, if it was tried.
+    found: Option<Found<T>>,
+}
+
+impl<T: Real> Widening<T> {
+    /// Takes the share of a wider neighborhood that it deserves.
+    fn take(&mut self, found: Found<T>) {
+        let (own, wider) = (self.roughness, roughness(&found.plane));
+        let share = (1.0 - falling(own, ROUGH))
+            * falling(wider / own, GAIN)
+            * falling(one_sidedness(&found), RIM);
+        if share > 0.0 {
+            // The roughness at hand may be infinite.
+            let kept = if share < 1.0 {
+                (1.0 - share) * own
+            } else {
+                0.0
+            };
+            self.roughness = share * wider + kept;
+            self.factor = share * found.factor.f64() + (1.0 - share) * self.factor;
+            self.found = (share == 1.0).then_some(found);
+        }
+    }
+}
+
+/// For each point of a task that has one: the axis in the wider neighborhood.
 fn smoothest<T: Real>(
     neighborhoods: &Neighborhoods<T>,
     planes: &[Plane<T>],
     task: &[u32],
 ) -> Vec<Found<T>> {
     let mut candidates = Candidates::default();
-    let input = |position: u32| neighborhoods.index.order()[position as usize] as usize;
-    let mut best: Vec<(f64, Option<Found<T>>)> = task
-        .iter()
-        .map(|&position| (roughness(&planes[input(position)]), None))
-        .collect();
+    let order = neighborhoods.index.order();
+    let begin = |&position: &u32| Widening {
+        position,
+        roughness: roughness(&planes[order[position as usize] as usize]),
+        factor: 1.0,
+        found: None,
+    };
+    let mut all: Vec<Widening<T>> = task.iter().map(begin).collect();
     for step in STEPS {
-        let rough = |(_, best): &(&u32, &mut (f64, Option<Found<T>>))| best.0 > ROUGH;
-        let (positions, places): (Vec<u32>, Vec<_>) =
-            task.iter().zip(&mut best).filter(rough).unzip();
-        let radius = |i: usize| T::of(step) * neighborhoods.radius[i];
-        let found = find(neighborhoods, &positions, radius, &mut candidates);
-        for (place, found) in places.into_iter().zip(found) {
-            let roughness = roughness(&found.plane);
-            if roughness <= GAIN * place.0 && !is_at_rim(&found) {
-                *place = (roughness, Some(found));
-            }
-        }
+        let mut rough: Vec<&mut Widening<T>> =
+            all.iter_mut().filter(|w| w.roughness > ROUGH[0]).collect();
+        let wide: Vec<(u32, T)> = rough.iter().map(|w| (w.position, T::of(step))).collect();
+        let found = find(neighborhoods, &wide, &mut candidates);
+        rough
+            .iter_mut()
+            .zip(found)
+            .for_each(|(w, found)| w.take(found));
     }
-    best.into_iter().filter_map(|(_, found)| found).collect()
+    let between = |w: &&Widening<T>| w.found.is_none() && w.factor > 1.0;
+    let wide = all.iter().filter(between);
+    let wide: Vec<(u32, T)> = wide.map(|w| (w.position, T::of(w.factor))).collect();
+    let mut found = find(neighborhoods, &wide, &mut candidates);
+    found.extend(all.into_iter().filter_map(|w| w.found));
+    found
 }
 
-/// The axes of the points at some sorted positions, within `radius(input index)` of each.
+/// The axes of the points at some sorted positions, in neighborhoods wider than their own by some factors.
 fn find<T: Real>(
     neighborhoods: &Neighborhoods<T>,
-    positions: &[u32],
-    radius: impl Fn(usize) -> T,
+    wide: &[(u32, T)],
     candidates: &mut Candidates<T>,
 ) -> Vec<Found<T>> {
-    let (arch, index) = (Arch::new(), &neighborhoods.index);
-    let radius = |position: u32| radius(index.order()[position as usize] as usize);
-    let mut count = Vec::with_capacity(positions.len());
-    let sums = positions.iter().map(|&position| {
-        let (point, radius) = (index.point(position as usize), radius(position));
+    let (arch, index, rule) = (Arch::new(), &neighborhoods.index, neighborhoods.rule);
+    let own = |position: u32| neighborhoods.radius[index.order()[position as usize] as usize];
+    let mut count = Vec::with_capacity(wide.len());
+    let sums = wide.iter().map(|&(position, factor)| {
+        let (point, radius) = (index.point(position as usize), factor * own(position));
         let values = [];
         index.candidates(point, Search { radius, values }, candidates);
         count.push(Census::of(arch, point, radius, candidates).count);
-        Sum::only(moments(arch, point, radius, candidates))
+        Sum::only(moments(arch, rule, point, radius, candidates))
     });
     let sums: Vec<Sum<T, Moments<T>>> = sums.collect();
     let mut normals = vec![[T::zero(); 3]; sums.len()];
     let mut planes = vec![Plane::default(); sums.len()];
     let all: Vec<u32> = (0..sums.len() as u32).collect();
     simd::vectorized!(arch, find_planes(&sums, &all, &mut normals, &mut planes));
-    let found = positions
-        .iter()
-        .zip(count)
-        .zip(normals.into_iter().zip(planes));
-    let found = found.map(|((&position, count), (normal, plane))| Found {
+    let found = wide.iter().zip(count).zip(normals.into_iter().zip(planes));
+    let found = found.map(|((&(position, factor), count), (normal, plane))| Found {
         position,
-        radius: radius(position),
+        factor,
+        radius: factor * own(position),
         count,
         normal,
         plane,
@@ -187,6 +226,7 @@ fn write<T: Real>(neighborhoods: &Neighborhoods<T>, found: Vec<Found<T>>, out: &
     for found in found {
         let i = neighborhoods.index.order()[found.position as usize] as usize;
         out.radius[i] = found.radius;
+        out.widening[i] = found.factor;
         out.count[i] = found.count;
         out.normals[i] = found.normal;
         out.planes[i] = found.plane;

@@ -11,10 +11,11 @@ use crate::data::cells::CellsMut;
 use crate::data::{Field, GridCotangent};
 use crate::distance::{extend, lattice};
 use crate::isosurface::{Level, local_level};
+use crate::neighbors::RadiiCotangent;
 use crate::orient::Method;
 use crate::poisson::screened;
 use crate::splat::{SampleCotangent, SortedSamples};
-use crate::{Real, isosurface, normals, orient, poisson, splat, vector};
+use crate::{Real, isosurface, neighbors, normals, orient, poisson, splat, vector};
 
 /// Scratch buffers of the pullback: a field, an index for each cell whose φ has a cotangent, and some numbers
 /// for each sample and each face.
@@ -38,6 +39,7 @@ pub struct PullbackScratch<T: Real> {
     splat: splat::PullbackScratch<T>,
     areas: splat::area::PullbackScratch<T>,
     normals: normals::Scratch<T>,
+    radii: RadiiCotangent,
 }
 
 /// The scratch buffers that stay with a reconstruction between calls of [`Reconstruction::pullback_into`]. A call while
@@ -55,7 +57,7 @@ impl<T: Pipeline> Reconstruction<T> {
     /// Cotangents of the samples and of the grid, from cotangents of any of the results: the transpose of the derivative
     /// of the whole pipeline, stage by stage in reverse.
     ///
-    /// Held constant, as the stages say: neighborhoods and their radii, signs of the normals, which cells are
+    /// Held constant, as the stages say: which samples are neighbors, signs of the normals, which cells are
     /// inside, which face is closest. A derivative without a bound is replaced by a bounded one, one that the number type
     /// cannot hold by the nearest number that it can, or 0; both are counted in [`CloudCotangent::guarded`]. The result has the same bits for any number of threads.
     ///
@@ -355,6 +357,8 @@ impl<T: Real> Reconstruction<T> {
             ..
         } = &mut scratch.samples;
         out.normals.clear();
+        let radii_bar = &mut scratch.radii;
+        radii_bar.clear();
         match self.options.orient {
             Method::Given => {
                 out.guarded += orient::given_pullback(&self.given, normals_bar);
@@ -363,7 +367,8 @@ impl<T: Real> Reconstruction<T> {
             _ => {
                 orient::axes_pullback(&self.orientation.normals, &axes.normals, normals_bar);
                 let scratch = &mut scratch.normals;
-                out.guarded += normals::pullback(neighborhoods, axes, normals_bar, scratch, points);
+                out.guarded +=
+                    normals::pullback(neighborhoods, axes, normals_bar, scratch, points, radii_bar);
             }
         }
         if self.options.area {
@@ -373,8 +378,10 @@ impl<T: Real> Reconstruction<T> {
                 areas,
                 &mut scratch.areas,
                 points,
+                radii_bar,
             );
         }
+        neighbors::pullback(neighborhoods, radii_bar, points);
         out.points.clear();
         out.points.extend_from_slice(points);
     }

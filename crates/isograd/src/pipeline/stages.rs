@@ -449,7 +449,7 @@ fn march<T: Real>(
     }
 }
 
-/// Neighborhoods, with the radii of `held` if given, and the axis of every point, unless all normals are given.
+/// Neighborhoods, and the axis of every point, unless all normals are given; isolated and widened as in `held` if given.
 pub(super) fn find_axes<T: Real>(
     cloud: &PointCloud<T>,
     radius: Radius,

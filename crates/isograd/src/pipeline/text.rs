@@ -48,9 +48,27 @@ macro_rules! from_str {
     };
 }
 
-from_str!(Radius, "radius", "a finite length above 0, or 'auto'", {
-    "auto" => Self::Auto,
-}, |r: f64| r > 0.0 => Self::Fixed);
+impl FromStr for Radius {
+    type Err = ParseOptionError;
+
+    fn from_str(text: &str) -> Result<Self, ParseOptionError> {
+        let length = |text: &str| {
+            let length = text.trim().parse::<f64>().ok();
+            length.filter(|&r| r > 0.0 && r.is_finite())
+        };
+        let value = match (text, text.strip_prefix("cut:")) {
+            ("auto", _) => Some(Self::Auto),
+            (_, Some(radius)) => length(radius).map(Self::Cut),
+            (radius, None) => length(radius).map(Self::Fixed),
+        };
+        value.ok_or(ParseOptionError {
+            option: "radius",
+            text: text.into(),
+            expected: "a finite length above 0, or 'auto'; 'cut:' before the length for the paper's weights",
+        })
+    }
+}
+
 from_str!(Method, "orient", "'auto', 'parity', 'given', 'signs', 'sensors' or 'previous'", {
     "auto" => Self::Auto,
     "parity" => Self::Parity(ParityOptions::default()),
@@ -208,7 +226,7 @@ mod tests {
         for (text, message) in [
             (
                 r#"{"radius": 0}"#,
-                "radius is '0'; give a finite length above 0, or 'auto'",
+                "radius is '0'; give a finite length above 0, or 'auto'; 'cut:' before the length for the paper's weights",
             ),
             (r#"{"radius": "wide"}"#, "radius is 'wide'"),
             (

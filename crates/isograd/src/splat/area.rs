@@ -18,17 +18,17 @@
 //! Given `ā_i`, with `d_j = x_j − x_i`:
 //! ```text
 //! d̄_j = ā_i a_i² · 12/(π R_i⁴) · (1 − r_j²/R_i²) d_j
-//! x̄_j += d̄_j,   x̄_i −= Σ_j d̄_j
+//! x̄_j += d̄_j,   x̄_i −= Σ_j d̄_j,   R_i R̄_i = 2 a_i ā_i − Σ_j ⟨d̄_j, d_j⟩
 //! ```
 //! `K` and its derivative are 0 at the radius, so samples enter and leave smoothly. [`pullback`] gathers.
 //!
 //! # Not differentiable
-//! The radii and the isolated samples are held constant.
+//! The isolated samples are held constant.
 
 use rayon::prelude::*;
 
 use crate::element::plane;
-use crate::neighbors::{Candidates, LANES, Neighborhoods};
+use crate::neighbors::{Candidates, LANES, Neighborhoods, RadiiCotangent};
 use crate::{Real, parallel, vector};
 
 /// Writes the `(N,)` areas `a_i`, in input order and the unit of the points squared; positive, and 0
@@ -69,17 +69,18 @@ pub struct PullbackScratch<T> {
     /// `ā_i a_i² · 12/(π R_i⁴)`, in input order and in that of the cells, 0 there for grown radii.
     factors: Vec<T>,
     sorted_factors: Vec<T>,
-    sorted: Vec<[T; 3]>,
+    sorted: Vec<[T; 4]>,
 }
 
 /// Adds to `points_bar` `(N, 3)` the cotangents of the points from those of the areas, `areas_bar` `(N,)`.
-/// `neighborhoods` and `areas` are those of [`forward`]; all in input order.
+/// `neighborhoods` and `areas` are those of [`forward`]; all in input order. What the radii get is added to `radii_bar`.
 pub fn pullback<T: Real>(
     neighborhoods: &Neighborhoods<T>,
     areas: &[T],
     areas_bar: &[T],
     scratch: &mut PullbackScratch<T>,
     points_bar: &mut [[T; 3]],
+    radii_bar: &mut RadiiCotangent,
 ) {
     let PullbackScratch {
         factors,
@@ -101,22 +102,34 @@ pub fn pullback<T: Real>(
     order.map(common).collect_into_vec(sorted_factors);
     let (arch, radius) = (pulp::Arch::new(), neighborhoods.common_radius);
     let own = &*sorted_factors;
-    neighborhoods.add_gathered([own], sorted, points_bar, &|position, point, candidates| {
-        crate::simd::vectorized!(arch, gather(point, own[position], radius, candidates))
+    let common =
+        neighborhoods.add_gathered([own], sorted, points_bar, &|position, point, candidates| {
+            crate::simd::vectorized!(arch, gather(point, own[position], radius, candidates))
+        });
+    // An area grows with the square of the lengths if the offsets and the radius are scaled alike.
+    let twice = |i: usize| 2.0 * areas[i].f64() * areas_bar[i].f64();
+    let [of_areas] = parallel::sum_array(areas.len(), |i| match neighborhoods.has_grown(i) {
+        true => [0.0],
+        false => [twice(i)],
     });
+    radii_bar.add_common(of_areas - common);
     let factors = &*factors;
-    neighborhoods.add_from_wide(&neighborhoods.radius, points_bar, &|i, _, offset| {
+    let offset_bar = |i: usize, _, offset| {
         let square = neighborhoods.radius[i] * neighborhoods.radius[i];
         let rise = T::one() - vector::norm_squared(offset) / square;
         vector::scale(offset, factors[i] * rise.max(T::zero()))
-    });
+    };
+    let radius_bar = |i: usize, sum: f64| twice(i) - sum;
+    let radius = &neighborhoods.radius;
+    neighborhoods.add_from_wide(radius, points_bar, radii_bar, &offset_bar, &radius_bar);
 }
 
-/// `−Σ_c (f_k + f_c)(1 − r_c²/R²) d_c`: cotangent of point `k` as a center, and as a neighbor of others.
+/// `−Σ_c (f_k + f_c)(1 − r_c²/R²) d_c`: cotangent of point `k` as a center, and as a neighbor of others; and
+/// `Σ_c f_k (1 − r_c²/R²) r_c²`.
 #[inline(always)]
-fn gather<T: Real>(center: [T; 3], own: T, radius: T, candidates: &Candidates<T, 1>) -> [T; 3] {
+fn gather<T: Real>(center: [T; 3], own: T, radius: T, candidates: &Candidates<T, 1>) -> [T; 4] {
     let scale = T::one() / (radius * radius);
-    let mut sums = [[T::zero(); LANES]; 3];
+    let mut sums = [[T::zero(); LANES]; 4];
     candidates.for_each_lanes(
         radius,
         #[inline(always)]
@@ -124,14 +137,16 @@ fn gather<T: Real>(center: [T; 3], own: T, radius: T, candidates: &Candidates<T,
             for l in 0..LANES {
                 let [x, y, z] = [0, 1, 2].map(|a| lanes.point[a][l] - center[a]);
                 let d2 = x * x + y * y + z * z;
-                let f = if d2 <= lanes.limit[l] {
-                    (own + lanes.values[0][l]) * (T::one() - d2 * scale)
+                let rise = if d2 <= lanes.limit[l] {
+                    T::one() - d2 * scale
                 } else {
                     T::zero()
                 };
+                let f = (own + lanes.values[0][l]) * rise;
                 sums[0][l] -= f * x;
                 sums[1][l] -= f * y;
                 sums[2][l] -= f * z;
+                sums[3][l] += own * rise * d2;
             }
         },
     );

@@ -1,6 +1,7 @@
 //! One program for all tests that need none of their own, since each program compiles the stages again.
 
 mod common;
+mod continuity;
 mod determinism;
 mod finite;
 mod gradients;

@@ -22,7 +22,7 @@ fn constants_are_kept<T: Real>() {
     let constant = [0.1, -3.7e5, 2.0 / 3.0];
     let (extension, _) = scene.extend(&scene.attribute(|_| constant));
     // A sum of weights that is 1 to a few rounding errors.
-    let tolerance = 4.0 * T::epsilon().f64();
+    let tolerance = 8.0 * T::epsilon().f64();
     for value in extension
         .vertices
         .chunks_exact(3)

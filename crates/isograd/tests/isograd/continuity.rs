@@ -1,0 +1,106 @@
+//! The indicator is continuous in the points: one sample moves along the surface, through the neighborhoods of others, and
+//! what it changes by in one step is ever less in ever smaller ones.
+
+use isograd::isosurface::Level;
+use isograd::neighbors::Radius;
+use isograd::orient::Method;
+use isograd::{Grid, Options, PointCloud, Reconstructor, SurfaceResolution};
+
+use crate::common::{TORUS, Uniform};
+
+/// A torus of 400 samples, one of which is moved.
+struct Line {
+    cloud: PointCloud<f64>,
+    moving: usize,
+    direction: [f64; 3],
+    plan: Reconstructor<f64>,
+}
+
+impl Line {
+    fn new(seed: u64, options: &Options) -> Self {
+        let grid = Grid::new([-1.23, -1.21, -0.62], 0.1, [25, 25, 13]).expect("a grid");
+        let cloud = TORUS.uniform::<f64>(400, seed);
+        let mut random = Uniform::new(seed);
+        let moving = (400.0 * random.next()) as usize;
+        let [x, y, _] = cloud.points()[moving];
+        // Along the surface, by about three times the distance between samples.
+        let direction = [-y, x, 0.0].map(|v| 0.4 * v / x.hypot(y));
+        Self {
+            cloud,
+            moving,
+            direction,
+            plan: Reconstructor::new(grid, options.clone()).expect("options"),
+        }
+    }
+
+    /// The indicator, relative to its level at the surface.
+    fn at(&mut self, step: f64) -> Vec<f64> {
+        let mut points = self.cloud.points().to_vec();
+        let start = points[self.moving];
+        points[self.moving] = std::array::from_fn(|a| start[a] + step * self.direction[a]);
+        let normals = self.cloud.normals().expect("given").to_vec();
+        let moved = PointCloud::new(points).and_then(|cloud| cloud.with_normals(normals));
+        let result = self.plan.reconstruct(&moved.expect("a cloud"));
+        let result = result.expect("a torus");
+        let values = result.indicator().values().iter();
+        values.map(|chi| chi - result.iso_value()).collect()
+    }
+
+    /// What is left of the largest of the changes in `steps` steps when the step is halved 30 times.
+    fn jump(&mut self, steps: usize) -> f64 {
+        let change = |a: &[f64], b: &[f64]| {
+            let changes = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+            changes.fold(0.0, f64::max)
+        };
+        let place = |k: usize| k as f64 / steps as f64;
+        let mut largest = (0.0, 0);
+        let mut last = self.at(0.0);
+        for k in 1..=steps {
+            let next = self.at(place(k));
+            let changed = change(&last, &next);
+            if changed > largest.0 {
+                largest = (changed, k);
+            }
+            last = next;
+        }
+        let [mut low, mut high] = [place(largest.1 - 1), place(largest.1)];
+        let (mut below, mut above) = (self.at(low), self.at(high));
+        for _ in 0..30 {
+            let middle = 0.5 * (low + high);
+            let between = self.at(middle);
+            match change(&below, &between) > change(&between, &above) {
+                true => (high, above) = (middle, between),
+                false => (low, below) = (middle, between),
+            }
+        }
+        change(&below, &above)
+    }
+}
+
+#[test]
+fn the_indicator_does_not_jump_where_a_sample_enters_a_neighborhood() {
+    let sided = Options::default().orient(Method::Signs).checks(false);
+    let fine = sided.clone().surface(SurfaceResolution::Factor(1.5));
+    let local = sided
+        .clone()
+        .surface(SurfaceResolution::Grid)
+        .level(Level::Local);
+    for options in [fine, local] {
+        for seed in 1..4 {
+            let jump = Line::new(seed, &options).jump(60);
+            assert!(jump < 1e-8, "seed {seed}: {jump:e}, {options:?}");
+        }
+    }
+}
+
+/// The test above finds jumps.
+#[test]
+fn the_indicator_jumps_with_the_weights_of_the_paper() {
+    let options = Options::default().orient(Method::Signs).checks(false);
+    let options = options
+        .surface(SurfaceResolution::Grid)
+        .radius(Radius::Cut(0.3));
+    let jumps = (1..4).map(|seed| Line::new(seed, &options).jump(60));
+    let jumps = jumps.filter(|&jump| jump > 1e-5).count();
+    assert!(jumps >= 2, "{jumps} of 3");
+}
