@@ -17,7 +17,7 @@ const FEW: usize = 16;
 
 /// Share of contradicted couplings that is doubtful, times the square root of the number of samples: a wrong patch shows
 /// along its border, the samples of which grow with that root.
-const CONTRADICTED: f64 = 0.3;
+const CONTRADICTED: f64 = 0.25;
 
 /// Share of noisy samples from which couplings and winding number are not reliable enough.
 const NOISY: f64 = 0.2;
@@ -42,7 +42,7 @@ impl DomainSigns {
             return;
         }
         // The first patch has a border that explains the contradictions; then its outline is refined.
-        let mut least = self.sign.len().isqrt();
+        let mut least = self.sign.len().isqrt() / 2;
         for share in SHARES {
             let segments = self.cut(graph, (self.sign.len() / share).max(FEW));
             let (ties, outcome) = self.solve(graph, evidence, segments, winding, place);
