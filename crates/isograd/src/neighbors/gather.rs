@@ -13,6 +13,14 @@ use super::radius_pullback::RadiiCotangent;
 use crate::parallel::{self, CHUNK};
 use crate::{Real, vector};
 
+/// What some centers contribute.
+struct Contributions<T> {
+    /// Cotangents of points.
+    points: Vec<(u32, [T; 3])>,
+    /// `Σ ⟨d̄_j, d_j⟩` of each center.
+    sums: Vec<f64>,
+}
+
 impl<T: Real> Neighborhoods<T> {
     /// Whether the radius of a point has grown beyond the common one.
     #[inline(always)]
@@ -69,15 +77,16 @@ impl<T: Real> Neighborhoods<T> {
         let wide: Vec<usize> = wide.collect();
         // Rounds of a fixed number of centers, so that the lists stay short.
         for round in wide.chunks(4 * CHUNK) {
-            let lists: Vec<(Vec<(u32, [T; 3])>, Vec<f64>)> = round
+            let lists: Vec<Contributions<T>> = round
                 .par_chunks(CHUNK / 8)
                 .map(|centers| self.contributions(radius, centers, offset_bar))
                 .collect();
-            let (points, sums): (Vec<_>, Vec<_>) = lists.into_iter().unzip();
-            for (j, bar) in points.into_iter().flatten() {
-                points_bar[j as usize] = vector::add(points_bar[j as usize], bar);
+            for (j, bar) in lists.iter().flat_map(|list| &list.points) {
+                let sum = &mut points_bar[*j as usize];
+                *sum = vector::add(*sum, *bar);
             }
-            for (&i, sum) in round.iter().zip(sums.into_iter().flatten()) {
+            let sums = lists.iter().flat_map(|list| &list.sums);
+            for (&i, &sum) in round.iter().zip(sums) {
                 radii_bar.add(self, i, radius_bar(i, sum));
             }
         }
@@ -88,8 +97,11 @@ impl<T: Real> Neighborhoods<T> {
         radius: &[T],
         centers: &[usize],
         offset_bar: &impl Fn(usize, usize, [T; 3]) -> [T; 3],
-    ) -> (Vec<(u32, [T; 3])>, Vec<f64>) {
-        let (mut list, mut sums) = (Vec::new(), Vec::new());
+    ) -> Contributions<T> {
+        let mut out = Contributions {
+            points: Vec::new(),
+            sums: Vec::with_capacity(centers.len()),
+        };
         for &i in centers {
             let center = self.index.point(self.position()[i] as usize);
             let (mut total, mut sum) = ([T::zero(); 3], 0.0);
@@ -100,12 +112,12 @@ impl<T: Real> Neighborhoods<T> {
                     let bar = offset_bar(i, j, offset);
                     total = vector::sub(total, bar);
                     sum += vector::dot(bar, offset).f64();
-                    list.push((j as u32, bar));
+                    out.points.push((j as u32, bar));
                 }
             });
-            list.push((i as u32, total));
-            sums.push(sum);
+            out.points.push((i as u32, total));
+            out.sums.push(sum);
         }
-        (list, sums)
+        out
     }
 }

@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use super::radius::{Neighborhoods, Radius};
-use super::rule::{AUTO_MARGIN, FEWEST_NEIGHBORS, GROWTH_MARGIN};
+use super::rule::{AUTO_MARGIN, AUTO_NEIGHBORS, FEWEST_NEIGHBORS, GROWTH_MARGIN};
 use crate::{Real, vector};
 
 /// Cotangents of the radii, in one over the unit of the points where the result has no unit.
@@ -55,21 +55,20 @@ pub fn pullback<T: Real>(
     radii_bar: &RadiiCotangent,
     points_bar: &mut [[T; 3]],
 ) {
-    let index = &neighborhoods.index;
+    let Neighborhoods { index, radius, .. } = neighborhoods;
+    let mut pairs = pairs(neighborhoods, &radii_bar.grown, FEWEST_NEIGHBORS);
+    for (i, _, bar) in &mut pairs {
+        *bar *= GROWTH_MARGIN / radius[*i as usize].f64();
+    }
+    if neighborhoods.rule == Radius::Auto && radii_bar.common != 0.0 {
+        let middle = middle_half(neighborhoods);
+        let share = AUTO_MARGIN * radii_bar.common / neighborhoods.common_radius.f64();
+        let bar = share / middle.len() as f64;
+        let middle: Vec<(u32, f64)> = middle.into_iter().map(|i| (i, bar)).collect();
+        pairs.extend(self::pairs(neighborhoods, &middle, AUTO_NEIGHBORS));
+    }
     let point = |i: u32| index.point(neighborhoods.position()[i as usize] as usize);
-    let grown = radii_bar.grown.par_iter().map(|&(i, bar)| {
-        let mut nearest = Vec::new();
-        index.nearest(point(i), FEWEST_NEIGHBORS, &mut nearest);
-        let &(j, _) = nearest.last()?;
-        let by_distance = GROWTH_MARGIN * bar / neighborhoods.radius[i as usize].f64();
-        Some((i, j, by_distance))
-    });
-    let grown: Vec<Option<(u32, u32, f64)>> = grown.collect();
-    let automatic = match neighborhoods.rule {
-        Radius::Auto if radii_bar.common != 0.0 => middle_pairs(neighborhoods, radii_bar.common),
-        _ => Vec::new(),
-    };
-    for (i, j, by_distance) in grown.into_iter().flatten().chain(automatic) {
+    for (i, j, by_distance) in pairs {
         let offset = vector::sub(point(j), point(i));
         let length = vector::norm(offset);
         if length > T::zero() {
@@ -80,29 +79,28 @@ pub fn pullback<T: Real>(
     }
 }
 
-/// Pairs of points whose distances the automatic radius is the mean of, with the cotangent of each distance: a point of
-/// the middle half, and its 24th sample. Where several are equally far, each has a share.
-fn middle_pairs<T: Real>(neighborhoods: &Neighborhoods<T>, bar: f64) -> Vec<(u32, u32, f64)> {
+/// The points whose distances the automatic radius is the mean of.
+fn middle_half<T: Real>(neighborhoods: &Neighborhoods<T>) -> Vec<u32> {
     let Neighborhoods { index, reach, .. } = neighborhoods;
     let Some([least, largest]) = neighborhoods.middle else {
         return Vec::new();
     };
-    let is_middle = |&position: &usize| least <= reach[position] && reach[position] <= largest;
-    let positions = (0..reach.len()).into_par_iter();
-    let middle: Vec<usize> = positions.filter(is_middle).collect();
-    let share = AUTO_MARGIN * bar / (neighborhoods.common_radius.f64() * middle.len() as f64);
-    let pairs = middle.par_iter().flat_map_iter(|&position| {
-        let square = reach[position];
-        let (center, mut last) = (index.order()[position], Vec::new());
-        // Rounding of the root must not leave the last one out.
-        let radius = square.sqrt() * (T::one() + T::of(4.0) * T::epsilon());
-        index.for_each_within(index.point(position), radius, |j, d2| {
-            if d2 == square {
-                last.push(j as u32);
-            }
-        });
-        let share = share / last.len() as f64;
-        last.into_iter().map(move |j| (center, j, share))
-    });
-    pairs.collect()
+    let samples = index.order().par_iter().zip(reach);
+    let middle = samples.filter(|&(_, &square)| least <= square && square <= largest);
+    middle.map(|(&i, _)| i).collect()
+}
+
+/// Each of the points with its `k`-th sample and its number.
+fn pairs<T: Real>(
+    neighborhoods: &Neighborhoods<T>,
+    points: &[(u32, f64)],
+    k: usize,
+) -> Vec<(u32, u32, f64)> {
+    let index = &neighborhoods.index;
+    let pair = |nearest: &mut Vec<(u32, T)>, &(i, bar): &(u32, f64)| {
+        let point = index.point(neighborhoods.position()[i as usize] as usize);
+        index.nearest(point, k, nearest);
+        (i, nearest.last().map_or(i, |&(j, _)| j), bar)
+    };
+    points.par_iter().map_init(Vec::new, pair).collect()
 }

@@ -15,7 +15,7 @@ pub const FEWEST_NEIGHBORS: usize = 8;
 /// the radius.
 pub const GROWTH_MARGIN: f64 = 1.05;
 
-/// Samples that the automatic radius holds at the median, the center included.
+/// Samples that the automatic radius holds in the middle, the center included.
 pub const AUTO_NEIGHBORS: usize = 24;
 
 /// By how much the automatic radius passes the mean: else samples of a lattice would lie exactly on the radius of
