@@ -119,7 +119,11 @@ impl Inputs for Library {
 fn options(random: &mut Random) -> Options {
     let mut options = Options::default();
     if random.one_in(3) {
-        options.radius = Radius::Fixed(random.power(-3.0, 1.0));
+        let radius = random.power(-3.0, 1.0);
+        options.radius = match random.one_in(3) {
+            true => Radius::Cut(radius),
+            false => Radius::Fixed(radius),
+        };
     }
     if random.one_in(2) {
         let parity = ParityOptions {

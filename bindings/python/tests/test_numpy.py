@@ -305,6 +305,8 @@ def test_bad_arguments_are_refused_with_a_reason():
         (ValueError, "normals", lambda: isograd.reconstruct(SPHERE, GRID, orient="given")),
         (ValueError, "does not use", lambda: isograd.reconstruct(SPHERE, GRID, normals=SPHERE)),
         (ValueError, "smoothing", lambda: isograd.Options(smoothing=-1)),
+        (ValueError, "radius is 'cut:0'; give", lambda: isograd.Options(radius="cut:0")),
+        (ValueError, "radius is 'wide'", lambda: isograd.Options(radius="wide")),
         (ValueError, "surface is '0.5x'", lambda: isograd.Options(surface="0.5x")),
         (ValueError, "surface is 0", lambda: isograd.Options(surface=0)),
         (ValueError, "'sparse'", lambda: isograd.Options(solve="fast")),

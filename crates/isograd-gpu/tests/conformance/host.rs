@@ -1,6 +1,7 @@
 //! The front for hosts, beside the CPU's plan.
 
 use isograd::distance::extend;
+use isograd::neighbors::Radius;
 use isograd::orient::Method;
 use isograd::poisson::Walls;
 use isograd::{
@@ -448,6 +449,8 @@ fn what_devices_do_not_have_is_named() {
     assert!(text.contains("0 or more"), "{text}");
     let text = refused(options().trim(isograd::isosurface::trim::Trim::Auto));
     assert!(text.contains("neither trim nor sheet"), "{text}");
+    let text = refused(options().radius(Radius::Cut(0.1)));
+    assert!(text.contains("cut:0.1"), "{text}");
     let text = refused(options().walls(Walls::Closed));
     assert!(text.contains("give 'free'"), "{text}");
     let text = refused(options().surface(SurfaceResolution::Factor(2.0)));

@@ -219,6 +219,8 @@ mod tests {
         let text = r#"{"radius": "auto", "smoothing": "auto", "surface": "auto", "band": "full"}"#;
         let options: Options = serde_json::from_str(text).expect("valid");
         assert_eq!(options, Options::default());
+        let options: Options = serde_json::from_str(r#"{"radius": "cut:0.5"}"#).expect("valid");
+        assert_eq!(options.radius, Radius::Cut(0.5));
     }
 
     #[test]
@@ -229,6 +231,7 @@ mod tests {
                 "radius is '0'; give a finite length above 0, or 'auto'; 'cut:' before the length for the paper's weights",
             ),
             (r#"{"radius": "wide"}"#, "radius is 'wide'"),
+            (r#"{"radius": "cut:-1"}"#, "radius is 'cut:-1'"),
             (
                 r#"{"smoothing": -1}"#,
                 "smoothing is '-1'; give 0 or more cells",
