@@ -5,8 +5,9 @@
 
 use rayon::prelude::*;
 
+use super::cell_index::compare_points;
 use super::radius::{Neighborhoods, Radius};
-use super::rule::{AUTO_MARGIN, AUTO_NEIGHBORS, FEWEST_NEIGHBORS, GROWTH_MARGIN};
+use super::rule::{AUTO_MARGIN, FEWEST_NEIGHBORS, GROWTH_MARGIN};
 use crate::{Real, vector};
 
 /// Cotangents of the radii, in one over the unit of the points where the result has no unit.
@@ -55,17 +56,10 @@ pub fn pullback<T: Real>(
     radii_bar: &RadiiCotangent,
     points_bar: &mut [[T; 3]],
 ) {
-    let Neighborhoods { index, radius, .. } = neighborhoods;
-    let mut pairs = pairs(neighborhoods, &radii_bar.grown, FEWEST_NEIGHBORS);
-    for (i, _, bar) in &mut pairs {
-        *bar *= GROWTH_MARGIN / radius[*i as usize].f64();
-    }
+    let index = &neighborhoods.index;
+    let mut pairs = grown_pairs(neighborhoods, &radii_bar.grown);
     if neighborhoods.rule == Radius::Auto && radii_bar.common != 0.0 {
-        let middle = middle_half(neighborhoods);
-        let share = AUTO_MARGIN * radii_bar.common / neighborhoods.common_radius.f64();
-        let bar = share / middle.len() as f64;
-        let middle: Vec<(u32, f64)> = middle.into_iter().map(|i| (i, bar)).collect();
-        pairs.extend(self::pairs(neighborhoods, &middle, AUTO_NEIGHBORS));
+        pairs.extend(middle_pairs(neighborhoods, radii_bar.common));
     }
     let point = |i: u32| index.point(neighborhoods.position()[i as usize] as usize);
     for (i, j, by_distance) in pairs {
@@ -79,28 +73,50 @@ pub fn pullback<T: Real>(
     }
 }
 
-/// The points whose distances the automatic radius is the mean of.
-fn middle_half<T: Real>(neighborhoods: &Neighborhoods<T>) -> Vec<u32> {
+/// Points whose radius has grown, each with its 8th sample and the cotangent of the distance to it.
+fn grown_pairs<T: Real>(
+    neighborhoods: &Neighborhoods<T>,
+    grown: &[(u32, f64)],
+) -> Vec<(u32, u32, f64)> {
+    let Neighborhoods { index, radius, .. } = neighborhoods;
+    let pair = |nearest: &mut Vec<(u32, T)>, &(i, bar): &(u32, f64)| {
+        let position = neighborhoods.position()[i as usize] as usize;
+        index.nearest(index.point(position), FEWEST_NEIGHBORS, nearest);
+        let j = nearest.last().map_or(i, |&(j, _)| j);
+        (i, j, GROWTH_MARGIN * bar / radius[i as usize].f64())
+    };
+    grown.par_iter().map_init(Vec::new, pair).collect()
+}
+
+/// The points whose distances the automatic radius is the mean of, each with its 24th sample and the cotangent of the
+/// distance to it. Of several that are equally far it is the first by its coordinates.
+fn middle_pairs<T: Real>(neighborhoods: &Neighborhoods<T>, bar: f64) -> Vec<(u32, u32, f64)> {
     let Neighborhoods { index, reach, .. } = neighborhoods;
     let Some([least, largest]) = neighborhoods.middle else {
         return Vec::new();
     };
-    let samples = index.order().par_iter().zip(reach);
-    let middle = samples.filter(|&(_, &square)| least <= square && square <= largest);
-    middle.map(|(&i, _)| i).collect()
-}
-
-/// Each of the points with its `k`-th sample and its number.
-fn pairs<T: Real>(
-    neighborhoods: &Neighborhoods<T>,
-    points: &[(u32, f64)],
-    k: usize,
-) -> Vec<(u32, u32, f64)> {
-    let index = &neighborhoods.index;
-    let pair = |nearest: &mut Vec<(u32, T)>, &(i, bar): &(u32, f64)| {
-        let point = index.point(neighborhoods.position()[i as usize] as usize);
-        index.nearest(point, k, nearest);
-        (i, nearest.last().map_or(i, |&(j, _)| j), bar)
+    let is_middle = |&position: &usize| least <= reach[position] && reach[position] <= largest;
+    let positions = (0..reach.len()).into_par_iter();
+    let middle: Vec<usize> = positions.filter(is_middle).collect();
+    let share = AUTO_MARGIN * bar / neighborhoods.common_radius.f64();
+    let share = share / middle.len() as f64;
+    let point = |j: u32| index.point(neighborhoods.position()[j as usize] as usize);
+    let pair = |&position: &usize| {
+        let (i, square) = (index.order()[position], reach[position]);
+        let mut last = None;
+        // Rounding of the root must not leave the sample out.
+        let radius = square.sqrt() * (T::one() + T::of(4.0) * T::epsilon());
+        index.for_each_within(index.point(position), radius, |j, d2| {
+            let j = j as u32;
+            let comes_before = |last: u32| {
+                let by_place = compare_points(point(j), point(last));
+                by_place.then(j.cmp(&last)).is_lt()
+            };
+            if d2 == square && last.is_none_or(comes_before) {
+                last = Some(j);
+            }
+        });
+        (i, last.unwrap_or(i), share)
     };
-    points.par_iter().map_init(Vec::new, pair).collect()
+    middle.par_iter().map(pair).collect()
 }

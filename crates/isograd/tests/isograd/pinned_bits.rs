@@ -271,7 +271,7 @@ const RECORDED: [[[u64; 5]; 2]; 5] = [
             0x820b6ab6fd9628ca,
             0xc1ce30a2c61ae3be,
             0x989a8c559887319d,
-            0x137b982bcb910c3e,
+            0x21d31e756f282e26,
         ],
     ],
     [
@@ -287,7 +287,7 @@ const RECORDED: [[[u64; 5]; 2]; 5] = [
             0x92c98c42a6c5bafa,
             0x3d1a437be76e3d97,
             0xbb267a0bb334e03a,
-            0xf23595f6a3386467,
+            0x6c301955dbbadc78,
         ],
     ],
     [
@@ -319,7 +319,7 @@ const RECORDED: [[[u64; 5]; 2]; 5] = [
             0x762da0d9423b4060,
             0x52e01855a52b090e,
             0xbf5918b86693d771,
-            0x8c7b97347a9ad9d7,
+            0x48458bf5c5fceefd,
         ],
     ],
     [
@@ -335,7 +335,7 @@ const RECORDED: [[[u64; 5]; 2]; 5] = [
             0xb1c5bca15d861f28,
             0xc82795898cfdffd9,
             0x989a8c559887319d,
-            0x7724442c7bc56d40,
+            0xe6eb9822ac0d6dab,
         ],
     ],
 ];
