@@ -18,9 +18,22 @@ fn taper<F: Element>(r: F, steepness: F) -> F {
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 fn rim<F: Element>(r: F, steepness: F) -> F {
-    let t = (F::new(1.0) - r) * steepness;
-    let below = select(t < F::new(1.0), t, F::new(1.0));
-    select(below > F::new(0.0), below, F::new(0.0))
+    to_unit::<F>((F::new(1.0) - r) * steepness)
+}
+
+/// A number, at least 0 and at most 1; 0 for one that is not a number.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+fn to_unit<F: Element>(x: F) -> F {
+    let above = select(x > F::new(0.0), x, F::new(0.0));
+    select(above < F::new(1.0), above, F::new(1.0))
+}
+
+/// 1 up to `from`, 0 from `to` on.
+#[cfg_attr(cube, cube)]
+#[inline(always)]
+pub fn falling<F: Element>(x: F, from: F, to: F) -> F {
+    to_unit::<F>((to - x) / (to - from))
 }
 
 /// `w = s/(r + ε)`: weight of a sample at distance `r`, in radii, in the covariance.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -46,7 +46,7 @@ def orient(
     *,
     normals: ArrayLike | None = None,
     sensors: ArrayLike | None = None,
-    radius: float | Literal["auto"] = "auto",
+    radius: float | str = "auto",
     orient: OrientLike = Orient.AUTO,
 ) -> Oriented:
     """Outward unit normals of a cloud, and the confidence in the side of each.

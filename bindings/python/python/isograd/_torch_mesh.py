@@ -161,7 +161,7 @@ def extend(
 
 
 @in_batches
-def orient(points: Tensor, before: Tensor, *, radius: float | Literal["auto"] = "auto") -> Tensor:
+def orient(points: Tensor, before: Tensor, *, radius: float | str = "auto") -> Tensor:
     """``(N, 3)`` unit normals, estimated from the points, each on the side of a given normal.
 
     For a cloud that moves: ``before`` are the normals of the same points in the step before, at first those of

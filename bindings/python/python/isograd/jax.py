@@ -256,7 +256,7 @@ _mesh.defvjp(_mesh_forward, _mesh_pullback)
 
 
 def orient(
-    points: ArrayLike, before: ArrayLike, *, radius: float | Literal["auto"] = "auto"
+    points: ArrayLike, before: ArrayLike, *, radius: float | str = "auto"
 ) -> jax.Array:
     """``(N, 3)`` unit normals, estimated from the points, each on the side of a given normal.
 

@@ -93,15 +93,6 @@ fn flag_rough<F: Float + CubeElement>(rough: &Array<F>, flags: &mut Array<u32>, 
     }
 }
 
-/// 1 up to the limit at an index, 0 from the next one on.
-#[cube]
-fn falling<F: Float + CubeElement>(x: F, limits: &Array<F>, #[comptime] index: usize) -> F {
-    let (from, to) = (limits[index], limits[index + 1]);
-    let share = (to - x) / (to - from);
-    let below = select(share < F::new(1.0), share, F::new(1.0));
-    select(below > F::new(0.0), below, F::new(0.0))
-}
-
 /// One unit tries one of the listed points, of which the last of `sums` says how many there are. `limits` are those of
 /// the roughness, of the gain and of the one-sidedness.
 #[cube(launch)]
@@ -126,9 +117,9 @@ fn try_wider<F: Float + CubeElement>(
         let one_sided = F::sqrt(second * second + third * third);
         let wider = roughness::<F>(fit.eigen.values);
         let own = rough[at];
-        let share = (F::new(1.0) - falling::<F>(own, limits, 0usize))
-            * falling::<F>(wider / own, limits, 2usize)
-            * falling::<F>(one_sided, limits, 4usize);
+        let share = (F::new(1.0) - plane::falling::<F>(own, limits[0], limits[1]))
+            * plane::falling::<F>(wider / own, limits[2], limits[3])
+            * plane::falling::<F>(one_sided, limits[4], limits[5]);
         if share > F::new(0.0) {
             rough[at] = share * wider + (F::new(1.0) - share) * own;
             factors[at] = share * step + (F::new(1.0) - share) * factors[at];

@@ -11,7 +11,7 @@
 //! As printed there; [`pullback`] gathers, with the radius of each center.
 //!
 //! # Not differentiable
-//! What is isolated, which is held constant.
+//! The isolated samples are held constant.
 
 use cubecl::prelude::*;
 

@@ -13,7 +13,7 @@ use super::radius_pullback::RadiiCotangent;
 use crate::parallel::{self, CHUNK};
 use crate::{Real, vector};
 
-/// What some centers contribute.
+/// Contributions of some centers.
 struct Contributions<T> {
     /// Cotangents of points.
     points: Vec<(u32, [T; 3])>,

@@ -1,7 +1,7 @@
 //! Cotangents of the radii to cotangents of the points.
 //!
-//! What depends on the radius depends on it through quotients `d/R` alone, but for powers of `R` as factors; so a
-//! pullback that has the `d̄_j` has `R R̄ = p y ȳ − Σ ⟨d̄_j, d_j⟩` as well, for a `y` in units of length to the power `p`.
+//! Normals and areas depend on the radius through quotients `d/R` alone, but for powers of `R` as factors. So a pullback that
+//! has the `d̄_j` also has `R R̄ = p y ȳ − Σ ⟨d̄_j, d_j⟩`, for a `y` in units of length to the power `p`.
 
 use rayon::prelude::*;
 

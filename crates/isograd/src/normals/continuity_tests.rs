@@ -6,7 +6,7 @@ use crate::neighbors::tests::{Random, torus};
 use crate::neighbors::{self, Neighborhoods, Radius};
 use crate::{splat, vector};
 
-/// What the cloud of a step has.
+/// Normals, radii and areas of the cloud at one step.
 struct State {
     normals: Vec<[f64; 3]>,
     /// Radii and roots of areas, which have the unit of the points.
@@ -57,7 +57,7 @@ impl Line {
         turns.chain(lengths).fold(0.0, f64::max)
     }
 
-    /// What is left of the largest of the changes in `steps` steps along the line when the step is halved 40 times.
+    /// The largest of the changes in `steps` steps along the line, and of it the larger half, 40 times over.
     fn jump(&self, steps: usize) -> f64 {
         let states: Vec<State> = (0..=steps)
             .map(|k| self.at(k as f64 / steps as f64))

@@ -31,11 +31,11 @@ pub fn forward<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residual<T>)
 /// constant. `neighborhoods` are those of the moved points, as many as before.
 pub(crate) fn hold<T: Real>(
     neighborhoods: &Neighborhoods<T>,
-    held: &Residual<T>,
+    (before, held): (&Neighborhoods<T>, &Residual<T>),
     out: &mut Residual<T>,
 ) {
     find_in_own(neighborhoods, out);
-    widen::repeat(neighborhoods, &held.widening, out);
+    widen::repeat(neighborhoods, &before.radius, &held.radius, out);
 }
 
 /// Axes in the neighborhoods as they are.
@@ -148,8 +148,6 @@ fn moment_terms<T: Real>(
 fn find_all_planes<T: Real>(neighborhoods: &Neighborhoods<T>, arch: Arch, out: &mut Residual<T>) {
     let n = neighborhoods.index.len();
     out.radius.clone_from(&neighborhoods.radius);
-    out.widening.clear();
-    out.widening.resize(n, T::one());
     out.count.clone_from(&neighborhoods.count);
     out.normals.resize(n, [T::zero(); 3]);
     out.planes.resize(n, Plane::default());

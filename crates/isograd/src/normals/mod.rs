@@ -100,8 +100,6 @@ pub struct Residual<T> {
     pub normals: Vec<[T; 3]>,
     /// The radius within which each was found: `R_i`, or up to `3.1 R_i`.
     pub radius: Vec<T>,
-    /// That radius over `R_i`.
-    pub widening: Vec<T>,
     /// Number of samples within that radius, the point itself included.
     pub count: Vec<u32>,
     /// The plane round each point.
@@ -120,7 +118,6 @@ impl<T> Residual<T> {
     pub(crate) fn bytes(&self) -> [usize; 2] {
         let needed = size_of_val(self.normals.as_slice())
             + size_of_val(self.radius.as_slice())
-            + size_of_val(self.widening.as_slice())
             + size_of_val(self.count.as_slice())
             + size_of_val(self.planes.as_slice());
         [needed, size_of_val(self.sorted.as_slice())]
@@ -130,7 +127,6 @@ impl<T> Residual<T> {
     pub fn clear(&mut self) {
         self.normals.clear();
         self.radius.clear();
-        self.widening.clear();
         self.count.clear();
         self.planes.clear();
     }

@@ -61,19 +61,21 @@ pub(super) fn choose<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residu
     }
 }
 
-/// Replaces the axes of samples by those in neighborhoods wider than their own by a factor above 1.
+/// Replaces the axes of samples by those in neighborhoods wider than their own by as much as `radius` is above `own`.
 pub(super) fn repeat<T: Real>(
     neighborhoods: &Neighborhoods<T>,
-    widening: &[T],
+    own: &[T],
+    radius: &[T],
     out: &mut Residual<T>,
 ) {
-    let positions = positions(neighborhoods, |i| widening[i] > T::one());
+    let positions = positions(neighborhoods, |i| radius[i] > own[i]);
     let order = neighborhoods.index.order();
     let found = in_tasks(&positions, |task| {
-        let wide = task
-            .iter()
-            .map(|&p| (p, widening[order[p as usize] as usize]));
-        let wide: Vec<(u32, T)> = wide.collect();
+        let factor = |position: &u32| {
+            let i = order[*position as usize] as usize;
+            (*position, radius[i] / own[i])
+        };
+        let wide: Vec<(u32, T)> = task.iter().map(factor).collect();
         find(neighborhoods, &wide, &mut Candidates::default())
     });
     write(neighborhoods, found, out);
@@ -101,11 +103,6 @@ fn one_sidedness<T: Real>(found: &Found<T>) -> f64 {
     lateral[0].hypot(lateral[1]) / found.radius.f64()
 }
 
-/// 1 up to the first number, 0 from the second on.
-fn falling(x: f64, [from, to]: [f64; 2]) -> f64 {
-    ((to - x) / (to - from)).clamp(0.0, 1.0)
-}
-
 /// Sorted positions of the points that are wanted, by input index.
 fn positions<T: Real>(
     neighborhoods: &Neighborhoods<T>,
@@ -131,7 +128,7 @@ struct Widening<T> {
     roughness: f64,
     /// Of the radius.
     factor: f64,
-    /// What was found with that factor, if it was tried.
+    /// The axis with that factor, if it was tried.
     found: Option<Found<T>>,
 }
 
@@ -139,6 +136,7 @@ impl<T: Real> Widening<T> {
     /// Takes the share of a wider neighborhood that it deserves.
     fn take(&mut self, found: Found<T>) {
         let (own, wider) = (self.roughness, roughness(&found.plane));
+        let falling = |x, [from, to]: [f64; 2]| plane::falling(x, from, to);
         let share = (1.0 - falling(own, ROUGH))
             * falling(wider / own, GAIN)
             * falling(one_sidedness(&found), RIM);
@@ -226,7 +224,6 @@ fn write<T: Real>(neighborhoods: &Neighborhoods<T>, found: Vec<Found<T>>, out: &
     for found in found {
         let i = neighborhoods.index.order()[found.position as usize] as usize;
         out.radius[i] = found.radius;
-        out.widening[i] = found.factor;
         out.count[i] = found.count;
         out.normals[i] = found.normal;
         out.planes[i] = found.plane;

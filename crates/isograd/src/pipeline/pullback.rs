@@ -57,7 +57,7 @@ impl<T: Pipeline> Reconstruction<T> {
     /// Cotangents of the samples and of the grid, from cotangents of any of the results: the transpose of the derivative
     /// of the whole pipeline, stage by stage in reverse.
     ///
-    /// Held constant, as the stages say: which samples are neighbors, signs of the normals, which cells are
+    /// Held constant, as the stages say: how far neighborhoods are widened, signs of the normals, which cells are
     /// inside, which face is closest. A derivative without a bound is replaced by a bounded one, one that the number type
     /// cannot hold by the nearest number that it can, or 0; both are counted in [`CloudCotangent::guarded`]. The result has the same bits for any number of threads.
     ///

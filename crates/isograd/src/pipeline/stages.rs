@@ -467,7 +467,7 @@ pub(super) fn find_axes<T: Real>(
     }
     match held {
         _ if is_given => out.clear(),
-        Some(held) => normals::hold(neighborhoods, &held.normals, out),
+        Some(held) => normals::hold(neighborhoods, (&held.neighborhoods, &held.normals), out),
         None => {}
     }
     report.radius = neighborhoods.common_radius.f64();

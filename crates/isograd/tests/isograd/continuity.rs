@@ -46,7 +46,7 @@ impl Line {
         values.map(|chi| chi - result.iso_value()).collect()
     }
 
-    /// What is left of the largest of the changes in `steps` steps when the step is halved 30 times.
+    /// The largest of the changes in `steps` steps, and of it the larger half, 30 times over.
     fn jump(&mut self, steps: usize) -> f64 {
         let change = |a: &[f64], b: &[f64]| {
             let changes = a.iter().zip(b).map(|(a, b)| (a - b).abs());
