@@ -22,12 +22,12 @@ class Swim:
 
     def __init__(self, n=40, count=4000, lengths=(3, 1, 1), surface="2x", courant=0.25, **shape):
         self.grid = isograd.Grid((0.0, 0.0, 0.0), 1 / n, tuple(round(n * length) for length in lengths))
-        self.tunnel = Tunnel(self.grid, 1 / REYNOLDS, courant / n, speed=SPEED)
         self.fish = isograd.Shape("fish", **{"amplitude": AMPLITUDE, **shape})
         self.coordinates = self.fish.sample(count).coordinates  # the same material points at all times
         self.place = np.array([0.4, lengths[1] / 2, lengths[2] / 2])
         low, high = (np.round((self.place + sweep) * n).astype(int) for sweep in (LOW, HIGH))
         self.window = isograd.Grid(tuple(low / n), 1 / n, tuple(map(int, high - low)))
+        self.tunnel = Tunnel(self.grid, 1 / REYNOLDS, courant / n, SPEED, self.window)
         spacing = 2 * np.sqrt(self.fish.area / count)
         self.options = isograd.Options(orient="signs", surface=surface, radius=2 * spacing)
 
@@ -47,8 +47,7 @@ class Swim:
 
     def body(self, points, velocity, normals):
         band = 3 * self.grid.spacing
-        near = immersed.staggered(points, velocity, self.window, normals=normals, options=self.options, band=band)
-        return immersed.paste(near, np.zeros(3, np.int32), self.window, self.grid, band)
+        return immersed.staggered(points, velocity, self.window, normals=normals, options=self.options, band=band)
 
     def step(self, state, now):
         return self.tunnel.step(state, self.body(*now))

@@ -4,7 +4,8 @@
 use std::any::Any;
 use std::sync::{Mutex, PoisonError};
 
-use isograd::CloudCotangent;
+use isograd::{CloudCotangent, PointCloud, Real, Saved};
+use isograd_backend::View;
 use pyo3::prelude::*;
 
 use crate::arrays::Number;
@@ -15,12 +16,52 @@ use crate::settings::Settings;
 /// Capacity of the pool; the plan that has been idle longest is dropped first.
 const CAPACITY: usize = 4;
 
-/// A plan and the buffers of its pullbacks.
+/// A plan, the cloud of its last result, and the buffers of its pullbacks.
 pub struct Plan<T: Number> {
-    /// The plan.
-    pub plan: isograd_backend::Plan<T>,
-    /// Output of the pullback.
-    pub bar: CloudCotangent<T>,
+    plan: isograd_backend::Plan<T>,
+    last: Option<PointCloud<T>>,
+    bar: CloudCotangent<T>,
+}
+
+impl<T: Number> Plan<T> {
+    /// The reconstruction of a cloud.
+    ///
+    /// # Errors
+    /// Errors of a stage or of the device.
+    pub fn reconstruct(&mut self, cloud: &PointCloud<T>) -> Result<View<'_, T>, Failure> {
+        self.last = None;
+        let result = self.plan.reconstruct(cloud)?;
+        self.last = Some(cloud.clone());
+        Ok(result)
+    }
+
+    /// The reconstruction of a cloud from what was saved of it, and the output of its pullback. Nothing is computed again
+    /// for the cloud of the last call, as in an optimizer, or with a checkpoint.
+    ///
+    /// # Errors
+    /// Errors of a stage or of the device; arrays saved from another result.
+    pub fn restore(
+        &mut self,
+        cloud: &PointCloud<T>,
+        saved: &Saved<'_, T>,
+    ) -> Result<(View<'_, T>, &mut CloudCotangent<T>), Failure> {
+        let Self { plan, last, bar } = self;
+        let is_last = last.take().is_some_and(|last| is_same(&last, cloud));
+        let result = plan.restore(cloud, saved, is_last)?;
+        *last = Some(cloud.clone());
+        Ok((result, bar))
+    }
+}
+
+/// Whether two clouds have the same points and normals, to the bit.
+fn is_same<T: Real>(a: &PointCloud<T>, b: &PointCloud<T>) -> bool {
+    let bits = |rows: &[[T; 3]]| -> Vec<u64> {
+        rows.as_flattened()
+            .iter()
+            .map(|x| x.f64().to_bits())
+            .collect()
+    };
+    bits(a.points()) == bits(b.points()) && a.normals().map(bits) == b.normals().map(bits)
 }
 
 /// An idle plan, its settings and its number type.
@@ -54,6 +95,7 @@ pub fn with_plan<T: Number, R>(
 fn create<T: Number>(settings: &str) -> Result<Plan<T>, Failure> {
     Ok(Plan {
         plan: backend::plan(&Settings::parse(settings)?)?,
+        last: None,
         bar: CloudCotangent::default(),
     })
 }

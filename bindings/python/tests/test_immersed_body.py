@@ -212,6 +212,33 @@ def test_a_window_that_follows_gives_the_body_of_the_whole_grid(x64):  # noqa: F
         immersed.paste(sphere((0, 0, 0), 1.0, (0, 0, 0)), jnp.zeros(3, int), small, GRID, band)
 
 
+def test_a_blend_in_a_window_is_that_of_the_whole_grid(x64):  # noqa: F811
+    small = isograd.Grid((-0.8, -0.8, -0.8), H, (16, 16, 16))
+    fluid = tuple(jnp.asarray(np.random.default_rng(k).standard_normal(GRID.shape)) for k in range(3))
+    cells = jnp.array([3, -2, 1])
+
+    def of(body, near):
+        blended = immersed.blend(near, body, width=H, spacing=H)
+        inner = immersed.inner_momentum(near, body, H)
+        return blended, immersed.loads(near, blended, body, spacing=H, dt=0.1).force, sum(u.sum() for u in inner)
+
+    center = H * np.array([3, -2, 1])
+    whole = sphere(center, 0.35, (0.1, 0.2, 0.3))
+    cut = [immersed.crop(part, cells, small, GRID) for part in (whole.sdf, fluid)]
+    assert cut[0][0].shape == small.shape
+    near = whole._replace(sdf=cut[0], velocity=tuple(v[:16, :16, :16] for v in whole.velocity))  # the same everywhere
+    (blended, force, momentum), (parts, found, inner) = of(whole, fluid), of(near, cut[1])
+    for expected, part in zip(blended, immersed.insert(fluid, parts, cells, small, GRID)):
+        np.testing.assert_allclose(part, expected, atol=1e-14)
+    np.testing.assert_allclose(found, force, rtol=1e-12)
+    np.testing.assert_allclose(inner, momentum, rtol=1e-12)
+    for bad in (lambda: immersed.crop(cut[1], cells, small, GRID), lambda: immersed.insert(fluid, fluid, cells, small, GRID)):
+        with pytest.raises(ValueError, match=r"have the shapes .* give those of the grid"):
+            bad()
+    with pytest.raises(ValueError, match="3 fields and 2 parts"):
+        immersed.insert(fluid, parts[:2], cells, small, GRID)
+
+
 def test_derivatives_of_loads_agree_with_differences_and_a_closed_form(x64):  # noqa: F811
     where = immersed.positions(GRID)
     fluid = tuple(jnp.sin(x[..., 0] + 2 * x[..., 1] - x[..., 2] + k) for k, x in enumerate(where))

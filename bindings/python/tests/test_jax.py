@@ -88,6 +88,22 @@ def test_bits_are_those_without_jax(dtype, orient, by, monkeypatch):
         assert (np.abs(normals_bar[0]).max() > 0) == (orient == "given")
 
 
+@pytest.mark.parametrize("with_normals", [False, True])
+def test_a_pullback_has_the_same_bits_whatever_ran_since(dtype, with_normals):
+    points, normals = torus(dtype=dtype)
+    given = (jnp.asarray(normals),) if with_normals else ()
+    _, pull = jax.vjp(loss, jnp.asarray(points), *given)
+    at_once = pull(dtype.type(1))
+    again = pull(dtype.type(1))
+    others = (-given[0],) if with_normals else ()
+    jax.block_until_ready(loss(jnp.asarray(points), *others) if with_normals else loss(jnp.asarray(points[1:])))
+    with pytest.raises(jax.errors.JaxRuntimeError, match="every sample must be at least 2 cells inside"):
+        jax.block_until_ready(loss(10 * jnp.asarray(points), *given))
+    after_others = pull(dtype.type(1))
+    for one, two, three in zip(at_once, again, after_others):
+        assert np.array_equal(one, two) and np.array_equal(one, three)
+
+
 def test_the_field_is_the_distance_to_the_torus(x64):
     points, _ = torus(count=6000)
     x, y, z = np.moveaxis(GRID.centers(), -1, 0)

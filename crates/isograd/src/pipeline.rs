@@ -173,6 +173,11 @@ impl<T: Pipeline> Reconstructor<T> {
         Ok(&self.result)
     }
 
+    /// The last result: incomplete if its run failed, empty before the first.
+    pub fn reconstruction(&self) -> &Reconstruction<T> {
+        &self.result
+    }
+
     /// The last result, without the plan.
     pub fn into_reconstruction(self) -> Reconstruction<T> {
         self.result

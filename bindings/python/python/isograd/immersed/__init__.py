@@ -17,7 +17,7 @@ from ._fractions import apertures, volume_fraction
 from ._kernels import blend, derivative, fluid_share, mu0, mu1, unit_gradient
 from ._loads import Loads, inner_momentum, loads
 from ._markers import Markers, markers
-from ._window import paste, window
+from ._window import crop, insert, paste, window
 
 __all__ = [
     "CENTERS",
@@ -29,9 +29,11 @@ __all__ = [
     "apertures",
     "blend",
     "collocated",
+    "crop",
     "derivative",
     "fluid_share",
     "inner_momentum",
+    "insert",
     "links",
     "loads",
     "markers",

@@ -10,6 +10,8 @@ import jax.numpy as jnp
 from ._body import Body
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from jax.typing import ArrayLike
 
     from .._grid import Grid
@@ -19,8 +21,9 @@ def window(center: ArrayLike, small: Grid, grid: Grid) -> jax.Array:
     """``(3,)`` int32: cells by which a small grid is moved so that its middle is near ``center``, inside ``grid``.
 
     Whole cells, so that places of the moved grid are places of the solver's. The body is then
-    ``paste(staggered(points − spacing · cells, velocity, small), cells, small, grid, band)``, at the cost of the small
-    grid. The cells have no derivative, and φ has none in them.
+    ``staggered(points − spacing · cells, velocity, small)``, at the cost of the small grid, and so are its blend and its
+    loads with the velocities of :func:`crop`. :func:`paste` puts it on the whole grid. The cells have no derivative, and
+    φ has none in them.
 
     Args:
         center: ``(3,)`` position of the body.
@@ -52,21 +55,77 @@ def paste(body: Body, cells: ArrayLike, small: Grid, grid: Grid, band: float) ->
     Raises:
         ValueError: grids that do not fit, or a body of another shape.
     """
-    start = jnp.asarray(_first(small, grid), jnp.int32) + jnp.asarray(cells, jnp.int32)
-    shapes = {sdf.shape for sdf in body.sdf}
-    if shapes != {small.shape}:
-        raise ValueError(f"the body has the shapes {sorted(shapes)} and the small grid {small.shape}; give its own grid")
+    start = _start(cells, small, grid)
+    _check_shapes("body", body.sdf, small, "small grid")
 
     def put(field: jax.Array, beyond: float) -> jax.Array:
         whole = jnp.full((*grid.shape, *field.shape[3:]), beyond, field.dtype)
-        index = (start[0], start[1], start[2], *(jnp.int32(0) for _ in field.shape[3:]))
-        return jax.lax.dynamic_update_slice(whole, field, index)
+        return jax.lax.dynamic_update_slice(whole, field, (*start, *(jnp.int32(0) for _ in field.shape[3:])))
 
     return Body(
         tuple(put(sdf, band) for sdf in body.sdf),
         tuple(put(normal, 0) for normal in body.normal),
         tuple(put(velocity, 0) for velocity in body.velocity),
     )
+
+
+def crop(fields: Sequence[jax.Array], cells: ArrayLike, small: Grid, grid: Grid) -> tuple[jax.Array, ...]:
+    """Fields of the solver, such as the components of the velocity, on a small grid that was moved by ``cells``.
+
+    :func:`blend`, :func:`inner_momentum` and :func:`loads` of a body on that grid then cost as much as the small grid:
+    off the body the blend is the fluid, and the loads are 0. Give the blend back with :func:`insert`.
+
+    Args:
+        fields: each of the shape of ``grid``.
+        cells: ``(3,)`` from :func:`window`, or zeros.
+        small: static.
+        grid: static; grid of the solver.
+
+    Raises:
+        ValueError: grids that do not fit, or fields of another shape.
+    """
+    start = _start(cells, small, grid)
+    _check_shapes("fields", fields, grid, "grid of the solver")
+    return tuple(jax.lax.dynamic_slice(field, start, small.shape) for field in fields)
+
+
+def insert(
+    fields: Sequence[jax.Array], parts: Sequence[jax.Array], cells: ArrayLike, small: Grid, grid: Grid
+) -> tuple[jax.Array, ...]:
+    """The fields with other values on the small grid: the inverse of :func:`crop`.
+
+    Args:
+        fields: each of the shape of ``grid``.
+        parts: as many, of the shape of ``small``.
+        cells: as for :func:`crop`.
+        small: static.
+        grid: static; grid of the solver.
+
+    Raises:
+        ValueError: grids that do not fit, fields or parts of another shape, or another number of them.
+    """
+    start = _start(cells, small, grid)
+    _check_shapes("fields", fields, grid, "grid of the solver")
+    _check_shapes("parts", parts, small, "small grid")
+    if len(fields) != len(parts):
+        raise ValueError(f"there are {len(fields)} fields and {len(parts)} parts; give as many")
+    return tuple(jax.lax.dynamic_update_slice(*pair, start) for pair in zip(fields, parts))
+
+
+def _start(cells: ArrayLike, small: Grid, grid: Grid) -> tuple[jax.Array, ...]:
+    """The cell of the grid at which the small grid begins.
+
+    Raises:
+        ValueError: grids that do not fit.
+    """
+    start = jnp.asarray(_first(small, grid), jnp.int32) + jnp.asarray(cells, jnp.int32)
+    return start[0], start[1], start[2]
+
+
+def _check_shapes(what: str, fields: Sequence[jax.Array], grid: Grid, name: str) -> None:
+    shapes = {field.shape for field in fields}
+    if shapes != {grid.shape}:
+        raise ValueError(f"the {what} have the shapes {sorted(shapes)} and the {name} {grid.shape}; give those of the grid")
 
 
 def _first(small: Grid, grid: Grid) -> tuple[int, ...]:
