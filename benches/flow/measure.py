@@ -156,7 +156,7 @@ class Mean:
 
 
 def gradient(n=24, count=3000, steps=200):
-    """Derivatives of the mean drag in parameters and along random smooth motions, and differences over a cell."""
+    """Derivatives of the mean drag in parameters and along random smooth motions, and differences over two steps."""
     swim = Swim(n, count, lengths=(2, 1, 1))
     mean = Mean(swim, steps)
     points, normals = swim.motion(1, steps)
@@ -164,8 +164,11 @@ def gradient(n=24, count=3000, steps=200):
     bar, rows = np.asarray(bar, np.float64), []
     for name, way in ways(swim, steps, points):
         way = way * (0.5 * swim.grid.spacing / np.linalg.norm(way, axis=-1).max())
-        ends = [float(mean.value((points + s * way).astype(np.float32), normals)) for s in (-1, 1)]
-        rows.append({"name": name, "pullback": float(np.sum(bar * way)), "difference": (ends[1] - ends[0]) / 2})
+        row = {"name": name, "pullback": float(np.sum(bar * way))}
+        for step, size in (("near", 0.1), ("difference", 1.0)):  # in half cells
+            ends = [float(mean.value((points + s * size * way).astype(np.float32), normals)) for s in (-1, 1)]
+            row[step] = (ends[1] - ends[0]) / (2 * size)
+        rows.append(row)
         print(rows[-1], flush=True)
     return {"cells": n, "points": count, "steps": steps, "drag": float(value), "finite": bool(np.isfinite(bar).all()),
             "rows": rows}

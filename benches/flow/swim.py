@@ -28,8 +28,7 @@ class Swim:
         low, high = (np.round((self.place + sweep) * n).astype(int) for sweep in (LOW, HIGH))
         self.window = isograd.Grid(tuple(low / n), 1 / n, tuple(map(int, high - low)))
         self.tunnel = Tunnel(self.grid, 1 / REYNOLDS, courant / n, SPEED, self.window)
-        spacing = 2 * np.sqrt(self.fish.area / count)
-        self.options = isograd.Options(orient="signs", surface=surface, radius=2 * spacing)
+        self.options = isograd.Options(orient="signs", surface=surface)
 
     def times(self, first, steps):
         """Times of the points of `steps` steps, one before and one after them included."""

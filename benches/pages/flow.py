@@ -1,5 +1,7 @@
 """The measured part of docs/flow.md, and its chart."""
 
+from statistics import median
+
 import charts
 from text import number, percent, scientific, significant, table, thousands
 
@@ -21,9 +23,12 @@ def context(data: dict) -> dict:
     if "gradient" in data:
         rows = data["gradient"]["rows"]
         largest = max(abs(row["difference"]) for row in rows)
-        ratios = [row["pullback"] / row["difference"] for row in rows if abs(row["difference"]) > 0.05 * largest]
+        relevant = [row for row in rows if abs(row["difference"]) > 0.05 * largest]
+        ratios = [row["pullback"] / row["difference"] for row in relevant]
         found |= {"gradient": gradient(rows), "relevant": len(ratios), "agreeing": sum(r > 0 for r in ratios)}
         found["close"] = sum(abs(r - 1) < 0.25 for r in ratios)
+        found["met"] = sum(abs(r - 1) < 0.02 for r in ratios)
+        found["near"] = median(abs(row["pullback"] / row["near"] - 1) for row in relevant)
     if "cost" in data:
         found["cost"] = cost(data["cost"])
     if "optimization" in data:
@@ -89,13 +94,16 @@ def gradient(rows: list[dict]) -> str:
         [
             row["name"],
             scientific(row["pullback"], 3),
-            scientific(row["difference"], 3),
-            f"{row['pullback'] / row['difference']:.3f}",
+            *(x for step in ("near", "difference") for x in against(row["pullback"], row[step])),
             f"{abs(row['difference']) / largest:.2f}",
         ]
         for row in rows
     ]
-    return table(["motion"], ["pullback", "difference", "ratio", "share of the largest"], cells)
+    return table(["motion"], ["pullback", "over 1/10 cell", "ratio", "over a cell", "ratio", "share"], cells)
+
+
+def against(pullback: float, difference: float) -> list[str]:
+    return [scientific(difference, 3), f"{pullback / difference:.3f}"]
 
 
 def cost(rows: list[dict]) -> str:

@@ -55,13 +55,16 @@ impl<T: Number> Plan<T> {
 
 /// Whether two clouds have the same points and normals, to the bit.
 fn is_same<T: Real>(a: &PointCloud<T>, b: &PointCloud<T>) -> bool {
-    let bits = |rows: &[[T; 3]]| -> Vec<u64> {
-        rows.as_flattened()
-            .iter()
-            .map(|x| x.f64().to_bits())
-            .collect()
+    let bits = |x: &T| x.f64().to_bits();
+    let are_same = |a: &[[T; 3]], b: &[[T; 3]]| {
+        let [a, b] = [a, b].map(|rows| rows.as_flattened().iter().map(bits));
+        a.eq(b)
     };
-    bits(a.points()) == bits(b.points()) && a.normals().map(bits) == b.normals().map(bits)
+    let have_same_normals = match (a.normals(), b.normals()) {
+        (Some(a), Some(b)) => are_same(a, b),
+        (a, b) => a.is_none() && b.is_none(),
+    };
+    are_same(a.points(), b.points()) && have_same_normals
 }
 
 /// An idle plan, its settings and its number type.

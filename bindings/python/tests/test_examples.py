@@ -6,6 +6,8 @@ import re
 import subprocess
 import sys
 
+import isograd
+import numpy as np
 import pytest
 
 # Data sets are small here.
@@ -35,3 +37,19 @@ def test_an_example_runs(path):
             pytest.skip(f"SKIPPED: {name} is not installed")
     arguments = SMALL if path.name.startswith("dataset_") else []
     subprocess.run([sys.executable, path, *arguments], check=True, timeout=None)
+
+
+def test_fluxes_of_the_tunnel_are_those_of_jax_cfd(monkeypatch):
+    pytest.importorskip("jax_cfd", reason="SKIPPED: jax-cfd is not installed")
+    monkeypatch.syspath_prepend(EXAMPLES[0].parent)
+    from flow_host.jax_cfd_tunnel import Tunnel
+    from jax_cfd.base import advection, diffusion
+
+    tunnel = Tunnel(isograd.Grid((0.0, 0.0, 0.0), 0.1, (8, 6, 7)), viscosity=0.03, dt=0.02)
+    velocity = [np.random.default_rng(k).standard_normal((8, 6, 7)).astype(np.float32) for k in range(3)]
+    variables = tunnel.variables(velocity, tunnel.grid.cell_faces)
+    for i, u in enumerate(variables):
+        # Its `advect_van_leer` takes the correction from the next cell along the component.
+        carried = advection.advect_van_leer_using_limiters(u, variables, tunnel.dt).data
+        expected = carried + diffusion.diffuse(u, tunnel.viscosity).data
+        np.testing.assert_allclose(tunnel.rate(velocity, i), expected, atol=1e-4 * np.abs(expected).max())

@@ -97,7 +97,7 @@ def test_a_pullback_has_the_same_bits_whatever_ran_since(dtype, with_normals):
     again = pull(dtype.type(1))
     others = (-given[0],) if with_normals else ()
     jax.block_until_ready(loss(jnp.asarray(points), *others) if with_normals else loss(jnp.asarray(points[1:])))
-    with pytest.raises(jax.errors.JaxRuntimeError, match="every sample must be at least 2 cells inside"):
+    with pytest.raises((ValueError, jax.errors.JaxRuntimeError), match="every sample must be at least 2 cells inside"):
         jax.block_until_ready(loss(10 * jnp.asarray(points), *given))
     after_others = pull(dtype.type(1))
     for one, two, three in zip(at_once, again, after_others):

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ._options import Fill, check_fill
-from ._places import NO_FACE, Offset, are_centers, axes_at, band_width, is_many, on_grids, shaped
+from ._places import NO_FACE, Offset, are_centers, axes_at, band_width, is_many, near_surface, on_grids, shaped
 from ._xla import Plan, call, floats, like, pair, prepare
 
 if TYPE_CHECKING:
@@ -105,14 +105,16 @@ def surface(
         TypeError, ValueError, jax.errors.JaxRuntimeError: as for :func:`isograd.jax.signed_distance`.
     """
     check_fill(fill)
-    plan, points, normals = prepare(points, grid, normals, options, "cpu")
     width = band_width(band, grid, 4, "full")
+    regular = on_grids(places, grid)
+    # At cell centers φ and the closest faces on the grid save the search.
+    at_centers = are_centers(regular, grid)
+    options = options if at_centers else near_surface(options, width, grid)
+    plan, points, normals = prepare(points, grid, normals, options, "cpu")
     plan = replace(plan, band=width)
     values, is_scalar = sample_values(values, points)
-    regular = on_grids(places, grid)
     positions, shapes = _positions(places, regular, points.dtype)
-    # Without places, φ and the closest faces on the grid save the search.
-    given = positions[:0] if are_centers(regular, grid) else positions
+    given = positions[:0] if at_centers else positions
     found: tuple[jax.Array, ...] = _surface(plan, (len(positions), grid.spacing), points, given, values, normals)
     found = _within(found, positions, width) if fill == "band" else found
     parts, start = [], 0

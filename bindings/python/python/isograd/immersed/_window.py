@@ -56,7 +56,7 @@ def paste(body: Body, cells: ArrayLike, small: Grid, grid: Grid, band: float) ->
         ValueError: grids that do not fit, or a body of another shape.
     """
     start = _start(cells, small, grid)
-    _check_shapes("body", body.sdf, small, "small grid")
+    _check_shapes("fields of the body", body.sdf, small, "small grid")
 
     def put(field: jax.Array, beyond: float) -> jax.Array:
         whole = jnp.full((*grid.shape, *field.shape[3:]), beyond, field.dtype)
