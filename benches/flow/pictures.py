@@ -56,7 +56,8 @@ def picture(swim, state, points, normals):
 
 def drag(n=24, count=50_000, steps=96):
     """Change of the mean drag where the surface grows by a unit volume, at each of all points, from one reverse pass."""
-    swim = Swim(n, count, lengths=(2, 1, 1))
+    # Vertices have the velocity of samples within the radius; with a cell of the surface each sample has its share.
+    swim = Swim(n, count, lengths=(2, 1, 1), radius=1 / (2 * n))
     points, normals = swim.motion(1, steps)
     _, bar = Mean(swim, steps).slope(points, normals)
     along = np.einsum("tnk,tnk->n", np.asarray(bar)[1:-1], normals) * count / swim.fish.area

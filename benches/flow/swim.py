@@ -20,7 +20,7 @@ LOW, HIGH = np.array([-0.15, -0.3, -0.25]), np.array([1.15, 0.3, 0.25])
 class Swim:
     """A fish of length 1 in a tunnel of `lengths`, with `n` cells a length, float32 throughout."""
 
-    def __init__(self, n=40, count=4000, lengths=(3, 1, 1), surface="2x", courant=0.25, **shape):
+    def __init__(self, n=40, count=4000, lengths=(3, 1, 1), surface="2x", courant=0.25, radius="auto", **shape):
         self.grid = isograd.Grid((0.0, 0.0, 0.0), 1 / n, tuple(round(n * length) for length in lengths))
         self.fish = isograd.Shape("fish", **{"amplitude": AMPLITUDE, **shape})
         self.coordinates = self.fish.sample(count).coordinates  # the same material points at all times
@@ -28,7 +28,7 @@ class Swim:
         low, high = (np.round((self.place + sweep) * n).astype(int) for sweep in (LOW, HIGH))
         self.window = isograd.Grid(tuple(low / n), 1 / n, tuple(map(int, high - low)))
         self.tunnel = Tunnel(self.grid, 1 / REYNOLDS, courant / n, SPEED, self.window)
-        self.options = isograd.Options(orient="signs", surface=surface)
+        self.options = isograd.Options(orient="signs", surface=surface, radius=radius)
 
     def times(self, first, steps):
         """Times of the points of `steps` steps, one before and one after them included."""
