@@ -4,8 +4,7 @@
 use std::any::Any;
 use std::sync::{Mutex, PoisonError};
 
-use isograd::{CloudCotangent, PointCloud, Real, Saved};
-use isograd_backend::View;
+use isograd::CloudCotangent;
 use pyo3::prelude::*;
 
 use crate::arrays::Number;
@@ -16,55 +15,12 @@ use crate::settings::Settings;
 /// Capacity of the pool; the plan that has been idle longest is dropped first.
 const CAPACITY: usize = 4;
 
-/// A plan, the cloud of its last result, and the buffers of its pullbacks.
+/// A plan and the buffers of its pullbacks.
 pub struct Plan<T: Number> {
-    plan: isograd_backend::Plan<T>,
-    last: Option<PointCloud<T>>,
-    bar: CloudCotangent<T>,
-}
-
-impl<T: Number> Plan<T> {
-    /// The reconstruction of a cloud.
-    ///
-    /// # Errors
-    /// Errors of a stage or of the device.
-    pub fn reconstruct(&mut self, cloud: &PointCloud<T>) -> Result<View<'_, T>, Failure> {
-        self.last = None;
-        let result = self.plan.reconstruct(cloud)?;
-        self.last = Some(cloud.clone());
-        Ok(result)
-    }
-
-    /// The reconstruction of a cloud from what was saved of it, and the output of its pullback. Nothing is computed again
-    /// for the cloud of the last call, as in an optimizer, or with a checkpoint.
-    ///
-    /// # Errors
-    /// Errors of a stage or of the device; arrays saved from another result.
-    pub fn restore(
-        &mut self,
-        cloud: &PointCloud<T>,
-        saved: &Saved<'_, T>,
-    ) -> Result<(View<'_, T>, &mut CloudCotangent<T>), Failure> {
-        let Self { plan, last, bar } = self;
-        let is_last = last.take().is_some_and(|last| is_same(&last, cloud));
-        let result = plan.restore(cloud, saved, is_last)?;
-        *last = Some(cloud.clone());
-        Ok((result, bar))
-    }
-}
-
-/// Whether two clouds have the same points and normals, to the bit.
-fn is_same<T: Real>(a: &PointCloud<T>, b: &PointCloud<T>) -> bool {
-    let bits = |x: &T| x.f64().to_bits();
-    let are_same = |a: &[[T; 3]], b: &[[T; 3]]| {
-        let [a, b] = [a, b].map(|rows| rows.as_flattened().iter().map(bits));
-        a.eq(b)
-    };
-    let have_same_normals = match (a.normals(), b.normals()) {
-        (Some(a), Some(b)) => are_same(a, b),
-        (a, b) => a.is_none() && b.is_none(),
-    };
-    are_same(a.points(), b.points()) && have_same_normals
+    /// The plan.
+    pub plan: isograd_backend::Plan<T>,
+    /// Output of the pullback.
+    pub bar: CloudCotangent<T>,
 }
 
 /// An idle plan, its settings and its number type.
@@ -98,7 +54,6 @@ pub fn with_plan<T: Number, R>(
 fn create<T: Number>(settings: &str) -> Result<Plan<T>, Failure> {
     Ok(Plan {
         plan: backend::plan(&Settings::parse(settings)?)?,
-        last: None,
         bar: CloudCotangent::default(),
     })
 }

@@ -114,8 +114,7 @@ impl<T: Number> Plan<T> {
         }
     }
 
-    /// Finds a result of the same grid, options and cloud again, to the bit. Where the last run succeeded and was of this
-    /// cloud, `is_last` spares the CPU another one.
+    /// Finds a result of the same grid, options and cloud again, to the bit.
     ///
     /// # Errors
     /// What a stage or the device says; what was saved of another result.
@@ -123,15 +122,9 @@ impl<T: Number> Plan<T> {
         &mut self,
         cloud: &PointCloud<T>,
         saved: &Saved<'_, T>,
-        is_last: bool,
     ) -> Result<View<'_, T>, Error> {
         match &mut self.0 {
-            On::Cpu(plan, _) => {
-                if !is_last {
-                    plan.restore(cloud, saved)?;
-                }
-                Ok(View(Of::Cpu(plan.reconstruction())))
-            }
+            On::Cpu(plan, _) => Ok(View(Of::Cpu(plan.restore(cloud, saved)?))),
             #[cfg(feature = "gpu")]
             On::Device(plan, made) => {
                 *made = None;

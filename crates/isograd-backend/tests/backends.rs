@@ -173,7 +173,8 @@ fn results_to_keep_and_results_found_again_are_the_same() {
             closest: kept.closest().unwrap(),
             normals: kept.normals().unwrap(),
         };
-        let again = plan.restore(&cloud, &saved, false).unwrap();
+        let mut other = self::plan(backend).expect("there is one");
+        let again = other.restore(&cloud, &saved).unwrap();
         assert_eq!(again.sdf().unwrap(), &sdf);
         assert_eq!(again.mesh().unwrap(), kept.mesh().unwrap());
         let short = Saved {
@@ -181,7 +182,7 @@ fn results_to_keep_and_results_found_again_are_the_same() {
             ..saved
         };
         assert!(matches!(
-            plan.restore(&cloud, &short, false),
+            plan.restore(&cloud, &short),
             Err(Error::Restore(_))
         ));
         let mut stop = |_| ControlFlow::Break(());

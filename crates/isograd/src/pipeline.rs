@@ -56,6 +56,8 @@ pub use text::ParseOptionError;
 pub struct Reconstructor<T: Real> {
     scratch: Scratch<T>,
     result: Reconstruction<T>,
+    /// Whether the result is that of its cloud alone, and of all stages.
+    is_whole: bool,
 }
 
 /// Scratch buffers of the stages, reused between calls.
@@ -98,6 +100,7 @@ impl<T: Pipeline> Reconstructor<T> {
         Ok(Self {
             result: Reconstruction::empty(grid, options),
             scratch: Scratch::default(),
+            is_whole: false,
         })
     }
 
@@ -153,6 +156,7 @@ impl<T: Pipeline> Reconstructor<T> {
         held: Option<&Reconstruction<T>>,
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
     ) -> Result<&Reconstruction<T>, Error> {
+        self.is_whole = false;
         let cells = self.result.sdf.values().len();
         memory::check_points::<T>(cloud.len(), self.result.points.capacity(), cells)?;
         let used = self.result.select(cloud, held);
@@ -170,12 +174,8 @@ impl<T: Pipeline> Reconstructor<T> {
             self.result.report.seconds.set(stage, seconds);
         }
         self.result.expand(all);
+        self.is_whole = held.is_none();
         Ok(&self.result)
-    }
-
-    /// The last result: incomplete if its run failed, empty before the first.
-    pub fn reconstruction(&self) -> &Reconstruction<T> {
-        &self.result
     }
 
     /// The last result, without the plan.

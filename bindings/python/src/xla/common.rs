@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::buffers::{Call, Element};
 use crate::arrays::Number;
 use crate::backend::Failure;
-use crate::pool;
+use crate::pool::{self, Plan};
 
 /// Number type of the library, of NumPy and of XLA.
 pub trait Float: Number + Element {}
@@ -231,7 +231,7 @@ impl<'a> Call<'a> {
         work: impl FnOnce(View<'_, T>) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         self.check_all_taken()?;
-        pool::with_plan::<T, _>(self.settings, |plan| work(plan.reconstruct(cloud)?))?
+        pool::with_plan::<T, _>(self.settings, |plan| work(plan.plan.reconstruct(cloud)?))?
     }
 
     /// Passes the reconstruction that was saved to `work`; all arrays must have been taken.
@@ -246,8 +246,11 @@ impl<'a> Call<'a> {
     ) -> Result<(), Failure> {
         self.check_all_taken()?;
         pool::with_plan::<T, _>(self.settings, |plan| {
-            let (result, bar) = plan.restore(cloud, saved)?;
-            work(Restored { result, bar })
+            let Plan { plan, bar } = plan;
+            work(Restored {
+                result: plan.restore(cloud, saved)?,
+                bar,
+            })
         })?
     }
 }

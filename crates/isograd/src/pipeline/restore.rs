@@ -4,6 +4,7 @@
 use super::{Error, Pipeline, Reconstruction, Reconstructor};
 use crate::data::PointCloud;
 use crate::distance::NO_TRIANGLE;
+use crate::{Real, orient};
 
 /// The most expensive results, from which the others are recomputed: arrays with the length of the cloud or of the grid,
 /// which are known before the computation.
@@ -47,7 +48,8 @@ pub enum RestoreError {
 
 impl<T: Pipeline> Reconstructor<T> {
     /// The reconstruction of `cloud` from saved results, with the same bits. All stages but orientation and distance are
-    /// recomputed. The report and the confidence are empty.
+    /// recomputed; none where the plan has this result already, as in an optimizer. The report and the confidence are empty
+    /// if any was.
     ///
     /// # Errors
     /// As [`RestoreError`] lists.
@@ -67,6 +69,10 @@ impl<T: Pipeline> Reconstructor<T> {
         saved: &Saved<'_, T>,
     ) -> Result<(), RestoreError> {
         saved.check(self.grid().cells(), cloud.len())?;
+        if self.is_whole && self.result.is_saved(cloud, saved) {
+            return Ok(());
+        }
+        self.is_whole = false;
         let used = self.result.select(cloud, None);
         let all = cloud;
         let cloud = used.as_ref().unwrap_or(cloud);
@@ -94,8 +100,30 @@ impl<T: Pipeline> Reconstructor<T> {
             return Err(RestoreError::Face { faces });
         }
         self.result.expand(all);
+        self.is_whole = true;
         Ok(())
     }
+}
+
+impl<T: Real> Reconstruction<T> {
+    /// Whether this is the result that `saved` is of, to the bit, and of the same points and given normals.
+    fn is_saved(&self, cloud: &PointCloud<T>, saved: &Saved<'_, T>) -> bool {
+        let is_given = |normals: &[[T; 3]]| {
+            let used = self.selection.gather(normals, 1);
+            have_same_bits(used.as_flattened(), self.given.as_flattened())
+        };
+        have_same_bits(self.points().as_flattened(), cloud.points().as_flattened())
+            && (self.options.orient != orient::Method::Given
+                || cloud.normals().is_some_and(is_given))
+            && have_same_bits(self.normals().as_flattened(), saved.normals.as_flattened())
+            && have_same_bits(self.sdf.values(), saved.sdf)
+            && self.closest == saved.closest
+    }
+}
+
+fn have_same_bits<T: Real>(a: &[T], b: &[T]) -> bool {
+    let bits = |x: &T| x.f64().to_bits();
+    a.iter().map(bits).eq(b.iter().map(bits))
 }
 
 impl<T> Saved<'_, T> {

@@ -433,6 +433,10 @@ fn assert_restored<T: Pipeline>(options: &Options) {
     let extended = Extended::new(&restored, &cloud);
     let pulled = Weighted::new(&restored, &extended).pull(&restored, &extended);
     assert!(pulled == expected);
+    let same = plan.restore(&cloud, &saved).expect("its last result");
+    let extended = Extended::new(same, &cloud);
+    let pulled = Weighted::new(same, &extended).pull(same, &extended);
+    assert!(pulled == expected);
     let short = Saved {
         normals: &result.normals()[1..],
         ..saved

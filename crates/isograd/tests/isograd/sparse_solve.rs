@@ -132,8 +132,8 @@ fn saved_results_restore_the_same_bits() {
     let options = Options::default()
         .orient(Method::Given)
         .solve(Solve::Sparse);
+    let result = reconstruct(&cloud, options.clone());
     let mut plan = Reconstructor::new(grid(), options).expect("options");
-    let result = plan.reconstruct(&cloud).expect("a surface").clone();
     let saved = Saved {
         sdf: result.sdf().values(),
         closest: result.closest(),
