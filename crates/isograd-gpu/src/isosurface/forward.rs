@@ -5,9 +5,7 @@ use isograd::Grid;
 use isograd::isosurface;
 
 use super::error::{Error, bad_level, bad_value, one_sided};
-use super::signs::{
-    BLOCK, Bits, Signs, at_lane, case_of, count_crossed, crossed, cubes, vertex_on,
-};
+use super::signs::{BLOCK, Bits, Signs, at_lane, case_of, count_crossed, crossed, cubes};
 use super::total::Total;
 use super::values::{Values, fraction_on};
 use super::{Plan, Residual, Surface};
@@ -15,12 +13,10 @@ use crate::device::{check_length, launch};
 use crate::primitives::scan::exclusive_sum;
 use crate::{Buffer, Device, Scalar};
 
-/// Where the triangles begin in the table of [`Plan`].
-const TRIANGLES: usize = 257;
-
 /// The surface `χ = level`, in the user's unit, of `(nx, ny, nz)` values `chi` at the cell centers of `grid`; `level`
 /// is one number. Vertices and faces are those of [`isograd::isosurface::forward`], in the same order; positions
-/// agree to the rounding of coordinates in `T`.
+/// agree to the rounding of coordinates in `T`. Where triangulations of a loop enclose the same but for rounding, faces
+/// may be those of another one.
 ///
 /// # Errors
 /// Those of the CPU's stage. [`TooLarge`](crate::Error::TooLarge), also where the cells (counting rows as if
@@ -114,20 +110,6 @@ impl<T: Scalar> Residual<T> {
             self.signs, self.before, self.values(device)?, vertices, self.edges,
         ));
         Ok(vertices)
-    }
-
-    fn faces<R: Runtime>(
-        &self,
-        device: &Device<R>,
-        plan: &Plan,
-        before: &Buffer<u32>,
-        count: usize,
-    ) -> Result<Buffer<u32>, crate::Error> {
-        let faces = device.empty(3 * count)?;
-        launch!(device, self.signs.units(), BLOCK => emit_faces(
-            self.signs, self.before, before, plan.table, faces, BLOCK,
-        ));
-        Ok(faces)
     }
 }
 
@@ -233,72 +215,4 @@ fn coordinate<F: Float + CubeElement>(
     let center = fma(h, F::cast_from(k) + F::new(0.5), lower);
     let next = fma(h, F::cast_from(k) + F::new(1.5), lower);
     min(fma(h, eta, center), next)
-}
-
-/// One unit a cube counts its triangles, adds up those of the cubes before it in its word, and writes its own.
-#[cube(launch)]
-fn emit_faces(
-    signs: &Signs,
-    before_vertices: &Array<u32>,
-    before_faces: &Array<u32>,
-    table: &Array<u32>,
-    faces: &mut Array<u32>,
-    #[comptime] block: usize,
-) {
-    let mut shared = SharedMemory::<u32>::new(block);
-    let unit = UNIT_POS as usize;
-    let word = ABSOLUTE_POS as u32 / 32u32;
-    let lane = ABSOLUTE_POS as u32 % 32u32;
-    let row = word / signs.words;
-    let w = word % signs.words;
-    let mut first = 0u32;
-    let mut own = 0u32;
-    if word < signs.nx * signs.ny * signs.words {
-        let cubes = cubes(signs, row, w);
-        if (cubes.active >> lane) & 1u32 == 1u32 {
-            let case = case_of(&cubes, lane) as usize;
-            first = table[case];
-            own = table[case + 1] - first;
-        }
-    }
-    shared[unit] = own;
-    sync_cube();
-    let mut reach = 1usize.runtime();
-    while reach < 32 {
-        let mut more = 0u32;
-        if lane as usize >= reach {
-            more = shared[unit - reach];
-        }
-        sync_cube();
-        shared[unit] += more;
-        sync_cube();
-        reach *= 2;
-    }
-    if own > 0u32 {
-        let to = before_faces[word as usize] + shared[unit] - own;
-        for triangle in 0..own {
-            let edges = table[TRIANGLES + (first + triangle) as usize];
-            for corner in 0..3u32 {
-                let edge = (edges >> (8u32 * corner)) & 255u32;
-                faces[(3u32 * (to + triangle) + corner) as usize] =
-                    vertex_of_cube(signs, before_vertices, row, 32u32 * w + lane, edge);
-            }
-        }
-    }
-}
-
-/// The vertex on edge `4·axis + 2·u + v` of the cube whose low corner is cell `k` of a row.
-#[cube]
-fn vertex_of_cube(signs: &Signs, before: &Array<u32>, row: u32, k: u32, edge: u32) -> u32 {
-    let axis = edge / 4u32;
-    let u = (edge >> 1u32) & 1u32;
-    let v = edge & 1u32;
-    // Along x the two other axes are y and z, along y they are x and z, along z x and y.
-    let rows = select(
-        axis == 0u32,
-        u,
-        select(axis == 1u32, u * signs.ny, u * signs.ny + v),
-    );
-    let cells = select(axis == 2u32, 0u32, v);
-    vertex_on(signs, before, row + rows, k + cells, axis)
 }

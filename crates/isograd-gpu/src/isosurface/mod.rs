@@ -16,6 +16,7 @@
 //! sums over all vertices, as a tree of fixed shape.
 
 mod error;
+mod faces;
 mod forward;
 pub mod iso_value;
 pub mod local_level;
@@ -27,7 +28,7 @@ mod values;
 
 use cubecl::prelude::Runtime;
 use isograd::Grid;
-use isograd::isosurface::{Report, triangles};
+use isograd::isosurface::{Loop, Report, loops_of};
 
 use crate::{Buffer, Device};
 
@@ -38,24 +39,39 @@ pub use pullback::{Cotangent, pullback};
 /// Tables of the stage, uploaded once.
 #[derive(Clone)]
 pub struct Plan {
-    /// Where the triangles of each of the 256 sign patterns begin, the end of the last, then the triangles: three
-    /// edges of the cube each, one a byte, from the lowest.
+    /// For each of the 256 sign patterns, the triangles before it and then, [`LOOPS`] words on, the loops; the loops: a
+    /// word with the place of the first triangle and, in a byte each, how many triangles a triangulation has and how many of
+    /// these there are; last the triangles: three edges of the cube each, one a byte, from the lowest.
     table: Buffer<u32>,
 }
+
+/// Where the table counts loops, and where these are.
+const LOOPS: usize = 257;
 
 impl Plan {
     /// A plan for a device.
     pub fn new<R: Runtime>(device: &Device<R>) -> Result<Self, crate::Error> {
-        let mut starts = vec![0];
-        let mut packed = Vec::new();
-        for case in 0..=255 {
-            let edges = triangles(case).iter();
-            packed.extend(edges.map(|&[a, b, c]| u32::from_le_bytes([a, b, c, 0])));
-            starts.push(packed.len() as u32);
+        let loops = (0..=255).map(loops_of);
+        let count = |of: &Loop| of.triangulations().next().map_or(0, <[_]>::len) as u32;
+        let mut counts = vec![0];
+        let mut places = vec![2 * LOOPS as u32];
+        for loops in loops.clone() {
+            counts.push(counts[counts.len() - 1] + loops.iter().map(count).sum::<u32>());
+            places.push(places[places.len() - 1] + loops.len() as u32);
         }
-        starts.extend(packed);
+        let mut first = places[places.len() - 1];
+        let mut packed = Vec::new();
+        let mut triangles = Vec::new();
+        for of in loops.flatten() {
+            let all = of.triangulations().count() as u32;
+            packed.push(first | count(of) << 16 | all << 24);
+            first += all * count(of);
+            let edges = of.triangulations().flatten();
+            triangles.extend(edges.map(|&[a, b, c]| u32::from_le_bytes([a, b, c, 0])));
+        }
+        let table = [counts, places, packed, triangles].concat();
         Ok(Self {
-            table: device.upload(&starts)?,
+            table: device.upload(&table)?,
         })
     }
 }

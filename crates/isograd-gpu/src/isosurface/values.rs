@@ -1,7 +1,7 @@
 //! The field, the level and the grid in kernels.
 
 use cubecl::prelude::*;
-use isograd::isosurface::SMALLEST_DIFFERENCE;
+use isograd::isosurface::{SMALLEST_DIFFERENCE, TIE};
 
 use super::Residual;
 use super::signs::Signs;
@@ -14,7 +14,8 @@ pub struct Values<F: Float + CubeElement> {
     pub chi: Array<F>,
     /// One number.
     pub level: Array<F>,
-    /// Low corner and spacing of the grid; the share of the range of `χ` that a difference counts as, at least.
+    /// Low corner and spacing of the grid; the share of the range of `χ` that a difference counts as, at least; the
+    /// difference of volumes that counts as none.
     pub scales: Array<F>,
 }
 
@@ -26,7 +27,8 @@ impl<T: Scalar> Residual<T> {
     ) -> Result<Ready<ValuesLaunch<T, R>>, Error> {
         let [x, y, z] = self.grid.lower();
         let smallest = T::of(SMALLEST_DIFFERENCE);
-        let scales = device.upload(&[x, y, z, self.grid.spacing(), smallest])?;
+        let tie = T::of(TIE) * T::EPSILON;
+        let scales = device.upload(&[x, y, z, self.grid.spacing(), smallest, tie])?;
         let values = ValuesLaunch::new(self.chi.arg(), self.level.arg(), scales.arg());
         Ok(Ready::new(values))
     }

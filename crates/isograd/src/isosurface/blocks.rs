@@ -3,9 +3,9 @@
 
 use rayon::prelude::*;
 
-use super::march::{position, split};
+use super::march::{position, split, values_at_corners};
 use super::signs::ones;
-use super::tables::TABLE;
+use super::tables::{self, TABLE};
 use super::{Error, Report};
 use crate::Real;
 use crate::data::blocks::{BlockField, Blocks, EDGE, NODES};
@@ -321,9 +321,8 @@ fn emit_faces<T: Real>(
     let corners = Corners::new(chi, level, block);
     let place = chi.blocks.corner(block).map(|c| c / EDGE);
     let vertex = |cell: [usize; 3], edge: u8| {
-        let (axis, u, v) = (edge as usize / 4, edge as usize / 2 % 2, edge as usize % 2);
-        let step = [[0, u, v], [u, 0, v], [u, v, 0]][axis];
-        let cell = plus(cell, step);
+        let (corner, axis) = tables::start(edge);
+        let cell = plus(cell, corner);
         let owner = chi.blocks.at(plus(place, cell.map(|c| c / EDGE)));
         let local = cell.map(|c| c % EDGE);
         owner.map_or(0, |owner| crossings[owner].vertex(axis, local))
@@ -331,9 +330,12 @@ fn emit_faces<T: Real>(
     let mut places = faces.iter_mut();
     for cell in cells() {
         let case = corners.case(cell).unwrap_or(0);
-        for (triangle, place) in TABLE.triangles(case).iter().zip(&mut places) {
-            *place = triangle.map(|edge| vertex(cell, edge));
-        }
+        let values = || values_at_corners(chi.into(), plus(chi.blocks.corner(block), cell));
+        TABLE.for_each_triangle(case, values, level, |triangle| {
+            if let Some(place) = places.next() {
+                *place = triangle.map(|edge| vertex(cell, edge));
+            }
+        });
     }
 }
 

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::signs::{Signs, ones};
 use super::tables::TABLE;
 use super::{Error, Report};
+use crate::data::cells::Cells;
 use crate::data::{Field, Grid, LatticeEdge, Mesh};
 use crate::element::crossing::crossing;
 use crate::{Real, vector};
@@ -97,23 +98,26 @@ impl Scratch {
                     #[inline(always)]
                     || {
                         emit_vertices(&self.signs, chi, level, i, vertices, edges);
-                        self.emit_faces(i, faces);
+                        self.emit_faces(chi, level, i, faces);
                     },
                 );
             });
     }
 
     #[inline(always)]
-    fn emit_faces(&self, i: usize, faces: &mut [[u32; 3]]) {
+    fn emit_faces<T: Real>(&self, chi: &Field<T>, level: T, i: usize, faces: &mut [[u32; 3]]) {
         let mut places = faces.iter_mut();
         self.signs.for_each_block(i, |j, w, block| {
             let rows =
                 [(i, j), (i, j + 1), (i + 1, j), (i + 1, j + 1)].map(|(i, j)| self.row(i, j, w));
             for k in ones(block.active) {
                 let ids = cube_vertices(&rows, k);
-                for (triangle, place) in TABLE.triangles(block.case(k)).iter().zip(&mut places) {
-                    *place = triangle.map(|e| ids[e as usize]);
-                }
+                let values = || values_at_corners(chi.into(), [i, j, 64 * w + k as usize]);
+                TABLE.for_each_triangle(block.case(k), values, level, |triangle| {
+                    if let Some(place) = places.next() {
+                        *place = triangle.map(|edge| ids[edge as usize]);
+                    }
+                });
             }
         });
     }
@@ -197,6 +201,16 @@ fn emit_vertices<T: Real>(
             }
         }
     }
+}
+
+/// Values at the corners of the cube whose low corner is `cell`.
+#[inline(always)]
+pub(super) fn values_at_corners<T: Real>(chi: Cells<T>, [i, j, k]: [usize; 3]) -> [T; 8] {
+    let mut values = [T::zero(); 8];
+    for (n, pair) in values.as_chunks_mut::<2>().0.iter_mut().enumerate() {
+        *pair = chi.row([i + n / 2, j + n % 2, k]);
+    }
+    values
 }
 
 /// The point at the fraction `eta` of the way from the center of `cell` to the next along `axis`. Each

@@ -3,11 +3,13 @@
 //! # Map
 //! `(χ, c) → mesh`. A cell with `χ < c` is inside; a value exactly at the level is outside. Each lattice
 //! edge `(p, q)` from a cell center to the next one along an axis whose ends differ carries one vertex,
-//! `y = (1−η) p + η q` with `η = (c − χ_p)/(χ_q − χ_p)`. The triangles of a cube depend on the signs of
-//! its eight corners alone. On a face with two inside corners on a diagonal those two are kept apart,
-//! whichever side the face is looked at from, so neighboring cubes fit: away from the walls every edge
-//! belongs to exactly two triangles, with opposite directions, and the triangles round a vertex form one
-//! ring. Faces are counter-clockwise seen from the side where `χ ≥ c`.
+//! `y = (1−η) p + η q` with `η = (c − χ_p)/(χ_q − χ_p)`. The signs of a cube's eight corners give the
+//! closed loops of vertices that its triangles fill. On a face with two inside corners on a diagonal those
+//! two are kept apart, whichever side the face is looked at from, so neighboring cubes fit: away from the
+//! walls every edge belongs to exactly two triangles, with opposite directions, and the triangles round a
+//! vertex form one ring. Of the triangulations of a loop for which that holds, the one that encloses the most is
+//! taken: the surface then does not jump where another is. Faces are counter-clockwise seen from the side
+//! where `χ ≥ c`.
 //!
 //! Vertices are stored in the order of their [`LatticeEdge`](crate::LatticeEdge), faces in the order of
 //! their cube. A triangle may have no area: where a corner lies exactly at the level, the vertices round
@@ -29,13 +31,13 @@
 //! [`measure_pullback`] is where `ȳ` may come from: the gradient of area and volume.
 //!
 //! # Not differentiable
-//! The signs, hence the list of faces. When a value passes the level, vertices appear or vanish at that
-//! cell center; positions stay continuous.
+//! The signs and the choice of triangulations, hence the list of faces. When a value passes the level, vertices appear or
+//! vanish at that cell center; positions stay continuous, and so does the surface, but where parts of it join or separate.
 //!
 //! # Source
 //! Lorensen and Cline, *Marching cubes*, SIGGRAPH 1987; the rule for faces is that of Montani, Scateni and
 //! Scopigno, *A modified look-up table for implicit disambiguation of marching cubes*, 1994. The table is
-//! computed, not copied.
+//! computed, not copied, and has all triangulations of a loop instead of one.
 
 pub(crate) mod blocks;
 pub mod iso_value;
@@ -60,7 +62,7 @@ pub use measure::Measures;
 pub use measure_pullback::pullback as measure_pullback;
 pub(crate) use pullback::pullback_on;
 pub use pullback::{LevelCotangent, SMALLEST_DIFFERENCE, pullback};
-pub use tables::triangles;
+pub use tables::{Loop, TIE, loops_of};
 
 /// Iso-value of the indicator at which the surface is extracted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

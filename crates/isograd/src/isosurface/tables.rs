@@ -4,59 +4,163 @@
 //! one segment; the segments of all faces join end to end into closed loops of crossed edges. *Diagonals*:
 //! a loop is triangulated without a diagonal between two vertices of the same face, for the cube beyond
 //! that face might choose the same one and four triangles would meet there. Every loop has such a
-//! triangulation (a test goes through all of them); the one with the shortest diagonals is taken.
+//! triangulation (a test goes through all of them). Of several, the one that encloses the most is taken:
+//! two that cut a quadrilateral along one diagonal and the other enclose the same only where it is flat,
+//! so the surface does not jump when the choice changes.
 //!
 //! Corner `4·dx + 2·dy + dz` lies at `(dx, dy, dz)`. Edge `4·axis + 2·u + v` runs along `axis` from the
 //! corner whose other two coordinates, in the order x, y, z, are `(u, v)`.
 
 use std::sync::LazyLock;
 
-/// Triangles of all cases, one after the other, each three edges of the cube.
+use crate::Real;
+use crate::element::crossing::crossing;
+use crate::vector::{cross, dot, sub};
+
+/// Roundings of a volume within which two triangulations count as the same surface: of a cube of volume 1.
+pub const TIE: f64 = 64.0;
+
+/// Loops of all cases, one after the other, and their triangles.
 pub(super) struct Table {
+    /// Loops before each case.
     start: [u16; 257],
+    /// Triangles of each case.
+    counts: [u8; 256],
+    loops: Vec<Loop>,
     triangles: Vec<[u8; 3]>,
+}
+
+/// A closed loop of crossed edges of a cube.
+#[derive(Clone, Copy, Debug)]
+pub struct Loop {
+    /// Its first triangle in the list of all.
+    first: u16,
+    /// Triangles in each triangulation.
+    triangles: u8,
+    /// Number of triangulations, one after the other.
+    triangulations: u8,
 }
 
 /// The one table.
 pub(super) static TABLE: LazyLock<Table> = LazyLock::new(Table::build);
 
-/// The triangles of a cube of the lattice, counter-clockwise seen from outside, each three of its edges. Corner
-/// `4·dx + 2·dy + dz` lies at `(dx, dy, dz)` and is inside where its bit of `case` is set. Edge
-/// `4·axis + 2·u + v` runs along `axis` from the corner whose other two coordinates, in the order x, y, z, are
-/// `(u, v)`.
-pub fn triangles(case: u8) -> &'static [[u8; 3]] {
-    TABLE.triangles(case)
+/// Loops in which the surface cuts the edges of a cube of the lattice, counter-clockwise seen from outside. Corner
+/// `4·dx + 2·dy + dz` lies at `(dx, dy, dz)` and is inside where its bit of `case` is set. Edge `4·axis + 2·u + v` runs
+/// along `axis` from the corner whose other two coordinates, in the order x, y, z, are `(u, v)`.
+pub fn loops_of(case: u8) -> &'static [Loop] {
+    TABLE.loops(case)
+}
+
+impl Loop {
+    /// Its triangulations, that with the shortest diagonals first: triangles, each three edges of the cube.
+    pub fn triangulations(&self) -> impl Iterator<Item = &'static [[u8; 3]]> {
+        TABLE.triangulations(self)
+    }
 }
 
 impl Table {
-    /// Triangles of the cube whose corner `c` is inside where bit `c` of `case` is set.
     #[inline(always)]
-    pub(super) fn triangles(&self, case: u8) -> &[[u8; 3]] {
+    fn loops(&self, case: u8) -> &[Loop] {
         let case = case as usize;
-        &self.triangles[self.start[case] as usize..self.start[case + 1] as usize]
+        &self.loops[self.start[case] as usize..self.start[case + 1] as usize]
     }
 
-    /// How many triangles the cube has.
+    #[inline(always)]
+    fn triangulations(&self, of: &Loop) -> impl Iterator<Item = &[[u8; 3]]> {
+        let count = usize::from(of.triangles);
+        let all = usize::from(of.triangulations) * count;
+        self.triangles[of.first.into()..][..all].chunks_exact(count)
+    }
+
+    /// How many triangles the cube has whose corner `c` is inside where bit `c` of `case` is set.
     #[inline(always)]
     pub(super) fn count(&self, case: u8) -> usize {
-        (self.start[case as usize + 1] - self.start[case as usize]) as usize
+        self.counts[case as usize].into()
+    }
+
+    /// Calls `found` with each triangle, three of its edges, of a cube with these values at its corners.
+    #[inline(always)]
+    pub(super) fn for_each_triangle<T: Real>(
+        &self,
+        case: u8,
+        values: impl FnOnce() -> [T; 8],
+        level: T,
+        mut found: impl FnMut([u8; 3]),
+    ) {
+        let loops = self.loops(case);
+        let is_given = loops.iter().all(|of| of.triangulations == 1);
+        let values = if is_given { [T::zero(); 8] } else { values() };
+        for of in loops {
+            let mut best = &self.triangles[of.first.into()..][..of.triangles.into()];
+            if of.triangulations > 1 {
+                let mut vertices = [[0.0; 3]; 12];
+                for &edge in best.as_flattened() {
+                    vertices[edge as usize] = vertex(edge, &values, level);
+                }
+                let mut largest = enclosed(best, &vertices);
+                for other in self.triangulations(of).skip(1) {
+                    let volume = enclosed(other, &vertices);
+                    if volume > largest + TIE * T::epsilon().f64() {
+                        (best, largest) = (other, volume);
+                    }
+                }
+            }
+            best.iter().for_each(|&triangle| found(triangle));
+        }
     }
 
     fn build() -> Self {
         let mut table = Self {
             start: [0; 257],
+            counts: [0; 256],
+            loops: Vec::new(),
             triangles: Vec::new(),
         };
         for case in 0..=255u8 {
             for cycle in loops(case) {
-                table
-                    .triangles
-                    .extend(triangulate(&cycle).unwrap_or_default());
+                let all = triangulations(&cycle);
+                let of = Loop {
+                    first: table.triangles.len() as u16,
+                    triangles: (cycle.len() - 2) as u8,
+                    triangulations: all.len() as u8,
+                };
+                table.counts[case as usize] += of.triangles;
+                table.loops.push(of);
+                table.triangles.extend(all.concat());
             }
-            table.start[case as usize + 1] = table.triangles.len() as u16;
+            table.start[case as usize + 1] = table.loops.len() as u16;
         }
         table
     }
+}
+
+/// Six times the volume between triangles and the first vertex.
+#[inline(always)]
+fn enclosed(triangles: &[[u8; 3]], vertices: &[[f64; 3]; 12]) -> f64 {
+    let origin = vertices[triangles[0][0] as usize];
+    let volume = |triangle: &[u8; 3]| {
+        let [a, b, c] = triangle.map(|edge| sub(vertices[edge as usize], origin));
+        dot(a, cross(b, c))
+    };
+    // The first triangle has the first vertex.
+    triangles[1..].iter().map(volume).sum()
+}
+
+/// The vertex on an edge of a cube, which is crossed.
+#[inline(always)]
+fn vertex<T: Real>(edge: u8, values: &[T; 8], level: T) -> [f64; 3] {
+    let (corner, axis) = start(edge);
+    let from = 4 * corner[0] + 2 * corner[1] + corner[2];
+    let mut point = corner.map(|c| c as f64);
+    point[axis] = crossing(values[from], values[from + usize::from(BIT[axis])], level).f64();
+    point
+}
+
+/// The corner from which an edge runs, and its axis.
+#[inline(always)]
+pub(super) fn start(edge: u8) -> ([usize; 3], usize) {
+    let (axis, u, v) = (edge as usize / 4, edge as usize / 2 % 2, edge as usize % 2);
+    ([[0, u, v], [u, 0, v], [u, v, 0]][axis], axis)
 }
 
 /// Weight of each axis in the number of a corner.
@@ -131,45 +235,41 @@ pub(super) fn share_face(a: u8, b: u8) -> bool {
     faces().iter().any(|f| corners_of(a, f) && corners_of(b, f))
 }
 
-/// Triangles of a loop, none with a diagonal within a face of the cube; `None` if there is no such set.
-pub(super) fn triangulate(cycle: &[u8]) -> Option<Vec<[u8; 3]>> {
-    let mut triangles = Vec::new();
-    cover(cycle, 0, cycle.len() - 1, &mut triangles)?;
-    Some(triangles)
+/// All triangulations of a loop, none with a diagonal within a face of the cube, those with the shortest diagonals (the
+/// vertices taken at the middle of their edges) first.
+pub(super) fn triangulations(cycle: &[u8]) -> Vec<Vec<[u8; 3]>> {
+    let mut all = cover(cycle, 0, cycle.len() - 1);
+    all.sort_by_key(|(squares, _)| *squares);
+    all.into_iter().map(|(_, triangles)| triangles).collect()
 }
 
-/// Cuts the part of a loop between its vertices `i` and `j` into triangles, with the least sum of squared
-/// diagonals (the vertices taken at the middle of their edges), and returns that sum. Every choice is
-/// tried: a loop has seven vertices at most.
-fn cover(cycle: &[u8], i: usize, j: usize, triangles: &mut Vec<[u8; 3]>) -> Option<u32> {
+/// All ways to cut the part of a loop between its vertices `i` and `j` into triangles, each with its sum of squared
+/// diagonals. A loop has seven vertices at most.
+fn cover(cycle: &[u8], i: usize, j: usize) -> Vec<(u32, Vec<[u8; 3]>)> {
     if j == i + 1 {
-        return Some(0);
+        return vec![(0, Vec::new())];
     }
     let whole = i == 0 && j + 1 == cycle.len();
     if !whole && share_face(cycle[i], cycle[j]) {
-        return None;
+        return Vec::new();
     }
-    let mut best: Option<(u32, Vec<[u8; 3]>)> = None;
+    let own = match whole {
+        true => 0,
+        false => distance_squared(cycle[i], cycle[j]),
+    };
+    let mut all = Vec::new();
     for k in i + 1..j {
-        let mut part = vec![[cycle[i], cycle[k], cycle[j]]];
-        let Some(left) = cover(cycle, i, k, &mut part) else {
-            continue;
-        };
-        let Some(right) = cover(cycle, k, j, &mut part) else {
-            continue;
-        };
-        if best.as_ref().is_none_or(|(least, _)| left + right < *least) {
-            best = Some((left + right, part));
+        let (left, right) = (cover(cycle, i, k), cover(cycle, k, j));
+        for (a, left) in &left {
+            for (b, right) in &right {
+                let mut triangles = vec![[cycle[i], cycle[k], cycle[j]]];
+                triangles.extend(left);
+                triangles.extend(right);
+                all.push((own + a + b, triangles));
+            }
         }
     }
-    let (sum, part) = best?;
-    triangles.extend(part);
-    let own = if whole {
-        0
-    } else {
-        distance_squared(cycle[i], cycle[j])
-    };
-    Some(sum + own)
+    all
 }
 
 /// Squared distance between the middles of two edges, in half edge lengths.
@@ -238,13 +338,16 @@ mod tests {
         for case in 0..=255 {
             for cycle in loops(case) {
                 longest = longest.max(cycle.len());
-                let triangles = triangulate(&cycle)
-                    .unwrap_or_else(|| panic!("case {case:08b}: none for {cycle:?}"));
-                assert_eq!(triangles.len(), cycle.len() - 2);
+                let choices = triangulations(&cycle);
+                assert!(!choices.is_empty(), "case {case:08b}: none for {cycle:?}");
+                let mut sorted = choices.clone();
+                sorted.dedup();
+                assert_eq!(sorted.len(), choices.len());
                 let neighbors = |a, b| {
                     (0..cycle.len()).any(|i| [cycle[i], cycle[(i + 1) % cycle.len()]] == [a, b])
                 };
-                for t in triangles {
+                assert!(choices.iter().all(|of| of.len() == cycle.len() - 2));
+                for t in choices.concat() {
                     for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
                         let diagonal = !neighbors(a, b) && !neighbors(b, a);
                         assert!(
@@ -258,27 +361,32 @@ mod tests {
         assert_eq!(longest, 7);
     }
 
-    /// Directed edges of the triangles of a case that no other triangle of the case uses the other way.
+    /// Directed edges of the triangles of a case that no other triangle of the case uses the other way: the same for every
+    /// triangulation of its loops.
     fn rim(case: u8) -> Vec<(u8, u8)> {
-        let directed: Vec<(u8, u8)> = TABLE
-            .triangles(case)
-            .iter()
-            .flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])])
-            .collect();
-        let mut rim: Vec<_> = directed
-            .iter()
-            .copied()
-            .filter(|&(a, b)| !directed.contains(&(b, a)))
-            .collect();
-        rim.sort();
-        let count = rim.len();
-        rim.dedup();
+        let mut whole = Vec::new();
+        for of in loops_of(case) {
+            let mut rims = of.triangulations().map(|triangles| {
+                let sides = |t: &[u8; 3]| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
+                let directed: Vec<_> = triangles.iter().flat_map(sides).collect();
+                let mut rim = directed.clone();
+                rim.retain(|&(a, b)| !directed.contains(&(b, a)));
+                rim.sort();
+                rim
+            });
+            let rim = rims.next().expect("a triangulation");
+            assert!(rims.all(|other| other == rim), "case {case:08b}");
+            whole.extend(rim);
+        }
+        whole.sort();
+        let count = whole.len();
+        whole.dedup();
         assert_eq!(
-            rim.len(),
+            whole.len(),
             count,
             "case {case:08b}: an edge used twice in one direction"
         );
-        rim
+        whole
     }
 
     #[test]
@@ -325,7 +433,11 @@ mod tests {
     #[test]
     fn one_inside_corner_is_cut_off_by_one_triangle_that_faces_away_from_it() {
         for c in 0..8u8 {
-            let triangles = TABLE.triangles(1 << c);
+            let triangles: Vec<_> = loops_of(1 << c)
+                .iter()
+                .flat_map(Loop::triangulations)
+                .flatten()
+                .collect();
             assert_eq!(triangles.len(), 1);
             let p = triangles[0].map(|e| middle(e).map(f64::from));
             let normal = crate::vector::cross(

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::tables::TABLE;
+use super::tables::{loops, triangulations};
 use super::*;
 use crate::data::{Field, Grid, LatticeEdge, Mesh};
 use crate::{Real, vector};
@@ -82,25 +82,43 @@ fn plain(
         let case = (0..8)
             .filter(|&c| chi.at(corner(c)) < level)
             .fold(0u8, |s, c| s | 1 << c);
-        for triangle in TABLE.triangles(case) {
-            let edges = triangle.map(|e| {
-                let (axis, u, v) = (e as usize / 4, e as usize >> 1 & 1, e as usize & 1);
-                let start = [[0, u, v], [u, 0, v], [u, v, 0]][axis];
-                let start: [usize; 3] = std::array::from_fn(|a| cell[a] + start[a]);
-                let end: [usize; 3] = std::array::from_fn(|a| start[a] + usize::from(a == axis));
-                let edge = LatticeEdge::new(grid.index(start), axis);
-                let (p, q) = (chi.at(start), chi.at(end));
-                let eta = (level - p) / (q - p);
-                let y = std::array::from_fn(|a| {
-                    (1.0 - eta) * grid.center(start)[a] + eta * grid.center(end)[a]
-                });
-                vertices.insert(edge, y);
-                edge
+        let mut vertex = |e: u8| {
+            let (axis, u, v) = (e as usize / 4, e as usize >> 1 & 1, e as usize & 1);
+            let start = [[0, u, v], [u, 0, v], [u, v, 0]][axis];
+            let start: [usize; 3] = std::array::from_fn(|a| cell[a] + start[a]);
+            let end: [usize; 3] = std::array::from_fn(|a| start[a] + usize::from(a == axis));
+            let edge = LatticeEdge::new(grid.index(start), axis);
+            let (p, q) = (chi.at(start), chi.at(end));
+            let eta = (level - p) / (q - p);
+            let y = std::array::from_fn(|a| {
+                (1.0 - eta) * grid.center(start)[a] + eta * grid.center(end)[a]
             });
-            faces.insert(edges);
+            vertices.insert(edge, y);
+            (edge, y)
+        };
+        for cycle in loops(case) {
+            let (_, first) = vertex(cycle[0]);
+            let mut largest = (f64::NEG_INFINITY, Vec::new());
+            for triangles in triangulations(&cycle) {
+                let corners: Vec<_> = triangles.iter().map(|t| t.map(&mut vertex)).collect();
+                let around = corners
+                    .iter()
+                    .map(|t| t.map(|(_, y)| vector::sub(y, first)));
+                let volume: f64 = around.map(enclosed).sum();
+                // Cells are 0.1 wide; sums of volumes that are the same differ by 1e-17.
+                if volume > largest.0 + 1e-15 {
+                    largest = (volume, corners);
+                }
+            }
+            faces.extend(largest.1.into_iter().map(|t| t.map(|(edge, _)| edge)));
         }
     }
     (vertices, faces)
+}
+
+/// Volume between the origin and a triangle.
+fn enclosed([a, b, c]: [[f64; 3]; 3]) -> f64 {
+    vector::dot(a, vector::cross(b, c)) / 6.0
 }
 
 #[test]

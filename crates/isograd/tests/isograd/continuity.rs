@@ -1,10 +1,10 @@
-//! The indicator is continuous in the points: one sample moves along the surface, through the neighborhoods of others, and
-//! what it changes by in one step is ever less in ever smaller ones.
+//! The indicator and the distance are continuous in the points: one sample moves along the surface, through the
+//! neighborhoods of others, and what they change by in one step is ever less in ever smaller ones.
 
 use isograd::isosurface::Level;
 use isograd::neighbors::Radius;
 use isograd::orient::Method;
-use isograd::{Grid, Options, PointCloud, Reconstructor, SurfaceResolution};
+use isograd::{Grid, Options, PointCloud, Reconstruction, Reconstructor, SurfaceResolution};
 
 use crate::common::{TORUS, Uniform};
 
@@ -14,10 +14,21 @@ struct Line {
     moving: usize,
     direction: [f64; 3],
     plan: Reconstructor<f64>,
+    values: fn(&Reconstruction<f64>) -> Vec<f64>,
+}
+
+/// The indicator, relative to its level at the surface.
+fn indicator(result: &Reconstruction<f64>) -> Vec<f64> {
+    let values = result.indicator().values().iter();
+    values.map(|chi| chi - result.iso_value()).collect()
+}
+
+fn distance(result: &Reconstruction<f64>) -> Vec<f64> {
+    result.sdf().values().to_vec()
 }
 
 impl Line {
-    fn new(seed: u64, options: &Options) -> Self {
+    fn new(seed: u64, options: &Options, values: fn(&Reconstruction<f64>) -> Vec<f64>) -> Self {
         let grid = Grid::new([-1.23, -1.21, -0.62], 0.1, [25, 25, 13]).expect("a grid");
         let cloud = TORUS.uniform::<f64>(400, seed);
         let mut random = Uniform::new(seed);
@@ -30,10 +41,10 @@ impl Line {
             moving,
             direction,
             plan: Reconstructor::new(grid, options.clone()).expect("options"),
+            values,
         }
     }
 
-    /// The indicator, relative to its level at the surface.
     fn at(&mut self, step: f64) -> Vec<f64> {
         let mut points = self.cloud.points().to_vec();
         let start = points[self.moving];
@@ -41,9 +52,7 @@ impl Line {
         let normals = self.cloud.normals().expect("given").to_vec();
         let moved = PointCloud::new(points).and_then(|cloud| cloud.with_normals(normals));
         let result = self.plan.reconstruct(&moved.expect("a cloud"));
-        let result = result.expect("a torus");
-        let values = result.indicator().values().iter();
-        values.map(|chi| chi - result.iso_value()).collect()
+        (self.values)(result.expect("a torus"))
     }
 
     /// The largest of the changes in `steps` steps, and of it the larger half, 30 times over.
@@ -77,17 +86,30 @@ impl Line {
     }
 }
 
-#[test]
-fn the_indicator_does_not_jump_where_a_sample_enters_a_neighborhood() {
+/// On a finer surface, and on the grid with a local level.
+fn options() -> [Options; 2] {
     let sided = Options::default().orient(Method::Signs).checks(false);
     let fine = sided.clone().surface(SurfaceResolution::Factor(1.5));
-    let local = sided
-        .clone()
-        .surface(SurfaceResolution::Grid)
-        .level(Level::Local);
-    for options in [fine, local] {
+    let local = sided.surface(SurfaceResolution::Grid).level(Level::Local);
+    [fine, local]
+}
+
+#[test]
+fn the_indicator_does_not_jump_where_a_sample_enters_a_neighborhood() {
+    for options in options() {
         for seed in 1..4 {
-            let jump = Line::new(seed, &options).jump(60);
+            let jump = Line::new(seed, &options, indicator).jump(60);
+            assert!(jump < 1e-8, "seed {seed}: {jump:e}, {options:?}");
+        }
+    }
+}
+
+/// Corners of cubes change sides, and marching cubes its triangles.
+#[test]
+fn the_distance_does_not_jump_where_the_triangles_change() {
+    for options in options() {
+        for seed in 1..7 {
+            let jump = Line::new(seed, &options, distance).jump(60);
             assert!(jump < 1e-8, "seed {seed}: {jump:e}, {options:?}");
         }
     }
@@ -100,7 +122,7 @@ fn the_indicator_jumps_with_the_weights_of_the_paper() {
     let options = options
         .surface(SurfaceResolution::Grid)
         .radius(Radius::Cut(0.3));
-    let jumps = (1..4).map(|seed| Line::new(seed, &options).jump(60));
+    let jumps = (1..4).map(|seed| Line::new(seed, &options, indicator).jump(60));
     let jumps = jumps.filter(|&jump| jump > 1e-5).count();
     assert!(jumps >= 2, "{jumps} of 3");
 }
