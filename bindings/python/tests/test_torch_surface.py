@@ -55,7 +55,8 @@ def test_gradients_agree_with_differences(places):
     def loss(points, normals, values, where=None):
         found = it.surface(points, GRID, where, values=values, normals=normals, options=OPTIONS, band="full")
         sdf = found.sdf.reshape(-1, 1)
-        clear = (sdf.abs() > 0.03) & (sdf > -0.5)
+        # Deeper inside, cells may lie between two parts of the surface as close as each other.
+        clear = (sdf.abs() > 0.03) & (sdf > -0.3)
         return sum((w * part.reshape(len(w), -1) * clear).sum() for w, part in zip(weights, found)) / 100
 
     slopes = torch.autograd.grad(loss(*inputs), inputs)
