@@ -95,7 +95,7 @@ fn axes_and_areas_with_grown_radii() {
     let bar = axes_pullback(&near.held, &residual, &w);
     assert_adjoint("axes", inner(&bar, &v), step, |s| {
         let mut at = normals::Residual::default();
-        normals::hold(&near.moved(&v, s), (&near.held, &residual), &mut at);
+        normals::forward(&near.moved(&v, s), &mut at);
         inner(&at.normals, &w)
     });
 
@@ -122,8 +122,7 @@ fn axes_from_wider_neighborhoods() {
     let bar = axes_pullback(&near.held, &residual, &w);
     assert_adjoint("axes", inner(&bar, &v), step, |s| {
         let mut at = normals::Residual::default();
-        normals::hold(&near.moved(&v, s), (&near.held, &residual), &mut at);
-        assert_eq!(at.count, residual.count, "a neighborhood changed");
+        normals::forward(&near.moved(&v, s), &mut at);
         inner(&at.normals, &w)
     });
 }

@@ -12,7 +12,7 @@ use isograd::{
     Selection, Stage, Warning,
 };
 
-use super::work::{Work, vectors_of};
+use super::work::{RadiiCotangents, Work, vectors_of};
 use super::{Error, Number};
 use crate::pipeline::RadiiAndSigns;
 use crate::{Buffer, pipeline};
@@ -266,13 +266,25 @@ impl<T: Number> Reconstruction<T> {
 
     /// To the samples that are used.
     fn pull_used(&self, cotangent: &Cotangent<'_, T>) -> Result<CloudCotangent<T>, Error> {
-        let (mut found, radii) = self.device.pullback(&self.result, cotangent)?;
+        let (mut found, bars) = self.device.pullback(&self.result, cotangent)?;
         if !self.held.has_moved {
-            let near = self.neighborhoods()?;
-            let radii = RadiiCotangent::of(near, &radii);
-            isograd::neighbors::pullback(near, &radii, &mut found.points);
+            self.pull_radii(bars, &mut found.points)?;
         }
         Ok(found)
+    }
+
+    fn pull_radii(&self, bars: RadiiCotangents<T>, points_bar: &mut [[T; 3]]) -> Result<(), Error> {
+        let near = self.neighborhoods()?;
+        let mut radii = RadiiCotangent::of(near, &bars.areas);
+        radii.add_common(bars.common);
+        if !bars.axes.is_empty() {
+            let [found, own] =
+                [&self.held.radii, &self.held.area_radii].map(|of| self.device.numbers(of));
+            let widened = [&found?[..], &own?[..]];
+            isograd::normals::radii_pullback(near, widened, &bars.axes, points_bar, &mut radii);
+        }
+        isograd::neighbors::pullback(near, &radii, points_bar);
+        Ok(())
     }
 
     fn field(&self, buffer: &Buffer<T>) -> Result<Field<T>, Error> {

@@ -51,12 +51,12 @@ pub trait Work<T: Scalar>: Send + Sync {
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
     ) -> Result<Reconstruction<T>, Error>;
 
-    /// Cotangents in the host's memory to such cotangents, at fixed radii, and to the `(N,)` radii, times these.
+    /// Cotangents in the host's memory to such cotangents, at fixed radii, and to the radii.
     fn pullback(
         &self,
         result: &Reconstruction<T>,
         cotangent: &Cotangent<'_, T>,
-    ) -> Result<(CloudCotangent<T>, Vec<T>), Error>;
+    ) -> Result<(CloudCotangent<T>, RadiiCotangents<T>), Error>;
 
     /// An attribute on the surface and round it.
     fn extend(
@@ -81,6 +81,16 @@ pub struct CallStart<T: Scalar> {
     pub axes: Option<SampleAxes<T>>,
     /// Part of the report about the samples.
     pub report: Report,
+}
+
+/// Cotangents of radii, times these.
+pub struct RadiiCotangents<T> {
+    /// `(N,)` of those that areas are found with.
+    pub areas: Vec<T>,
+    /// `(N,)` of those that axes are found with, or none.
+    pub axes: Vec<T>,
+    /// Of the common one, by itself.
+    pub common: f64,
 }
 
 /// `f32` and `f64`, compiled here.
@@ -239,7 +249,7 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
         &self,
         result: &Reconstruction<T>,
         bars: &Cotangent<'_, T>,
-    ) -> Result<(CloudCotangent<T>, Vec<T>), Error> {
+    ) -> Result<(CloudCotangent<T>, RadiiCotangents<T>), Error> {
         let device = self.device();
         let vectors = |given: Option<&[[T; 3]]>| upload(device, given.map(<[_]>::as_flattened));
         let level = (bars.iso_value != T::of(0.0)).then_some([bars.iso_value]);
@@ -286,7 +296,18 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
             },
             guarded,
         };
-        Ok((of_cloud, device.download(&found.radii)?))
+        let radii = RadiiCotangents {
+            areas: device.download(&found.radii)?,
+            axes: match &found.axis_radii {
+                Some(radii) => device.download(radii)?,
+                None => Vec::new(),
+            },
+            common: match &found.common_radius {
+                Some(radius) => isograd::Real::f64(device.download(radius)?[0]),
+                None => 0.0,
+            },
+        };
+        Ok((of_cloud, radii))
     }
 
     fn extend(

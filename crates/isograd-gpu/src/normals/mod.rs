@@ -16,7 +16,8 @@
 //! as a center, with the radius of each center. No atomics.
 //!
 //! # Not differentiable
-//! By how much neighborhoods are widened, and the sign. Where `λ₂ − λ₁` is at most `10⁻³ λ₃`, the pullback bounds
+//! The sign. By how much neighborhoods are widened is pulled back on the CPU, by
+//! [`isograd::normals::radii_pullback`]. Where `λ₂ − λ₁` is at most `10⁻³ λ₃`, the pullback bounds
 //! `1/(λ₁ − λ_k)`: [`Residual::guarded`].
 
 mod forward;

@@ -30,10 +30,18 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
 }
 
 impl<T: Scalar> Reconstruction<T> {
+    /// Whether the least radius of an extension is the cell size, as that is larger than the common radius.
+    pub(super) fn radius_of_spacing(&self) -> bool {
+        self.residuals.common_radius < self.residuals.distance.grid().spacing()
+    }
+
     pub(super) fn extended_samples(&self) -> Samples<'_, T> {
         Samples {
             neighborhoods: &self.residuals.near,
-            common_radius: self.residuals.common_radius,
+            radius: match self.radius_of_spacing() {
+                true => self.residuals.distance.grid().spacing(),
+                false => self.residuals.common_radius,
+            },
             areas: &self.areas,
         }
     }

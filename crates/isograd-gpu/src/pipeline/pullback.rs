@@ -9,7 +9,7 @@ use crate::isosurface::{self, iso_value, local_level as local};
 use crate::primitives::fill::{add, zeros};
 use crate::primitives::flags;
 use crate::splat::{self, SampleCotangent, Samples, area};
-use crate::{Buffer, Scalar, distance, normals, orient, poisson};
+use crate::{Buffer, Device, Scalar, distance, normals, orient, poisson};
 
 /// Cotangents of the results of a reconstruction: by how much a scalar (a loss) changes, a unit of each
 /// result. What is left out counts as zero.
@@ -73,8 +73,12 @@ impl<T> Cotangent<'_, T> {
 pub struct CloudCotangent<T> {
     /// `(N, 3)` of the points, at fixed radii.
     pub points: Buffer<T>,
-    /// `(N,)` of the radii, times these, for [`isograd::neighbors::pullback`].
+    /// `(N,)` of the radii, times these, for [`isograd::neighbors::pullback`]: those that areas are found with.
     pub radii: Buffer<T>,
+    /// `(N,)` of the radii, times these, that axes are found with; none where normals were given.
+    pub axis_radii: Option<Buffer<T>>,
+    /// `(1,)` of the common radius, times it, by itself; none where nothing was extended.
+    pub common_radius: Option<Buffer<T>>,
     /// `(N, 3)` of the given normals; none where the normals were found.
     pub normals: Option<Buffer<T>>,
     /// Of each extended attribute, `(N, components)`, in the order of [`Cotangent::extensions`].
@@ -91,6 +95,7 @@ struct Extended<T> {
     attributes: Vec<Buffer<T>>,
     /// None where nothing was extended.
     vertices: Option<Buffer<T>>,
+    common_radius: Option<Buffer<T>>,
     guarded: Vec<Buffer<u32>>,
 }
 
@@ -126,7 +131,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             all => Some(flags::sum_of_all(device, &all.iter().collect::<Vec<_>>())?),
         };
         let radii = zeros(device, result.areas.len())?;
-        let given = match &residuals.normals {
+        let (given, axis_radii) = match &residuals.normals {
             Source::Axes {
                 axes,
                 outward,
@@ -135,10 +140,12 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
                 let axes_bar = held::turn(device, &bars.normals, axes, outward)?;
                 let (by_axes, of_radii) = normals::pullback(device, residual, &axes_bar)?;
                 add(device, &by_axes, &bars.points)?;
-                add(device, &of_radii, &radii)?;
-                None
+                (None, Some(of_radii))
             }
-            Source::Given(given) => Some(orient::given::pullback(device, given, &bars.normals)?),
+            Source::Given(given) => {
+                let given = orient::given::pullback(device, given, &bars.normals)?;
+                (Some(given), None)
+            }
         };
         if let Some(areas) = &residuals.areas {
             let (by_areas, of_radii) = area::pullback(device, areas, &bars.areas)?;
@@ -148,6 +155,8 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         Ok(CloudCotangent {
             points: bars.points,
             radii,
+            axis_radii,
+            common_radius: extended.common_radius,
             normals: given,
             attributes: extended.attributes,
             grid: bars.grid,
@@ -166,6 +175,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         let mut out = Extended {
             attributes: Vec::new(),
             vertices: None,
+            common_radius: None,
             guarded: Vec::new(),
         };
         for of in cotangent.extensions {
@@ -182,9 +192,12 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             add(device, &found.points, &bars.points)?;
             add(device, &found.areas, &bars.areas)?;
             add(device, &found.grid, &bars.grid)?;
-            match &out.vertices {
-                Some(sum) => add(device, &found.vertices, sum)?,
-                None => out.vertices = Some(found.vertices),
+            add_or_set(device, &mut out.vertices, found.vertices)?;
+            match result.radius_of_spacing() {
+                true => launch!(device, 1, 1 => add_to_spacing<T>(
+                    found.radius, bars.grid, T::of(1.0) / self.grid.spacing(),
+                )),
+                false => add_or_set(device, &mut out.common_radius, found.radius)?,
             }
             out.attributes.push(found.attribute);
             out.guarded.push(found.guarded);
@@ -300,6 +313,32 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             T::of(cells / self.grid.spacing().f64()),
         ));
         Ok(())
+    }
+}
+
+fn add_or_set<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    sum: &mut Option<Buffer<T>>,
+    part: Buffer<T>,
+) -> Result<(), crate::Error> {
+    match sum {
+        Some(sum) => add(device, &part, sum),
+        None => {
+            *sum = Some(part);
+            Ok(())
+        }
+    }
+}
+
+/// Adds the cotangent of a length that is the cell size, times it, to that of the cell size.
+#[cube(launch)]
+fn add_to_spacing<F: Float + CubeElement>(
+    bar: &Array<F>,
+    grid_bar: &mut Array<F>,
+    one_over_spacing: F,
+) {
+    if ABSOLUTE_POS == 0 {
+        grid_bar[3] += bar[0] * one_over_spacing;
     }
 }
 

@@ -7,7 +7,7 @@ use isograd_element::vector;
 use isograd_gpu::splat::area;
 use isograd_gpu::{Device, Scalar, neighbors};
 
-use crate::clouds::{Cloud, clouds, real, relative};
+use crate::clouds::{Cloud, clouds, downloaded, real, relative};
 use crate::devices::{Numbers, tests, tolerance};
 
 tests! {
@@ -53,8 +53,10 @@ fn areas_and_their_pullback_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: 
         let scratch = &mut Default::default();
         splat::area::pullback(cpu, &expected, &bar, scratch, &mut pulled, &mut radii);
         let found = area::pullback(device, &residual, &device.upload(&bar).unwrap()).unwrap();
+        let (found, of_radii) = downloaded(device, found);
+        let found_radii = RadiiCotangent::of(cpu, &of_radii);
         println!("{name}, {}: areas within {worst:.1e}", T::NAME);
-        cloud.compare_pullbacks(device, found, (pulled, radii), tolerance::<T>());
+        cloud.compare_pullbacks((found, found_radii), (pulled, radii), tolerance::<T>());
     }
     assert!(isolated >= 2, "{isolated} isolated points");
 }

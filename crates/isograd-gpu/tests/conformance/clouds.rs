@@ -50,16 +50,13 @@ impl<T: Scalar> Cloud<T> {
 
 impl<T: Scalar> Cloud<T> {
     /// Compares cotangents of points, at fixed radii and with what the radii mean for them, with those of the CPU.
-    pub fn compare_pullbacks<R: Runtime>(
+    pub fn compare_pullbacks(
         &self,
-        device: &Device<R>,
-        (points, radii): (Buffer<T>, Buffer<T>),
+        (mut found, radii): (Vec<[T; 3]>, RadiiCotangent),
         (mut expected, expected_radii): (Vec<[T; 3]>, RadiiCotangent),
         tolerance: f64,
     ) {
-        let mut found = device.download(&points).unwrap().as_chunks().0.to_vec();
         let fixed = relative(found.as_flattened(), expected.as_flattened());
-        let radii = RadiiCotangent::of(&self.near, &device.download(&radii).unwrap());
         neighbors::pullback(&self.near, &radii, &mut found);
         neighbors::pullback(&self.near, &expected_radii, &mut expected);
         let error = relative(found.as_flattened(), expected.as_flattened());
@@ -67,6 +64,15 @@ impl<T: Scalar> Cloud<T> {
         println!("{name}, {number}: pullback within {fixed:.1e}, with radii {error:.1e}");
         assert!(fixed.max(error) <= tolerance, "{name}: {fixed:e} {error:e}");
     }
+}
+
+/// Cotangents of points and of their radii, in the host's memory.
+pub fn downloaded<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    (points, radii): (Buffer<T>, Buffer<T>),
+) -> (Vec<[T; 3]>, Vec<T>) {
+    let [points, radii] = [&points, &radii].map(|bar| device.download(bar).unwrap());
+    (points.as_chunks().0.to_vec(), radii)
 }
 
 /// The nearest number of type `T`.

@@ -170,18 +170,29 @@ fn phi_and_its_gradient_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Dev
                 extensions: &[],
             };
             let bars = plan.pullback(result, &cotangent).unwrap();
-            [&bars.points, &bars.radii, &bars.grid].map(|bar| device.download(bar).unwrap())
+            let axis_radii = bars.axis_radii.as_ref().expect("axes");
+            [&bars.points, &bars.radii, axis_radii, &bars.grid]
+                .map(|bar| device.download(bar).unwrap())
         };
         let mut near = Neighborhoods::default();
         isograd::neighbors::forward(cloud.points(), Radius::Auto, &mut near).unwrap();
+        let widened = device.download(&held.radii).unwrap();
         let mut of_all = None;
         for given in cotangents() {
             let expected = expected.pullback(&only(&bars.on_cpu(), given));
             let expected = expected.unwrap();
             let [x, y, z] = expected.grid.lower;
-            let [fixed, of_radii, of_grid] = pull(&result, given);
+            let [fixed, of_radii, of_axis_radii, of_grid] = pull(&result, given);
             let mut of_points = fixed.as_chunks().0.to_vec();
-            let radii = RadiiCotangent::of(&near, &of_radii);
+            let mut radii = RadiiCotangent::of(&near, &of_radii);
+            let widened = [&widened[..], &near.radius];
+            isograd::normals::radii_pullback(
+                &near,
+                widened,
+                &of_axis_radii,
+                &mut of_points,
+                &mut radii,
+            );
             isograd::neighbors::pullback(&near, &radii, &mut of_points);
             let errors = [
                 relative(of_points.as_flattened(), expected.points.as_flattened()),
@@ -195,7 +206,7 @@ fn phi_and_its_gradient_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Dev
             let most = errors.into_iter().fold(0.0, f64::max);
             assert!(most < 10.0 * tolerance, "{name} {given:?}: {most:e}");
             if given == [true; 6] {
-                of_all = Some([fixed, of_radii, of_grid]);
+                of_all = Some([fixed, of_radii, of_axis_radii, of_grid]);
             }
         }
 

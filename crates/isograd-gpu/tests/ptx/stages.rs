@@ -235,7 +235,7 @@ fn extensions<T: Scalar>(device: &Device<Recorder>) {
         let near = neighbors::forward(device, &numbers(device, 3 * count), &areas).unwrap();
         let samples = extend::Samples {
             neighborhoods: &near,
-            common_radius: <T as isograd::Real>::of(0.1),
+            radius: <T as isograd::Real>::of(0.1),
             areas: &areas,
         };
         let values = numbers::<T>(device, components * count);

@@ -7,7 +7,7 @@
 //! [direction](Motion), whose longest vector has length 1, and three derivatives of `L` are taken:
 //!
 //! - by [pullback](crate::Reconstruction::pullback);
-//! - by central differences over a small step, with the signs and the widening of neighborhoods
+//! - by central differences over a small step, with the signs
 //!   [held](crate::Reconstructor::reconstruct_held): what the pullback is the derivative of, so both agree to
 //!   many digits;
 //! - by central differences over a step of half a cell either way, with nothing held: what an optimizer sees

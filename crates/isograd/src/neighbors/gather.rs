@@ -71,7 +71,7 @@ impl<T: Real> Neighborhoods<T> {
         points_bar: &mut [[T; 3]],
         radii_bar: &mut RadiiCotangent,
         offset_bar: &(impl Fn(usize, usize, [T; 3]) -> [T; 3] + Sync),
-        radius_bar: &(impl Fn(usize, f64) -> f64 + Sync),
+        radius_bar: &mut impl FnMut(usize, f64) -> f64,
     ) {
         let wide = (0..radius.len()).filter(|&i| radius[i] > self.common_radius);
         let wide: Vec<usize> = wide.collect();

@@ -36,7 +36,7 @@ impl RadiiCotangent {
     }
 
     /// Adds `R R̄` of the common radius.
-    pub(crate) fn add_common(&mut self, bar: f64) {
+    pub fn add_common(&mut self, bar: f64) {
         self.common += bar;
     }
 

@@ -27,17 +27,6 @@ pub fn forward<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residual<T>)
     widen::choose(neighborhoods, out);
 }
 
-/// The axes of moved points, in neighborhoods wider than their own by the factors of `held`: what the pullback holds
-/// constant. `neighborhoods` are those of the moved points, as many as before.
-pub(crate) fn hold<T: Real>(
-    neighborhoods: &Neighborhoods<T>,
-    (before, held): (&Neighborhoods<T>, &Residual<T>),
-    out: &mut Residual<T>,
-) {
-    find_in_own(neighborhoods, out);
-    widen::repeat(neighborhoods, &before.radius, &held.radius, out);
-}
-
 /// Axes in the neighborhoods as they are.
 fn find_in_own<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residual<T>) {
     let (arch, rule) = (Arch::new(), neighborhoods.rule);

@@ -55,11 +55,11 @@
 //! x̄_j += d̄_j,   x̄_i −= Σ_j d̄_j,   R_i R̄_i = −Σ_j ⟨d̄_j, d_j⟩
 //! ```
 //! `⟨B, C⟩ = gᵀ C n = 0`, because `C n = λ₁ n` and `g` is normal to `n`. Both terms are gathered: over
-//! `N_i`, and over all `i` with `j ∈ N_i`: [`pullback`].
+//! `N_i`, and over all `i` with `j ∈ N_i`: [`pullback`]. Where `R_i` is wider than the point's own radius, its cotangent also
+//! goes to the eigenvalues and centroids of the neighborhoods that were tried (`widen_pullback.rs`).
 //!
 //! # Not differentiable
-//! By how much a neighborhood is wider than its own radius (a continuous function of the points, held constant), and the
-//! sign. Where `λ₂ − λ₁` is at most `10⁻³ λ₃` (a line, an isolated point, a corner as thick as it is wide) the axis itself is ill defined:
+//! The sign. Where `λ₂ − λ₁` is at most `10⁻³ λ₃` (a line, an isolated point, a corner as thick as it is wide) the axis itself is ill defined:
 //! such a plane is marked [`Plane::guarded`], and the pullback bounds `1/(λ₁ − λ_k)` there.
 
 #[cfg(test)]
@@ -69,12 +69,13 @@ mod pullback;
 #[cfg(test)]
 mod tests;
 pub mod widen;
+mod widen_pullback;
 #[cfg(test)]
 mod widen_tests;
 
-pub(crate) use forward::hold;
 pub use forward::{forward, forward_with_neighborhoods};
 pub use pullback::{Scratch, pullback};
+pub use widen_pullback::radii_pullback;
 
 use crate::neighbors::Found;
 

@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use super::forward::{EPSILON, SMALLEST_GAP};
-use super::{Plane, Residual};
+use super::{Plane, Residual, widen_pullback};
 use crate::element::plane;
 use crate::neighbors::{Candidates, LANES, Neighborhoods, RadiiCotangent, rule};
 use crate::vector::{add, dot, norm, scale};
@@ -76,13 +76,20 @@ pub fn pullback<T: Real>(
             T::one() / radius,
         )
     };
+    let mut widened = Vec::new();
     neighborhoods.add_from_wide(
         &residual.radius,
         points_bar,
         radii_bar,
         &offset_bar,
-        &|_, sum| -sum,
+        &mut |i, sum| {
+            if residual.radius[i] > neighborhoods.radius[i] && sum != 0.0 {
+                widened.push((i as u32, -sum));
+            }
+            -sum
+        },
     );
+    widen_pullback::pullback(neighborhoods, &widened, points_bar, radii_bar);
     let guarded =
         |(plane, bar): &(&Plane<T>, &[T; 3])| plane.guarded && bar.iter().any(|&x| x != T::zero());
     residual

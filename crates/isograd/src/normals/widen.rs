@@ -35,18 +35,18 @@ pub const GAIN: [f64; 2] = [0.4, 0.6];
 pub const RIM: [f64; 2] = [0.17, 0.23];
 
 /// Points of one task.
-const TASK: usize = 256;
+pub(super) const TASK: usize = 256;
 
 /// The axis of one sample in a neighborhood wider than its own.
 #[derive(Clone, Copy, Debug)]
-struct Found<T> {
+pub(super) struct Found<T> {
     position: u32,
     /// Of the point's own radius.
     factor: T,
-    radius: T,
+    pub radius: T,
     count: u32,
-    normal: [T; 3],
-    plane: Plane<T>,
+    pub normal: [T; 3],
+    pub plane: Plane<T>,
 }
 
 /// Replaces the axes of rough neighborhoods by those of wider ones that are far less rough. A radius that was
@@ -61,28 +61,8 @@ pub(super) fn choose<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residu
     }
 }
 
-/// Replaces the axes of samples by those in neighborhoods wider than their own by as much as `radius` is above `own`.
-pub(super) fn repeat<T: Real>(
-    neighborhoods: &Neighborhoods<T>,
-    own: &[T],
-    radius: &[T],
-    out: &mut Residual<T>,
-) {
-    let positions = positions(neighborhoods, |i| radius[i] > own[i]);
-    let order = neighborhoods.index.order();
-    let found = in_tasks(&positions, |task| {
-        let factor = |position: &u32| {
-            let i = order[*position as usize] as usize;
-            (*position, radius[i] / own[i])
-        };
-        let wide: Vec<(u32, T)> = task.iter().map(factor).collect();
-        find(neighborhoods, &wide, &mut Candidates::default())
-    });
-    write(neighborhoods, found, out);
-}
-
 /// `q`, see the [module](self); infinite where the axis is no better than another.
-fn roughness<T: Real>(plane: &Plane<T>) -> f64 {
+pub(super) fn roughness<T: Real>(plane: &Plane<T>) -> f64 {
     let [first, others @ ..] = plane.eigenvalues.map(|value| value.f64());
     match first > 0.0 {
         true => others
@@ -93,14 +73,13 @@ fn roughness<T: Real>(plane: &Plane<T>) -> f64 {
     }
 }
 
-/// How far the samples found lie on one side of the one in their middle, in radii; much at the rim of a plate, whose
-/// face is another than that of the plate.
-fn one_sidedness<T: Real>(found: &Found<T>) -> f64 {
-    let lateral = found
-        .plane
-        .tangents
-        .map(|t| vector::dot(t, found.plane.centroid).f64());
-    lateral[0].hypot(lateral[1]) / found.radius.f64()
+/// How far the samples found lie on one side of the one in their middle, along the two tangents; much at the rim of a plate,
+/// whose face is another than that of the plate.
+pub(super) fn lateral<T: Real>(found: &Found<T>) -> [f64; 2] {
+    let Plane {
+        tangents, centroid, ..
+    } = found.plane;
+    tangents.map(|tangent| vector::dot(tangent, centroid).f64())
 }
 
 /// Sorted positions of the points that are wanted, by input index.
@@ -123,23 +102,31 @@ fn in_tasks<T: Real>(
 }
 
 /// How far a neighborhood is widened.
-struct Widening<T> {
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Widening<T> {
     position: u32,
-    roughness: f64,
+    pub roughness: f64,
     /// Of the radius.
-    factor: f64,
+    pub factor: f64,
     /// The axis with that factor, if it was tried.
     found: Option<Found<T>>,
 }
 
 impl<T: Real> Widening<T> {
+    pub(super) fn new(position: u32, own: &Plane<T>) -> Self {
+        Self {
+            position,
+            roughness: roughness(own),
+            factor: 1.0,
+            found: None,
+        }
+    }
+
     /// Takes the share of a wider neighborhood that it deserves.
     fn take(&mut self, found: Found<T>) {
         let (own, wider) = (self.roughness, roughness(&found.plane));
-        let falling = |x, [from, to]: [f64; 2]| plane::falling(x, from, to);
-        let share = (1.0 - falling(own, ROUGH))
-            * falling(wider / own, GAIN)
-            * falling(one_sidedness(&found), RIM);
+        let [rough, gain, rim] = parts_of_share(own, &found);
+        let share = rough * gain * rim;
         if share > 0.0 {
             // The roughness at hand may be infinite.
             let kept = if share < 1.0 {
@@ -154,6 +141,42 @@ impl<T: Real> Widening<T> {
     }
 }
 
+/// The share of a wider neighborhood that is taken where the roughness at hand is `own` is the product of these, by
+/// [`ROUGH`], [`GAIN`] and [`RIM`].
+pub(super) fn parts_of_share<T: Real>(own: f64, found: &Found<T>) -> [f64; 3] {
+    let falling = |x, [from, to]: [f64; 2]| plane::falling(x, from, to);
+    let [x, y] = lateral(found);
+    let rough = 1.0 - falling(own, ROUGH);
+    let gain = falling(roughness(&found.plane) / own, GAIN);
+    let rim = falling(x.hypot(y) / found.radius.f64(), RIM);
+    [rough, gain, rim]
+}
+
+/// Tries wider neighborhoods, one step after the other, for those that are still rough. `tried(step, which, widening before,
+/// found)` is called for each.
+pub(super) fn try_wider<T: Real>(
+    neighborhoods: &Neighborhoods<T>,
+    all: &mut [Widening<T>],
+    candidates: &mut Candidates<T>,
+    mut tried: impl FnMut(usize, usize, Widening<T>, Found<T>),
+) {
+    for (step, factor) in STEPS.into_iter().enumerate() {
+        let rough = (0..all.len()).filter(|&k| all[k].roughness > ROUGH[0]);
+        let rough: Vec<usize> = rough.collect();
+        let wide: Vec<(u32, T)> = rough
+            .iter()
+            .map(|&k| (all[k].position, T::of(factor)))
+            .collect();
+        for (k, found) in rough
+            .into_iter()
+            .zip(find(neighborhoods, &wide, candidates))
+        {
+            tried(step, k, all[k], found);
+            all[k].take(found);
+        }
+    }
+}
+
 /// For each point of a task that has one: the axis in the wider neighborhood.
 fn smoothest<T: Real>(
     neighborhoods: &Neighborhoods<T>,
@@ -162,23 +185,12 @@ fn smoothest<T: Real>(
 ) -> Vec<Found<T>> {
     let mut candidates = Candidates::default();
     let order = neighborhoods.index.order();
-    let begin = |&position: &u32| Widening {
-        position,
-        roughness: roughness(&planes[order[position as usize] as usize]),
-        factor: 1.0,
-        found: None,
+    let begin = |&position: &u32| {
+        let own = &planes[order[position as usize] as usize];
+        Widening::new(position, own)
     };
     let mut all: Vec<Widening<T>> = task.iter().map(begin).collect();
-    for step in STEPS {
-        let mut rough: Vec<&mut Widening<T>> =
-            all.iter_mut().filter(|w| w.roughness > ROUGH[0]).collect();
-        let wide: Vec<(u32, T)> = rough.iter().map(|w| (w.position, T::of(step))).collect();
-        let found = find(neighborhoods, &wide, &mut candidates);
-        rough
-            .iter_mut()
-            .zip(found)
-            .for_each(|(w, found)| w.take(found));
-    }
+    try_wider(neighborhoods, &mut all, &mut candidates, |_, _, _, _| ());
     let between = |w: &&Widening<T>| w.found.is_none() && w.factor > 1.0;
     let wide = all.iter().filter(between);
     let wide: Vec<(u32, T)> = wide.map(|w| (w.position, T::of(w.factor))).collect();
@@ -188,7 +200,7 @@ fn smoothest<T: Real>(
 }
 
 /// The axes of the points at some sorted positions, in neighborhoods wider than their own by some factors.
-fn find<T: Real>(
+pub(super) fn find<T: Real>(
     neighborhoods: &Neighborhoods<T>,
     wide: &[(u32, T)],
     candidates: &mut Candidates<T>,

@@ -80,9 +80,16 @@ impl<T: Real> Reconstruction<T> {
         distance::extend::at_vertices(self.samples(), &used, self.mesh())
     }
 
+    /// Not below the cell size of the surface, so that samples closer together than its vertices are not passed over.
+    fn extension_radius(&self) -> T {
+        let common = self.residuals.neighborhoods.common_radius;
+        common.max(self.surface_grid().spacing())
+    }
+
     pub(super) fn samples(&self) -> Samples<'_, T> {
         Samples {
             neighborhoods: &self.residuals.neighborhoods,
+            radius: self.extension_radius(),
             areas: &self.areas,
         }
     }

@@ -57,8 +57,7 @@ impl<T: Pipeline> Reconstruction<T> {
     /// Cotangents of the samples and of the grid, from cotangents of any of the results: the transpose of the derivative
     /// of the whole pipeline, stage by stage in reverse.
     ///
-    /// Held constant, as the stages say: how far neighborhoods are widened, signs of the normals, which cells are
-    /// inside, which face is closest. A derivative without a bound is replaced by a bounded one, one that the number type
+    /// Held constant, as the stages say: signs of the normals, which cells are inside, which face is closest. A derivative without a bound is replaced by a bounded one, one that the number type
     /// cannot hold by the nearest number that it can, or 0; both are counted in [`CloudCotangent::guarded`]. The result has the same bits for any number of threads.
     ///
     /// # Errors
@@ -146,8 +145,11 @@ impl<T: Real> Reconstruction<T> {
             extension: found,
             vertices,
             samples,
+            radii,
             ..
         } = scratch;
+        let spacing = self.surface_grid().spacing();
+        let radius_follows = self.residuals.neighborhoods.common_radius >= spacing;
         for (of, attribute) in cotangent.extensions.iter().zip(&mut out.attributes) {
             let inputs = extend::Inputs {
                 samples: self.samples(),
@@ -167,6 +169,10 @@ impl<T: Real> Reconstruction<T> {
                 lower: vector::to_f64(found.grid.lower),
                 spacing: found.grid.spacing.f64(),
             });
+            match radius_follows {
+                true => radii.add_common(found.radius),
+                false => samples.grid.spacing += found.radius / self.sdf.grid().spacing().f64(),
+            }
             out.guarded += found.guarded;
         }
         Ok(())
@@ -358,7 +364,6 @@ impl<T: Real> Reconstruction<T> {
         } = &mut scratch.samples;
         out.normals.clear();
         let radii_bar = &mut scratch.radii;
-        radii_bar.clear();
         match self.options.orient {
             Method::Given => {
                 out.guarded += orient::given_pullback(&self.given, normals_bar);
@@ -401,6 +406,7 @@ impl<T: Real> PullbackScratch<T> {
         );
         fill(&mut samples.areas, cotangent.areas, points, T::zero());
         samples.grid = GridCotangent::default();
+        self.radii.clear();
         fill(&mut self.vertices, None, vertices, [T::zero(); 3]);
     }
 

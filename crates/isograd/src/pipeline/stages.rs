@@ -449,7 +449,7 @@ fn march<T: Real>(
     }
 }
 
-/// Neighborhoods, and the axis of every point, unless all normals are given; isolated and widened as in `held` if given.
+/// Neighborhoods, and the axis of every point, unless all normals are given; isolated as in `held` if given.
 pub(super) fn find_axes<T: Real>(
     cloud: &PointCloud<T>,
     radius: Radius,
@@ -467,7 +467,7 @@ pub(super) fn find_axes<T: Real>(
     }
     match held {
         _ if is_given => out.clear(),
-        Some(held) => normals::hold(neighborhoods, (&held.neighborhoods, &held.normals), out),
+        Some(_) => normals::forward(neighborhoods, out),
         None => {}
     }
     report.radius = neighborhoods.common_radius.f64();

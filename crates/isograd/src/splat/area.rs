@@ -119,9 +119,9 @@ pub fn pullback<T: Real>(
         let rise = T::one() - vector::norm_squared(offset) / square;
         vector::scale(offset, factors[i] * rise.max(T::zero()))
     };
-    let radius_bar = |i: usize, sum: f64| twice(i) - sum;
+    let mut radius_bar = |i: usize, sum: f64| twice(i) - sum;
     let radius = &neighborhoods.radius;
-    neighborhoods.add_from_wide(radius, points_bar, radii_bar, &offset_bar, &radius_bar);
+    neighborhoods.add_from_wide(radius, points_bar, radii_bar, &offset_bar, &mut radius_bar);
 }
 
 /// `−Σ_c (f_k + f_c)(1 − r_c²/R²) d_c`: cotangent of point `k` as a center, and as a neighbor of others; and

@@ -2,6 +2,8 @@
 
 use cubecl::prelude::*;
 
+use isograd::distance::extend::rule::{MARGIN, REACH};
+
 use super::FIT;
 use super::checks::Given;
 use super::fits::{covariance, in_frame, ridge, solve};
@@ -26,6 +28,11 @@ pub(super) struct Adjoints<T> {
     pub records: Buffer<T>,
     /// `(V, 2, components)` `ū_v` and `u_v` in their order.
     pub bars: Buffer<T>,
+    /// `(V,)` the sample whose distance a radius is a multiple of, and `R_v R̄_v`, where it has grown; else 0.
+    pub last: Buffer<u32>,
+    pub grown: Buffer<T>,
+    /// `(V,)` `R R̄` of the least radius where it is that, else 0.
+    pub least: Buffer<T>,
     /// `(V,)` how often something was bounded.
     pub guarded: Buffer<u32>,
 }
@@ -35,17 +42,26 @@ pub(super) struct Adjoints<T> {
 pub(crate) struct AdjointArrays<F: Float + CubeElement> {
     pub records: Array<F>,
     pub bars: Array<F>,
+    pub last: Array<u32>,
+    pub grown: Array<F>,
+    pub least: Array<F>,
+    pub guarded: Array<u32>,
 }
 
-argument!(Adjoints<T> => AdjointArraysLaunch<T, R>: |of| of.records.arg(), of.bars.arg());
+argument!(
+    Adjoints<T> => AdjointArraysLaunch<T, R>:
+    |of| of.records.arg(), of.bars.arg(), of.last.arg(), of.grown.arg(), of.least.arg(),
+        of.guarded.arg()
+);
 
 /// Pulls `bars` `(V, components)` of the values at the vertices back to the vertices themselves: adds to
-/// `vertices_bar` `(V, 3)`, and bounds that. There is at least one vertex.
+/// `vertices_bar` `(V, 3)`, and bounds that. There is at least one vertex; `radius` is the least.
 pub(super) fn pullback<R: Runtime, T: Scalar>(
     device: &Device<R>,
     sorted: &Sorted<T>,
     vertices: &Buffer<T>,
     given: &Given<'_, T>,
+    radius: T,
     bars: &Buffer<T>,
     vertices_bar: &Buffer<T>,
 ) -> Result<Adjoints<T>, Error> {
@@ -58,6 +74,9 @@ pub(super) fn pullback<R: Runtime, T: Scalar>(
     let found = Adjoints {
         records: device.empty(ADJOINT * count)?,
         bars: device.empty(2 * bars.len())?,
+        last: device.empty(count)?,
+        grown: device.empty(count)?,
+        least: device.empty(count)?,
         guarded: device.empty(count)?,
         near,
     };
@@ -65,8 +84,7 @@ pub(super) fn pullback<R: Runtime, T: Scalar>(
         bars, values, found.near.places, found.bars, components as u32,
     ));
     launch!(device, count => pull_fits<T>(
-        sorted, found.near, fits, found.bars, found.records, vertices_bar,
-        found.guarded,
+        sorted, found.near, fits, found, vertices_bar, radius, T::of(REACH), T::of(MARGIN),
     ));
     Ok(found)
 }
@@ -121,6 +139,22 @@ pub(super) struct Adjoint<F: Float> {
     pub middle: F,
     /// `Σ_k p_k D_k`.
     pub mean_pull: F,
+}
+
+/// `R R̄ d/|d|²`, the cotangent of the sample whose distance the radius is a multiple of; `offset` is `d/R`, `unit` is `1/R`.
+#[cube]
+pub(super) fn share_of_last<F: Float>(offset: Vector3<F>, radius_bar: F, unit: F) -> Vector3<F> {
+    let square = offset.dot(offset);
+    let exists = square > F::new(0.0);
+    let factor = radius_bar * unit / select(exists, square, F::new(1.0));
+    offset.scale(factor)
+}
+
+/// By how much the closer of two multiples of a length is not 1.
+#[cube]
+fn not_one<F: Float>(length: F, first: F, second: F) -> F {
+    let by_first = F::abs(first * length - F::new(1.0));
+    min(by_first, F::abs(second * length - F::new(1.0)))
 }
 
 /// A sample as an adjoint sees it.
@@ -210,16 +244,18 @@ impl<F: Float> Adjoint<F> {
     }
 }
 
-/// One unit takes one vertex, in the order of the vertices' tree: its adjoint, and `−Σ_j d̄_j` for itself.
+/// One unit takes one vertex, in the order of the vertices' tree: its adjoint, `−Σ_j d̄_j` for itself, and `R_v R̄_v`. The
+/// radius is the least, or `reach` or `margin` times the distance to a sample.
 #[cube(launch)]
 fn pull_fits<F: Float + CubeElement>(
     samples: &SampleArrays<F>,
     near: &NeighborhoodArrays<F>,
     fits: &Array<F>,
-    bars: &Array<F>,
-    records: &mut Array<F>,
+    adjoints: &mut AdjointArrays<F>,
     vertices_bar: &mut Array<F>,
-    guarded: &mut Array<u32>,
+    least_radius: F,
+    reach: F,
+    margin: F,
 ) {
     let k = ABSOLUTE_POS;
     if k < near.radii.len() {
@@ -228,6 +264,9 @@ fn pull_fits<F: Float + CubeElement>(
         let mut sums = Array::<F>::new(3usize);
         through_surface.store(&mut sums, 0usize);
         let mut bounded = 0u32.runtime();
+        adjoints.last[k] = 0u32;
+        adjoints.grown[k] = F::new(0.0);
+        adjoints.least[k] = F::new(0.0);
         if near.radii[k] > F::new(0.0) {
             let y = Vector3::<F>::at(&near.tree.points, k);
             let of = Fitted::<F>::at(fits, vertex);
@@ -251,7 +290,7 @@ fn pull_fits<F: Float + CubeElement>(
                     let n = neighbor::<F>(d, of.unit, samples.areas[j]);
                     if n.weight > F::new(0.0) {
                         let p = n.weight / of.weight;
-                        let q = p * contract::<F>(bars, k, samples, j);
+                        let q = p * contract::<F>(&adjoints.bars, k, samples, j);
                         let offset = n.offset.sub(of.mean);
                         let e = in_frame::<F>(axes, offset);
                         found[8] += p * of.tilt.dot(offset);
@@ -283,12 +322,15 @@ fn pull_fits<F: Float + CubeElement>(
                 mean_pull: F::new(0.0),
             };
 
-            // Σ p D; Σ d̄ through the weights without that in w̄; and what that is multiplied by.
-            let mut shares = Array::<F>::new(7usize);
+            // Σ p D; Σ d̄ through the weights without that in w̄; and what that is multiplied by. Σ d̄·d of the same, with
+            // that through the fit.
+            let mut shares = Array::<F>::new(9usize);
             #[unroll]
-            for i in 0..7usize {
+            for i in 0..9usize {
                 shares[i] = F::new(0.0);
             }
+            let mut last = 0u32.runtime();
+            let mut error = F::new(1.0);
             let mut node = next_leaf::<F>(&samples.tree, y, of.radius, 0usize, false);
             while node < samples.tree.links.len() {
                 let first = first_of_leaf(&samples.tree.links, node);
@@ -296,7 +338,7 @@ fn pull_fits<F: Float + CubeElement>(
                     let d = Vector3::<F>::at(&samples.tree.points, j).sub(y);
                     let n = neighbor::<F>(d, of.unit, samples.areas[j]);
                     if n.weight > F::new(0.0) {
-                        let q = contract::<F>(bars, k, samples, j);
+                        let q = contract::<F>(&adjoints.bars, k, samples, j);
                         let seen = without_mean.see(n, q);
                         let radial =
                             fit::radial::<F>(F::new(1.0) / of.weight, samples.areas[j], n.rest);
@@ -305,17 +347,34 @@ fn pull_fits<F: Float + CubeElement>(
                             .scale(radial * seen.pull)
                             .add_to(&mut shares, 1usize);
                         n.offset.scale(radial).add_to(&mut shares, 4usize);
+                        let square = n.offset.dot(n.offset);
+                        shares[7] += radial * seen.pull * square
+                            + without_mean.through_fit(seen).dot(n.offset);
+                        shares[8] += radial * square;
+                        let by = not_one::<F>(F::sqrt(square), reach, margin);
+                        last = select(by < error, j as u32, last);
+                        error = min(error, by);
                     }
                 }
                 node = next_leaf::<F>(&samples.tree, y, of.radius, node + 1, false);
             }
-            without_mean.write(records, k, shares[0]);
+            without_mean.write(&mut adjoints.records, k, shares[0]);
             let of_mean = Vector3::<F>::load(&shares, 4usize).scale(shares[0]);
             let through_weights = Vector3::<F>::load(&shares, 1usize).sub(of_mean);
             // Σ p t = 1, Σ p ρ = 0 and Σ p e = 0: s may be so large that their rounding would count.
             let through_fit = of.mean.scale(without_mean.of_mean).sub(slope);
             let total = through_weights.add(through_fit);
             total.scale(-of.unit).add_to(&mut sums, 0usize);
+            let radius_bar = shares[0] * shares[8] - shares[7];
+            if of.radius > least_radius {
+                adjoints.last[k] = last;
+                adjoints.grown[k] = radius_bar;
+                let d = Vector3::<F>::at(&samples.tree.points, last as usize).sub(y);
+                let bar = share_of_last::<F>(d.scale(of.unit), radius_bar, of.unit);
+                bar.scale(F::new(-1.0)).add_to(&mut sums, 0usize);
+            } else {
+                adjoints.least[k] = radius_bar;
+            }
             bounded += select(ridge.coincide, 1u32, 0u32);
         }
         let zero = F::new(0.0);
@@ -325,6 +384,6 @@ fn pull_fits<F: Float + CubeElement>(
             vertices_bar[3 * vertex + axis] = select(finite, sums[axis], zero);
             bounded += select(finite, 0u32, 1u32);
         }
-        guarded[k] = bounded;
+        adjoints.guarded[k] = bounded;
     }
 }

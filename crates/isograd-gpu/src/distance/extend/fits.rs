@@ -38,7 +38,7 @@ pub(super) fn forward<R: Runtime, T: Scalar>(
     let count = vertices.len() / 3;
     let fits = device.empty(FIT * count)?;
     launch!(device, count => find_radii<T>(
-        near, vertices, fits, samples.common_radius, T::of(REACH), T::of(MARGIN),
+        near, vertices, fits, samples.radius, T::of(REACH), T::of(MARGIN),
         ENOUGH.min(near.len()), MOST.min(near.len()),
     ));
     launch!(device, count => fit_vertices<T>(sorted, vertices, fits));
@@ -75,7 +75,7 @@ fn find_radii<F: Float + CubeElement>(
     near: &NeighborhoodArrays<F>,
     vertices: &Array<F>,
     fits: &mut Array<F>,
-    common: F,
+    least: F,
     reach: F,
     margin: F,
     #[comptime] enough: usize,
@@ -84,10 +84,10 @@ fn find_radii<F: Float + CubeElement>(
     if 3 * ABSOLUTE_POS < vertices.len() {
         let y = Vector3::<F>::at(vertices, ABSOLUTE_POS);
         let grown = reach * F::sqrt(reach_squared::<F>(&near.tree, y, enough));
-        let mut radius = common;
-        if grown > common {
+        let mut radius = least;
+        if grown > least {
             let last = margin * F::sqrt(reach_squared::<F>(&near.tree, y, most));
-            radius = max(common, min(grown, last));
+            radius = max(least, min(grown, last));
         }
         fits[FIT * ABSOLUTE_POS] = radius;
     }

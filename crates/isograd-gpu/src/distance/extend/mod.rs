@@ -55,8 +55,8 @@ pub const FIT: usize = 8;
 pub struct Samples<'a, T> {
     /// Their tree, which holds the points; the radii in it are not used.
     pub neighborhoods: &'a Neighborhoods<T>,
-    /// [`isograd::neighbors::Neighborhoods::common_radius`].
-    pub common_radius: T,
+    /// Least radius `R` of the samples that a vertex takes its value from, in the unit of the points.
+    pub radius: T,
     /// `(N,)` area of each, not negative; any common factor makes no difference.
     pub areas: &'a Buffer<T>,
 }

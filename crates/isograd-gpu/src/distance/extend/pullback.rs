@@ -9,7 +9,7 @@ use super::{
     samples as of_samples,
 };
 use crate::primitives::fill::{add, zeros};
-use crate::primitives::flags;
+use crate::primitives::{flags, reduce};
 use crate::{Buffer, Device, Scalar};
 
 /// Cotangents of what an attribute was extended from.
@@ -25,6 +25,8 @@ pub struct Cotangent<T> {
     pub vertices: Buffer<T>,
     /// `(4,)` of the low corner of the grid and of its spacing, through the centers of the cells.
     pub grid: Buffer<T>,
+    /// `(1,)` `R R̄` of the least radius `R`.
+    pub radius: Buffer<T>,
     /// `(1,)` cells and vertices where a derivative does not exist or has no bound, and a bounded one was taken.
     pub guarded: Buffer<u32>,
 }
@@ -33,7 +35,7 @@ pub struct Cotangent<T> {
 /// `values_bar` is `(B, components)`, row by row, finite; what is left out counts as zero. The other arguments are those
 /// of the forward map and what it gave. Waits for the device, once, for its checks.
 ///
-/// The radii `R_v`, `a₀`, φ (which chooses the band) and the closest faces are held constant.
+/// `a₀`, φ (which chooses the band) and the closest faces are held constant.
 ///
 /// # Errors
 /// Errors of [`isograd::distance::extend::pullback`]; errors of the device.
@@ -72,7 +74,16 @@ pub fn pullback<R: Runtime, T: Scalar>(
     let sorted = Sorted::new(device, samples, attribute, &residual.smallest_area)?;
     let vertices = &surface.mesh.vertices;
     let vertices_bar = of_cells.vertices;
-    let adjoints = adjoint::pullback(device, &sorted, vertices, &given, &bars, &vertices_bar)?;
+    let least = samples.radius;
+    let adjoints = adjoint::pullback(
+        device,
+        &sorted,
+        vertices,
+        &given,
+        least,
+        &bars,
+        &vertices_bar,
+    )?;
     let found = of_samples::gather(device, &sorted, &adjoints)?;
     let mut guarded: Vec<&Buffer<u32>> = of_cells.guarded.iter().collect();
     guarded.extend([&adjoints.guarded, &found.guarded]);
@@ -82,6 +93,7 @@ pub fn pullback<R: Runtime, T: Scalar>(
         areas: found.areas,
         vertices: vertices_bar,
         grid: of_cells.grid,
+        radius: reduce::sum(device, &adjoints.least)?,
         guarded: flags::sum_of_all(device, &guarded)?,
     })
 }
@@ -99,6 +111,7 @@ fn of_nothing<R: Runtime, T: Scalar>(
         areas: zeros(device, count)?,
         vertices: device.empty(0)?,
         grid: zeros(device, 4)?,
+        radius: zeros(device, 1)?,
         guarded: flags::sum_of_all(device, &[])?,
     })
 }

@@ -2,7 +2,7 @@
 
 use cubecl::prelude::*;
 
-use super::adjoint::{Adjoint, AdjointArrays, Adjoints};
+use super::adjoint::{Adjoint, AdjointArrays, Adjoints, share_of_last};
 use super::columns;
 use super::neighbor::{SampleArrays, Sorted, contract, neighbor};
 use crate::device::launch;
@@ -87,9 +87,13 @@ fn gather_points<F: Float + CubeElement>(
                         let adjoint = Adjoint::<F>::at(&adjoints.records, k);
                         let seen = adjoint.see(n, q);
                         let share = adjoint.offset_bar(seen, n.rest, samples.areas[j]);
-                        sum_x += share.x * unit;
-                        sum_y += share.y * unit;
-                        sum_z += share.z * unit;
+                        let is_last = adjoints.last[k] == j as u32;
+                        let of_radius = select(is_last, adjoints.grown[k], zero);
+                        let through_radius = share_of_last::<F>(n.offset, of_radius, unit);
+                        let share = share.scale(unit).add(through_radius);
+                        sum_x += share.x;
+                        sum_y += share.y;
+                        sum_z += share.z;
                         of_area += adjoint.weight_bar(seen) * n.rest * n.rest;
                     }
                 }

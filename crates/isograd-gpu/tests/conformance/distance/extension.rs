@@ -121,6 +121,7 @@ impl<T: Scalar> Scene<T> {
     fn samples(&self) -> cpu::Samples<'_, T> {
         cpu::Samples {
             neighborhoods: &self.near,
+            radius: self.near.common_radius,
             areas: &self.areas,
         }
     }
@@ -158,7 +159,7 @@ impl<T: Scalar> Scene<T> {
         let radii = device.upload(&self.near.radius).unwrap();
         OnDevice {
             near: isograd_gpu::neighbors::forward(device, &points, &radii).unwrap(),
-            common: self.near.common_radius,
+            radius: self.near.common_radius,
             areas: device.upload(&self.areas).unwrap(),
             values: device.upload(&attribute.values).unwrap(),
             components: attribute.components,
@@ -202,7 +203,7 @@ fn measure<T: Scalar>(mesh: &Mesh<T>) -> (Field<T>, Vec<u32>) {
 /// The same on a device.
 struct OnDevice<T> {
     near: isograd_gpu::neighbors::Neighborhoods<T>,
-    common: T,
+    radius: T,
     areas: Buffer<T>,
     values: Buffer<T>,
     components: usize,
@@ -216,7 +217,7 @@ impl<T: Scalar> OnDevice<T> {
     fn samples(&self) -> extend::Samples<'_, T> {
         extend::Samples {
             neighborhoods: &self.near,
-            common_radius: self.common,
+            radius: self.radius,
             areas: &self.areas,
         }
     }

@@ -4,6 +4,7 @@
 //! unit.
 
 use super::fit::{self, Neighbor};
+use super::rule::{ENOUGH, MARGIN, MOST, REACH};
 use crate::element::fit as element;
 use crate::vector::{add, dot, norm_squared, scale};
 
@@ -91,6 +92,33 @@ impl Adjoint {
         )
     }
 
+    /// `d_j / R_v`.
+    pub(super) fn offset(&self, n: &Neighbor) -> [f64; 3] {
+        add(n.offset, self.mean)
+    }
+
+    /// The sample whose distance a radius that has grown is a multiple of, and its `d_k / R_v`.
+    pub(super) fn last_within(&self, neighbors: &[Neighbor]) -> Option<(u32, [f64; 3])> {
+        let mut offsets: Vec<_> = neighbors
+            .iter()
+            .map(|n| (n.sample, self.offset(n)))
+            .collect();
+        let by_distance = |a: &(u32, [f64; 3]), b: &(u32, [f64; 3])| {
+            norm_squared(a.1).total_cmp(&norm_squared(b.1))
+        };
+        offsets.sort_by(by_distance);
+        let last = offsets.len().checked_sub(1)?;
+        let [enough, most] = [ENOUGH, MOST].map(|count| offsets[last.min(count - 1)]);
+        let by = |(_, offset): (u32, [f64; 3]), factor: f64| {
+            (factor * norm_squared(offset).sqrt() - 1.0).abs()
+        };
+        let found = match by(enough, REACH) <= by(most, MARGIN) {
+            true => enough,
+            false => most,
+        };
+        (norm_squared(found.1) > 0.0).then_some(found)
+    }
+
     /// Cotangents of a neighbor: `q` is its `q_j`, `area` is `a_j + a₀`.
     #[inline(always)]
     pub(super) fn share(&self, n: &Neighbor, q: f64, area: f64) -> Share {
@@ -102,7 +130,7 @@ impl Adjoint {
             let of_ridge = element::ridge_bar(self.mean[k], of_mean, e[k], of_offset);
             element::fit_bar(self.slope[k], t, self.tilt[k], rho, of_ridge)
         });
-        let d = add(e, self.mean);
+        let d = self.offset(n);
         let rest = element::rest(norm_squared(d));
         Share {
             value: n.weight + n.correction,

@@ -206,12 +206,12 @@ fn gather<T: Real>(
 ) -> f64 {
     let Workspace { neighbors, nearest } = workspace;
     let index = &samples.neighborhoods.index;
-    let common = samples.neighborhoods.common_radius;
+    let least = samples.radius;
     let mut collect = |radius| collect(samples, smallest_area, vertex, radius, neighbors);
-    if collect(common) >= ENOUGH.min(index.len()) {
-        return common.f64();
+    if collect(least) >= ENOUGH.min(index.len()) {
+        return least.f64();
     }
-    let radius = grown_radius(index, vertex, common, nearest);
+    let radius = grown_radius(index, vertex, least, nearest);
     collect(radius);
     radius.f64()
 }
@@ -228,6 +228,7 @@ pub(super) fn collect<T: Real>(
     let Samples {
         neighborhoods,
         areas,
+        ..
     } = samples;
     let (index, position) = (&neighborhoods.index, neighborhoods.position());
     let (y, reach) = (to_f64(vertex), radius.f64());
@@ -252,7 +253,7 @@ pub(super) fn collect<T: Real>(
 fn grown_radius<T: Real>(
     index: &CellIndex<T>,
     vertex: [T; 3],
-    common: T,
+    least: T,
     nearest: &mut Vec<(u32, T)>,
 ) -> T {
     index.nearest(vertex, MOST, nearest);
@@ -263,7 +264,7 @@ fn grown_radius<T: Real>(
             .map_or(T::zero(), |&(_, d2)| d2.sqrt())
     };
     let reach = T::of(REACH) * distance(ENOUGH);
-    common.max(reach.min(T::of(MARGIN) * distance(MOST)))
+    least.max(reach.min(T::of(MARGIN) * distance(MOST)))
 }
 
 /// `Σ_j p_j t_j v_j`, as the mean and a correction to it, so that constants are exact.

@@ -22,10 +22,10 @@
 //! where a vertex is far from its samples compared with how far they are from each other (`τ` of 16 and
 //! more), where a slope would be extrapolated. Nothing depends on the unit of length.
 //!
-//! `R_v` is the common radius of the neighborhoods where a vertex has enough samples round it. Else it is
-//! `max(R, min(1.5 r₆, 1.05 r₆₄))` with `r_k` the distance to the `k`-th nearest sample: a vertex in a hole
-//! takes the samples round the hole. `a₀` is a millionth of the mean area: outliers, whose area is 0, count
-//! only where there is nothing else.
+//! `R_v = max(R, min(1.5 r₆, 1.05 r₆₄))` with `r_k` the distance to the `k`-th nearest sample: `R` where a vertex has
+//! enough samples round it; a vertex in a hole takes the samples round the hole. In the pipeline `R` is the common radius
+//! of the neighborhoods, or the cell size of the surface where that is larger: then every sample has a share in a vertex.
+//! `a₀` is a millionth of the mean area: outliers, whose area is 0, count only where there is nothing else.
 //!
 //! # Residual
 //! [`Residual`]: `R_v`, `W`, `m` and `s` of every vertex, `a₀`, and `β` of every cell in the band. Besides it
@@ -44,6 +44,8 @@
 //!       − w̄_j (a_j + a₀) (4/R_v²) (1 − r_j²/R_v²) d_j
 //! x̄_j += d̄_j,   ȳ_v −= Σ_j d̄_j,   ā_j += w̄_j K(r_j)
 //! ```
+//! The value depends on lengths through `d_j/R_v` alone, so `R_v R̄_v = −Σ_j ⟨d̄_j, d_j⟩`. It goes to `R`, or where `R_v` is
+//! `1.5 |d_k|` or `1.05 |d_k|` of a sample `k`, to that: `x̄_k += R_v R̄_v d_k/|d_k|²`, and the opposite to `ȳ_v`.
 //! To the surface through `β`, per cell of center `q`: let `y_0` be a corner of the feature (face, edge or
 //! vertex) that holds the closest point `p`, `E` the columns `y_k − y_0` for its other corners, `o = q − p`
 //! and, summed over components, `δ_k = ū (u_k − u_0)`. Then with `γ = (EᵀE)⁻¹ δ` and `G = E γ`
@@ -52,8 +54,8 @@
 //! ```
 //!
 //! # Not differentiable
-//! `R_v` and `a₀` are held constant. Which cells are in the band, which triangle is closest and which of its
-//! features: values jump on the medial axis, and their slopes jump from feature to feature. A triangle much
+//! `a₀` and which sample is the 6th or 64th are held constant. Which cells are in the band, which triangle is closest and
+//! which of its features: values jump on the medial axis, and their slopes jump from feature to feature. A triangle much
 //! thinner than a cell turns without bound when a corner moves: the direction in which it is thinner than `√ε`
 //! cells (`ε` of the number type) is left out. Where all samples round a vertex coincide, the fit has no slope,
 //! and none is differentiated. [`Cotangent::guarded`] counts both.
@@ -78,8 +80,10 @@ use crate::{Attribute, Field, Mesh, PointCloud, Real};
 /// The samples whose attribute is extended.
 #[derive(Clone, Copy, Debug)]
 pub struct Samples<'a, T> {
-    /// Their neighborhoods, which hold the points.
+    /// Their neighborhoods, which hold the points; the radii in them are not used.
     pub neighborhoods: &'a Neighborhoods<T>,
+    /// Least radius `R` of the samples that a vertex takes its value from, in the unit of the points.
+    pub radius: T,
     /// `(N,)` area of each, not negative; any common factor makes no difference.
     pub areas: &'a [T],
 }

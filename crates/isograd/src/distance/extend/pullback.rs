@@ -72,6 +72,8 @@ pub struct Cotangent<T> {
     pub vertices: Vec<[T; 3]>,
     /// Of the grid, through the centers of the cells.
     pub grid: GridCotangent<T>,
+    /// `R R̄` of the least radius `R`.
+    pub radius: f64,
     /// Cells and vertices where a derivative does not exist or has no bound, and a bounded one was taken.
     pub guarded: usize,
     work: Work,
@@ -93,8 +95,8 @@ struct Work {
 /// Pulls cotangents of an extension back to all its inputs. Overwrites `out`. The same bits for any number of
 /// threads.
 ///
-/// The radii `R_v`, `a₀`, φ (which chooses the band) and the list of closest faces are held constant; see the
-/// [module](super) for that and for what is guarded.
+/// `a₀`, φ (which chooses the band) and the list of closest faces are held constant; see the [module](super) for that and
+/// for what is guarded.
 ///
 /// # Errors
 /// As the forward map, and [`Error::Mismatch`] or [`Error::Cell`] where something has the wrong length or names
@@ -106,6 +108,8 @@ pub fn pullback<T: Real>(inputs: &Inputs<'_, T>, out: &mut Cotangent<T>) -> Resu
     out.guarded = 0;
     from_cells(inputs, out);
     from_vertices(inputs, out);
+    let bars = out.work.shares.iter().map(|shares| shares.least_radius);
+    out.radius = bounded::<T>(bars.sum(), &mut out.guarded).f64();
     let stride = attribute.components;
     out.attribute.resize(attribute.values.len(), T::zero());
     out.points.resize(samples.areas.len(), [T::zero(); 3]);

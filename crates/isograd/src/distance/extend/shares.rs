@@ -14,7 +14,7 @@ use super::pullback::Inputs;
 use crate::Real;
 use crate::gather::bounded;
 use crate::parallel::CHUNK;
-use crate::vector::{add, scale};
+use crate::vector::{dot, norm_squared, scale, sub};
 
 /// Scratch buffers of one thread.
 #[derive(Default)]
@@ -35,6 +35,8 @@ pub(super) struct Shares {
     order: Vec<(u32, u32)>,
     /// By slot: 3 of the point, 1 of the area, and the components of the attribute.
     sums: Vec<f64>,
+    /// `R R̄` of the least radius.
+    pub least_radius: f64,
 }
 
 /// Numbers of a slot before the attribute's.
@@ -44,6 +46,7 @@ impl Shares {
     pub(super) fn begin(&mut self, work: &mut Workspace) {
         self.order.clear();
         self.sums.clear();
+        self.least_radius = 0.0;
         work.slots.clear();
     }
 
@@ -79,13 +82,21 @@ impl Shares {
         }));
         let adjoint = Adjoint::new(radius, neighbors, contracted);
         *guarded += usize::from(adjoint.degenerate);
-        let mut of_vertex = [0.0; 3];
+        let (mut of_vertex, mut of_radius) = ([0.0; 3], 0.0);
         for (n, &q) in neighbors.iter().zip(&*contracted) {
             let area = samples.areas[n.sample as usize].f64() + smallest_area;
             let share = adjoint.share(n, q, area);
             let of_point = scale(share.offset, 1.0 / radius);
-            of_vertex = add(of_vertex, scale(of_point, -1.0));
+            of_vertex = sub(of_vertex, of_point);
+            of_radius -= dot(share.offset, adjoint.offset(n));
             self.add(n.sample, of_point, share, bar, slots);
+        }
+        if radius <= samples.radius.f64() {
+            self.least_radius += of_radius;
+        } else if let Some((sample, offset)) = adjoint.last_within(neighbors) {
+            let of_point = scale(offset, of_radius / (radius * norm_squared(offset)));
+            of_vertex = sub(of_vertex, of_point);
+            self.add(sample, of_point, Share::default(), bar, slots);
         }
         of_vertex
     }
@@ -99,7 +110,7 @@ impl Shares {
         bar: &[f64],
         slots: &mut HashMap<u32, u32>,
     ) {
-        let Self { order, sums } = self;
+        let Self { order, sums, .. } = self;
         let stride = FIXED + bar.len();
         let slot = *slots.entry(sample).or_insert_with(|| {
             let slot = order.len() as u32;
@@ -155,7 +166,10 @@ pub(super) fn add_to_samples<T: Real>(
 /// Adds up the shares of the samples from `first` on.
 fn add_chunks(shares: &[Shares], first: usize, stride: usize, sums: &mut [f64]) {
     let end = first + sums.len() / stride;
-    for Shares { order, sums: parts } in shares {
+    for Shares {
+        order, sums: parts, ..
+    } in shares
+    {
         let begin = order.partition_point(|&(sample, _)| (sample as usize) < first);
         for &(sample, slot) in &order[begin..] {
             if sample as usize >= end {

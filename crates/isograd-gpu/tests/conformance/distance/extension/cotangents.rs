@@ -33,12 +33,13 @@ impl<T: Scalar> Bars<T> {
     }
 }
 
-/// Cotangents in the host's memory: of attribute, points, areas, vertices, low corner and spacing of the grid.
+/// Cotangents in the host's memory: of attribute, points and least radius, areas, vertices, low corner and spacing of the
+/// grid.
 type Pulled<T> = [Vec<T>; 6];
 
 const NAMES: [&str; 6] = [
     "attribute",
-    "points",
+    "points and radius",
     "areas",
     "vertices",
     "lower",
@@ -59,9 +60,10 @@ fn pull<R: Runtime, T: Scalar>(
         .unwrap();
     let numbers = |buffer: &Buffer<T>| device.download(buffer).unwrap();
     let grid = numbers(&found.grid);
+    let radius = numbers(&found.radius)[0] / scene.radius;
     let pulled = [
         numbers(&found.attribute),
-        numbers(&found.points),
+        [numbers(&found.points), vec![radius]].concat(),
         numbers(&found.areas),
         numbers(&found.vertices),
         grid[..3].to_vec(),
@@ -87,9 +89,10 @@ fn pull_on_cpu<T: Scalar>(
         values_bar: bars.cells.as_deref(),
     };
     cpu::pullback(&inputs, &mut out).unwrap();
+    let radius = T::of(out.radius / Real::f64(scene.samples().radius));
     let pulled = [
         out.attribute,
-        out.points.into_flattened(),
+        [out.points.into_flattened(), vec![radius]].concat(),
         out.areas,
         out.vertices.into_flattened(),
         out.grid.lower.to_vec(),
@@ -101,6 +104,17 @@ fn pull_on_cpu<T: Scalar>(
 fn largest<T: Scalar>(numbers: &[T]) -> f64 {
     let sizes = numbers.iter().map(|x| Real::f64(*x).abs());
     sizes.fold(0.0, |a, b| if b > a || b.is_nan() { b } else { a })
+}
+
+/// Adds up the cotangents of the points that coincide: every so many of them.
+fn add_up<T: Scalar>(points_and_radius: &mut Vec<T>, places: usize) {
+    let radius = points_and_radius.pop().expect("a radius");
+    let mut sums = vec![T::of(0.0); 3 * places];
+    for (i, bar) in points_and_radius.iter().enumerate() {
+        sums[i % (3 * places)] += *bar;
+    }
+    sums.push(radius);
+    *points_and_radius = sums;
 }
 
 fn cotangents_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
@@ -119,9 +133,16 @@ fn cotangents_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
             let made = on_device.extend(device, 3.0).unwrap();
             let of_cpu = downloaded(device, scene.grid().shape(), &made);
             for (case, bars) in Bars::all(&of_cpu.0).into_iter().enumerate() {
-                let (found, guarded) = pull(device, &on_device, &made, &bars);
-                let (expected, wanted) = pull_on_cpu(&scene, &attribute, &of_cpu, &bars);
+                let (mut found, guarded) = pull(device, &on_device, &made, &bars);
+                let (mut expected, wanted) = pull_on_cpu(&scene, &attribute, &of_cpu, &bars);
                 println!("{}, {components} in {}:", scene.name, T::NAME);
+                let pulled = found.clone();
+                if scene.name == "four places" {
+                    // Which of the samples in one place is the 6th or 64th is not said.
+                    for of in [&mut found, &mut expected] {
+                        add_up(&mut of[1], 4);
+                    }
+                }
                 for (k, name) in NAMES.into_iter().enumerate() {
                     if largest(&expected[k]) > 1e-12 {
                         assert_near(name, &found[k], &expected[k], tolerance);
@@ -137,7 +158,7 @@ fn cotangents_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
                 // Of all cotangents, which go through every kernel.
                 if case == 0 {
                     let again = pull(device, &on_device, &made, &bars);
-                    assert!(again == (found, guarded), "other bits the second time");
+                    assert!(again == (pulled, guarded), "other bits the second time");
                 }
             }
         }

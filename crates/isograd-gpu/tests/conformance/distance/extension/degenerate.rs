@@ -13,7 +13,7 @@ tests! {
 fn of_samples<R: Runtime, T: Scalar>(
     device: &Device<R>,
     points: &[[f64; 3]],
-    common: f64,
+    radius: f64,
     values: &[f64],
 ) -> OnDevice<T> {
     let scene = Scene::<T>::even();
@@ -28,7 +28,7 @@ fn of_samples<R: Runtime, T: Scalar>(
     let ones = device.upload(&vec![T::of(1.0); count]).unwrap();
     OnDevice {
         near: isograd_gpu::neighbors::forward(device, &points, &ones).unwrap(),
-        common: T::of(common),
+        radius: T::of(radius),
         areas: ones,
         ..scene.upload(device, &attribute)
     }
@@ -62,8 +62,8 @@ fn few_samples_or_equal_ones_give_their_mean<R: Runtime, T: Scalar>(device: &Dev
         (one.repeat(5), vec![1.0, 2.0, 3.0, 4.0, 10.0]),
     ] {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
-        for common in [1e-3, 100.0] {
-            let scene = of_samples::<R, T>(device, &points, common, &values);
+        for radius in [1e-3, 100.0] {
+            let scene = of_samples::<R, T>(device, &points, radius, &values);
             let made = scene.extend(device, 3.0).unwrap();
             for value in all(device, &made.0.vertices)
                 .into_iter()

@@ -98,6 +98,7 @@ impl<T: Real> Scene<T> {
     pub fn samples(&self) -> Samples<'_, T> {
         Samples {
             neighborhoods: &self.neighborhoods,
+            radius: self.neighborhoods.common_radius,
             areas: &self.areas,
         }
     }

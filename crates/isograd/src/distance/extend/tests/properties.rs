@@ -199,6 +199,7 @@ fn unit_of_length_makes_no_difference() {
         let mesh = Mesh::new(vertices, scene.mesh.faces().to_vec()).expect("a mesh");
         let samples = Samples {
             neighborhoods: &neighborhoods,
+            radius: neighborhoods.common_radius,
             areas: &scene.areas,
         };
         let surface = Surface {
