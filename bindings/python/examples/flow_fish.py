@@ -27,7 +27,7 @@ def main(n=16, steps=4, count=1000):
     material = fish.jax(coordinates, NAMES)
     times = tunnel.dt * jnp.arange(steps)
     place = jnp.array([0.5, 0.5, 0.5])
-    options = isograd.Options(orient="signs", surface="2x", radius=0.05)
+    options = isograd.Options(orient="signs", surface="2x")
 
     @jax.checkpoint  # keeps the state of each step alone, and computes the rest again
     def step(values, state, time):
