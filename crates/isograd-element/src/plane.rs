@@ -66,12 +66,14 @@ pub fn area<F: Element>(pi: F, radius: F, crowd: F) -> F {
     pi * radius * radius / (F::new(3.0) * crowd)
 }
 
-/// `λ₁λ/(λ − λ₁)²`: contribution of one of the two larger eigenvalues to the roughness of a neighborhood; they
-/// differ from the smallest.
+/// `λ₁λ/((λ − λ₁)² + λ₁λ/Q)` with `Q = 16`: contribution of one of the two larger eigenvalues to the roughness of a
+/// neighborhood. `λ₁` is positive.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn roughness<F: Element>(first: F, value: F) -> F {
-    first * value / ((value - first) * (value - first))
+    let product = first * value;
+    let gap = value - first;
+    product / (gap * gap + product / F::new(16.0))
 }
 
 /// `−w' (g·e)(n·e)/r`: factor of the offset in its cotangent, 0 at distance 0.

@@ -44,24 +44,15 @@ pub fn widen<R: Runtime, T: Scalar>(
     scatter(device, &widened, &near.places)
 }
 
-/// Roughness of a neighborhood from its ascending eigenvalues; practically infinite if the smallest equals another.
+/// Roughness of a neighborhood from its ascending eigenvalues.
 #[cube]
 fn roughness<F: Float>(values: Vector3<F>) -> F {
     let mut found = F::new(0.0);
     if values.x > F::new(0.0) {
-        found = share::<F>(values.x, values.y) + share::<F>(values.x, values.z);
+        let by_second = plane::roughness::<F>(values.x, values.y);
+        found = by_second + plane::roughness::<F>(values.x, values.z);
     }
     found
-}
-
-#[cube]
-fn share<F: Float>(first: F, value: F) -> F {
-    let gap = value - first;
-    let mut share = F::new(1e30);
-    if gap * gap > F::new(0.0) {
-        share = plane::roughness::<F>(first, value);
-    }
-    share
 }
 
 #[cube(launch)]

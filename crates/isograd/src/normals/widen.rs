@@ -5,7 +5,8 @@
 //! *roughness* `q = λ₁λ₂/(λ₂−λ₁)² + λ₁λ₃/(λ₃−λ₁)²`. In twice the radius, noise is a quarter of the roughness;
 //! two sheets of a thin body, which looks as thick as wide, less still. At an edge it stays, and where the
 //! surface is curved it grows fourfold. So whether noise is what makes a neighborhood rough is seen from
-//! wider ones.
+//! wider ones. Neither term counts as more than `Q = 16`, `1/(1/q + 1/Q)` instead of `q`: from there on the axis says nothing,
+//! and by how much it says nothing must not count, nor be differentiated.
 //!
 //! Source of the compromise between noise and curvature: N. Mitra, A. Nguyen, L. Guibas, "Estimating surface
 //! normals in noisy point cloud data" (2004); here neither noise nor curvature need be known.
@@ -61,7 +62,7 @@ pub(super) fn choose<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residu
     }
 }
 
-/// `q`, see the [module](self); infinite where the axis is no better than another.
+/// `q`, see the [module](self).
 pub(super) fn roughness<T: Real>(plane: &Plane<T>) -> f64 {
     let [first, others @ ..] = plane.eigenvalues.map(|value| value.f64());
     match first > 0.0 {
@@ -128,13 +129,7 @@ impl<T: Real> Widening<T> {
         let [rough, gain, rim] = parts_of_share(own, &found);
         let share = rough * gain * rim;
         if share > 0.0 {
-            // The roughness at hand may be infinite.
-            let kept = if share < 1.0 {
-                (1.0 - share) * own
-            } else {
-                0.0
-            };
-            self.roughness = share * wider + kept;
+            self.roughness = share * wider + (1.0 - share) * own;
             self.factor = share * found.factor.f64() + (1.0 - share) * self.factor;
             self.found = (share == 1.0).then_some(found);
         }

@@ -8,7 +8,7 @@
 //! d̄_j = (w_j/W)(2 B e + m̄) + (w_j'/W)(eᵀ B e + m̄·e) d_j/r_j
 //! ```
 //! since `Σ_k λ̄_k λ_k = 0` for a function of quotients of them. Nothing depends on the unit of length, so
-//! `R_i R̄_i = −Σ_j ⟨d̄_j, d_j⟩`. Of a guarded plane, whose roughness is a matter of rounding, nothing is handed out.
+//! `R_i R̄_i = −Σ_j ⟨d̄_j, d_j⟩`.
 
 use rayon::prelude::*;
 
@@ -122,11 +122,7 @@ impl Bars {
         let (own, wider) = (before.roughness, roughness(&found.plane));
         let [rough, gain, rim] = parts_of_share(own, found);
         let share = rough * gain * rim;
-        let mut share_bar = self.factor * (factor - before.factor);
-        // The roughness at hand may be infinite: it has no cotangent then.
-        if self.roughness != 0.0 {
-            share_bar += self.roughness * (wider - own);
-        }
+        let share_bar = self.factor * (factor - before.factor) + self.roughness * (wider - own);
         let mut wider_bar = share * self.roughness;
         self.roughness *= 1.0 - share;
         self.factor *= 1.0 - share;
@@ -158,7 +154,7 @@ fn add_plane<T: Real>(
     bars: [f64; 2],
     out: &mut Contributions,
 ) {
-    if bars == [0.0; 2] || found.plane.guarded {
+    if bars == [0.0; 2] {
         return;
     }
     let (index, position) = (&neighborhoods.index, neighborhoods.position());
@@ -246,17 +242,18 @@ impl Adjoint {
     }
 }
 
-/// `λ̄_k` of the roughness `Σ_k λ₁ λ_k/(λ_k − λ₁)²`.
+/// `λ̄_k` of the roughness `Σ_k λ₁ λ_k/D_k`, with `D_k = (λ_k − λ₁)² + λ₁λ_k/Q`.
 fn values_bar([first, others @ ..]: [f64; 3], bar: f64) -> [f64; 3] {
     let mut bars = [0.0; 3];
     if bar == 0.0 || !(first > 0.0) {
         return bars;
     }
     for (k, value) in others.into_iter().enumerate() {
-        let gap = value - first;
-        let common = bar * (value + first) / (gap * gap * gap);
+        let roughness = plane::roughness(first, value);
+        let divisor = first * value / roughness;
+        let common = bar * (value + first) * (value - first) / (divisor * divisor);
         bars[0] += value * common;
         bars[k + 1] = -first * common;
     }
-    bars.map(|bar| if bar.is_finite() { bar } else { 0.0 })
+    bars
 }
