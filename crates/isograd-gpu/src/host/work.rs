@@ -276,7 +276,15 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
             extensions: &extensions,
         };
         let found = Reconstructor::pullback(self, result, &cotangent)?;
-        let grid = device.download(&found.grid)?;
+        let mut grid = device.download(&found.grid)?;
+        let mut common = 0.0;
+        if let Some(radius) = &found.extension_radius {
+            let bar = device.download(radius)?[0];
+            match result.extends_within_cells() {
+                true => grid[3] += bar / self.grid().spacing(),
+                false => common = isograd::Real::f64(bar),
+            }
+        }
         let guarded = match &found.guarded {
             Some(count) => device.download(count)?[0] as usize,
             None => 0,
@@ -302,10 +310,7 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
                 Some(radii) => device.download(radii)?,
                 None => Vec::new(),
             },
-            common: match &found.common_radius {
-                Some(radius) => isograd::Real::f64(device.download(radius)?[0]),
-                None => 0.0,
-            },
+            common,
         };
         Ok((of_cloud, radii))
     }

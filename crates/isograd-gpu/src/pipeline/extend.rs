@@ -31,14 +31,14 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
 
 impl<T: Scalar> Reconstruction<T> {
     /// Whether the least radius of an extension is the cell size, as that is larger than the common radius.
-    pub(super) fn radius_of_spacing(&self) -> bool {
+    pub(crate) fn extends_within_cells(&self) -> bool {
         self.residuals.common_radius < self.residuals.distance.grid().spacing()
     }
 
     pub(super) fn extended_samples(&self) -> Samples<'_, T> {
         Samples {
             neighborhoods: &self.residuals.near,
-            radius: match self.radius_of_spacing() {
+            radius: match self.extends_within_cells() {
                 true => self.residuals.distance.grid().spacing(),
                 false => self.residuals.common_radius,
             },

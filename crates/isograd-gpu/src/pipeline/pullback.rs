@@ -77,8 +77,9 @@ pub struct CloudCotangent<T> {
     pub radii: Buffer<T>,
     /// `(N,)` of the radii, times these, that axes are found with; none where normals were given.
     pub axis_radii: Option<Buffer<T>>,
-    /// `(1,)` of the common radius, times it, by itself; none where nothing was extended.
-    pub common_radius: Option<Buffer<T>>,
+    /// `(1,)` of the radius of extensions, times it: of the common radius or, where it is larger, of the cell size, whose
+    /// part of [`grid`](Self::grid) this is not in. None where nothing was extended.
+    pub extension_radius: Option<Buffer<T>>,
     /// `(N, 3)` of the given normals; none where the normals were found.
     pub normals: Option<Buffer<T>>,
     /// Of each extended attribute, `(N, components)`, in the order of [`Cotangent::extensions`].
@@ -95,7 +96,7 @@ struct Extended<T> {
     attributes: Vec<Buffer<T>>,
     /// None where nothing was extended.
     vertices: Option<Buffer<T>>,
-    common_radius: Option<Buffer<T>>,
+    radius: Option<Buffer<T>>,
     guarded: Vec<Buffer<u32>>,
 }
 
@@ -156,7 +157,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             points: bars.points,
             radii,
             axis_radii,
-            common_radius: extended.common_radius,
+            extension_radius: extended.radius,
             normals: given,
             attributes: extended.attributes,
             grid: bars.grid,
@@ -175,7 +176,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         let mut out = Extended {
             attributes: Vec::new(),
             vertices: None,
-            common_radius: None,
+            radius: None,
             guarded: Vec::new(),
         };
         for of in cotangent.extensions {
@@ -193,12 +194,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             add(device, &found.areas, &bars.areas)?;
             add(device, &found.grid, &bars.grid)?;
             add_or_set(device, &mut out.vertices, found.vertices)?;
-            match result.radius_of_spacing() {
-                true => launch!(device, 1, 1 => add_to_spacing<T>(
-                    found.radius, bars.grid, T::of(1.0) / self.grid.spacing(),
-                )),
-                false => add_or_set(device, &mut out.common_radius, found.radius)?,
-            }
+            add_or_set(device, &mut out.radius, found.radius)?;
             out.attributes.push(found.attribute);
             out.guarded.push(found.guarded);
         }
@@ -327,18 +323,6 @@ fn add_or_set<R: Runtime, T: Scalar>(
             *sum = Some(part);
             Ok(())
         }
-    }
-}
-
-/// Adds the cotangent of a length that is the cell size, times it, to that of the cell size.
-#[cube(launch)]
-fn add_to_spacing<F: Float + CubeElement>(
-    bar: &Array<F>,
-    grid_bar: &mut Array<F>,
-    one_over_spacing: F,
-) {
-    if ABSOLUTE_POS == 0 {
-        grid_bar[3] += bar[0] * one_over_spacing;
     }
 }
 
