@@ -127,7 +127,7 @@ def test_gradients_agree_with_differences(x64, with_normals):
         arguments,
         order=1,
         modes=["rev"],
-        eps=1e-6,
+        eps=3e-8,  # on the hollow side of edges the closest face jumps too, by a little
         atol=1e-6,
         rtol=1e-6,
     )
