@@ -92,6 +92,22 @@ impl<T: Real> Neighborhoods<T> {
         }
     }
 
+    /// Calls `visit(j, x_j − x_i)` for every other point within `radius` of point `i`.
+    pub(crate) fn for_each_offset(
+        &self,
+        i: usize,
+        radius: T,
+        mut visit: impl FnMut(usize, [T; 3]),
+    ) {
+        let point = |i: usize| self.index.point(self.position()[i] as usize);
+        let center = point(i);
+        self.index.for_each_within(center, radius, |j, _| {
+            if j != i {
+                visit(j, vector::sub(point(j), center));
+            }
+        });
+    }
+
     fn contributions(
         &self,
         radius: &[T],
@@ -103,17 +119,12 @@ impl<T: Real> Neighborhoods<T> {
             sums: Vec::with_capacity(centers.len()),
         };
         for &i in centers {
-            let center = self.index.point(self.position()[i] as usize);
             let (mut total, mut sum) = ([T::zero(); 3], 0.0);
-            self.index.for_each_within(center, radius[i], |j, _| {
-                if j != i {
-                    let point = self.index.point(self.position()[j] as usize);
-                    let offset = vector::sub(point, center);
-                    let bar = offset_bar(i, j, offset);
-                    total = vector::sub(total, bar);
-                    sum += vector::dot(bar, offset).f64();
-                    out.points.push((j as u32, bar));
-                }
+            self.for_each_offset(i, radius[i], |j, offset| {
+                let bar = offset_bar(i, j, offset);
+                total = vector::sub(total, bar);
+                sum += vector::dot(bar, offset).f64();
+                out.points.push((j as u32, bar));
             });
             out.points.push((i as u32, total));
             out.sums.push(sum);

@@ -22,9 +22,9 @@ use crate::neighbors::{Candidates, Neighborhoods, RadiiCotangent, rule};
 use crate::vector::{add, dot, norm, scale, sub, to_f64};
 use crate::{Real, vector};
 
-/// Adds what cotangents of the radii that axes were found with mean: `bars` are `(N,)` `R_i R̄_i`. The own radii get them, in
-/// `radii_bar`; the `(N, 3)` `points_bar` gets what they mean for how far a radius is `widened` beyond its `own`, both `(N,)`.
-/// The [pullback of the axes](super::pullback) has done so itself.
+/// Pulls `(N,)` cotangents `R_i R̄_i` of the radii that axes were found with back to the radii of the neighborhoods, in
+/// `radii_bar`, and through how far each radius is `widened` beyond its `own`, both `(N,)`, to the `(N, 3)` `points_bar`. Adds
+/// to both. The [pullback of the axes](super::pullback) includes it.
 pub fn radii_pullback<T: Real>(
     neighborhoods: &Neighborhoods<T>,
     [widened, own]: [&[T]; 2],
@@ -42,9 +42,9 @@ pub fn radii_pullback<T: Real>(
     pullback(neighborhoods, &of_widened, points_bar, radii_bar);
 }
 
-/// Adds to the `(N, 3)` `points_bar` what the cotangents of widened radii mean for the points by how far they are widened:
-/// `bars` are points whose neighborhood is wider than their own and `R R̄` of the radius `R` that it has. What their own
-/// radii get is added to `radii_bar`.
+/// Pulls cotangents of widened radii back through how far they are widened, to the `(N, 3)` `points_bar` and to `radii_bar`,
+/// the radii of the neighborhoods. Adds to both. `bars` are points whose radius `R` is wider than that of their neighborhood,
+/// and `R R̄`.
 pub(super) fn pullback<T: Real>(
     neighborhoods: &Neighborhoods<T>,
     bars: &[(u32, f64)],
@@ -65,7 +65,7 @@ pub(super) fn pullback<T: Real>(
     }
 }
 
-/// What some points and radii get.
+/// Parts of the cotangents of points and radii.
 #[derive(Default)]
 struct Contributions {
     points: Vec<(u32, [f64; 3])>,
@@ -146,7 +146,7 @@ fn is_between(part: f64) -> bool {
     0.0 < part && part < 1.0
 }
 
-/// Adds what a neighborhood means for its points, by the cotangents of its roughness and its one-sidedness.
+/// Adds the cotangents of the points of a neighborhood, and of its radius, from those of its roughness and its one-sidedness.
 fn add_plane<T: Real>(
     neighborhoods: &Neighborhoods<T>,
     i: u32,
@@ -157,21 +157,16 @@ fn add_plane<T: Real>(
     if bars == [0.0; 2] {
         return;
     }
-    let (index, position) = (&neighborhoods.index, neighborhoods.position());
     let adjoint = Adjoint::new(found, bars, rule::steepness(neighborhoods.rule));
-    let center = index.point(position[i as usize] as usize);
     let radius = found.radius.f64();
     let (mut total, mut along) = ([0.0; 3], 0.0);
-    index.for_each_within(center, found.radius, |j, _| {
-        if j as u32 != i {
-            let point = index.point(position[j] as usize);
-            let offset = scale(to_f64(vector::sub(point, center)), 1.0 / radius);
-            let bar = adjoint.offset_bar(offset);
-            along += dot(bar, offset);
-            let bar = scale(bar, 1.0 / radius);
-            total = sub(total, bar);
-            out.points.push((j as u32, bar));
-        }
+    neighborhoods.for_each_offset(i as usize, found.radius, |j, offset| {
+        let offset = scale(to_f64(offset), 1.0 / radius);
+        let bar = adjoint.offset_bar(offset);
+        along += dot(bar, offset);
+        let bar = scale(bar, 1.0 / radius);
+        total = sub(total, bar);
+        out.points.push((j as u32, bar));
     });
     out.points.push((i, total));
     out.radii.push((i, -along));

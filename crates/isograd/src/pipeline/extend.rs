@@ -80,16 +80,19 @@ impl<T: Real> Reconstruction<T> {
         distance::extend::at_vertices(self.samples(), &used, self.mesh())
     }
 
-    /// Not below the cell size of the surface, so that samples closer together than its vertices are not passed over.
-    fn extension_radius(&self) -> T {
-        let common = self.residuals.neighborhoods.common_radius;
-        common.max(self.surface_grid().spacing())
+    /// Whether the least radius of an extension is the cell size of the surface, as that is larger than the common radius:
+    /// so samples closer together than its vertices are not passed over.
+    pub(super) fn extends_within_cells(&self) -> bool {
+        self.residuals.neighborhoods.common_radius < self.surface_grid().spacing()
     }
 
     pub(super) fn samples(&self) -> Samples<'_, T> {
         Samples {
             neighborhoods: &self.residuals.neighborhoods,
-            radius: self.extension_radius(),
+            radius: match self.extends_within_cells() {
+                true => self.surface_grid().spacing(),
+                false => self.residuals.neighborhoods.common_radius,
+            },
             areas: &self.areas,
         }
     }

@@ -57,8 +57,9 @@ impl<T: Pipeline> Reconstruction<T> {
     /// Cotangents of the samples and of the grid, from cotangents of any of the results: the transpose of the derivative
     /// of the whole pipeline, stage by stage in reverse.
     ///
-    /// Held constant, as the stages say: signs of the normals, which cells are inside, which face is closest. A derivative without a bound is replaced by a bounded one, one that the number type
-    /// cannot hold by the nearest number that it can, or 0; both are counted in [`CloudCotangent::guarded`]. The result has the same bits for any number of threads.
+    /// Held constant, as the stages say: signs of the normals, which cells are inside, which face is closest. A derivative
+    /// without a bound is replaced by a bounded one, one that the number type cannot hold by the nearest number that it can,
+    /// or 0; both are counted in [`CloudCotangent::guarded`]. The result has the same bits for any number of threads.
     ///
     /// # Errors
     /// As [`PullbackError`] lists.
@@ -148,8 +149,6 @@ impl<T: Real> Reconstruction<T> {
             radii,
             ..
         } = scratch;
-        let spacing = self.surface_grid().spacing();
-        let radius_follows = self.residuals.neighborhoods.common_radius >= spacing;
         for (of, attribute) in cotangent.extensions.iter().zip(&mut out.attributes) {
             let inputs = extend::Inputs {
                 samples: self.samples(),
@@ -169,9 +168,9 @@ impl<T: Real> Reconstruction<T> {
                 lower: vector::to_f64(found.grid.lower),
                 spacing: found.grid.spacing.f64(),
             });
-            match radius_follows {
-                true => radii.add_common(found.radius),
-                false => samples.grid.spacing += found.radius / self.sdf.grid().spacing().f64(),
+            match self.extends_within_cells() {
+                true => samples.grid.spacing += found.radius / self.sdf.grid().spacing().f64(),
+                false => radii.add_common(found.radius),
             }
             out.guarded += found.guarded;
         }

@@ -1,7 +1,6 @@
 //! The pullback of the fits to the vertices, and the records of it that the samples gather.
 
 use cubecl::prelude::*;
-
 use isograd::distance::extend::rule::{MARGIN, REACH};
 
 use super::FIT;
@@ -150,11 +149,33 @@ pub(super) fn share_of_last<F: Float>(offset: Vector3<F>, radius_bar: F, unit: F
     offset.scale(factor)
 }
 
-/// By how much the closer of two multiples of a length is not 1.
+/// The sample whose distance from the vertex at `y` times `reach` or `margin` is the radius.
 #[cube]
-fn not_one<F: Float>(length: F, first: F, second: F) -> F {
-    let by_first = F::abs(first * length - F::new(1.0));
-    min(by_first, F::abs(second * length - F::new(1.0)))
+fn last_within<F: Float + CubeElement>(
+    samples: &SampleArrays<F>,
+    y: Vector3<F>,
+    of: Fitted<F>,
+    reach: F,
+    margin: F,
+) -> u32 {
+    let one = F::new(1.0);
+    let mut last = 0u32.runtime();
+    let mut least = F::new(1.0);
+    let mut node = next_leaf::<F>(&samples.tree, y, of.radius, 0usize, false);
+    while node < samples.tree.links.len() {
+        let first = first_of_leaf(&samples.tree.links, node);
+        for j in first..end_of_leaf(first, samples.areas.len()) {
+            let d = Vector3::<F>::at(&samples.tree.points, j)
+                .sub(y)
+                .scale(of.unit);
+            let length = F::sqrt(d.dot(d));
+            let error = min(F::abs(reach * length - one), F::abs(margin * length - one));
+            last = select(error < least, j as u32, last);
+            least = min(error, least);
+        }
+        node = next_leaf::<F>(&samples.tree, y, of.radius, node + 1, false);
+    }
+    last
 }
 
 /// A sample as an adjoint sees it.
@@ -329,8 +350,6 @@ fn pull_fits<F: Float + CubeElement>(
             for i in 0..9usize {
                 shares[i] = F::new(0.0);
             }
-            let mut last = 0u32.runtime();
-            let mut error = F::new(1.0);
             let mut node = next_leaf::<F>(&samples.tree, y, of.radius, 0usize, false);
             while node < samples.tree.links.len() {
                 let first = first_of_leaf(&samples.tree.links, node);
@@ -351,9 +370,6 @@ fn pull_fits<F: Float + CubeElement>(
                         shares[7] += radial * seen.pull * square
                             + without_mean.through_fit(seen).dot(n.offset);
                         shares[8] += radial * square;
-                        let by = not_one::<F>(F::sqrt(square), reach, margin);
-                        last = select(by < error, j as u32, last);
-                        error = min(error, by);
                     }
                 }
                 node = next_leaf::<F>(&samples.tree, y, of.radius, node + 1, false);
@@ -367,6 +383,7 @@ fn pull_fits<F: Float + CubeElement>(
             total.scale(-of.unit).add_to(&mut sums, 0usize);
             let radius_bar = shares[0] * shares[8] - shares[7];
             if of.radius > least_radius {
+                let last = last_within::<F>(samples, y, of, reach, margin);
                 adjoints.last[k] = last;
                 adjoints.grown[k] = radius_bar;
                 let d = Vector3::<F>::at(&samples.tree.points, last as usize).sub(y);

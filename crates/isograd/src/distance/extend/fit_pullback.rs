@@ -4,7 +4,7 @@
 //! unit.
 
 use super::fit::{self, Neighbor};
-use super::rule::{ENOUGH, MARGIN, MOST, REACH};
+use super::rule::{MARGIN, REACH};
 use crate::element::fit as element;
 use crate::vector::{add, dot, norm_squared, scale};
 
@@ -99,23 +99,13 @@ impl Adjoint {
 
     /// The sample whose distance a radius that has grown is a multiple of, and its `d_k / R_v`.
     pub(super) fn last_within(&self, neighbors: &[Neighbor]) -> Option<(u32, [f64; 3])> {
-        let mut offsets: Vec<_> = neighbors
-            .iter()
-            .map(|n| (n.sample, self.offset(n)))
-            .collect();
-        let by_distance = |a: &(u32, [f64; 3]), b: &(u32, [f64; 3])| {
-            norm_squared(a.1).total_cmp(&norm_squared(b.1))
+        let error = |offset: &[f64; 3]| {
+            let length = norm_squared(*offset).sqrt();
+            let [by_reach, by_margin] = [REACH, MARGIN].map(|factor| (factor * length - 1.0).abs());
+            by_reach.min(by_margin)
         };
-        offsets.sort_by(by_distance);
-        let last = offsets.len().checked_sub(1)?;
-        let [enough, most] = [ENOUGH, MOST].map(|count| offsets[last.min(count - 1)]);
-        let by = |(_, offset): (u32, [f64; 3]), factor: f64| {
-            (factor * norm_squared(offset).sqrt() - 1.0).abs()
-        };
-        let found = match by(enough, REACH) <= by(most, MARGIN) {
-            true => enough,
-            false => most,
-        };
+        let offsets = neighbors.iter().map(|n| (n.sample, self.offset(n)));
+        let found = offsets.min_by(|(_, a), (_, b)| error(a).total_cmp(&error(b)))?;
         (norm_squared(found.1) > 0.0).then_some(found)
     }
 
