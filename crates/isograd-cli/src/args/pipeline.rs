@@ -75,7 +75,8 @@ pub struct MethodArgs {
     #[arg(long, value_name = "LEVEL", default_value = "thin")]
     pub level: Level,
     /// Cells that the surface is found on: auto (about the distance between samples, up to twice as fine as the grid of
-    /// φ), grid (those of φ), a cell size in the cloud's unit, or a factor such as 3x; φ stays on its own grid
+    /// φ, or four times within 2²⁵ cells), grid (those of φ), a cell size in the cloud's unit, or a factor such as 3x; φ
+    /// stays on its own grid
     #[arg(long, value_name = "auto|grid|H|Fx", default_value = "auto")]
     pub surface: SurfaceResolution,
     /// Cells at which the indicator is computed: dense (all of the surface's), sparse (near the samples, with coarse ones for

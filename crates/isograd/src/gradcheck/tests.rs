@@ -41,6 +41,8 @@ fn a_wrong_pullback_would_be_seen() {
     let paper = Options {
         reconstruction: crate::Options::default()
             .splat(crate::splat::Weights::Paper)
+            // Smaller cells have smaller jumps.
+            .surface(crate::SurfaceResolution::Factor(2.0))
             // It would mend what the weights do.
             .level(crate::isosurface::Level::Mean)
             .smoothing(crate::poisson::Smoothing::Cells(0.0)),

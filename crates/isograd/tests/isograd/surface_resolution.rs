@@ -141,5 +141,5 @@ fn an_automatic_surface_follows_the_samples() {
         result.surface_grid().shape()[0]
     };
     // 0.15, 0.08 and 0.03 apart, on cells of 0.1.
-    assert_eq!([300, 1000, 8000].map(fine), [24, 36, 48]);
+    assert_eq!([300, 1000, 8000].map(fine), [24, 36, 96]);
 }
