@@ -8,9 +8,9 @@ use crate::{Grid, GridError, Real};
 /// tray of plates 0.0041, 0.0049, 0.0068; a machined part 0.012, 0.020, 0.033.
 const CELLS_PER_SPACING: f64 = 1.2;
 
-/// Automatic ratios of the cell sizes. Few, so that the ratio seldom changes as the points move.
-/// Mean distance from the surface to the true mesh with 2, 3 and 4, in cells of φ (64 on the longest side): an airliner
-/// 0.0112, 0.0056, 0.0040; a flying wing 0.0237, 0.0128, 0.0081; an aorta 0.0077, 0.0046, 0.0037.
+/// Automatic ratios of the cell sizes. Few, so that the ratio seldom changes as the points move. Mean distance
+/// from the surface to the true mesh with 2, 3 and 4, in cells of φ (64 on the longest side): an airliner 0.0112, 0.0056,
+/// 0.0040; a flying wing 0.0237, 0.0128, 0.0081; an aorta 0.0077, 0.0046, 0.0037.
 const AUTO_FACTORS: [f64; 5] = [1.25, 1.5, 2.0, 3.0, 4.0];
 
 /// Automatic ratio up to which the solve may be sparse.
@@ -217,10 +217,11 @@ mod tests {
 
     #[test]
     fn automatic_cells_follow_the_samples_as_far_as_is_affordable() {
-        let cells = |side: usize, sample_spacing: f64, solve| {
-            let fine = SurfaceResolution::Auto.grid(&grid([side; 3]), 0.05 * sample_spacing, solve);
-            fine.expect("fits").shape()[0]
+        let cells = |shape, sample_spacing: f64, solve| {
+            let fine = SurfaceResolution::Auto.grid(&grid(shape), 0.05 * sample_spacing, solve);
+            fine.expect("fits").shape()
         };
+        let cube = [40; 3];
         for (sample_spacing, expected) in [
             (1.3, 40),
             (0.97, 50),
@@ -229,14 +230,19 @@ mod tests {
             (0.5, 120),
             (0.35, 160),
             (1e-9, 160),
-            (f64::NAN, 40),
         ] {
-            assert_eq!(cells(40, sample_spacing, Solve::Auto), expected);
+            assert_eq!(cells(cube, sample_spacing, Solve::Dense), [expected; 3]);
         }
+        assert_eq!(cells(cube, f64::NAN, Solve::Dense), cube);
         // At most 2²⁵ cells, or twice as fine by a sparse solve.
-        for (side, dense, sparse) in [(100, 300, 300), (150, 300, 300), (200, 300, 400)] {
-            assert_eq!(cells(side, 0.1, Solve::Dense), dense);
-            assert_eq!(cells(side, 0.1, Solve::Auto), sparse);
+        for (shape, dense, sparse) in [
+            ([100; 3], [300; 3], [300; 3]),
+            ([150; 3], [300; 3], [300; 3]),
+            ([200; 3], [300; 3], [400; 3]),
+            ([338, 120, 151], [338, 120, 151], [676, 240, 302]),
+        ] {
+            assert_eq!(cells(shape, 0.1, Solve::Dense), dense);
+            assert_eq!(cells(shape, 0.1, Solve::Auto), sparse);
         }
     }
 
