@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::march::{position, split, values_at_corners};
+use super::march::{position, split};
 use super::signs::ones;
 use super::tables::{self, TABLE};
 use super::{Error, Report};
@@ -40,14 +40,24 @@ struct Corners {
     inside: Vec<Option<bool>>,
 }
 
-/// Writes the surface `χ = level` of a field in blocks into `mesh`, in the user's unit. A cube without a value at each of
-/// its corners has no triangles. The same bits for any number of threads.
+/// Where a vertex lies on its edge, linearly between the values at the ends, from 0 to 1: for [`forward`].
+#[inline(always)]
+pub(crate) fn linear<T: Real>(chi: &BlockField<T>, level: T) -> impl Fn(LatticeEdge) -> T {
+    move |edge| {
+        let [low, high] = Cells::from(chi).ends(edge);
+        crossing(low, high, level)
+    }
+}
+
+/// Writes the surface `χ = level` of a field in blocks into `mesh`, in the user's unit, each vertex at a `fraction` of its
+/// edge. A cube without a value at each of its corners has no triangles. The same bits for any number of threads.
 ///
 /// # Errors
 /// As [`forward`](super::forward).
 pub(crate) fn forward<T: Real>(
     chi: &BlockField<T>,
     level: T,
+    fraction: impl Fn(LatticeEdge) -> T + Sync,
     mesh: &mut Mesh<T>,
 ) -> Result<Report, Error> {
     mesh.clear();
@@ -86,21 +96,21 @@ pub(crate) fn forward<T: Real>(
     if vertices >= u32::MAX as usize {
         return Err(Error::TooManyVertices { vertices });
     }
-    mesh.vertices.resize(vertices, [T::zero(); 3]);
     mesh.edges.resize(vertices, LatticeEdge::new(0, 0));
     mesh.faces.resize(faces, [0; 3]);
-    let vertices = split(&mut mesh.vertices, crossings.iter().map(|of| of.vertices));
     let edges = split(&mut mesh.edges, crossings.iter().map(|of| of.vertices));
+    let work = edges.into_par_iter().enumerate();
+    work.for_each(|(block, edges)| find_edges(chi, block, &crossings[block], edges));
+    let fractions: Vec<T> = mesh.edges.par_iter().map(|&edge| fraction(edge)).collect();
+    let places = mesh.edges.par_iter().zip(&fractions);
+    let vertex = |(edge, &fraction): (&LatticeEdge, &T)| {
+        position(&chi.grid, chi.grid.cell(edge.cell()), edge.axis(), fraction)
+    };
+    places.map(vertex).collect_into_vec(&mut mesh.vertices);
     let faces = split(&mut mesh.faces, crossings.iter().map(|of| of.faces));
-    let work = vertices.into_par_iter().zip(edges).zip(faces).enumerate();
-    work.for_each(|(block, ((vertices, edges), faces))| {
-        if !vertices.is_empty() {
-            emit_vertices(chi, level, block, &crossings[block], vertices, edges);
-        }
-        if !faces.is_empty() {
-            emit_faces(chi, level, block, &crossings, faces);
-        }
-    });
+    let work = faces.into_par_iter().enumerate();
+    work.filter(|(_, faces)| !faces.is_empty())
+        .for_each(|(block, faces)| emit_faces(chi, level, block, &crossings, &fractions, faces));
     Ok(Report {
         touches_wall: walls.as_flattened().contains(&true),
         walls,
@@ -282,26 +292,21 @@ impl Crossings {
     }
 }
 
-fn emit_vertices<T: Real>(
+/// The crossed edges that start in a block.
+fn find_edges<T: Real>(
     chi: &BlockField<T>,
-    level: T,
     block: usize,
     of: &Crossings,
-    vertices: &mut [[T; 3]],
     edges: &mut [LatticeEdge],
 ) {
     let corner = chi.blocks.corner(block);
-    let mut places = vertices.iter_mut().zip(edges);
+    let mut places = edges.iter_mut();
     for (n, word) in of.crossed.as_flattened().iter().enumerate() {
         let (axis, i) = (n / EDGE, n % EDGE);
         for bit in ones(*word) {
             let (j, k) = (bit as usize / EDGE, bit as usize % EDGE);
-            let cell = plus(corner, [i, j, k]);
-            let edge = LatticeEdge::new(chi.grid.index(cell), axis);
-            let [low, high] = Cells::from(chi).ends(edge);
-            if let Some((vertex, place)) = places.next() {
-                *vertex = position(&chi.grid, cell, axis, crossing(low, high, level));
-                *place = edge;
+            if let Some(place) = places.next() {
+                *place = LatticeEdge::new(chi.grid.index(plus(corner, [i, j, k])), axis);
             }
         }
     }
@@ -316,6 +321,7 @@ fn emit_faces<T: Real>(
     level: T,
     block: usize,
     crossings: &[Crossings],
+    fractions: &[T],
     faces: &mut [[u32; 3]],
 ) {
     let corners = Corners::new(chi, level, block);
@@ -330,12 +336,16 @@ fn emit_faces<T: Real>(
     let mut places = faces.iter_mut();
     for cell in cells() {
         let case = corners.case(cell).unwrap_or(0);
-        let values = || values_at_corners(chi.into(), plus(chi.blocks.corner(block), cell));
-        TABLE.for_each_triangle(case, values, level, |triangle| {
-            if let Some(place) = places.next() {
-                *place = triangle.map(|edge| vertex(cell, edge));
-            }
-        });
+        let fraction = |edge| fractions[vertex(cell, edge) as usize];
+        TABLE.for_each_triangle(
+            case,
+            || fraction,
+            |triangle| {
+                if let Some(place) = places.next() {
+                    *place = triangle.map(|edge| vertex(cell, edge));
+                }
+            },
+        );
     }
 }
 

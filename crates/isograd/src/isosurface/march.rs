@@ -4,7 +4,7 @@ use pulp::Arch;
 use rayon::prelude::*;
 
 use super::signs::{Signs, ones};
-use super::tables::TABLE;
+use super::tables::{self, TABLE};
 use super::{Error, Report};
 use crate::data::cells::Cells;
 use crate::data::{Field, Grid, LatticeEdge, Mesh};
@@ -112,8 +112,11 @@ impl Scratch {
                 [(i, j), (i, j + 1), (i + 1, j), (i + 1, j + 1)].map(|(i, j)| self.row(i, j, w));
             for k in ones(block.active) {
                 let ids = cube_vertices(&rows, k);
-                let values = || values_at_corners(chi.into(), [i, j, 64 * w + k as usize]);
-                TABLE.for_each_triangle(block.case(k), values, level, |triangle| {
+                let fractions = || {
+                    let values = values_at_corners(chi, [i, j, 64 * w + k as usize]);
+                    move |edge| tables::fraction(edge, &values, level)
+                };
+                TABLE.for_each_triangle(block.case(k), fractions, |triangle| {
                     if let Some(place) = places.next() {
                         *place = triangle.map(|edge| ids[edge as usize]);
                     }
@@ -205,10 +208,10 @@ fn emit_vertices<T: Real>(
 
 /// Values at the corners of the cube whose low corner is `cell`.
 #[inline(always)]
-pub(super) fn values_at_corners<T: Real>(chi: Cells<T>, [i, j, k]: [usize; 3]) -> [T; 8] {
+fn values_at_corners<T: Real>(chi: &Field<T>, [i, j, k]: [usize; 3]) -> [T; 8] {
     let mut values = [T::zero(); 8];
     for (n, pair) in values.as_chunks_mut::<2>().0.iter_mut().enumerate() {
-        *pair = chi.row([i + n / 2, j + n % 2, k]);
+        *pair = Cells::from(chi).row([i + n / 2, j + n % 2, k]);
     }
     values
 }

@@ -71,7 +71,8 @@ pub enum Level {
     /// of them is missed. Where the surface has a grid of its own, samples of such parts are moved apart until these are
     /// thick enough, if samples have areas and are not less than about a sixth of a cell of the surface apart. Where its cells
     /// are larger than 0.9 of the distance between samples, and the solve is dense, the surface is also that of quadratic
-    /// B-splines, marched on cells half as large: derivatives vary less within a cell, and edges are rounded a little more.
+    /// B-splines, marched on cells half as large: it hardly depends on how the body lies on the grid, and derivatives vary
+    /// less within a cell.
     #[default]
     Thin,
     /// Local value at the samples nearby: [`local_level`]. Parts thinner than two cells of the surface may be cut off.

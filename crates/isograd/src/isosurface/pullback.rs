@@ -68,7 +68,7 @@ pub(crate) fn pullback_on<T: Real>(
 }
 
 /// Greatest value less least value.
-fn range<T: Real>(values: &[T]) -> T {
+pub(super) fn range<T: Real>(values: &[T]) -> T {
     let none = || [T::infinity(), T::neg_infinity()];
     let wider = |[low, high]: [T; 2], [l, h]: [T; 2]| [low.min(l), high.max(h)];
     let [low, high] = values

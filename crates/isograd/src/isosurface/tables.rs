@@ -78,24 +78,24 @@ impl Table {
         self.counts[case as usize].into()
     }
 
-    /// Calls `found` with each triangle, three of its edges, of a cube with these values at its corners.
+    /// Calls `found` with each triangle, three of its edges, of a cube. If there is a choice, `fractions` is called for
+    /// where the vertices lie on their edges, from 0 to 1, given to `T`.
     #[inline(always)]
-    pub(super) fn for_each_triangle<T: Real>(
+    pub(super) fn for_each_triangle<T: Real, F: Fn(u8) -> T>(
         &self,
         case: u8,
-        values: impl FnOnce() -> [T; 8],
-        level: T,
+        fractions: impl FnOnce() -> F,
         mut found: impl FnMut([u8; 3]),
     ) {
         let loops = self.loops(case);
-        let is_given = loops.iter().all(|of| of.triangulations == 1);
-        let values = if is_given { [T::zero(); 8] } else { values() };
+        let is_open = loops.iter().any(|of| of.triangulations > 1);
+        let fractions = is_open.then(fractions);
         for of in loops {
             let mut best = &self.triangles[of.first.into()..][..of.triangles.into()];
-            if of.triangulations > 1 {
+            if let Some(fraction) = fractions.as_ref().filter(|_| of.triangulations > 1) {
                 let mut vertices = [[0.0; 3]; 12];
                 for &edge in best.as_flattened() {
-                    vertices[edge as usize] = vertex(edge, &values, level);
+                    vertices[edge as usize] = vertex(edge, fraction(edge).f64());
                 }
                 let mut largest = enclosed(best, &vertices);
                 for other in self.triangulations(of).skip(1) {
@@ -146,14 +146,21 @@ fn enclosed(triangles: &[[u8; 3]], vertices: &[[f64; 3]; 12]) -> f64 {
     triangles[1..].iter().map(volume).sum()
 }
 
-/// The vertex on an edge of a cube, which is crossed.
+/// The point at a fraction of an edge of a cube.
 #[inline(always)]
-fn vertex<T: Real>(edge: u8, values: &[T; 8], level: T) -> [f64; 3] {
+fn vertex(edge: u8, fraction: f64) -> [f64; 3] {
+    let (corner, axis) = start(edge);
+    let mut point = corner.map(|c| c as f64);
+    point[axis] = fraction;
+    point
+}
+
+/// Where the level lies on an edge, which is crossed, between these values at the corners of the cube.
+#[inline(always)]
+pub(super) fn fraction<T: Real>(edge: u8, values: &[T; 8], level: T) -> T {
     let (corner, axis) = start(edge);
     let from = 4 * corner[0] + 2 * corner[1] + corner[2];
-    let mut point = corner.map(|c| c as f64);
-    point[axis] = crossing(values[from], values[from + usize::from(BIT[axis])], level).f64();
-    point
+    crossing(values[from], values[from + usize::from(BIT[axis])], level)
 }
 
 /// The corner from which an edge runs, and its axis.

@@ -23,8 +23,6 @@ use crate::{Real, isosurface, neighbors, normals, orient, poisson, splat, vector
 pub struct PullbackScratch<T: Real> {
     /// Cotangent of `χ`, then of the right-hand side.
     field: Option<Field<T>>,
-    /// Cotangents of the refined indicator.
-    refined: Vec<T>,
     /// Cotangents of the vertices.
     vertices: Vec<[T; 3]>,
     pub(super) samples: SampleCotangent<T>,
@@ -202,12 +200,9 @@ impl<T: Real> Reconstruction<T> {
             None => Bars::Dense(scratch.take_field(&self.indicator, cotangent.indicator)),
         };
         let PullbackScratch {
-            refined,
-            vertices,
-            samples,
-            ..
+            vertices, samples, ..
         } = scratch;
-        let found = self.pull_vertices(vertices, refined, bars.cells_mut());
+        let found = self.pull_vertices(vertices, bars.cells_mut());
         samples.grid.add(&found.grid);
         out.guarded += found.guarded;
         let given = self.splat_samples();
@@ -269,34 +264,20 @@ impl<T: Real> Reconstruction<T> {
         Ok(())
     }
 
-    /// From the vertices to the indicator, its level and the grid of the surface; `buffer` holds the cotangents of the
-    /// refined indicator.
+    /// From the vertices to the indicator, its level and the grid of the surface.
     fn pull_vertices(
         &self,
         vertices: &[[T; 3]],
-        buffer: &mut Vec<T>,
-        mut chi_bar: CellsMut<'_, T>,
+        chi_bar: CellsMut<'_, T>,
     ) -> isosurface::LevelCotangent {
-        let (level, mesh) = (self.iso_value, &self.mesh);
-        match (&self.refined, &mut chi_bar) {
-            (Some(refined), CellsMut::Dense(grid, chi_bar)) => {
-                buffer.clear();
-                buffer.resize(refined.values.len(), T::zero());
-                let mut bars = BlockField {
-                    grid: refined.grid,
-                    blocks: refined.blocks.clone(),
-                    values: std::mem::take(buffer),
-                };
-                let blocks = CellsMut::Blocks(&mut bars);
-                let mut found =
-                    isosurface::pullback_on(refined.into(), level, mesh, vertices, blocks);
-                isosurface::refine::pullback(&bars, grid, chi_bar);
-                *buffer = bars.values;
-                // From the size of the refined cells to that of the indicator's.
-                found.grid.spacing *= 0.5;
-                found
+        let mesh = &self.mesh;
+        match (&self.refined, chi_bar) {
+            (Some(BlockField { grid, .. }), CellsMut::Dense(_, chi_bar)) => {
+                isosurface::refine::pullback(&self.indicator, grid, mesh, vertices, chi_bar)
             }
-            _ => isosurface::pullback_on(self.chi(), level, mesh, vertices, chi_bar),
+            (_, chi_bar) => {
+                isosurface::pullback_on(self.chi(), self.iso_value, mesh, vertices, chi_bar)
+            }
         }
     }
 

@@ -108,12 +108,12 @@ impl<T: Real> Reconstructor<T> {
 
     pub(super) fn splat(&mut self, held: Option<&Reconstruction<T>>) -> Result<(), Error> {
         let (grid, octaves) = self.choose_surface_grid(held)?;
-        let smoothing = self.smoothing(&grid, held);
-        self.result.thicken(&grid, smoothing);
         self.result.residuals.is_refined = match held {
             Some(held) => held.residuals.is_refined,
             None => octaves == 0 && self.result.would_be_refined(&grid),
         };
+        let smoothing = self.smoothing(&grid, held);
+        self.result.thicken(&grid, smoothing);
         let Reconstruction {
             options,
             points,
@@ -443,9 +443,17 @@ fn march<T: Real>(
     scratch: &mut isosurface::Scratch,
     mesh: &mut Mesh<T>,
 ) -> Result<isosurface::Report, isosurface::Error> {
-    match marched(indicator, sparse, refined) {
-        Cells::Blocks(chi) => isosurface::blocks::forward(chi, level, mesh),
-        Cells::Dense(..) => isosurface::forward(indicator, level, scratch, mesh),
+    use isosurface::{blocks, refine};
+    match (refined, sparse) {
+        (Some(refined), _) => {
+            let fraction = refine::fraction(indicator, &refined.grid, level);
+            blocks::forward(refined, level, fraction, mesh)
+        }
+        (None, Some(sparse)) => {
+            let chi = &sparse.chi;
+            blocks::forward(chi, level, blocks::linear(chi, level), mesh)
+        }
+        (None, None) => isosurface::forward(indicator, level, scratch, mesh),
     }
 }
 

@@ -85,7 +85,13 @@ fn signs_carried_across_planes_rows_and_cavities_beyond_the_band_are_the_dense_o
             "seed {seed}: blocks leave much of the grid out"
         );
         let mut mesh = Mesh::default();
-        isosurface::blocks::forward(&blocks, 0.0, &mut mesh).expect("a surface");
+        isosurface::blocks::forward(
+            &blocks,
+            0.0,
+            isosurface::blocks::linear(&blocks, 0.0),
+            &mut mesh,
+        )
+        .expect("a surface");
         let (expected, _) = solve(&mesh, (&dense).into());
         let (found, closest) = solve(&mesh, (&blocks).into());
         let [planes, rows] = beyond(&closest);

@@ -10,7 +10,7 @@
 //!
 //! `e_o = Σ_i â_i B_o(x_i) s_i / D_o`, `D_o = ε + Σ_i â_i B_o(x_i)`, and subtracts it: `χ_o ← χ_o − λ e_o`.
 //!
-//! After at most [`PASSES`] passes, each with the `r_i` that remain, `χ = c − δ` at the samples, for the same linear
+//! After at most [`PASSES`] passes, each with the `r_i` that remain, `χ = c − δ` at the samples, for the same
 //! interpolation that places the vertices. It is the local part of the screened equation (Kazhdan and
 //! Hoppe, *Screened Poisson surface reconstruction*, ACM TOG 2013), as a few weighted means without another solve.
 //!

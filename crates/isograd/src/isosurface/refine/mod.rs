@@ -1,35 +1,39 @@
-//! Refinement: the indicator between its cells, on cells half as large near the surface.
+//! Refinement: the surface of the quadratic B-spline of the indicator, on cells half as large.
 //!
 //! # Map
-//! At the center `y` of a cell half as large, `χ(y) = Σ_o B_o(y) χ_o`, with `B` the product of quadratic B-splines and `χ`
-//! continued across the walls by its even reflection: along an axis, the weights of the nearest three cells are 9/32,
-//! 22/32 and 1/32. Values are in blocks that contain every crossing of the iso-value.
+//! `χ(y) = Σ_o B_o(y) χ_o`, with `B` the product of quadratic B-splines and `χ` continued across the walls by its even
+//! reflection. At the center of a cell half as large the weights of the nearest three cells along an axis are 9/32, 22/32 and
+//! 1/32. Values are in blocks that contain every crossing of the iso-value. A vertex lies on an edge of the lattice of these
+//! centers, at `t` where the spline itself has the iso-value, `χ(p + t e) = c`: [`fraction`].
 //!
-//! Marching cubes on these cells follows parts half as thin. And where it cuts the surface from one lattice into
-//! triangles hardly shows: as samples move through cells, the surface moves with them, and derivatives vary less within
-//! a cell.
+//! Marching cubes on these cells follows parts half as thin. And how the surface lies on the lattice hardly shows: samples
+//! and vertices read the same smooth function. If vertices are placed by linear interpolation, a plate as thick as 1.4 cells
+//! of the indicator becomes thicker and thinner by 0.044 cells as it moves through one; with the spline, by 0.0002.
 //!
 //! # Pullback
-//! The transpose: `χ̄_o += Σ_y B_o(y) χ̄(y)`.
+//! With `ȳ` the cotangent of a vertex, and `χ' = e·∇χ` at it: `χ̄_o −= (ȳ·e) B_o/χ'`, `c̄ += (ȳ·e)/χ'`: [`pullback`]. As for
+//! [linear interpolation](super), a slope below a millionth of the range of `χ` counts as that much.
 //!
 //! # Not differentiable
 //! Which blocks have values is held constant; those without have no crossing.
+
+mod edge;
+mod pullback;
 
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use crate::data::blocks::{BlockField, EDGE, Marks, NODES};
-use crate::{Field, Grid, GridError, Real};
+use crate::{Field, Grid, GridError, LatticeEdge, Real};
+use edge::Edge;
+pub(crate) use pullback::pullback;
 
 /// Cells of the indicator along each side of a block.
 const OWN: usize = EDGE / 2;
 
 /// [`OWN`] and one more at both ends.
 const WIDE: usize = OWN + 2;
-
-/// Blocks whose cotangents are held at once.
-const TASK: usize = 1024;
 
 /// Values at the cells of the indicator under a block and round it.
 type Halo<T> = [T; WIDE * WIDE * WIDE];
@@ -75,19 +79,13 @@ pub(crate) fn forward<T: Real>(
     Ok(refined)
 }
 
-/// Adds to `chi_bar` `(nx, ny, nz)` on `grid` the cotangents of the indicator from those of the refined one.
-pub(crate) fn pullback<T: Real>(refined_bar: &BlockField<T>, grid: &Grid<T>, chi_bar: &mut [T]) {
-    let mut parts: Vec<Halo<T>> = Vec::with_capacity(TASK);
-    let mut corners = (0..refined_bar.blocks.len()).map(|block| refined_bar.blocks.corner(block));
-    for values in refined_bar.values.chunks(TASK * NODES) {
-        let values = values.par_chunks_exact(NODES);
-        values
-            .map(interpolate_transposed)
-            .collect_into_vec(&mut parts);
-        for (part, corner) in parts.iter().zip(&mut corners) {
-            for_each_cell(grid, corner, |place, cell| chi_bar[cell] += part[place]);
-        }
-    }
+/// Where a vertex of the surface of `chi` at `level` lies on its edge of the lattice of `refined`, from 0 to 1.
+pub(crate) fn fraction<T: Real>(
+    chi: &Field<T>,
+    refined: &Grid<T>,
+    level: T,
+) -> impl Fn(LatticeEdge) -> T {
+    move |edge| Edge::new(chi.grid(), refined, edge).crossing(chi, level)
 }
 
 /// Blocks of the refined grid that may be crossed: cells of the indicator under them and round them are on both sides.
@@ -170,32 +168,5 @@ fn interpolate<T: Real>(halo: &Halo<T>, out: &mut [T]) {
     }
 }
 
-fn interpolate_transposed<T: Real>(bars: &[T]) -> Halo<T> {
-    let mut planes = [T::zero(); WIDE * EDGE * EDGE];
-    for (n, &bar) in bars.iter().enumerate() {
-        let (i, rest) = (n / EDGE / EDGE, n % (EDGE * EDGE));
-        for t in 0..3 {
-            planes[(i / 2 + t) * EDGE * EDGE + rest] += weight::<T>(i, t) * bar;
-        }
-    }
-    let mut rows = [T::zero(); WIDE * WIDE * EDGE];
-    for (n, &bar) in planes.iter().enumerate() {
-        let (i, j, k) = (n / EDGE / EDGE, n / EDGE % EDGE, n % EDGE);
-        for t in 0..3 {
-            rows[(i * WIDE + j / 2 + t) * EDGE + k] += weight::<T>(j, t) * bar;
-        }
-    }
-    let mut halo = [T::zero(); WIDE * WIDE * WIDE];
-    for (halo, row) in halo.chunks_exact_mut(WIDE).zip(rows.chunks_exact(EDGE)) {
-        for (k, &bar) in row.iter().enumerate() {
-            for t in 0..3 {
-                halo[k / 2 + t] += weight::<T>(k, t) * bar;
-            }
-        }
-    }
-    halo
-}
-
 #[cfg(test)]
-#[path = "refine_tests.rs"]
 mod tests;

@@ -1,0 +1,150 @@
+//! The spline along an edge of the refined lattice, and where it crosses the level.
+
+use crate::data::LatticeEdge;
+use crate::element::stencil::{bspline, bspline_slope};
+use crate::{Field, Grid, Real};
+
+/// Most steps to the crossing. Newton's method takes two or three.
+const STEPS: usize = 30;
+
+/// An edge between the centers of two cells half as large as those of the indicator.
+pub(super) struct Edge {
+    /// Cells of the indicator: four along the axis of the edge, from the one before that in which it starts, and three along
+    /// the other two axes, in their order.
+    along: [usize; 4],
+    across: [[usize; 3]; 2],
+    /// Weights of the cells across.
+    weights: [[f64; 3]; 2],
+    /// Where it starts, from the center of the cell of the indicator, in cells: ∓¼.
+    start: f64,
+}
+
+/// The spline at a place on an edge, as weights of 3 of the 4 cells along it.
+pub(super) struct Place {
+    /// The first of the three.
+    first: usize,
+    weights: [f64; 3],
+    slopes: [f64; 3],
+}
+
+impl Edge {
+    /// The edge with this name on the lattice of `fine`, for an indicator on `grid`.
+    #[inline(always)]
+    pub(super) fn new<T: Real>(grid: &Grid<T>, fine: &Grid<T>, edge: LatticeEdge) -> Self {
+        let (cell, axis) = (fine.cell(edge.cell()), edge.axis());
+        let others = [usize::from(axis == 0), if axis == 2 { 1 } else { 2 }];
+        Self {
+            along: near(grid, axis, cell[axis]),
+            across: others.map(|a| near(grid, a, cell[a])),
+            weights: others.map(|a| std::array::from_fn(|t| super::weight(cell[a], t))),
+            start: if cell[axis] % 2 == 0 { -0.25 } else { 0.25 },
+        }
+    }
+
+    /// The spline at a fraction of the edge, from 0 to 1.
+    #[inline(always)]
+    pub(super) fn at(&self, fraction: f64) -> Place {
+        let place = self.start + 0.5 * fraction;
+        let first = usize::from(place > 0.5);
+        let offset = place - first as f64;
+        Place {
+            first,
+            weights: bspline(offset).into(),
+            slopes: bspline_slope(offset).into(),
+        }
+    }
+
+    /// Where the spline of `chi` has the value `level`, as a fraction of the edge. One end is below the level and the other
+    /// one is not.
+    #[inline(always)]
+    pub(super) fn crossing<T: Real>(&self, chi: &Field<T>, level: T) -> T {
+        let line = self.line(chi);
+        let excess = |fraction: f64| {
+            let at = self.at(fraction);
+            // The edge is half a cell long.
+            [at.value(&line) - level.f64(), 0.5 * at.slope(&line)]
+        };
+        let [[below, _], [above, _]] = [0.0, 1.0].map(excess);
+        let [mut low, mut high] = [0.0, 1.0];
+        let mut fraction = below / (below - above);
+        if !(0.0..=1.0).contains(&fraction) {
+            fraction = 0.5;
+        }
+        for _ in 0..STEPS {
+            let [value, slope] = excess(fraction);
+            match (value < 0.0) == (below < 0.0) {
+                true => low = fraction,
+                false => high = fraction,
+            }
+            let newton = fraction - value / slope;
+            let next = match newton >= low && newton <= high {
+                true => newton,
+                false => 0.5 * (low + high),
+            };
+            let step = (next - fraction).abs();
+            fraction = next;
+            if step < 1e-15 {
+                break;
+            }
+        }
+        T::of(fraction)
+    }
+
+    /// The values of `chi` in the cells along the edge, each the weighted sum over the cells across.
+    #[inline(always)]
+    pub(super) fn line<T: Real>(&self, chi: &Field<T>) -> [f64; 4] {
+        let mut line = [0.0; 4];
+        self.for_each_across(|offset, weight| {
+            for (sum, cell) in line.iter_mut().zip(self.along) {
+                *sum += weight * chi.values()[offset + cell].f64();
+            }
+        });
+        line
+    }
+
+    /// Calls `visit` for the 3³ cells that have a weight at a place, with their place in memory.
+    #[inline(always)]
+    pub(super) fn for_each_cell(&self, at: &Place, mut visit: impl FnMut(usize, f64)) {
+        self.for_each_across(|offset, weight| {
+            for (cell, along) in self.along[at.first..].iter().zip(at.weights) {
+                visit(offset + cell, weight * along);
+            }
+        });
+    }
+
+    /// Calls `visit` for the 3² rows of cells along the edge, with the place in memory to which those of [`Self::along`] are
+    /// added, and their weight.
+    #[inline(always)]
+    fn for_each_across(&self, mut visit: impl FnMut(usize, f64)) {
+        for (first, x) in self.across[0].into_iter().zip(self.weights[0]) {
+            for (second, y) in self.across[1].into_iter().zip(self.weights[1]) {
+                visit(first + second, x * y);
+            }
+        }
+    }
+}
+
+impl Place {
+    #[inline(always)]
+    fn value(&self, line: &[f64; 4]) -> f64 {
+        let weights = self.weights.iter().zip(&line[self.first..]);
+        weights.map(|(weight, value)| weight * value).sum()
+    }
+
+    /// The slope of the spline along the edge, per cell of the indicator.
+    #[inline(always)]
+    pub(super) fn slope(&self, line: &[f64; 4]) -> f64 {
+        let slopes = self.slopes.iter().zip(&line[self.first..]);
+        slopes.map(|(slope, value)| slope * value).sum()
+    }
+}
+
+/// Places in memory, along one axis, of the cells of the indicator from the one before that of cell `half` of the refined
+/// grid on, reflected at the walls.
+#[inline(always)]
+fn near<T: Real, const N: usize>(grid: &Grid<T>, axis: usize, half: usize) -> [usize; N] {
+    std::array::from_fn(|n| {
+        let cell = (half / 2 + n).saturating_sub(1);
+        cell.min(grid.shape()[axis] - 1) * grid.strides()[axis]
+    })
+}

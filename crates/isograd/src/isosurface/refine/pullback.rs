@@ -1,0 +1,114 @@
+//! Cotangents of the vertices to cotangents of the indicator, the level and the grid.
+
+use rayon::prelude::*;
+
+use super::edge::{Edge, Place};
+use crate::data::GridCotangent;
+use crate::element::crossing::bounded;
+use crate::gather::Buckets;
+use crate::isosurface::pullback::{LevelCotangent, SMALLEST_DIFFERENCE, range};
+use crate::{Field, Grid, Mesh, Real, parallel, vector};
+
+/// Planes across x that one task owns.
+const SLAB: usize = 8;
+
+/// Adds the cotangent of the indicator `chi` to `chi_bar` `(nx, ny, nz)`, and returns those of the level and the grid of
+/// `chi`, from the cotangents `vertices_bar` `(V, 3)` of the vertices of `mesh`, which lie on the lattice of `refined`.
+pub(crate) fn pullback<T: Real>(
+    chi: &Field<T>,
+    refined: &Grid<T>,
+    mesh: &Mesh<T>,
+    vertices_bar: &[[T; 3]],
+    chi_bar: &mut [T],
+) -> LevelCotangent {
+    let vertices = Vertices {
+        chi,
+        refined,
+        mesh,
+        bars: vertices_bar,
+        smallest: SMALLEST_DIFFERENCE * range(chi.values()).f64(),
+    };
+    let plane = chi.grid().strides()[0];
+    let slabs = chi.grid().shape()[0].div_ceil(SLAB);
+    let mut near = Buckets::default();
+    near.fill(slabs, vertices_bar.len(), |vertex| {
+        let [low, high] = vertices.planes(vertex).map(|plane| (plane / SLAB) as u32);
+        low..=high
+    });
+    let work = chi_bar.par_chunks_mut(SLAB * plane).enumerate();
+    work.for_each(|(slab, out)| {
+        let first = slab * SLAB * plane;
+        for &vertex in near.of(slab) {
+            let (edge, at) = vertices.place(vertex as usize);
+            let pull = vertices.pull(vertex as usize, &edge, &at).0;
+            edge.for_each_cell(&at, |cell, weight| {
+                if let Some(value) = cell.checked_sub(first).and_then(|at| out.get_mut(at)) {
+                    *value -= T::of(pull * weight);
+                }
+            });
+        }
+    });
+    vertices.level()
+}
+
+struct Vertices<'a, T> {
+    chi: &'a Field<T>,
+    refined: &'a Grid<T>,
+    mesh: &'a Mesh<T>,
+    bars: &'a [[T; 3]],
+    /// Lower bound of slopes along an edge.
+    smallest: f64,
+}
+
+impl<T: Real> Vertices<'_, T> {
+    /// The first and the last plane across x with a cell that has a weight at a vertex.
+    fn planes(&self, vertex: usize) -> [usize; 2] {
+        let half = self.refined.cell(self.mesh.edges()[vertex].cell())[0];
+        let last = self.chi.grid().shape()[0] - 1;
+        // One before that of the cell in which the edge starts, and two after it.
+        [(half / 2).saturating_sub(1), (half / 2 + 2).min(last)]
+    }
+
+    /// The edge of a vertex, and the spline at the vertex.
+    #[inline(always)]
+    fn place(&self, vertex: usize) -> (Edge, Place) {
+        let name = self.mesh.edges()[vertex];
+        let (cell, axis) = (self.refined.cell(name.cell()), name.axis());
+        let position = self.refined.to_index(self.mesh.vertices()[vertex]);
+        let fraction = position[axis].f64() - cell[axis] as f64 - 0.5;
+        let edge = Edge::new(self.chi.grid(), self.refined, name);
+        let at = edge.at(fraction.clamp(0.0, 1.0));
+        (edge, at)
+    }
+
+    /// `ȳ·e/χ'`, and whether `χ'` was bounded.
+    #[inline(always)]
+    fn pull(&self, vertex: usize, edge: &Edge, at: &Place) -> (f64, bool) {
+        let axis = self.mesh.edges()[vertex].axis();
+        let bar = (self.bars[vertex][axis] * self.chi.grid().spacing()).f64();
+        let slope = at.slope(&edge.line(self.chi));
+        let guarded = slope.abs() < self.smallest && bar != 0.0;
+        (bar / bounded(slope, self.smallest), guarded)
+    }
+
+    fn level(&self) -> LevelCotangent {
+        let grid = self.chi.grid();
+        let [level, x, y, z, spacing, guarded] = parallel::sum_array(self.bars.len(), |vertex| {
+            let (edge, at) = self.place(vertex);
+            let (pull, guarded) = self.pull(vertex, &edge, &at);
+            let place = vector::to_f64(grid.to_index(self.mesh.vertices()[vertex]));
+            let mut part = GridCotangent::default();
+            part.add_place(place, vector::to_f64(self.bars[vertex]));
+            let [x, y, z] = part.lower;
+            [pull, x, y, z, part.spacing, f64::from(u8::from(guarded))]
+        });
+        LevelCotangent {
+            level,
+            grid: GridCotangent {
+                lower: [x, y, z],
+                spacing,
+            },
+            guarded: guarded as usize,
+        }
+    }
+}

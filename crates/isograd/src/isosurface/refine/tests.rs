@@ -1,0 +1,166 @@
+use super::*;
+use crate::Mesh;
+use crate::neighbors::tests::Random;
+use crate::testing::bspline;
+
+/// Noise on a grid, a step along x.
+fn setting() -> Field<f64> {
+    let grid = Grid::new([-0.3, 0.1, 2.0], 0.25, [25, 14, 9]).expect("a grid");
+    let mut random = Random::new(7);
+    let value = |n: usize| grid.cell(n)[0] as f64 - 12.2 + random.uniform();
+    let values = (0..grid.cells()).map(value).collect();
+    Field::new(grid, values).expect("sizes match")
+}
+
+/// Weight of a cell at a place, in cells from the corner of the grid: over the cell itself and its image behind each wall.
+fn weight(shape: [usize; 3], cell: [usize; 3], place: [f64; 3]) -> f64 {
+    let along = |a: usize| {
+        let (n, center) = (shape[a] as f64, cell[a] as f64 + 0.5);
+        [center, -center, 2.0 * n - center]
+            .map(|c| bspline(c - place[a]))
+            .iter()
+            .sum::<f64>()
+    };
+    along(0) * along(1) * along(2)
+}
+
+/// The spline at a place, in cells from the corner of the grid, as a sum over all cells.
+fn spline(chi: &Field<f64>, place: [f64; 3]) -> f64 {
+    let part = |o: usize| chi.values()[o] * weight(chi.grid().shape(), chi.grid().cell(o), place);
+    (0..chi.grid().cells()).map(part).sum()
+}
+
+/// The surface of `chi`.
+fn surface(chi: &Field<f64>, level: f64) -> (Grid<f64>, Mesh<f64>) {
+    let refined = forward(chi, level, None).expect("a grid");
+    let mut mesh = Mesh::default();
+    let fraction = fraction(chi, &refined.grid, level);
+    crate::isosurface::blocks::forward(&refined, level, fraction, &mut mesh).expect("a surface");
+    (refined.grid, mesh)
+}
+
+#[test]
+fn values_are_those_of_the_spline_and_every_crossing_has_them() {
+    let (chi, level) = (setting(), 0.1);
+    let refined = forward(&chi, level, None).expect("a grid");
+    let (shape, fine) = (chi.grid().shape(), refined.grid);
+    assert_eq!(fine.shape(), shape.map(|n| 2 * n));
+    assert_eq!(fine.spacing(), 0.125);
+    let center = |n: usize| fine.cell(n).map(|c| (c as f64 + 0.5) / 2.0);
+    let plain: Vec<f64> = (0..fine.cells()).map(|n| spline(&chi, center(n))).collect();
+    let mut absent = 0;
+    for n in 0..fine.cells() {
+        let cell = fine.cell(n);
+        match refined.get(cell) {
+            Some(value) => assert!((value - plain[n]).abs() < 1e-13, "{cell:?}"),
+            None => absent += 1,
+        }
+        for axis in 0..3 {
+            let mut next = cell;
+            next[axis] += 1;
+            let crosses = next[axis] < fine.shape()[axis]
+                && (plain[n] < level) != (plain[fine.index(next)] < level);
+            let both = [cell, next].map(|cell| refined.get(cell).is_some());
+            assert!(!crosses || both == [true; 2], "{cell:?}");
+        }
+    }
+    assert!(absent > 0);
+}
+
+#[test]
+fn every_vertex_is_where_the_spline_has_the_level() {
+    let (chi, level) = (setting(), 0.1);
+    let (fine, mesh) = surface(&chi, level);
+    let mut linear = 0.0_f64;
+    for (vertex, edge) in mesh.vertices().iter().zip(mesh.edges()) {
+        let place = chi.grid().to_index(*vertex);
+        assert!((spline(&chi, place) - level).abs() < 1e-12, "{place:?}");
+        let ends = [0.0, 1.0].map(|end| {
+            let mut place = fine.cell(edge.cell()).map(|c| (c as f64 + 0.5) / 2.0);
+            place[edge.axis()] += 0.5 * end;
+            (place[edge.axis()], spline(&chi, place) - level)
+        });
+        let [(low, below), (high, above)] = ends;
+        assert!((below < 0.0) != (above < 0.0));
+        let along = place[edge.axis()];
+        assert!((low - 1e-12..=high + 1e-12).contains(&along));
+        let between = low + (high - low) * below / (below - above);
+        linear = linear.max((along - between).abs());
+    }
+    // The noise bends the spline.
+    assert!(linear > 0.01, "{linear}");
+}
+
+#[test]
+fn pullback_is_the_derivative_by_every_cell_the_level_and_the_grid() {
+    let (chi, level) = (setting(), 0.1);
+    let (fine, mesh) = surface(&chi, level);
+    let mut random = Random::new(8);
+    let bars: Vec<[f64; 3]> = mesh
+        .vertices()
+        .iter()
+        .map(|_| std::array::from_fn(|_| random.uniform() - 0.5))
+        .collect();
+    let mut chi_bar = vec![0.0; chi.grid().cells()];
+    let found = pullback(&chi, &fine, &mesh, &bars, &mut chi_bar);
+    assert_eq!(found.guarded, 0);
+    let loss = |chi: &Field<f64>, level: f64| -> f64 {
+        let (_, moved) = surface(chi, level);
+        assert_eq!(moved.edges(), mesh.edges());
+        let parts = moved.vertices().iter().zip(&bars);
+        parts.map(|(v, bar)| crate::vector::dot(*v, *bar)).sum()
+    };
+    let close = |found: f64, expected: f64, what: &str| {
+        let scale = 1.0 + expected.abs();
+        assert!(
+            (found - expected).abs() < 1e-6 * scale,
+            "{what}: {found} {expected}"
+        );
+    };
+    let step = 1e-6;
+    for _ in 0..20 {
+        let direction: Vec<f64> = chi_bar.iter().map(|_| random.uniform() - 0.5).collect();
+        let at = |step: f64| {
+            let values = chi.values().iter().zip(&direction);
+            let values = values.map(|(chi, d)| chi + step * d).collect();
+            loss(
+                &Field::new(*chi.grid(), values).expect("sizes match"),
+                level,
+            )
+        };
+        let slope: f64 = chi_bar.iter().zip(&direction).map(|(bar, d)| bar * d).sum();
+        close(slope, (at(step) - at(-step)) / (2.0 * step), "χ");
+    }
+    let by_level = (loss(&chi, level + step) - loss(&chi, level - step)) / (2.0 * step);
+    close(found.level, by_level, "level");
+    let on = |lower: [f64; 3], spacing: f64| {
+        let grid = Grid::new(lower, spacing, chi.grid().shape()).expect("a grid");
+        loss(
+            &Field::new(grid, chi.values().to_vec()).expect("sizes match"),
+            level,
+        )
+    };
+    let (lower, spacing) = (chi.grid().lower(), chi.grid().spacing());
+    let by_spacing = (on(lower, spacing + step) - on(lower, spacing - step)) / (2.0 * step);
+    close(found.grid.spacing, by_spacing, "spacing");
+    for a in 0..3 {
+        let moved = |step: f64| {
+            let mut lower = lower;
+            lower[a] += step;
+            on(lower, spacing)
+        };
+        let by_lower = (moved(step) - moved(-step)) / (2.0 * step);
+        close(found.grid.lower[a], by_lower, "lower");
+    }
+}
+
+#[test]
+fn threads_do_not_change_a_bit() {
+    let chi = setting();
+    crate::testing::assert_same_bits(|| {
+        let (fine, mesh) = surface(&chi, 0.1);
+        let mut chi_bar = vec![0.0; chi.grid().cells()];
+        let found = pullback(&chi, &fine, &mesh, mesh.vertices(), &mut chi_bar);
+        (mesh, chi_bar, found)
+    });
+}
