@@ -62,6 +62,19 @@ impl<T: Real> Reconstruction<T> {
         self.residuals.thickened = thickened;
     }
 
+    /// Width of the step of the indicator, in cells of the surface's grid.
+    fn step_width(&self) -> f64 {
+        Step::width_of(self.residuals.smoothing)
+    }
+
+    /// The least thickness in widths of the step, and its derivative by that width in cells of the surface's grid.
+    fn least_thickness(&self) -> [f64; 2] {
+        // Of the cells that the surface is marched on.
+        let parts = if self.residuals.is_refined { 2.0 } else { 1.0 };
+        let [least, slope] = thicken::least(parts * self.step_width());
+        [least, parts * slope]
+    }
+
     fn thin_inputs(&self, grid: &Grid<T>) -> Inputs<'_, T> {
         Inputs {
             index: &self.residuals.neighborhoods.index,
@@ -70,7 +83,8 @@ impl<T: Real> Reconstruction<T> {
                 normals: &self.orientation.normals,
                 areas: &self.areas,
             },
-            width: Step::width_of(self.residuals.smoothing) * grid.spacing().f64(),
+            width: self.step_width() * grid.spacing().f64(),
+            least: self.least_thickness()[0],
         }
     }
 
@@ -90,13 +104,13 @@ impl<T: Real> Reconstruction<T> {
         pull(scratch)?;
         std::mem::swap(&mut scratch.moved, &mut scratch.samples.points);
         let (samples, grid) = (&mut scratch.samples, self.surface_grid());
-        let width_bar = thicken::pullback(self.thin_inputs(grid), sums, &scratch.moved, samples);
-        let smoothing = self.residuals.smoothing;
-        let width = Step::width_of(smoothing);
-        samples.grid.spacing += width_bar * width;
+        let inputs = self.thin_inputs(grid);
+        let [length_bar, least_bar] = thicken::pullback(inputs, sums, &scratch.moved, samples);
+        let (width, [_, slope]) = (self.step_width(), self.least_thickness());
+        samples.grid.spacing += length_bar * width;
         if self.options.smoothing_follows() {
-            let bar = width_bar * grid.spacing().f64() * smoothing / width;
-            self.pull_smoothing(bar, samples);
+            let width_bar = length_bar * grid.spacing().f64() + least_bar * slope;
+            self.pull_smoothing(width_bar * self.residuals.smoothing / width, samples);
         }
         Ok(())
     }

@@ -33,7 +33,7 @@ pub(crate) fn forward<T: Real>(inputs: Inputs<'_, T>, out: &mut Thickened<T>) {
     });
     found.collect_into_vec(sums);
     let moves = sums.par_iter().enumerate().map(|(i, sums)| {
-        let away = displacement(sums, inputs.width);
+        let away = displacement(sums, inputs.width, inputs.least);
         if away == 0.0 {
             return old[i];
         }

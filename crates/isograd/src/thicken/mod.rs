@@ -15,7 +15,7 @@
 //! - `e(u) = (2u − 1)²` for `u > ½`, else 0: normals within 60° of the face's own, or of the opposite one;
 //! - `k(q) = (1 − q)²`, as in the [areas](crate::splat::area);
 //! - `g` rises smoothly from 0 at `z = −ℓ/4` to 1 at `z = 0`: what lies further outside is another part, across a gap;
-//! - `f(t) = T − t` up to `T − B`, then `(T + B − t)²/4B`, and 0 from `T + B` on, with `T =` [`LEAST`] and `B =` [`BLEND`];
+//! - `f(t) = T − t` up to `T − B`, then `(T + B − t)²/4B`, and 0 from `T + B` on, with `B =` [`BLEND`] and `T =` [`least`];
 //! - `c(s) = s(2 − s)`, and 1 from `s = 1` on.
 //!
 //! Each of them has a continuous derivative. At a rim half of either face is missing, and `s` stays about 1: the part is as
@@ -33,7 +33,8 @@
 //! x̄_i += d̄   x̄_j −= d̄   n̄_i += z̄ d + ū n_j   n̄_j += ū n_i   ā_j += w̄ w/a_j
 //! ```
 //! and `x̄_i += b`, `n̄_i += ½ ℓ f c b`. The map is homogeneous in lengths, so `ℓ ℓ̄ = Σ b·(x' − x) − Σ d̄·d − 2 Σ ā a`.
-//! [`pullback`] gathers: a sample adds its own pairs and those in which it is the other one.
+//! [`pullback`] gathers: a sample adds its own pairs and those in which it is the other one. `T̄ = −Σ f̄ f'`, since `f` depends
+//! on `T − t`.
 //!
 //! # Not differentiable
 //! Nothing; second derivatives jump.
@@ -56,7 +57,12 @@ use crate::vector::{dot, to_f64};
 const REACH: f64 = 2.5;
 
 /// Thickness, in widths, that thinner parts are given.
-const LEAST: f64 = 1.2;
+const LEAST: f64 = 1.0;
+
+/// The same in cells that the surface is marched on. Thinner plates whose samples scatter by a twentieth of a cell have
+/// holes where they lie askew in the lattice: it takes √3 cells for each plane to have a connected layer of lattice points,
+/// and less where the indicator is smooth.
+const LEAST_CELLS: f64 = 1.5;
 
 /// Half of the range of thicknesses over which parts begin to be thickened, in widths.
 const BLEND: f64 = 0.4;
@@ -72,6 +78,16 @@ pub(crate) struct Inputs<'a, T> {
     pub samples: Samples<'a, T>,
     /// `ℓ`, in the unit of the points.
     pub width: f64,
+    /// `T`, in widths.
+    pub least: f64,
+}
+
+/// `T` for a step of this width, in cells that the surface is marched on, and its derivative.
+pub(crate) fn least(width: f64) -> [f64; 2] {
+    match LEAST * width < LEAST_CELLS {
+        true => [LEAST_CELLS / width, -LEAST_CELLS / width.powi(2)],
+        false => [LEAST, 0.0],
+    }
 }
 
 /// Sums over the pairs of a sample.

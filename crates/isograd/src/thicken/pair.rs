@@ -1,6 +1,6 @@
 //! Two samples, and the displacement of one from its sums.
 
-use super::{BLEND, LEAST, REACH, Sums};
+use super::{BLEND, REACH, Sums};
 use crate::vector::{add, dot, norm_squared, scale, sub};
 
 /// A sample.
@@ -142,11 +142,11 @@ fn thickness_and_share(sums: &Sums, width: f64) -> Option<[f64; 2]> {
 }
 
 /// `f` and its derivative.
-fn lack(t: f64) -> [f64; 2] {
-    if t < LEAST - BLEND {
-        [LEAST - t, -1.0]
+fn lack(t: f64, least: f64) -> [f64; 2] {
+    if t < least - BLEND {
+        [least - t, -1.0]
     } else {
-        let rest = (LEAST + BLEND - t).max(0.0);
+        let rest = (least + BLEND - t).max(0.0);
         [rest * rest / (4.0 * BLEND), -rest / (2.0 * BLEND)]
     }
 }
@@ -158,25 +158,27 @@ fn credit(s: f64) -> [f64; 2] {
 }
 
 /// Displacement along the normal, `½ ℓ f c`, in the unit of the points.
-pub(super) fn displacement(sums: &Sums, width: f64) -> f64 {
-    thickness_and_share(sums, width).map_or(0.0, |[t, s]| 0.5 * width * lack(t)[0] * credit(s)[0])
+pub(super) fn displacement(sums: &Sums, width: f64, least: f64) -> f64 {
+    let found = thickness_and_share(sums, width);
+    found.map_or(0.0, |[t, s]| 0.5 * width * lack(t, least)[0] * credit(s)[0])
 }
 
-/// Cotangents of the sums from that of the displacement.
-pub(super) fn pull_sums(sums: &Sums, width: f64, bar: f64) -> Sums {
+/// Cotangents of the sums and of `T`, from that of the displacement.
+pub(super) fn pull_sums(sums: &Sums, width: f64, least: f64, bar: f64) -> (Sums, f64) {
     let Some([t, s]) = thickness_and_share(sums, width) else {
-        return Sums::default();
+        return Default::default();
     };
-    let ([f, slope], [c, rise]) = (lack(t), credit(s));
+    let ([f, slope], [c, rise]) = (lack(t, least), credit(s));
     let half = 0.5 * width * bar;
     let depth = half * c * slope / (sums.weight * width);
     let by_share = match s < 1.0 {
         true => half * f * rise / sums.own,
         false => 0.0,
     };
-    Sums {
+    let bars = Sums {
         weight: by_share - depth * t * width,
         depth,
         own: -by_share * s,
-    }
+    };
+    (bars, -half * c * slope)
 }

@@ -18,33 +18,34 @@ struct Share {
     length: f64,
 }
 
-/// Adds the cotangents of the samples, from those `(N, 3)` of the moved points. Returns the cotangent of the width.
+/// Adds the cotangents of the samples, from those `(N, 3)` of the moved points. Returns the cotangents of `ℓ` and `T`.
 pub(crate) fn pullback<T: Real>(
     inputs: Inputs<'_, T>,
     sums: &[Sums],
     moved_bar: &[[T; 3]],
     out: &mut SampleCotangent<T>,
-) -> f64 {
-    let width = inputs.width;
+) -> [f64; 2] {
+    let Inputs { width, least, .. } = inputs;
     let bar_along = |i: usize| dot(to_f64(moved_bar[i]), to_f64(inputs.samples.normals[i]));
     let samples = || (0..sums.len()).into_par_iter();
-    let of_sums = samples().map(|i| pull_sums(&sums[i], width, bar_along(i)));
-    let of_sums: Vec<Sums> = of_sums.collect();
+    let of_sums = samples().map(|i| pull_sums(&sums[i], width, least, bar_along(i)));
+    let (of_sums, of_least): (Vec<Sums>, Vec<f64>) = of_sums.unzip();
     let shares: Vec<Share> = samples().map(|i| gather(inputs, &of_sums, i)).collect();
     let work = out.points.par_iter_mut().zip(&mut out.normals);
     let work = work.zip(&mut out.areas).enumerate();
     work.for_each(|(i, ((point, normal), area))| {
         let (share, bar) = (&shares[i], to_f64(moved_bar[i]));
-        let away = displacement(&sums[i], width);
+        let away = displacement(&sums[i], width, least);
         *point = of_f64(add(to_f64(*point), add(bar, share.point)));
         *normal = of_f64(add(to_f64(*normal), add(scale(bar, away), share.normal)));
         *area = T::of(area.f64() + share.area);
     });
-    let [by_length] = parallel::sum_array(sums.len(), |i| {
-        let moved = displacement(&sums[i], width) * bar_along(i);
-        [moved - shares[i].length - 2.0 * shares[i].area * inputs.samples.areas[i].f64()]
+    let [by_length, least_bar] = parallel::sum_array(sums.len(), |i| {
+        let moved = displacement(&sums[i], width, least) * bar_along(i);
+        let area = 2.0 * shares[i].area * inputs.samples.areas[i].f64();
+        [moved - shares[i].length - area, of_least[i]]
     });
-    by_length / width
+    [by_length / width, least_bar]
 }
 
 /// Sum over the pairs of sample `i`, and those of which it is the second.

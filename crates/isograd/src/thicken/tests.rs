@@ -25,10 +25,14 @@ fn plate(count: usize, thickness: f64, seed: u64) -> Cloud {
     (points, normals, areas.collect())
 }
 
-/// Runs `run` with the samples, their tree and a width.
+/// Thickness that is given, in widths.
+const T: f64 = 1.2;
+
+/// Runs `run` with the samples, their tree, a width and a least thickness.
 fn with<R>(
     (points, normals, areas): &Cloud,
     width: f64,
+    least: f64,
     run: impl FnOnce(Inputs<'_, f64>) -> R,
 ) -> R {
     let index = CellIndex::new(points);
@@ -41,12 +45,17 @@ fn with<R>(
         index: &index,
         samples,
         width,
+        least,
     })
 }
 
 fn thickened(cloud: &Cloud, width: f64) -> Thickened<f64> {
+    thickened_to(cloud, width, T)
+}
+
+fn thickened_to(cloud: &Cloud, width: f64, least: f64) -> Thickened<f64> {
     let mut out = Thickened::default();
-    with(cloud, width, |inputs| forward(inputs, &mut out));
+    with(cloud, width, least, |inputs| forward(inputs, &mut out));
     out
 }
 
@@ -80,8 +89,8 @@ fn oracle((points, normals, areas): &Cloud, l: f64) -> Vec<[f64; 3]> {
         }
         let (t, s): (f64, f64) = (depths / weights, (weights / own).min(1.0));
         let f = match t {
-            t if t < 0.8 => 1.2 - t,
-            t if t < 1.6 => (1.6 - t).powi(2) / 1.6,
+            t if t < T - 0.4 => T - t,
+            t if t < T + 0.4 => (T + 0.4 - t).powi(2) / 1.6,
             _ => 0.0,
         };
         add(points[i], scale(normals[i], 0.5 * l * f * s * (2.0 - s)))
@@ -110,7 +119,7 @@ fn thin_plates_become_thicker_and_thick_ones_stay() {
         for (i, (new, old)) in found.points.iter().zip(&cloud.0).enumerate() {
             let by = dot(sub(*new, *old), cloud.1[i]);
             let wanted = match thickness {
-                t if t <= 0.05 => 0.5 * (LEAST * width - t),
+                t if t <= 0.05 => 0.5 * (T * width - t),
                 _ => 0.0,
             };
             // Depths are those of a bent plate, and areas are random: the other face may seem smaller.
@@ -157,7 +166,8 @@ fn cotangents_are_the_transpose_of_differences() {
             let normals = cloud.1.iter().zip(&dn).map(along).collect();
             let areas = cloud.2.iter().zip(&da).map(|(a, d)| a + e * 0.01 * d[0]);
             let moved = (points, normals, areas.collect());
-            dot_all(&thickened(&moved, width * (1.0 + 0.1 * e)).points, &bar)
+            let found = thickened_to(&moved, width * (1.0 + 0.1 * e), T + 0.1 * e);
+            dot_all(&found.points, &bar)
         };
         let e = 1e-6;
         let differences = (loss(e) - loss(-e)) / (2.0 * e);
@@ -168,13 +178,13 @@ fn cotangents_are_the_transpose_of_differences() {
             areas: vec![0.0; n],
             ..Default::default()
         };
-        let of_width = with(&cloud, width, |inputs| {
+        let [of_width, of_least] = with(&cloud, width, T, |inputs| {
             pullback(inputs, &sums, &bar, &mut bars)
         });
         let of_areas = bars.areas.iter().zip(&da).map(|(a, d)| 0.01 * a * d[0]);
         let of_areas: f64 = of_areas.sum();
         let of_vectors = 0.05 * (dot_all(&bars.points, &dx) + dot_all(&bars.normals, &dn));
-        let pulled = of_vectors + of_areas + 0.1 * width * of_width;
+        let pulled = of_vectors + of_areas + 0.1 * (width * of_width + of_least);
         // Of sums of some hundred random terms, with kinks of second derivatives between.
         let error = (pulled - differences).abs();
         assert!(error < 1e-5, "{thickness}: {pulled} {differences}");
@@ -205,10 +215,21 @@ fn samples_without_area_have_finite_cotangents() {
         areas: vec![0.0; 400],
         ..Default::default()
     };
-    let of_width = with(&cloud, width, |inputs| {
+    let [of_width, _] = with(&cloud, width, T, |inputs| {
         pullback(inputs, &found.sums, &[[1.0; 3]; 400], &mut bars)
     });
     assert!(of_width.is_finite() && bars.areas.iter().all(|x| x.is_finite()));
     let vectors = bars.points.iter().chain(&bars.normals);
     assert!(vectors.flatten().all(|x| x.is_finite()));
+}
+
+#[test]
+fn the_least_thickness_is_a_width_and_enough_cells() {
+    let step = 1e-6;
+    for width in [0.4, 0.87, 1.4, 1.6, 3.0] {
+        let [of, slope] = least(width);
+        assert!(of * width >= width.max(1.5) - 1e-12, "{width}");
+        let difference = (least(width + step)[0] - least(width - step)[0]) / (2.0 * step);
+        assert!((slope - difference).abs() < 1e-6, "{width}");
+    }
 }
