@@ -7,23 +7,26 @@ use crate::vector::{add, scale, sub};
 use crate::{Field, Grid, PointCloud};
 
 /// Width of the soft edge, in cells.
-const WIDTH: f64 = 2.0;
+const WIDTH: f64 = 6.0;
+
+/// Least length over which the weights rise, in cells: sums over cells then hardly depend on the place on the grid.
+const LEAST_RISE: f64 = 16.0;
 
 /// Cells along each side of the blocks in which a parting is looked for.
 const BLOCK: usize = 8;
 
-/// `u = 1 + ⅓ Σ_a sin(π ξ_a) + 4/3 (ξ_x ξ_y + ξ_y ξ_z + ξ_z ξ_x)`, `ξ` from −½ to ½ across the bounding box.
+/// `u = 1 + ⅓ Σ_a sin(π ξ_a) + 4/3 (ξ_x ξ_y + ξ_y ξ_z + ξ_z ξ_x)`, `ξ` from −½ to ½ across a box of this size.
 /// It rises from one end of the body to the other, so that translations change `L` by as much as can be; the
 /// last term is for rotations.
 fn weight(center: [f64; 3], size: [f64; 3], place: [f64; 3]) -> f64 {
     let x = sub(place, center);
-    let [x, y, z] = [0, 1, 2].map(|a| x[a] / size[a].max(f64::MIN_POSITIVE));
+    let [x, y, z] = [0, 1, 2].map(|a| x[a] / size[a]);
     let rise = |t: f64| (std::f64::consts::PI * t.clamp(-0.5, 0.5)).sin();
     let products = x * y + y * z + z * x;
     1.0 + (rise(x) + rise(y) + rise(z) + 4.0 * products.clamp(-1.0, 1.0)) / 3.0
 }
 
-/// `h³ Σ_o u(x_o) s(φ_o)`: the weights `h³ u` are kept.
+/// `h³ Σ_o u(x_o) g(φ_o)`: the weights `h³ u` are kept.
 pub(super) struct Functional {
     weights: Vec<f64>,
     /// Of the soft edge, in the cloud's unit.
@@ -33,7 +36,11 @@ pub(super) struct Functional {
 impl Functional {
     pub(super) fn new(cloud: &PointCloud<f64>, grid: &Grid<f64>) -> Self {
         let (low, high) = cloud.bounds().unwrap_or_default();
-        let (center, size) = (scale(add(low, high), 0.5), sub(high, low));
+        let least = LEAST_RISE * grid.spacing();
+        let (center, size) = (
+            scale(add(low, high), 0.5),
+            sub(high, low).map(|side| side.max(least)),
+        );
         let volume = grid.spacing().powi(3);
         let weight = |cell: usize| volume * weight(center, size, grid.center_f64(grid.cell(cell)));
         Self {
@@ -45,24 +52,28 @@ impl Functional {
     /// The part of every cell.
     pub(super) fn parts(&self, phi: &Field<f64>) -> Vec<f64> {
         let cells = phi.values().par_iter().zip(&self.weights);
-        cells.map(|(&phi, u)| u * soft(phi / self.width)).collect()
+        cells.map(|(&phi, u)| u * fall(phi / self.width)).collect()
     }
 
     /// `∂L/∂φ` at every cell.
     pub(super) fn cotangent(&self, phi: &Field<f64>) -> Vec<f64> {
         let cells = phi.values().par_iter().zip(&self.weights);
         cells
-            .map(|(&phi, u)| {
-                let s = soft(phi / self.width);
-                -u * s * (1.0 - s) / self.width
-            })
+            .map(|(&phi, u)| u * slope(phi / self.width) / self.width)
             .collect()
     }
 }
 
-/// `1/(1 + exp(t))`.
-fn soft(t: f64) -> f64 {
-    1.0 / (1.0 + t.exp())
+/// From 1 at `t = 0` to 0 at `t = 1`, with two continuous derivatives.
+fn fall(t: f64) -> f64 {
+    let t = t.clamp(0.0, 1.0);
+    1.0 - t * t * t * (10.0 - t * (15.0 - 6.0 * t))
+}
+
+/// The derivative of [`fall`].
+fn slope(t: f64) -> f64 {
+    let t = t.clamp(0.0, 1.0);
+    -30.0 * (t * (1.0 - t)).powi(2)
 }
 
 /// The block of cells in which two derivatives, given cell by cell, differ most.

@@ -1,10 +1,15 @@
 //! The pullback of the whole pipeline against finite differences, on a user's own cloud.
 //!
 //! # What is compared
-//! A functional of φ that has a derivative everywhere: the volume of the body with soft edges, weighted,
-//! `L = h³ Σ_o u(x_o) s(φ_o)`, `s(φ) = 1/(1 + exp(φ/2h))`, `u` a smooth function of place that rises from one end
-//! of the body to the other (else a translation would change nothing). All points are moved along a
-//! [direction](Motion), whose longest vector has length 1, and three derivatives of `L` are taken:
+//! A functional of φ that has a derivative everywhere: the weighted volume of the body with soft edges,
+//! `L = h³ Σ_o u(x_o) g(φ_o)`, where `g` falls smoothly from 1 on the surface to 0 at `φ = 6h`, and `u` is a smooth function
+//! of place that rises from one end of the body to the other (else a translation would change nothing). Inside, `g` is
+//! constant: φ has a kink in the middle of a thin part, and a sum over cells of anything that sees the kink depends on how
+//! it lies between the cells. For the exact φ of a plate half a cell thick and `g = 1/(1 + exp(φ/2h))`, the derivative by a
+//! translation is 0.5 to 1.3 of the difference over a cell, for this `g` 0.998 to 1.006.
+//!
+//! All points are moved along a [direction](Motion), whose longest vector has length 1, and three derivatives of `L` are
+//! taken:
 //!
 //! - by [pullback](crate::Reconstruction::pullback);
 //! - by central differences over a small step, with the signs
