@@ -3,7 +3,7 @@
 use isograd::gradcheck;
 use isograd::isosurface::Level;
 use isograd::orient::Method;
-use isograd::{Grid, Options, PointCloud, Reconstructor, Resolution, SurfaceResolution};
+use isograd::{Grid, Options, PointCloud, Reconstructor, Resolution, Solve, SurfaceResolution};
 use isograd_element::vector;
 
 use crate::common::Uniform;
@@ -84,9 +84,8 @@ fn derivatives_on_a_lens_a_cell_thick_hold_across_a_cell() {
     };
     let found = gradcheck::gradcheck(&cloud, grid, &options, &mut |_| ()).expect("a surface");
     for row in &found.rows {
-        // Not refined (`SurfaceResolution::Grid`), the worst of the three is off by 0.37.
         println!("{:?}: {}", row.motion, row.large_ratio());
-        assert!((row.large_ratio() - 1.0).abs() < 0.15, "{row:?}");
+        assert!((row.large_ratio() - 1.0).abs() < 0.1, "{row:?}");
     }
 }
 
@@ -127,5 +126,77 @@ fn a_lens_thinner_than_a_cell_is_whole_and_moves_with_its_samples() {
         let most = changes.fold(0.0, f64::max);
         assert!(most < 2.0 * step, "{} steps", most / step);
         before = Some(now.to_vec());
+    }
+}
+
+/// Samples of a square plate with exact normals: sides 2, this thick, turned and moved.
+fn plate(
+    count: usize,
+    thickness: f64,
+    turn: impl Fn([f64; 3]) -> [f64; 3],
+    by: [f64; 3],
+) -> PointCloud<f64> {
+    let mut random = Uniform::new(5);
+    let size = [1.0, 1.0, 0.5 * thickness];
+    let (mut points, mut normals) = (Vec::new(), Vec::new());
+    for _ in 0..count {
+        let mut point = size.map(|side| side * (2.0 * random.next() - 1.0));
+        let rim = random.next() < thickness / (1.0 + thickness);
+        let axis = match (rim, random.next() < 0.5) {
+            (false, _) => 2,
+            (true, first) => usize::from(first),
+        };
+        let mut normal = [0.0; 3];
+        normal[axis] = if random.next() < 0.5 { 1.0 } else { -1.0 };
+        point[axis] = normal[axis] * size[axis];
+        points.push(vector::add(turn(point), by));
+        normals.push(turn(normal));
+    }
+    let cloud = PointCloud::new(points).expect("finite");
+    cloud.with_normals(normals).expect("one each")
+}
+
+#[test]
+fn a_plate_is_as_thick_wherever_it_lies_between_cell_centers() {
+    let spacing = 0.05;
+    let grid = Grid::new([-1.3, -1.3, -0.3], spacing, [52, 52, 12]).expect("a grid");
+    for thickness in [0.7, 1.0, 1.4].map(|cells| cells * spacing) {
+        let volumes = (0..8).map(|k| {
+            let by = [0.0, 0.0, f64::from(k) * spacing / 8.0];
+            let cloud = plate(20_000, thickness, |x| x, by);
+            let mut plan = Reconstructor::new(grid, thin(1.0)).expect("options");
+            let result = plan.reconstruct(&cloud).expect("a surface");
+            result.report().surface.volume
+        });
+        let volumes: Vec<f64> = volumes.collect();
+        let [low, high] = [f64::min, f64::max].map(|f| volumes.iter().copied().fold(volumes[0], f));
+        // With vertices by linear interpolation the volumes differ by 0.096, 0.081 and 0.026.
+        println!("{thickness}: {low} to {high}");
+        assert!(high - low < 0.004 * high, "{thickness}: {volumes:?}");
+    }
+}
+
+#[test]
+fn a_tilted_plate_of_a_sparse_solve_has_no_holes() {
+    let grid = Grid::new([-1.4; 3], 0.1, [28; 3]).expect("a grid");
+    let tilted = |[x, y, z]: [f64; 3]| {
+        let [x, z] = [0.8 * x - 0.6 * z, 0.6 * x + 0.8 * z];
+        [x, 0.6 * y - 0.8 * z, 0.8 * y + 0.6 * z]
+    };
+    // Half and whole cells of the surface thick.
+    for (thickness, count) in [(0.025, 60_000), (0.05, 30_000)] {
+        let cloud = plate(count, thickness, tilted, [0.013, -0.007, 0.021]);
+        let options = thin(2.0).solve(Solve::Sparse);
+        let mut plan = Reconstructor::new(grid, options).expect("options");
+        let surface = &plan
+            .reconstruct(&cloud)
+            .expect("a surface")
+            .report()
+            .surface;
+        println!(
+            "{thickness}: {} components, Euler {}",
+            surface.components, surface.euler
+        );
+        assert_eq!((surface.components, surface.euler), (1, 2));
     }
 }
