@@ -47,12 +47,13 @@ fn whole_pullback_is_the_transpose_of_the_derivative() {
                 row.large_ratio()
             );
             assert!(row.small.is_smooth(), "{name}: {row:?}");
-            // Where the axis is nearly as good as another, noise changes the slope within a thousandth of a cell.
-            let limit = match row.motion {
-                Motion::Noise => 1e-5,
-                _ => 1e-6,
+            // Where the axis is nearly as good as another, noise changes the slope within a thousandth of a cell; and its
+            // derivative is a sum of thousands of terms of either sign, which may nearly cancel.
+            let (limit, least) = match row.motion {
+                Motion::Noise => (1e-5, 0.2 * row.scale),
+                _ => (1e-6, 0.0),
             };
-            let error = (row.small_ratio() - 1.0).abs();
+            let error = (row.pullback - row.small.value).abs() / row.pullback.abs().max(least);
             assert!(error < limit, "{name}: {row:?}");
         }
     }

@@ -98,8 +98,22 @@ fn middle_pairs<T: Real>(neighborhoods: &Neighborhoods<T>, bar: f64) -> Vec<(u32
     let is_middle = |&position: &usize| least <= reach[position] && reach[position] <= largest;
     let positions = (0..reach.len()).into_par_iter();
     let middle: Vec<usize> = positions.filter(is_middle).collect();
-    let share = AUTO_MARGIN * bar / neighborhoods.common_radius.f64();
-    let share = share / middle.len() as f64;
+    // Two samples may each be the other's 24th: of equal distances at either end a part may be in the middle half.
+    let count = |is: &(dyn Fn(T) -> bool + Sync)| reach.par_iter().filter(|&&r| is(r)).count();
+    let quarter = count(&|r| r > T::zero()) / 4;
+    let [at_least, at_largest] = [least, largest].map(|end| count(&|r| r == end));
+    let beyond = [
+        quarter - count(&|r| T::zero() < r && r < least),
+        quarter - count(&|r| r > largest),
+    ];
+    let inside = middle.len() - beyond[0] - beyond[1];
+    let weight = move |square: T| match (square == least, square == largest) {
+        (true, true) => inside as f64 / at_least as f64,
+        (true, false) => 1.0 - beyond[0] as f64 / at_least as f64,
+        (false, true) => 1.0 - beyond[1] as f64 / at_largest as f64,
+        (false, false) => 1.0,
+    };
+    let share = AUTO_MARGIN * bar / neighborhoods.common_radius.f64() / inside as f64;
     let point = |j: u32| index.point(neighborhoods.position()[j as usize] as usize);
     let pair = |&position: &usize| {
         let (i, square) = (index.order()[position], reach[position]);
@@ -116,7 +130,58 @@ fn middle_pairs<T: Real>(neighborhoods: &Neighborhoods<T>, bar: f64) -> Vec<(u32
                 last = Some(j);
             }
         });
-        (i, last.unwrap_or(i), share)
+        (i, last.unwrap_or(i), share * weight(square))
     };
     middle.par_iter().map(pair).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::neighbors::{forward, tests::Random};
+
+    /// `R` of the automatic rule, and its derivative along `direction`.
+    fn radius(points: &[[f64; 3]], direction: &[[f64; 3]]) -> (Neighborhoods<f64>, f64) {
+        let mut found = Neighborhoods::default();
+        forward(points, Radius::Auto, &mut found).expect("a radius");
+        let mut bar = RadiiCotangent::default();
+        bar.add_common(found.common_radius);
+        let mut points_bar = vec![[0.0; 3]; points.len()];
+        pullback(&found, &bar, &mut points_bar);
+        let pairs = points_bar.iter().zip(direction);
+        let slope = pairs.map(|(bar, d)| vector::dot(*bar, *d)).sum();
+        (found, slope)
+    }
+
+    #[test]
+    fn the_automatic_radius_has_its_derivative_where_equal_distances_lie_at_the_ends_of_the_half() {
+        let mut split = 0;
+        for seed in 0..60 {
+            let mut random = Random::new(seed);
+            let mut vectors = |n| -> Vec<[f64; 3]> {
+                let one = |_| [random.uniform(), random.uniform(), 0.1 * random.uniform()];
+                (0..n).map(one).collect()
+            };
+            let (points, direction) = (vectors(200), vectors(200));
+            let (found, slope) = radius(&points, &direction);
+            let [least, largest] = found.middle.expect("positive distances");
+            let between = |r: &&f64| (least..=largest).contains(*r);
+            split += usize::from(found.reach.iter().filter(between).count() > 100);
+            let at = |step: f64| {
+                let moved = points.iter().zip(&direction);
+                let moved = moved.map(|(x, d)| vector::add(*x, vector::scale(*d, step)));
+                radius(&moved.collect::<Vec<_>>(), &direction)
+                    .0
+                    .common_radius
+            };
+            let step = 1e-7;
+            let difference = (at(step) - at(-step)) / (2.0 * step);
+            assert!(
+                (slope - difference).abs() < 1e-6,
+                "{seed}: {slope} {difference}"
+            );
+        }
+        // Two samples are each the other's 24th, and only one of the two distances is in the middle half.
+        assert!(split > 0);
+    }
 }
