@@ -264,14 +264,14 @@ const RECORDED: [[[u64; 5]; 2]; 5] = [
             0x15f03510a596258f,
             0xb6e4cbebb916671e,
             0xc81c441e5cbff7d0,
-            0x2e7cb4098aed7bb5,
+            0xa74ef392bb7cd4d0,
         ],
         [
             0xfd4c375d3835d767,
             0x820b6ab6fd9628ca,
             0x1ab94f4a2483a8e2,
             0x989a8c559887319d,
-            0xe6a7f8510adbe495,
+            0xd981e6fbc7a09974,
         ],
     ],
     [
@@ -328,14 +328,14 @@ const RECORDED: [[[u64; 5]; 2]; 5] = [
             0x0be2bfc506944367,
             0xd7890d5a39c02363,
             0xc81c441e5cbff7d0,
-            0x3b63a5e33ea00132,
+            0x3b92dac98de4e495,
         ],
         [
             0x950e142f4cf57322,
             0xb1c5bca15d861f28,
             0xf1574bd9f3b0b61d,
             0x989a8c559887319d,
-            0x5b6422efa2f1b3fc,
+            0xb0a5ceb6f6906a50,
         ],
     ],
 ];
