@@ -20,8 +20,8 @@ const NEGLIGIBLE: f64 = 0.005;
 const TOLERATED_STEP: f64 = 0.1;
 
 /// The loss that is differentiated: see [`isograd::gradcheck`].
-const LOSS: &str = "volume of the body, with an edge that is soft over 6 cells outside and weights that rise from one end to the other; a motion moves \
-the fastest point by 1";
+const LOSS: &str = "volume of the body, with an edge that is soft over 6 cells outside and weights that rise from one end to \
+the other; a motion moves the fastest point by 1";
 
 /// Runs the command, in double precision.
 ///

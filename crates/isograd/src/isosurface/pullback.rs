@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::data::cells::{Cells, CellsMut};
-use crate::data::{Field, GridCotangent, LatticeEdge, Mesh};
+use crate::data::{Field, Grid, GridCotangent, LatticeEdge, Mesh};
 use crate::element::crossing::{bounded, crossing};
 use crate::{Real, parallel, vector};
 
@@ -64,7 +64,39 @@ pub(crate) fn pullback_on<T: Real>(
             chi_bar.add_at_ends(mesh.edges(), |vertex| vertices.parts(vertex));
         }
     }
-    vertices.level(mesh)
+    LevelCotangent::sum(chi.grid(), mesh, vertices_bar, |vertex| {
+        let EdgeVertex { pull, guarded, .. } = vertices.edge_vertex(vertex);
+        (pull.f64(), guarded)
+    })
+}
+
+impl LevelCotangent {
+    /// The sum over the vertices of `mesh`, with their cotangents `vertices_bar` `(V, 3)`; `pull(vertex)` has the part of the
+    /// level, and whether it was bounded.
+    pub(super) fn sum<T: Real>(
+        grid: &Grid<T>,
+        mesh: &Mesh<T>,
+        vertices_bar: &[[T; 3]],
+        pull: impl Fn(usize) -> (f64, bool) + Sync,
+    ) -> Self {
+        let [level, x, y, z, spacing, guarded] =
+            parallel::sum_array(mesh.edges().len(), |vertex| {
+                let (pull, guarded) = pull(vertex);
+                let place = vector::to_f64(grid.to_index(mesh.vertices()[vertex]));
+                let mut part = GridCotangent::default();
+                part.add_place(place, vector::to_f64(vertices_bar[vertex]));
+                let [x, y, z] = part.lower;
+                [pull, x, y, z, part.spacing, f64::from(u8::from(guarded))]
+            });
+        Self {
+            level,
+            grid: GridCotangent {
+                lower: [x, y, z],
+                spacing,
+            },
+            guarded: guarded as usize,
+        }
+    }
 }
 
 /// Greatest value less least value.
@@ -133,27 +165,6 @@ impl<T: Real> Vertices<'_, T> {
                     *value += part;
                 }
             }
-        }
-    }
-
-    fn level(&self, mesh: &Mesh<T>) -> LevelCotangent {
-        let grid = self.chi.grid();
-        let [level, x, y, z, spacing, guarded] = parallel::sum_array(self.edges.len(), |vertex| {
-            let edge_vertex = self.edge_vertex(vertex);
-            let place = vector::to_f64(grid.to_index(mesh.vertices()[vertex]));
-            let mut part = GridCotangent::default();
-            part.add_place(place, vector::to_f64(self.bars[vertex]));
-            let [x, y, z] = part.lower;
-            let guarded = f64::from(u8::from(edge_vertex.guarded));
-            [edge_vertex.pull.f64(), x, y, z, part.spacing, guarded]
-        });
-        LevelCotangent {
-            level,
-            grid: GridCotangent {
-                lower: [x, y, z],
-                spacing,
-            },
-            guarded: guarded as usize,
         }
     }
 }

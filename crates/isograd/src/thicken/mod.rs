@@ -59,9 +59,9 @@ const REACH: f64 = 2.5;
 /// Thickness, in widths, that thinner parts are given.
 const LEAST: f64 = 1.0;
 
-/// The same in cells that the surface is marched on. Thinner plates whose samples scatter by a twentieth of a cell have
-/// holes where they lie askew in the lattice: it takes √3 cells for each plane to have a connected layer of lattice points,
-/// and less where the indicator is smooth.
+/// Least thickness of any part, in cells of the lattice that the surface is marched on. Thinner plates, tilted against the
+/// lattice and with noise of a twentieth of a cell, have holes: a layer of lattice points is connected in every direction from
+/// √3 cells on, and from less where the indicator is smooth.
 const LEAST_CELLS: f64 = 1.5;
 
 /// Half of the range of thicknesses over which parts begin to be thickened, in widths.

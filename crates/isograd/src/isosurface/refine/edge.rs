@@ -34,8 +34,8 @@ impl Edge {
         let (cell, axis) = (fine.cell(edge.cell()), edge.axis());
         let others = [usize::from(axis == 0), if axis == 2 { 1 } else { 2 }];
         Self {
-            along: near(grid, axis, cell[axis]),
-            across: others.map(|a| near(grid, a, cell[a])),
+            along: places(grid, axis, cell[axis]),
+            across: others.map(|a| places(grid, a, cell[a])),
             weights: others.map(|a| std::array::from_fn(|t| super::weight(cell[a], t))),
             start: if cell[axis] % 2 == 0 { -0.25 } else { 0.25 },
         }
@@ -140,11 +140,8 @@ impl Place {
 }
 
 /// Places in memory, along one axis, of the cells of the indicator from the one before that of cell `half` of the refined
-/// grid on, reflected at the walls.
+/// grid on.
 #[inline(always)]
-fn near<T: Real, const N: usize>(grid: &Grid<T>, axis: usize, half: usize) -> [usize; N] {
-    std::array::from_fn(|n| {
-        let cell = (half / 2 + n).saturating_sub(1);
-        cell.min(grid.shape()[axis] - 1) * grid.strides()[axis]
-    })
+fn places<T: Real, const N: usize>(grid: &Grid<T>, axis: usize, half: usize) -> [usize; N] {
+    std::array::from_fn(|n| super::cell_near(grid.shape()[axis], half, n) * grid.strides()[axis])
 }

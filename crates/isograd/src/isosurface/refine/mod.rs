@@ -124,11 +124,7 @@ fn crossed<T: Real>(chi: &Field<T>, level: T) -> Vec<[usize; 3]> {
 
 /// The cells of the indicator of a block's halo, by place there and place in memory, reflected at the walls.
 fn for_each_cell<T: Real>(grid: &Grid<T>, corner: [usize; 3], mut f: impl FnMut(usize, usize)) {
-    let shape = grid.shape();
-    let cell = |axis: usize, n: usize| {
-        let cell = (corner[axis] / 2 + n).saturating_sub(1);
-        cell.min(shape[axis] - 1)
-    };
+    let cell = |axis: usize, n: usize| cell_near(grid.shape()[axis], corner[axis], n);
     let mut place = 0;
     for i in 0..WIDE {
         for j in 0..WIDE {
@@ -138,6 +134,13 @@ fn for_each_cell<T: Real>(grid: &Grid<T>, corner: [usize; 3], mut f: impl FnMut(
             }
         }
     }
+}
+
+/// The `n`th cell of the indicator along an axis with `cells`, from the one before that of cell `half` of the refined grid on,
+/// reflected at the walls.
+#[inline(always)]
+fn cell_near(cells: usize, half: usize, n: usize) -> usize {
+    (half / 2 + n).saturating_sub(1).min(cells - 1)
 }
 
 /// From the three cells round that under half `half` of a block to the value there.

@@ -3,11 +3,10 @@
 use rayon::prelude::*;
 
 use super::edge::{Edge, Place};
-use crate::data::GridCotangent;
 use crate::element::crossing::bounded;
 use crate::gather::Buckets;
 use crate::isosurface::pullback::{LevelCotangent, SMALLEST_DIFFERENCE, range};
-use crate::{Field, Grid, Mesh, Real, parallel, vector};
+use crate::{Field, Grid, Mesh, Real};
 
 /// Planes across x that one task owns.
 const SLAB: usize = 8;
@@ -28,6 +27,10 @@ pub(crate) fn pullback<T: Real>(
         bars: vertices_bar,
         smallest: SMALLEST_DIFFERENCE * range(chi.values()).f64(),
     };
+    let pulls: Vec<(f64, bool)> = (0..vertices_bar.len())
+        .into_par_iter()
+        .map(|vertex| vertices.pull(vertex))
+        .collect();
     let plane = chi.grid().strides()[0];
     let slabs = chi.grid().shape()[0].div_ceil(SLAB);
     let mut near = Buckets::default();
@@ -40,7 +43,7 @@ pub(crate) fn pullback<T: Real>(
         let first = slab * SLAB * plane;
         for &vertex in near.of(slab) {
             let (edge, at) = vertices.place(vertex as usize);
-            let pull = vertices.pull(vertex as usize, &edge, &at).0;
+            let (pull, _) = pulls[vertex as usize];
             edge.for_each_cell(&at, |cell, weight| {
                 if let Some(value) = cell.checked_sub(first).and_then(|at| out.get_mut(at)) {
                     *value -= T::of(pull * weight);
@@ -48,7 +51,7 @@ pub(crate) fn pullback<T: Real>(
             });
         }
     });
-    vertices.level()
+    LevelCotangent::sum(chi.grid(), mesh, vertices_bar, |vertex| pulls[vertex])
 }
 
 struct Vertices<'a, T> {
@@ -83,32 +86,12 @@ impl<T: Real> Vertices<'_, T> {
 
     /// `ȳ·e/χ'`, and whether `χ'` was bounded.
     #[inline(always)]
-    fn pull(&self, vertex: usize, edge: &Edge, at: &Place) -> (f64, bool) {
+    fn pull(&self, vertex: usize) -> (f64, bool) {
+        let (edge, at) = self.place(vertex);
         let axis = self.mesh.edges()[vertex].axis();
         let bar = (self.bars[vertex][axis] * self.chi.grid().spacing()).f64();
         let slope = at.slope(&edge.line(self.chi));
         let guarded = slope.abs() < self.smallest && bar != 0.0;
         (bar / bounded(slope, self.smallest), guarded)
-    }
-
-    fn level(&self) -> LevelCotangent {
-        let grid = self.chi.grid();
-        let [level, x, y, z, spacing, guarded] = parallel::sum_array(self.bars.len(), |vertex| {
-            let (edge, at) = self.place(vertex);
-            let (pull, guarded) = self.pull(vertex, &edge, &at);
-            let place = vector::to_f64(grid.to_index(self.mesh.vertices()[vertex]));
-            let mut part = GridCotangent::default();
-            part.add_place(place, vector::to_f64(self.bars[vertex]));
-            let [x, y, z] = part.lower;
-            [pull, x, y, z, part.spacing, f64::from(u8::from(guarded))]
-        });
-        LevelCotangent {
-            level,
-            grid: GridCotangent {
-                lower: [x, y, z],
-                spacing,
-            },
-            guarded: guarded as usize,
-        }
     }
 }
