@@ -7,7 +7,7 @@
 use std::error::Error;
 use std::ops::ControlFlow;
 
-use isograd::{Grid, PointCloud, Resolution};
+use isograd::{Grid, PointCloud, Resolution, orient};
 use isograd_fit::{Fit, Options, ShapeParameters, Start, Target, Variables};
 use isograd_shapes::{Sampling, Shape, by_name};
 
@@ -31,7 +31,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         ..ShapeParameters::new(fish.clone())
     };
     let grid = around(&[&samples.cloud, &cloud(&variables.started()?)?])?;
-    let target = Target::from_cloud(&samples.cloud, grid, &isograd::Options::default())?;
+    // The fit of a shape takes the sides of its normals; so does this target, whose samples have theirs.
+    let reconstruction = isograd::Options::default().orient(orient::Method::Signs);
+    let target = Target::from_cloud(&samples.cloud, grid, &reconstruction)?;
     let options = Options {
         tolerance: 3e-4,
         ..Options::default()
