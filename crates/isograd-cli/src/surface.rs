@@ -86,7 +86,8 @@ fn with_values<T: Real>(
 ) -> Result<PointCloud<T>, PointCloudError> {
     if is_color {
         for value in &mut values {
-            *value = value.round().max(T::zero()).min(T::of(255.0));
+            // The sum makes 0 of a negative zero, which a byte does not have and `max` may keep.
+            *value = value.round().max(T::zero()).min(T::of(255.0)) + T::zero();
         }
     }
     vertices.with_attribute(Attribute {
