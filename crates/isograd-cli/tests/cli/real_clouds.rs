@@ -26,7 +26,7 @@ const CLOUDS: [&str; 10] = [
 ];
 const CELLS: usize = 96;
 /// Parts thinner than this many cells may merge or vanish.
-const THICK: f64 = 3.0;
+const THICK: f64 = 1.5;
 /// Of all samples, one in this many is looked at.
 const STRIDE: usize = 7;
 
@@ -129,7 +129,7 @@ fn ten_real_clouds_give_closed_surfaces_near_the_truth() {
             made.0, made.1, found.0, found.1
         );
         // The mean over samples on thick parts is not asked for: on a plate those are its rims alone.
-        if !(made.0 < 0.03 && made.1 < 0.3 && found.1 < 0.6) {
+        if !(made.0 < 0.03 && made.1 < 0.3 && found.1 < 0.5) {
             failures.push(name);
         }
     }
