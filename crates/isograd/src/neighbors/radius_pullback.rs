@@ -100,12 +100,11 @@ fn middle_pairs<T: Real>(neighborhoods: &Neighborhoods<T>, bar: f64) -> Vec<(u32
     let middle: Vec<usize> = positions.filter(is_middle).collect();
     // Two samples may each be the other's 24th: of equal distances at either end a part may be in the middle half.
     let count = |is: &(dyn Fn(T) -> bool + Sync)| reach.par_iter().filter(|&&r| is(r)).count();
-    let quarter = count(&|r| r > T::zero()) / 4;
     let [at_least, at_largest] = [least, largest].map(|end| count(&|r| r == end));
-    let beyond = [
-        quarter - count(&|r| T::zero() < r && r < least),
-        quarter - count(&|r| r > largest),
-    ];
+    let below = count(&|r| T::zero() < r && r < least);
+    let above = count(&|r| r > largest);
+    let quarter = (below + middle.len() + above) / 4;
+    let beyond = [quarter - below, quarter - above];
     let inside = middle.len() - beyond[0] - beyond[1];
     let weight = move |square: T| match (square == least, square == largest) {
         (true, true) => inside as f64 / at_least as f64,
