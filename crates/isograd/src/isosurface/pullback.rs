@@ -80,7 +80,7 @@ impl LevelCotangent {
         pull: impl Fn(usize) -> (f64, bool) + Sync,
     ) -> Self {
         let [level, x, y, z, spacing, guarded] =
-            parallel::sum_array(mesh.edges().len(), |vertex| {
+            parallel::sum_array(mesh.vertices().len(), |vertex| {
                 let (pull, guarded) = pull(vertex);
                 let place = vector::to_f64(grid.to_index(mesh.vertices()[vertex]));
                 let mut part = GridCotangent::default();

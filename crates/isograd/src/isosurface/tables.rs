@@ -28,6 +28,8 @@ pub(super) struct Table {
     counts: [u8; 256],
     loops: Vec<Loop>,
     triangles: Vec<[u8; 3]>,
+    /// The edges of each loop.
+    cycles: Vec<u8>,
 }
 
 /// A closed loop of crossed edges of a cube.
@@ -39,6 +41,8 @@ pub struct Loop {
     triangles: u8,
     /// Number of triangulations, one after the other.
     triangulations: u8,
+    /// Its first edge in the list of all.
+    cycle: u16,
 }
 
 /// The one table.
@@ -55,6 +59,12 @@ impl Loop {
     /// Its triangulations, that with the shortest diagonals first: triangles, each three edges of the cube.
     pub fn triangulations(&self) -> impl Iterator<Item = &'static [[u8; 3]]> {
         TABLE.triangulations(self)
+    }
+
+    /// Its edges of the cube.
+    #[inline(always)]
+    pub(super) fn cycle(&self) -> &'static [u8] {
+        &TABLE.cycles[self.cycle.into()..][..usize::from(self.triangles) + 2]
     }
 }
 
@@ -91,22 +101,34 @@ impl Table {
         let is_open = loops.iter().any(|of| of.triangulations > 1);
         let fractions = is_open.then(fractions);
         for of in loops {
-            let mut best = &self.triangles[of.first.into()..][..of.triangles.into()];
-            if let Some(fraction) = fractions.as_ref().filter(|_| of.triangulations > 1) {
-                let mut vertices = [[0.0; 3]; 12];
-                for &edge in best.as_flattened() {
-                    vertices[edge as usize] = vertex(edge, fraction(edge).f64());
-                }
-                let mut largest = enclosed(best, &vertices);
-                for other in self.triangulations(of).skip(1) {
-                    let volume = enclosed(other, &vertices);
-                    if volume > largest + TIE * T::epsilon().f64() {
-                        (best, largest) = (other, volume);
-                    }
+            let triangles = self.triangles(of, fractions.as_ref());
+            triangles.iter().for_each(|&triangle| found(triangle));
+        }
+    }
+
+    /// The triangulation of a loop that encloses the most where its vertices lie at these fractions of their edges, which are
+    /// needed if there is a choice.
+    #[inline(always)]
+    pub(super) fn triangles<T: Real>(
+        &self,
+        of: &Loop,
+        fraction: Option<impl Fn(u8) -> T>,
+    ) -> &[[u8; 3]] {
+        let mut best = &self.triangles[of.first.into()..][..of.triangles.into()];
+        if let Some(fraction) = fraction.filter(|_| of.triangulations > 1) {
+            let mut vertices = [[0.0; 3]; 12];
+            for &edge in best.as_flattened() {
+                vertices[edge as usize] = vertex(edge, fraction(edge).f64());
+            }
+            let mut largest = enclosed(best, &vertices);
+            for other in self.triangulations(of).skip(1) {
+                let volume = enclosed(other, &vertices);
+                if volume > largest + TIE * T::epsilon().f64() {
+                    (best, largest) = (other, volume);
                 }
             }
-            best.iter().for_each(|&triangle| found(triangle));
         }
+        best
     }
 
     fn build() -> Self {
@@ -115,6 +137,7 @@ impl Table {
             counts: [0; 256],
             loops: Vec::new(),
             triangles: Vec::new(),
+            cycles: Vec::new(),
         };
         for case in 0..=255u8 {
             for cycle in loops(case) {
@@ -123,7 +146,9 @@ impl Table {
                     first: table.triangles.len() as u16,
                     triangles: (cycle.len() - 2) as u8,
                     triangulations: all.len() as u8,
+                    cycle: table.cycles.len() as u16,
                 };
+                table.cycles.extend(&cycle);
                 table.counts[case as usize] += of.triangles;
                 table.loops.push(of);
                 table.triangles.extend(all.concat());
@@ -148,7 +173,7 @@ fn enclosed(triangles: &[[u8; 3]], vertices: &[[f64; 3]; 12]) -> f64 {
 
 /// The point at a fraction of an edge of a cube.
 #[inline(always)]
-fn vertex(edge: u8, fraction: f64) -> [f64; 3] {
+pub(super) fn vertex(edge: u8, fraction: f64) -> [f64; 3] {
     let (corner, axis) = start(edge);
     let mut point = corner.map(|c| c as f64);
     point[axis] = fraction;
@@ -161,6 +186,14 @@ pub(super) fn fraction<T: Real>(edge: u8, values: &[T; 8], level: T) -> T {
     let (corner, axis) = start(edge);
     let from = 4 * corner[0] + 2 * corner[1] + corner[2];
     crossing(values[from], values[from + usize::from(BIT[axis])], level)
+}
+
+/// The two faces of the cube that an edge lies on, as bits: `2·axis` of the low one and `2·axis + 1` of the high one.
+#[inline(always)]
+pub(super) fn faces_of(edge: u8) -> u8 {
+    let (corner, axis) = start(edge);
+    let face = |a: usize| 1 << (2 * a + corner[a]);
+    (0..3).filter(|&a| a != axis).map(face).sum()
 }
 
 /// The corner from which an edge runs, and its axis.

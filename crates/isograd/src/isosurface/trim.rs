@@ -90,14 +90,11 @@ pub fn forward<T: Real>(mesh: &Mesh<T>, points: &[[T; 3]], distance: f64) -> Tri
         .for_each(|v| *v = new[*v as usize]);
     let removed = mesh.faces().len() - faces.len();
     let at = |&v: &u32| mesh.vertices()[v as usize];
-    let edges = vertices
-        .iter()
-        .filter_map(|&v| mesh.edges().get(v as usize).copied());
     Trimmed {
         mesh: Mesh {
             vertices: vertices.iter().map(at).collect(),
             faces,
-            edges: edges.collect(),
+            ..Mesh::default()
         },
         vertices,
         distance,

@@ -273,7 +273,14 @@ impl<T: Real> Reconstruction<T> {
         let mesh = &self.mesh;
         match (&self.refined, chi_bar) {
             (Some(BlockField { grid, .. }), CellsMut::Dense(_, chi_bar)) => {
-                isosurface::refine::pullback(&self.indicator, grid, mesh, vertices, chi_bar)
+                isosurface::refine::pullback(
+                    &self.indicator,
+                    self.iso_value,
+                    grid,
+                    mesh,
+                    vertices,
+                    chi_bar,
+                )
             }
             (_, chi_bar) => {
                 isosurface::pullback_on(self.chi(), self.iso_value, mesh, vertices, chi_bar)

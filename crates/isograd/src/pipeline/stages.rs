@@ -446,12 +446,16 @@ fn march<T: Real>(
     use isosurface::{blocks, refine};
     match (refined, sparse) {
         (Some(refined), _) => {
-            let fraction = refine::fraction(indicator, &refined.grid, level);
-            blocks::forward(refined, level, fraction, mesh)
+            let places = refine::OnSpline {
+                chi: indicator,
+                refined,
+                level,
+            };
+            blocks::forward(refined, level, &places, mesh)
         }
         (None, Some(sparse)) => {
             let chi = &sparse.chi;
-            blocks::forward(chi, level, blocks::linear(chi, level), mesh)
+            blocks::forward(chi, level, &blocks::Linear { chi, level }, mesh)
         }
         (None, None) => isosurface::forward(indicator, level, scratch, mesh),
     }

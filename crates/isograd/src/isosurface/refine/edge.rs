@@ -2,6 +2,7 @@
 
 use crate::data::LatticeEdge;
 use crate::element::stencil::{bspline, bspline_slope};
+use crate::isosurface::blocks::sides;
 use crate::{Field, Grid, Real};
 
 /// Most steps to the crossing. Newton's method takes two or three.
@@ -32,7 +33,7 @@ impl Edge {
     #[inline(always)]
     pub(super) fn new<T: Real>(grid: &Grid<T>, fine: &Grid<T>, edge: LatticeEdge) -> Self {
         let (cell, axis) = (fine.cell(edge.cell()), edge.axis());
-        let others = [usize::from(axis == 0), if axis == 2 { 1 } else { 2 }];
+        let others = sides(axis);
         Self {
             along: places(grid, axis, cell[axis]),
             across: others.map(|a| places(grid, a, cell[a])),
@@ -142,6 +143,10 @@ impl Place {
 /// Places in memory, along one axis, of the cells of the indicator from the one before that of cell `half` of the refined
 /// grid on.
 #[inline(always)]
-fn places<T: Real, const N: usize>(grid: &Grid<T>, axis: usize, half: usize) -> [usize; N] {
+pub(super) fn places<T: Real, const N: usize>(
+    grid: &Grid<T>,
+    axis: usize,
+    half: usize,
+) -> [usize; N] {
     std::array::from_fn(|n| super::cell_near(grid.shape()[axis], half, n) * grid.strides()[axis])
 }

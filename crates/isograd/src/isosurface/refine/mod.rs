@@ -18,6 +18,8 @@
 //! Which blocks have values is held constant; those without have no crossing.
 
 mod edge;
+mod midpoint;
+mod pull_midpoints;
 mod pullback;
 
 use std::sync::Arc;
@@ -25,8 +27,8 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::data::blocks::{BlockField, EDGE, Marks, NODES};
-use crate::{Field, Grid, GridError, LatticeEdge, Real};
-use edge::Edge;
+use crate::{Field, Grid, GridError, Real};
+pub(crate) use midpoint::OnSpline;
 pub(crate) use pullback::pullback;
 
 /// Cells of the indicator along each side of a block.
@@ -77,15 +79,6 @@ pub(crate) fn forward<T: Real>(
         interpolate(&halo, out);
     });
     Ok(refined)
-}
-
-/// Where a vertex of the surface of `chi` at `level` lies on its edge of the lattice of `refined`, from 0 to 1.
-pub(crate) fn fraction<T: Real>(
-    chi: &Field<T>,
-    refined: &Grid<T>,
-    level: T,
-) -> impl Fn(LatticeEdge) -> T {
-    move |edge| Edge::new(chi.grid(), refined, edge).crossing(chi, level)
 }
 
 /// Blocks of the refined grid that may be crossed: cells of the indicator under them and round them are on both sides.

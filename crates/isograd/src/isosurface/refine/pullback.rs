@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::edge::{Edge, Place};
+use super::pull_midpoints::{Midpoints, square_of};
 use crate::element::crossing::bounded;
 use crate::gather::Buckets;
 use crate::isosurface::pullback::{LevelCotangent, SMALLEST_DIFFERENCE, range};
@@ -15,19 +16,25 @@ const SLAB: usize = 8;
 /// `chi`, from the cotangents `vertices_bar` `(V, 3)` of the vertices of `mesh`, which lie on the lattice of `refined`.
 pub(crate) fn pullback<T: Real>(
     chi: &Field<T>,
+    level: T,
     refined: &Grid<T>,
     mesh: &Mesh<T>,
     vertices_bar: &[[T; 3]],
     chi_bar: &mut [T],
 ) -> LevelCotangent {
+    let smallest = SMALLEST_DIFFERENCE * range(chi.values()).f64();
+    let midpoints = Midpoints::new(chi, level, refined, mesh, vertices_bar, smallest);
+    let on_edges = mesh.edges().len();
+    let mut bars = vertices_bar[..on_edges].to_vec();
+    midpoints.add_to_ends(mesh.midpoints(), &mut bars);
     let vertices = Vertices {
         chi,
         refined,
         mesh,
-        bars: vertices_bar,
-        smallest: SMALLEST_DIFFERENCE * range(chi.values()).f64(),
+        bars: &bars,
+        smallest,
     };
-    let pulls: Vec<(f64, bool)> = (0..vertices_bar.len())
+    let pulls: Vec<(f64, bool)> = (0..on_edges)
         .into_par_iter()
         .map(|vertex| vertices.pull(vertex))
         .collect();
@@ -41,17 +48,27 @@ pub(crate) fn pullback<T: Real>(
     let work = chi_bar.par_chunks_mut(SLAB * plane).enumerate();
     work.for_each(|(slab, out)| {
         let first = slab * SLAB * plane;
+        let mut add = |cell: usize, part: f64| {
+            if let Some(value) = cell.checked_sub(first).and_then(|at| out.get_mut(at)) {
+                *value += T::of(part);
+            }
+        };
         for &vertex in near.of(slab) {
-            let (edge, at) = vertices.place(vertex as usize);
-            let (pull, _) = pulls[vertex as usize];
-            edge.for_each_cell(&at, |cell, weight| {
-                if let Some(value) = cell.checked_sub(first).and_then(|at| out.get_mut(at)) {
-                    *value -= T::of(pull * weight);
-                }
-            });
+            let vertex = vertex as usize;
+            if let Some(midpoint) = vertex.checked_sub(on_edges) {
+                midpoints.for_each_cell(midpoint, &mut add);
+                continue;
+            }
+            let (edge, at) = vertices.place(vertex);
+            let (pull, _) = pulls[vertex];
+            edge.for_each_cell(&at, |cell, weight| add(cell, -pull * weight));
         }
     });
-    LevelCotangent::sum(chi.grid(), mesh, vertices_bar, |vertex| pulls[vertex])
+    let of_level = |vertex: usize| match vertex.checked_sub(on_edges) {
+        Some(midpoint) => midpoints.of_level(midpoint),
+        None => pulls[vertex],
+    };
+    LevelCotangent::sum(chi.grid(), mesh, vertices_bar, of_level)
 }
 
 struct Vertices<'a, T> {
@@ -66,9 +83,14 @@ struct Vertices<'a, T> {
 impl<T: Real> Vertices<'_, T> {
     /// The first and the last plane across x with a cell that has a weight at a vertex.
     fn planes(&self, vertex: usize) -> [usize; 2] {
-        let half = self.refined.cell(self.mesh.edges()[vertex].cell())[0];
+        let half = match vertex.checked_sub(self.mesh.edges().len()) {
+            Some(midpoint) => {
+                square_of(self.refined, self.mesh, self.mesh.midpoints()[midpoint]).cell[0]
+            }
+            None => self.refined.cell(self.mesh.edges()[vertex].cell())[0],
+        };
         let last = self.chi.grid().shape()[0] - 1;
-        // One before that of the cell in which the edge starts, and two after it.
+        // One before that of the cell in which the edge or the square starts, and two after it.
         [(half / 2).saturating_sub(1), (half / 2 + 2).min(last)]
     }
 

@@ -1,12 +1,19 @@
 //! Marching cubes on the blocks of a field: vertices, triangles and rules are those of [`forward`](super::forward), vertices
 //! and faces in the order of the blocks.
 
+mod open_ends;
+mod polygon;
+mod splits;
+
 use rayon::prelude::*;
 
 use super::march::{position, split};
 use super::signs::ones;
 use super::tables::{self, TABLE};
 use super::{Error, Report};
+pub(crate) use open_ends::open_ends;
+use splits::Splits;
+
 use crate::Real;
 use crate::data::blocks::{BlockField, Blocks, EDGE, NODES};
 use crate::data::cells::Cells;
@@ -32,6 +39,8 @@ struct Crossings {
     inside: usize,
     walls: [[bool; 2]; 3],
     is_finite: bool,
+    /// Whether cells of the block and the first ones of the next blocks are on both sides.
+    is_mixed: bool,
 }
 
 /// Signs at a block and the first cells of the next ones.
@@ -40,24 +49,64 @@ struct Corners {
     inside: Vec<Option<bool>>,
 }
 
-/// Where a vertex lies on its edge, linearly between the values at the ends, from 0 to 1: for [`forward`].
-#[inline(always)]
-pub(crate) fn linear<T: Real>(chi: &BlockField<T>, level: T) -> impl Fn(LatticeEdge) -> T {
-    move |edge| {
-        let [low, high] = Cells::from(chi).ends(edge);
-        crossing(low, high, level)
+/// Where the vertices of a surface lie.
+pub(crate) trait Places<T>: Sync {
+    /// Of the vertex on an edge, as a fraction of it, from 0 to 1.
+    fn on_edge(&self, edge: LatticeEdge) -> T;
+
+    /// Of the midpoint of a segment of the surface in a square of the lattice, from the ends of the segment, all from 0 to 1
+    /// along both sides of the square; `None` if the segment is not split.
+    fn in_square(&self, _square: Square, _ends: [[T; 2]; 2]) -> Option<[T; 2]> {
+        None
     }
 }
 
-/// Writes the surface `χ = level` of a field in blocks into `mesh`, in the user's unit, each vertex at a `fraction` of its
-/// edge. A cube without a value at each of its corners has no triangles. The same bits for any number of threads.
+/// A face of a cube of the lattice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Square {
+    /// Its low corner.
+    pub cell: [usize; 3],
+    /// The axis that it is perpendicular to.
+    pub axis: usize,
+}
+
+impl Square {
+    /// The axes along its sides, in their order.
+    pub fn sides(self) -> [usize; 2] {
+        sides(self.axis)
+    }
+}
+
+/// The two other axes.
+pub(crate) fn sides(axis: usize) -> [usize; 2] {
+    [usize::from(axis == 0), if axis == 2 { 1 } else { 2 }]
+}
+
+/// Vertices linearly between the values at the ends of their edges.
+pub(crate) struct Linear<'a, T> {
+    /// The indicator.
+    pub chi: &'a BlockField<T>,
+    /// The level of the surface.
+    pub level: T,
+}
+
+impl<T: Real> Places<T> for Linear<'_, T> {
+    #[inline(always)]
+    fn on_edge(&self, edge: LatticeEdge) -> T {
+        let [low, high] = Cells::from(self.chi).ends(edge);
+        crossing(low, high, self.level)
+    }
+}
+
+/// Writes the surface `χ = level` of a field in blocks into `mesh`, in the user's unit, the vertices at their `places`. A cube
+/// without a value at each of its corners has no triangles. The same bits for any number of threads.
 ///
 /// # Errors
 /// As [`forward`](super::forward).
 pub(crate) fn forward<T: Real>(
     chi: &BlockField<T>,
     level: T,
-    fraction: impl Fn(LatticeEdge) -> T + Sync,
+    places: &impl Places<T>,
     mesh: &mut Mesh<T>,
 ) -> Result<Report, Error> {
     mesh.clear();
@@ -97,93 +146,40 @@ pub(crate) fn forward<T: Real>(
         return Err(Error::TooManyVertices { vertices });
     }
     mesh.edges.resize(vertices, LatticeEdge::new(0, 0));
-    mesh.faces.resize(faces, [0; 3]);
     let edges = split(&mut mesh.edges, crossings.iter().map(|of| of.vertices));
     let work = edges.into_par_iter().enumerate();
     work.for_each(|(block, edges)| find_edges(chi, block, &crossings[block], edges));
-    let fractions: Vec<T> = mesh.edges.par_iter().map(|&edge| fraction(edge)).collect();
-    let places = mesh.edges.par_iter().zip(&fractions);
+    let fractions = mesh.edges.par_iter().map(|&edge| places.on_edge(edge));
+    let fractions: Vec<T> = fractions.collect();
+    let on_edges = mesh.edges.par_iter().zip(&fractions);
     let vertex = |(edge, &fraction): (&LatticeEdge, &T)| {
         position(&chi.grid, chi.grid.cell(edge.cell()), edge.axis(), fraction)
     };
-    places.map(vertex).collect_into_vec(&mut mesh.vertices);
-    let faces = split(&mut mesh.faces, crossings.iter().map(|of| of.faces));
-    let work = faces.into_par_iter().enumerate();
-    work.filter(|(_, faces)| !faces.is_empty())
-        .for_each(|(block, faces)| emit_faces(chi, level, block, &crossings, &fractions, faces));
+    on_edges.map(vertex).collect_into_vec(&mut mesh.vertices);
+    let vertices = Vertices {
+        chi,
+        crossings: &crossings,
+        fractions: &fractions,
+    };
+    let splits = Splits::new(&vertices, level, places);
+    let vertices_and_midpoints = mesh.vertices.len() + splits.len();
+    if vertices_and_midpoints >= u32::MAX as usize {
+        mesh.clear();
+        return Err(Error::TooManyVertices {
+            vertices: vertices_and_midpoints,
+        });
+    }
+    splits.add_to(&chi.grid, &chi.blocks, mesh);
+    let blocks = (0..chi.blocks.len()).into_par_iter();
+    let blocks = blocks.filter(|&block| crossings[block].faces > 0);
+    mesh.faces = blocks
+        .flat_map_iter(|block| faces_of(&vertices, &splits, level, block))
+        .collect();
     Ok(Report {
         touches_wall: walls.as_flattened().contains(&true),
         walls,
         inside,
     })
-}
-
-/// Absent blocks into which the surface `χ = level` continues.
-pub(crate) fn open_ends<T: Real>(chi: &BlockField<T>, level: T) -> Vec<[usize; 3]> {
-    let blocks = &chi.blocks;
-    let shape = blocks.cells().map(|n| n.div_ceil(EDGE));
-    let of_block = |block: usize| {
-        let place = blocks.corner(block).map(|c| c / EDGE);
-        let mut inside = None;
-        let mut found = Vec::new();
-        for next in 0..27 {
-            let step = [next / 9, next / 3 % 3, next % 3];
-            let at: [Option<usize>; 3] = std::array::from_fn(|a| {
-                let at = (place[a] + step[a]).checked_sub(1)?;
-                (at < shape[a]).then_some(at)
-            });
-            let [Some(x), Some(y), Some(z)] = at else {
-                continue;
-            };
-            if blocks.at([x, y, z]).is_some() {
-                continue;
-            }
-            let inside = inside.get_or_insert_with(|| surroundings(chi, level, block));
-            if is_mixed(inside, step) {
-                found.push([x, y, z]);
-            }
-        }
-        found
-    };
-    let found = (0..blocks.len()).into_par_iter().flat_map_iter(of_block);
-    found.collect()
-}
-
-/// Whether cells that touch the neighboring block in the direction `step − 1` are on both sides.
-fn is_mixed(inside: &[Option<bool>], step: [usize; 3]) -> bool {
-    let [x, y, z] = step.map(|s| match s {
-        0 => 1..2,
-        1 => 0..WIDE,
-        _ => EDGE..EDGE + 1,
-    });
-    let mut sides = [false; 2];
-    for i in x {
-        for j in y.clone() {
-            for k in z.clone() {
-                if let Some(inside) = inside[(i * WIDE + j) * WIDE + k] {
-                    sides[usize::from(inside)] = true;
-                }
-            }
-        }
-    }
-    sides == [true; 2]
-}
-
-/// Signs at a block and the cells round it; `None` where there is no value.
-fn surroundings<T: Real>(chi: &BlockField<T>, level: T, block: usize) -> Vec<Option<bool>> {
-    let corner = chi.blocks.corner(block);
-    let sign = |place: usize| {
-        let step = [place / WIDE / WIDE, place / WIDE % WIDE, place % WIDE];
-        let mut cell = [0; 3];
-        for a in 0..3 {
-            cell[a] = (corner[a] + step[a]).checked_sub(1)?;
-            if cell[a] >= chi.blocks.cells()[a] {
-                return None;
-            }
-        }
-        chi.get(cell).map(|value| value < level)
-    };
-    (0..WIDE * WIDE * WIDE).map(sign).collect()
 }
 
 impl Corners {
@@ -243,9 +239,9 @@ impl Crossings {
         };
         let corners = Corners::new(chi, level, block);
         of.count_inside(chi, block, &corners);
-        let mixed = corners.inside.iter().flatten().any(|&inside| inside)
+        of.is_mixed = corners.inside.iter().flatten().any(|&inside| inside)
             && corners.inside.iter().flatten().any(|&inside| !inside);
-        if !mixed {
+        if !of.is_mixed {
             return of;
         }
         for cell in cells() {
@@ -316,37 +312,54 @@ fn plus(a: [usize; 3], b: [usize; 3]) -> [usize; 3] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
-fn emit_faces<T: Real>(
-    chi: &BlockField<T>,
+/// The vertices on the edges of the lattice.
+struct Vertices<'a, T> {
+    chi: &'a BlockField<T>,
+    crossings: &'a [Crossings],
+    /// Where each lies on its edge.
+    fractions: &'a [T],
+}
+
+impl<T: Real> Vertices<'_, T> {
+    /// Number of the vertex on the edge along an axis from a cell that is counted from the corner of a block.
+    #[inline(always)]
+    fn number(&self, block: usize, cell: [usize; 3], axis: usize) -> u32 {
+        let place = self.chi.blocks.corner(block).map(|c| c / EDGE);
+        let owner = self.chi.blocks.at(plus(place, cell.map(|c| c / EDGE)));
+        let local = cell.map(|c| c % EDGE);
+        owner.map_or(0, |owner| self.crossings[owner].vertex(axis, local))
+    }
+}
+
+/// The triangles of a block.
+fn faces_of<T: Real>(
+    vertices: &Vertices<T>,
+    splits: &Splits<T>,
     level: T,
     block: usize,
-    crossings: &[Crossings],
-    fractions: &[T],
-    faces: &mut [[u32; 3]],
-) {
-    let corners = Corners::new(chi, level, block);
-    let place = chi.blocks.corner(block).map(|c| c / EDGE);
-    let vertex = |cell: [usize; 3], edge: u8| {
-        let (corner, axis) = tables::start(edge);
-        let cell = plus(cell, corner);
-        let owner = chi.blocks.at(plus(place, cell.map(|c| c / EDGE)));
-        let local = cell.map(|c| c % EDGE);
-        owner.map_or(0, |owner| crossings[owner].vertex(axis, local))
-    };
-    let mut places = faces.iter_mut();
+) -> Vec<[u32; 3]> {
+    let corners = Corners::new(vertices.chi, level, block);
+    let mut faces = Vec::with_capacity(vertices.crossings[block].faces);
+    let splits = splits.near(&vertices.chi.blocks, block);
     for cell in cells() {
         let case = corners.case(cell).unwrap_or(0);
-        let fraction = |edge| fractions[vertex(cell, edge) as usize];
-        TABLE.for_each_triangle(
-            case,
-            || fraction,
-            |triangle| {
-                if let Some(place) = places.next() {
-                    *place = triangle.map(|edge| vertex(cell, edge));
+        let vertex = |edge: u8| {
+            let (corner, axis) = tables::start(edge);
+            vertices.number(block, plus(cell, corner), axis)
+        };
+        let fraction = |edge: u8| vertices.fractions[vertex(edge) as usize];
+        for of in tables::loops_of(case) {
+            let polygon = splits.polygon(cell, of, &vertex, &fraction);
+            match polygon {
+                Some(polygon) => polygon.triangulate(T::epsilon().f64(), &mut faces),
+                None => {
+                    let triangles = TABLE.triangles(of, Some(&fraction));
+                    faces.extend(triangles.iter().map(|triangle| triangle.map(vertex)));
                 }
-            },
-        );
+            }
+        }
     }
+    faces
 }
 
 fn one_sided<T: Real>(chi: &BlockField<T>, level: T, nothing_inside: bool) -> Error {
