@@ -142,13 +142,15 @@ impl Place {
 
 /// How a midpoint moves: `e = −w F g/(g² + F²)`, with `F = χ − c` and `g = ∇χ` at it, both in the square: where χ is nearly
 /// linear Newton's step, and half the side of a square at most. The share `w` rises from 0 to 1 while the distance `|F|/|g|`
-/// does from one end of [`OFF`] to the other.
+/// does from one end of [`OFF`] to the other. All but `e` is in units of `m = |(F, g)|`, whose square may not be a number.
 pub(super) struct Step {
     excess: f64,
     gradient: [f64; 2],
     share: f64,
     /// By the distance.
     share_slope: f64,
+    /// `m`.
+    size: f64,
 }
 
 /// Cotangents of `F`, `g` and the place of the midpoint.
@@ -169,22 +171,18 @@ impl Step {
             return None;
         }
         let rise = ((excess.abs() / slope - from) / (to - from)).min(1.0);
+        let size = slope.hypot(excess);
         Some(Self {
-            excess,
-            gradient,
+            excess: excess / size,
+            gradient: gradient.map(|slope| slope / size),
+            size,
             share: rise * rise * (3.0 - 2.0 * rise),
             share_slope: 6.0 * rise * (1.0 - rise) / (to - from),
         })
     }
 
-    /// `g² + F²`.
-    fn divisor(&self) -> f64 {
-        let [x, y] = self.gradient;
-        x * x + y * y + self.excess * self.excess
-    }
-
     fn whole(&self) -> [f64; 2] {
-        let factor = -self.share * self.excess / self.divisor();
+        let factor = -self.share * self.excess;
         self.gradient.map(|slope| factor * slope)
     }
 
@@ -221,14 +219,15 @@ impl Step {
             middle_bar[side] -= limit_bar / step[side];
             step_bar[side] -= limit_bar * limit / step[side];
         }
-        let (excess, gradient, divisor) = (self.excess, self.gradient, self.divisor());
+        // `F² + g²` is 1.
+        let (excess, gradient) = (self.excess, self.gradient);
         let along = gradient[0] * step_bar[0] + gradient[1] * step_bar[1];
-        let share_bar = -excess * along / divisor;
-        let divisor_bar = self.share * excess * along / (divisor * divisor);
+        let share_bar = -excess * along;
+        let divisor_bar = self.share * excess * along;
         let mut of = StepCotangent {
-            excess: -self.share * along / divisor + 2.0 * excess * divisor_bar,
+            excess: -self.share * along + 2.0 * excess * divisor_bar,
             gradient: [0, 1].map(|side| {
-                2.0 * gradient[side] * divisor_bar - self.share * excess * step_bar[side] / divisor
+                2.0 * gradient[side] * divisor_bar - self.share * excess * step_bar[side]
             }),
             middle: middle_bar,
         };
@@ -242,16 +241,18 @@ impl Step {
                     distance_bar * excess.abs() * gradient[side] / (slope * slope * slope);
             }
         }
+        of.excess /= self.size;
+        of.gradient = of.gradient.map(|bar| bar / self.size);
         of
     }
 
     /// `g`.
     pub(super) fn gradient(&self) -> [f64; 2] {
-        self.gradient
+        self.gradient.map(|slope| slope * self.size)
     }
 
     /// Whether the spline has no slope over `smallest` and hardly another value than that of the surface.
     pub(super) fn is_flat(&self, smallest: f64) -> bool {
-        self.divisor() < smallest * smallest
+        self.size < smallest
     }
 }

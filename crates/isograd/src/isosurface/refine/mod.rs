@@ -4,15 +4,22 @@
 //! `χ(y) = Σ_o B_o(y) χ_o`, with `B` the product of quadratic B-splines and `χ` continued across the walls by its even
 //! reflection. At the center of a cell half as large the weights of the nearest three cells along an axis are 9/32, 22/32 and
 //! 1/32. Values are in blocks that contain every crossing of the iso-value. A vertex lies on an edge of the lattice of these
-//! centers, at `t` where the spline itself has the iso-value, `χ(p + t e) = c`: [`fraction`].
+//! centers, at `t` where the spline itself has the iso-value, `χ(p + t e) = c`.
+//!
+//! The segment between two vertices in a square of the lattice is split where its midpoint is off the surface by more than a
+//! hundredth of an edge. The midpoint moves within the square by `−F g/(g² + F²)`, nearly a step of Newton's method, with
+//! `F = χ − c` and `g = ∇χ` in the square; up to three hundredths by a share of that. See [`OnSpline`].
 //!
 //! Marching cubes on these cells follows parts half as thin. And how the surface lies on the lattice hardly shows: samples
 //! and vertices read the same smooth function. If vertices are placed by linear interpolation, a plate as thick as 1.4 cells
 //! of the indicator becomes thicker and thinner by 0.044 cells as it moves through one; with the spline, by 0.0002.
+//! And rims are hardly a cell wide: what inscribed triangles cut off one depends on where it lies. Of a ball of 1.5 edges of the
+//! lattice they cut off up to 24 %, with midpoints up to 9 %.
 //!
 //! # Pullback
 //! With `ȳ` the cotangent of a vertex, and `χ' = e·∇χ` at it: `χ̄_o −= (ȳ·e) B_o/χ'`, `c̄ += (ȳ·e)/χ'`: [`pullback`]. As for
-//! [linear interpolation](super), a slope below a millionth of the range of `χ` counts as that much.
+//! [linear interpolation](super), a slope below a millionth of the range of `χ` counts as that much. The cotangent
+//! of a midpoint goes to both vertices, and by `F` and `g` to the cells round it.
 //!
 //! # Not differentiable
 //! Which blocks have values is held constant; those without have no crossing.
