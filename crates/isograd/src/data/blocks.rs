@@ -192,6 +192,12 @@ impl Blocks {
         (x * EDGE + y) * EDGE + z
     }
 
+    /// The cell at a place among the nodes of a block, counted from the corner of the block.
+    #[inline(always)]
+    pub(crate) fn cell_of(node: usize) -> [usize; 3] {
+        [node / EDGE / EDGE, node / EDGE % EDGE, node % EDGE]
+    }
+
     /// Place among the values of a cell.
     #[inline(always)]
     pub(crate) fn place(&self, cell: [usize; 3]) -> Option<usize> {

@@ -271,8 +271,7 @@ fn successors(case: u8) -> [Option<u8>; 12] {
 
 /// Whether two edges lie on one face of the cube.
 pub(super) fn share_face(a: u8, b: u8) -> bool {
-    let corners_of = |e: u8, face: &[u8; 4]| (0..4).any(|i| edge(face[i], face[(i + 1) % 4]) == e);
-    faces().iter().any(|f| corners_of(a, f) && corners_of(b, f))
+    faces_of(a) & faces_of(b) != 0
 }
 
 /// All triangulations of a loop, none with a diagonal within a face of the cube, those with the shortest diagonals (the

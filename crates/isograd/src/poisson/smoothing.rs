@@ -4,7 +4,7 @@ use pulp::Arch;
 use rayon::prelude::*;
 
 use super::Plan;
-use crate::data::blocks::{BlockField, EDGE, NODES};
+use crate::data::blocks::{BlockField, Blocks, NODES};
 use crate::{Real, simd};
 
 /// Cells of smoothing for each cell of distance between samples. Errors of the vertices of a torus, in cells, mean
@@ -91,7 +91,7 @@ pub(crate) fn pullback_in_blocks<T: Real>(
             .enumerate()
             .filter(|(_, bar)| **bar != T::zero());
         let terms = bars.map(|(n, &bar)| {
-            let node = [n / EDGE / EDGE, n / EDGE % EDGE, n % EDGE];
+            let node = Blocks::cell_of(n);
             of_cell(std::array::from_fn(|a| corner[a] + node[a]), bar)
         });
         terms.sum()

@@ -51,6 +51,9 @@ struct Corners {
 
 /// Where the vertices of a surface lie.
 pub(crate) trait Places<T>: Sync {
+    /// Whether segments may be split.
+    const SPLITS: bool = false;
+
     /// Of the vertex on an edge, as a fraction of it, from 0 to 1.
     fn on_edge(&self, edge: LatticeEdge) -> T;
 
@@ -153,7 +156,11 @@ pub(crate) fn forward<T: Real>(
     let fractions: Vec<T> = fractions.collect();
     let on_edges = mesh.edges.par_iter().zip(&fractions);
     let vertex = |(edge, &fraction): (&LatticeEdge, &T)| {
-        position(&chi.grid, chi.grid.cell(edge.cell()), edge.axis(), fraction)
+        position(
+            &chi.grid,
+            chi.grid.cell(edge.cell()),
+            [(edge.axis(), fraction)],
+        )
     };
     on_edges.map(vertex).collect_into_vec(&mut mesh.vertices);
     let vertices = Vertices {
@@ -172,9 +179,8 @@ pub(crate) fn forward<T: Real>(
     splits.add_to(&chi.grid, &chi.blocks, mesh);
     let blocks = (0..chi.blocks.len()).into_par_iter();
     let blocks = blocks.filter(|&block| crossings[block].faces > 0);
-    mesh.faces = blocks
-        .flat_map_iter(|block| faces_of(&vertices, &splits, level, block))
-        .collect();
+    let faces = blocks.flat_map_iter(|block| faces_of(&vertices, &splits, level, block));
+    mesh.faces.par_extend(faces);
     Ok(Report {
         touches_wall: walls.as_flattened().contains(&true),
         walls,
@@ -185,16 +191,7 @@ pub(crate) fn forward<T: Real>(
 impl Corners {
     fn new<T: Real>(chi: &BlockField<T>, level: T, block: usize) -> Self {
         let (blocks, corner) = (&chi.blocks, chi.blocks.corner(block));
-        let place = corner.map(|c| c / EDGE);
-        let next: [Option<usize>; 8] = std::array::from_fn(|n| {
-            let at = [
-                place[0] + (n >> 2),
-                place[1] + (n >> 1 & 1),
-                place[2] + (n & 1),
-            ];
-            let is_inside = (0..3).all(|a| at[a] * EDGE < blocks.cells()[a]);
-            is_inside.then(|| blocks.at(at)).flatten()
-        });
+        let next = with_next(blocks, block);
         let sign = |at: usize| {
             let cell = [at / SIDE / SIDE, at / SIDE % SIDE, at % SIDE];
             let [x, y, z] = cell.map(|c| c / EDGE);
@@ -225,9 +222,19 @@ impl Corners {
     }
 }
 
+/// A block and those after it, block `4·dx + 2·dy + dz` that which is so many further along each axis.
+fn with_next(blocks: &Blocks, block: usize) -> [Option<usize>; 8] {
+    let place = blocks.corner(block).map(|c| c / EDGE);
+    std::array::from_fn(|n| {
+        let at = plus(place, [n >> 2, n >> 1 & 1, n & 1]);
+        let is_inside = (0..3).all(|a| at[a] * EDGE < blocks.cells()[a]);
+        is_inside.then(|| blocks.at(at)).flatten()
+    })
+}
+
 /// The cells of a block.
 fn cells() -> impl Iterator<Item = [usize; 3]> {
-    (0..NODES).map(|n| [n / EDGE / EDGE, n / EDGE % EDGE, n % EDGE])
+    (0..NODES).map(Blocks::cell_of)
 }
 
 impl Crossings {

@@ -3,12 +3,13 @@
 use rayon::prelude::*;
 
 use super::polygon::{Corner, Polygon};
-use super::{Corners, Places, Square, Vertices, cells, plus, sides};
+use super::{Corners, Places, Square, Vertices, cells, plus, sides, with_next};
+use crate::Grid;
 use crate::Real;
 use crate::data::Mesh;
 use crate::data::blocks::{Blocks, EDGE};
+use crate::isosurface::march::position;
 use crate::isosurface::tables::{self, Loop};
-use crate::{Grid, vector};
 
 /// A segment between two vertices that is split at its midpoint.
 #[derive(Clone, Debug)]
@@ -36,9 +37,9 @@ pub(super) struct Near<'a, T> {
 }
 
 impl<T: Real> Splits<T> {
-    pub(super) fn new(vertices: &Vertices<T>, level: T, places: &impl Places<T>) -> Self {
+    pub(super) fn new<P: Places<T>>(vertices: &Vertices<T>, level: T, places: &P) -> Self {
         let blocks = 0..vertices.crossings.len();
-        let of_block = |block: usize| match vertices.crossings[block].is_mixed {
+        let of_block = |block: usize| match P::SPLITS && vertices.crossings[block].is_mixed {
             true => of_block(vertices, level, places, block),
             false => Vec::new(),
         };
@@ -64,18 +65,10 @@ impl<T: Real> Splits<T> {
     pub(super) fn add_to(&self, grid: &Grid<T>, blocks: &Blocks, mesh: &mut Mesh<T>) {
         for (block, splits) in self.blocks.iter().enumerate() {
             for split in splits {
-                let node = split.square as usize / 3;
-                let cell = [node / EDGE / EDGE, node / EDGE % EDGE, node % EDGE];
-                let cell = plus(blocks.corner(block), cell);
-                let mut point = grid.center_f64(cell);
-                for (side, place) in sides(split.square as usize % 3)
-                    .into_iter()
-                    .zip(split.place)
-                {
-                    let along = cell[side] as f64 + 0.5 + place.f64();
-                    point[side] = grid.lower()[side].f64() + grid.spacing().f64() * along;
-                }
-                mesh.vertices.push(vector::of_f64(point));
+                let square = split.square as usize;
+                let cell = plus(blocks.corner(block), Blocks::cell_of(square / 3));
+                let ahead = sides(square % 3).into_iter().zip(split.place);
+                mesh.vertices.push(position(grid, cell, ahead));
                 mesh.midpoints.push(split.ends);
             }
         }
@@ -83,17 +76,10 @@ impl<T: Real> Splits<T> {
 
     /// Those of the squares of the cubes of a block.
     pub(super) fn near(&self, blocks: &Blocks, block: usize) -> Near<'_, T> {
-        let place = blocks.corner(block).map(|c| c / EDGE);
-        let shape = blocks.cells().map(|n| n.div_ceil(EDGE));
-        let next = |n: usize| {
-            let at = plus(place, [n >> 2, n >> 1 & 1, n & 1]);
-            let is_inside = (0..3).all(|a| at[a] < shape[a]);
-            let next = is_inside.then(|| blocks.at(at)).flatten();
-            next.filter(|&block| !self.blocks[block].is_empty())
-        };
+        let is_split = |block: &usize| !self.blocks[*block].is_empty();
         Near {
             splits: self,
-            blocks: std::array::from_fn(next),
+            blocks: with_next(blocks, block).map(|next| next.filter(is_split)),
         }
     }
 }
@@ -128,10 +114,8 @@ impl<T: Real> Near<'_, T> {
 
     /// The midpoint of the segment between two vertices on a face, one bit of [`tables::faces_of`], of a cube.
     fn midpoint(&self, cell: [usize; 3], face: u8, ends: [u32; 2]) -> Option<Corner> {
-        let (axis, high) = (
-            face.trailing_zeros() as usize / 2,
-            face.trailing_zeros() as usize % 2,
-        );
+        let number = face.trailing_zeros() as usize;
+        let (axis, high) = (number / 2, number % 2);
         let mut low = cell;
         low[axis] += high;
         let [x, y, z] = low.map(|c| c / EDGE);

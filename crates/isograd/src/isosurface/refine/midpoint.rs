@@ -22,6 +22,8 @@ pub(crate) struct OnSpline<'a, T> {
 }
 
 impl<T: Real> Places<T> for OnSpline<'_, T> {
+    const SPLITS: bool = true;
+
     fn on_edge(&self, edge: LatticeEdge) -> T {
         Edge::new(self.chi.grid(), &self.refined.grid, edge).crossing(self.chi, self.level)
     }

@@ -10,6 +10,8 @@ use crate::{Field, Grid, Mesh, Real};
 pub(super) struct Midpoints(Vec<Midpoint>);
 
 struct Midpoint {
+    /// Cell of the refined grid along x in which its square starts.
+    half: usize,
     patch: Patch,
     at: Place,
     /// Cotangents of `χ` and its slopes along both sides, at the midpoint.
@@ -44,6 +46,7 @@ impl Midpoints {
             let table = patch.table(chi);
             let bar = bar.map(|bar| bar.f64());
             let mut of = Midpoint {
+                half: square.cell[0],
                 patch,
                 at,
                 pulls: [0.0; 3],
@@ -84,6 +87,11 @@ impl Midpoints {
         }
     }
 
+    /// The cell of the refined grid along x in which the square of one starts.
+    pub(super) fn half(&self, midpoint: usize) -> usize {
+        self.0[midpoint].half
+    }
+
     /// The cotangent of the level of one, and whether it was left out.
     pub(super) fn of_level(&self, midpoint: usize) -> (f64, bool) {
         let of = &self.0[midpoint];
@@ -100,7 +108,7 @@ impl Midpoints {
 }
 
 /// The square on whose sides both ends of a midpoint lie.
-pub(super) fn square_of<T: Real>(refined: &Grid<T>, mesh: &Mesh<T>, ends: [u32; 2]) -> Square {
+fn square_of<T: Real>(refined: &Grid<T>, mesh: &Mesh<T>, ends: [u32; 2]) -> Square {
     let [first, second] = ends.map(|end| mesh.edges()[end as usize]);
     let [a, b] = [first, second].map(|edge| refined.cell(edge.cell()));
     let is_across =

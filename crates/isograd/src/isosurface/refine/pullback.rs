@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::edge::{Edge, Place};
-use super::pull_midpoints::{Midpoints, square_of};
+use super::pull_midpoints::Midpoints;
 use crate::element::crossing::bounded;
 use crate::gather::Buckets;
 use crate::isosurface::pullback::{LevelCotangent, SMALLEST_DIFFERENCE, range};
@@ -42,7 +42,9 @@ pub(crate) fn pullback<T: Real>(
     let slabs = chi.grid().shape()[0].div_ceil(SLAB);
     let mut near = Buckets::default();
     near.fill(slabs, vertices_bar.len(), |vertex| {
-        let [low, high] = vertices.planes(vertex).map(|plane| (plane / SLAB) as u32);
+        let [low, high] = vertices
+            .planes(vertex, &midpoints)
+            .map(|plane| (plane / SLAB) as u32);
         low..=high
     });
     let work = chi_bar.par_chunks_mut(SLAB * plane).enumerate();
@@ -82,11 +84,9 @@ struct Vertices<'a, T> {
 
 impl<T: Real> Vertices<'_, T> {
     /// The first and the last plane across x with a cell that has a weight at a vertex.
-    fn planes(&self, vertex: usize) -> [usize; 2] {
+    fn planes(&self, vertex: usize, midpoints: &Midpoints) -> [usize; 2] {
         let half = match vertex.checked_sub(self.mesh.edges().len()) {
-            Some(midpoint) => {
-                square_of(self.refined, self.mesh, self.mesh.midpoints()[midpoint]).cell[0]
-            }
+            Some(midpoint) => midpoints.half(midpoint),
             None => self.refined.cell(self.mesh.edges()[vertex].cell())[0],
         };
         let last = self.chi.grid().shape()[0] - 1;
