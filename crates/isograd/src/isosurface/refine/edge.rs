@@ -1,12 +1,19 @@
-//! The spline along an edge of the refined lattice, and where it crosses the level.
+//! The spline along an edge of the refined lattice, and where its vertex lies.
 
 use crate::data::LatticeEdge;
+use crate::element::crossing::bounded;
 use crate::element::stencil::{bspline, bspline_slope};
 use crate::isosurface::blocks::sides;
 use crate::{Field, Grid, Real};
 
 /// Most steps to the crossing. Newton's method takes two or three.
 const STEPS: usize = 30;
+
+/// The odds of a vertex are at most so many times those of linear interpolation, and at least that part of them.
+const SKEW: f64 = 16.0;
+
+/// Length of an edge, in cells of the indicator.
+const LENGTH: f64 = 0.5;
 
 /// An edge between the centers of two cells half as large as those of the indicator.
 pub(super) struct Edge {
@@ -18,6 +25,29 @@ pub(super) struct Edge {
     weights: [[f64; 3]; 2],
     /// Where it starts, from the center of the cell of the indicator, in cells: ∓¼.
     start: f64,
+}
+
+/// Where a vertex lies on an edge.
+pub(super) enum Crossing {
+    /// Where the spline has the level, from 0 to 1.
+    OnSpline(f64),
+    /// With odds that are `skew` times those of linear interpolation between the `ends`, the spline less the level there.
+    Bounded { ends: [f64; 2], skew: f64 },
+}
+
+impl Crossing {
+    /// From 0 to 1.
+    pub(super) fn fraction(&self) -> f64 {
+        match *self {
+            Self::OnSpline(fraction) => fraction,
+            Self::Bounded { ends, skew } => skewed(ends, skew),
+        }
+    }
+}
+
+/// Where the odds are `skew` times those of linear interpolation.
+fn skewed([below, above]: [f64; 2], skew: f64) -> f64 {
+    skew * below / (skew * below - above)
 }
 
 /// The spline at a place on an edge, as weights of 3 of the 4 cells along it.
@@ -45,7 +75,7 @@ impl Edge {
     /// The spline at a fraction of the edge, from 0 to 1.
     #[inline(always)]
     pub(super) fn at(&self, fraction: f64) -> Place {
-        let place = self.start + 0.5 * fraction;
+        let place = self.start + LENGTH * fraction;
         let first = usize::from(place > 0.5);
         let offset = place - first as f64;
         Place {
@@ -55,29 +85,40 @@ impl Edge {
         }
     }
 
-    /// Where the spline of `chi` has the value `level`, as a fraction of the edge. One end is below the level and the other
-    /// one is not.
+    /// Where the vertex lies, with [`Self::line`] of the indicator. One end is below the level and the other one is not.
     #[inline(always)]
-    pub(super) fn crossing<T: Real>(&self, chi: &Field<T>, level: T) -> T {
-        let line = self.line(chi);
-        let excess = |fraction: f64| {
-            let at = self.at(fraction);
-            // The edge is half a cell long.
-            [at.value(&line) - level.f64(), 0.5 * at.slope(&line)]
-        };
-        let [[below, _], [above, _]] = [0.0, 1.0].map(excess);
+    pub(super) fn crossing(&self, line: &[f64; 4], level: f64) -> Crossing {
+        let excess = |fraction: f64| self.at(fraction).value(line) - level;
+        let ends = [0.0, 1.0].map(excess);
+        if (ends[0] < 0.0) == (ends[1] < 0.0) {
+            // By rounding: the one that is nearer to the level is on the other side.
+            let is_last = ends[1].abs() < ends[0].abs();
+            return Crossing::OnSpline(if is_last { 1.0 } else { 0.0 });
+        }
+        let fraction = self.root(line, level, ends);
+        let [least, most] = [1.0 / SKEW, SKEW];
+        if fraction < skewed(ends, least) {
+            Crossing::Bounded { ends, skew: least }
+        } else if fraction > skewed(ends, most) {
+            Crossing::Bounded { ends, skew: most }
+        } else {
+            Crossing::OnSpline(fraction)
+        }
+    }
+
+    /// Where the spline has the level between ends where it is `below` and `above` less or more.
+    #[inline(always)]
+    fn root(&self, line: &[f64; 4], level: f64, [below, above]: [f64; 2]) -> f64 {
         let [mut low, mut high] = [0.0, 1.0];
         let mut fraction = below / (below - above);
-        if !(0.0..=1.0).contains(&fraction) {
-            fraction = 0.5;
-        }
         for _ in 0..STEPS {
-            let [value, slope] = excess(fraction);
+            let at = self.at(fraction);
+            let value = at.value(line) - level;
             match (value < 0.0) == (below < 0.0) {
                 true => low = fraction,
                 false => high = fraction,
             }
-            let newton = fraction - value / slope;
+            let newton = fraction - value / (LENGTH * at.slope(line));
             let next = match newton >= low && newton <= high {
                 true => newton,
                 false => 0.5 * (low + high),
@@ -88,7 +129,40 @@ impl Edge {
                 break;
             }
         }
-        T::of(fraction)
+        fraction
+    }
+
+    /// The cotangents of the spline at some places of the edge, from that of a vertex along it, in cells of the indicator; and
+    /// whether a slope less than `smallest` counts as that much.
+    #[inline(always)]
+    pub(super) fn pull(
+        &self,
+        line: &[f64; 4],
+        crossing: &Crossing,
+        bar: f64,
+        smallest: f64,
+    ) -> Pull {
+        match *crossing {
+            Crossing::OnSpline(fraction) => {
+                let slope = self.at(fraction).slope(line);
+                Pull {
+                    parts: [(fraction, -bar / bounded(slope, smallest)), (0.0, 0.0)],
+                    is_guarded: slope.abs() < smallest && bar != 0.0,
+                }
+            }
+            Crossing::Bounded { ends, skew } => {
+                let [below, above] = ends;
+                let difference = skew * below - above;
+                let factor = skew * LENGTH * bar / bounded(difference, smallest);
+                Pull {
+                    parts: [
+                        (0.0, -factor * (above / difference)),
+                        (1.0, factor * (below / difference)),
+                    ],
+                    is_guarded: difference.abs() < smallest && bar != 0.0,
+                }
+            }
+        }
     }
 
     /// The values of `chi` in the cells along the edge, each the weighted sum over the cells across.
@@ -123,6 +197,14 @@ impl Edge {
             }
         }
     }
+}
+
+/// What the cotangent of a vertex is worth.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pull {
+    /// Fractions of the edge, and cotangents of the spline there.
+    pub parts: [(f64, f64); 2],
+    pub is_guarded: bool,
 }
 
 impl Place {

@@ -25,7 +25,9 @@ impl<T: Real> Places<T> for OnSpline<'_, T> {
     const SPLITS: bool = true;
 
     fn on_edge(&self, edge: LatticeEdge) -> T {
-        Edge::new(self.chi.grid(), &self.refined.grid, edge).crossing(self.chi, self.level)
+        let edge = Edge::new(self.chi.grid(), &self.refined.grid, edge);
+        let crossing = edge.crossing(&edge.line(self.chi), self.level.f64());
+        T::of(crossing.fraction())
     }
 
     fn in_square(&self, square: Square, ends: [[T; 2]; 2]) -> Option<[T; 2]> {

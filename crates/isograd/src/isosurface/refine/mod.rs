@@ -4,7 +4,9 @@
 //! `χ(y) = Σ_o B_o(y) χ_o`, with `B` the product of quadratic B-splines and `χ` continued across the walls by its even
 //! reflection. At the center of a cell half as large the weights of the nearest three cells along an axis are 9/32, 22/32 and
 //! 1/32. Values are in blocks that contain every crossing of the iso-value. A vertex lies on an edge of the lattice of these
-//! centers, at `t` where the spline itself has the iso-value, `χ(p + t e) = c`.
+//! centers, at `t` where the spline itself has the iso-value, `χ(p + t e) = c`; but its odds `t/(1 − t)` are at most 16 times
+//! those of linear interpolation between the ends, and at least a 16th of them. So it comes to the end of its edge that changes
+//! sides, though the spline may have the iso-value there more than once.
 //!
 //! The segment between two vertices in a square of the lattice is split where its midpoint is off the surface by more than a
 //! hundredth of an edge. The midpoint moves within the square by `−F g/(g² + F²)`, nearly a step of Newton's method, with
@@ -17,12 +19,15 @@
 //! lattice they cut off up to 24 %, with midpoints up to 9 %.
 //!
 //! # Pullback
-//! With `ȳ` the cotangent of a vertex, and `χ' = e·∇χ` at it: `χ̄_o −= (ȳ·e) B_o/χ'`, `c̄ += (ȳ·e)/χ'`: [`pullback`]. As for
+//! With `ȳ` the cotangent of a vertex, and `χ' = e·∇χ` at it: `χ̄_o −= (ȳ·e) B_o/χ'`, `c̄ += (ȳ·e)/χ'`: [`pullback`]; of a vertex with
+//! bounded odds, by the spline at both ends of its edge. As for
 //! [linear interpolation](super), a slope below a millionth of the range of `χ` counts as that much. The cotangent
 //! of a midpoint goes to both vertices, and by `F` and `g` to the cells round it.
 //!
 //! # Not differentiable
-//! Which blocks have values is held constant; those without have no crossing.
+//! Which blocks have values is held constant; those without have no crossing. Which triangulation a loop with
+//! midpoints has: the surface jumps by up to a hundredth of a cell where another one encloses as much and is not the same
+//! surface, and where a segment becomes split beside one whose midpoint lies inwards.
 
 mod edge;
 mod midpoint;

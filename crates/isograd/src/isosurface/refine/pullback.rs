@@ -2,9 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::edge::{Edge, Place};
+use super::edge::{Edge, Pull};
 use super::pull_midpoints::Midpoints;
-use crate::element::crossing::bounded;
 use crate::gather::Buckets;
 use crate::isosurface::pullback::{LevelCotangent, SMALLEST_DIFFERENCE, range};
 use crate::{Field, Grid, Mesh, Real};
@@ -29,12 +28,13 @@ pub(crate) fn pullback<T: Real>(
     midpoints.add_to_ends(mesh.midpoints(), &mut bars);
     let vertices = Vertices {
         chi,
+        level: level.f64(),
         refined,
         mesh,
         bars: &bars,
         smallest,
     };
-    let pulls: Vec<(f64, bool)> = (0..on_edges)
+    let pulls: Vec<Pull> = (0..on_edges)
         .into_par_iter()
         .map(|vertex| vertices.pull(vertex))
         .collect();
@@ -61,20 +61,26 @@ pub(crate) fn pullback<T: Real>(
                 midpoints.for_each_cell(midpoint, &mut add);
                 continue;
             }
-            let (edge, at) = vertices.place(vertex);
-            let (pull, _) = pulls[vertex];
-            edge.for_each_cell(&at, |cell, weight| add(cell, -pull * weight));
+            let edge = vertices.edge(vertex);
+            for (fraction, pull) in pulls[vertex].parts.into_iter().filter(|part| part.1 != 0.0) {
+                let at = edge.at(fraction);
+                edge.for_each_cell(&at, |cell, weight| add(cell, pull * weight));
+            }
         }
     });
     let of_level = |vertex: usize| match vertex.checked_sub(on_edges) {
         Some(midpoint) => midpoints.of_level(midpoint),
-        None => pulls[vertex],
+        None => {
+            let [(_, first), (_, second)] = pulls[vertex].parts;
+            (-first - second, pulls[vertex].is_guarded)
+        }
     };
     LevelCotangent::sum(chi.grid(), mesh, vertices_bar, of_level)
 }
 
 struct Vertices<'a, T> {
     chi: &'a Field<T>,
+    level: f64,
     refined: &'a Grid<T>,
     mesh: &'a Mesh<T>,
     bars: &'a [[T; 3]],
@@ -94,26 +100,17 @@ impl<T: Real> Vertices<'_, T> {
         [(half / 2).saturating_sub(1), (half / 2 + 2).min(last)]
     }
 
-    /// The edge of a vertex, and the spline at the vertex.
-    #[inline(always)]
-    fn place(&self, vertex: usize) -> (Edge, Place) {
-        let name = self.mesh.edges()[vertex];
-        let (cell, axis) = (self.refined.cell(name.cell()), name.axis());
-        let position = self.refined.to_index(self.mesh.vertices()[vertex]);
-        let fraction = position[axis].f64() - cell[axis] as f64 - 0.5;
-        let edge = Edge::new(self.chi.grid(), self.refined, name);
-        let at = edge.at(fraction.clamp(0.0, 1.0));
-        (edge, at)
+    fn edge(&self, vertex: usize) -> Edge {
+        Edge::new(self.chi.grid(), self.refined, self.mesh.edges()[vertex])
     }
 
-    /// `ȳ·e/χ'`, and whether `χ'` was bounded.
     #[inline(always)]
-    fn pull(&self, vertex: usize) -> (f64, bool) {
-        let (edge, at) = self.place(vertex);
+    fn pull(&self, vertex: usize) -> Pull {
+        let edge = self.edge(vertex);
         let axis = self.mesh.edges()[vertex].axis();
         let bar = (self.bars[vertex][axis] * self.chi.grid().spacing()).f64();
-        let slope = at.slope(&edge.line(self.chi));
-        let guarded = slope.abs() < self.smallest && bar != 0.0;
-        (bar / bounded(slope, self.smallest), guarded)
+        let line = edge.line(self.chi);
+        let crossing = edge.crossing(&line, self.level);
+        edge.pull(&line, &crossing, bar, self.smallest)
     }
 }

@@ -4,11 +4,15 @@ use crate::isosurface::blocks::Places;
 use crate::neighbors::tests::Random;
 use crate::testing::bspline;
 
-/// Noise on a grid, a step along x.
+/// A step along x, with noise.
 fn setting() -> Field<f64> {
+    with_noise(1.0)
+}
+
+fn with_noise(noise: f64) -> Field<f64> {
     let grid = Grid::new([-0.3, 0.1, 2.0], 0.25, [25, 14, 9]).expect("a grid");
     let mut random = Random::new(7);
-    let value = |n: usize| grid.cell(n)[0] as f64 - 12.2 + random.uniform();
+    let value = |n: usize| grid.cell(n)[0] as f64 - 12.2 + noise * random.uniform();
     let values = (0..grid.cells()).map(value).collect();
     Field::new(grid, values).expect("sizes match")
 }
@@ -91,28 +95,40 @@ fn values_are_those_of_the_spline_and_every_crossing_has_them() {
     assert!(absent > 0);
 }
 
+/// Every vertex is where the spline has the level, or has the odds that are nearest to that.
 #[test]
-fn every_vertex_is_where_the_spline_has_the_level() {
-    let (chi, level) = (setting(), 0.1);
+fn vertices_are_where_the_spline_has_the_level_with_bounded_odds() {
+    let (chi, level) = (with_noise(8.0), 0.1);
     let (fine, mesh) = surface(&chi, level);
-    let mut linear = 0.0_f64;
+    let (mut linear, mut bounded) = (0.0_f64, 0);
     for (vertex, edge) in mesh.vertices().iter().zip(mesh.edges()) {
         let place = chi.grid().to_index(*vertex);
-        assert!((spline(&chi, place) - level).abs() < 1e-12, "{place:?}");
-        let ends = [0.0, 1.0].map(|end| {
-            let mut place = fine.cell(edge.cell()).map(|c| (c as f64 + 0.5) / 2.0);
-            place[edge.axis()] += 0.5 * end;
-            (place[edge.axis()], spline(&chi, place) - level)
-        });
-        let [(low, below), (high, above)] = ends;
+        let start = fine.cell(edge.cell()).map(|c| (c as f64 + 0.5) / 2.0);
+        let excess = |fraction: f64| {
+            let mut place = start;
+            place[edge.axis()] += 0.5 * fraction;
+            spline(&chi, place) - level
+        };
+        let [below, above] = [0.0, 1.0].map(excess);
         assert!((below < 0.0) != (above < 0.0));
-        let along = place[edge.axis()];
-        assert!((low - 1e-12..=high + 1e-12).contains(&along));
-        let between = low + (high - low) * below / (below - above);
-        linear = linear.max((along - between).abs());
+        let fraction = 2.0 * (place[edge.axis()] - start[edge.axis()]);
+        assert!((-1e-12..=1.0 + 1e-12).contains(&fraction));
+        let between = below / (below - above);
+        linear = linear.max((fraction - between).abs());
+        if excess(fraction).abs() < 1e-12 {
+            continue;
+        }
+        // The root is beyond the bound.
+        bounded += 1;
+        let odds = fraction / (1.0 - fraction) / (between / (1.0 - between));
+        let is_most = (odds / 16.0 - 1.0).abs() < 1e-9;
+        assert!(is_most || (odds * 16.0 - 1.0).abs() < 1e-9, "{odds}");
+        let side = if is_most { below } else { above };
+        assert!((excess(fraction) < 0.0) == (side < 0.0));
     }
     // The noise bends the spline.
     assert!(linear > 0.01, "{linear}");
+    assert!((1..mesh.edges().len() / 20).contains(&bounded), "{bounded}");
 }
 
 #[test]
@@ -196,8 +212,14 @@ fn areas_and_volumes_of_small_balls_are_those_of_balls_wherever_they_lie() {
 
 #[test]
 fn pullback_is_the_derivative_by_every_cell_the_level_and_the_grid() {
-    let (chi, level) = (setting(), 0.1);
-    let (fine, mesh) = surface(&chi, level);
+    check_pullback(&setting());
+    // Some vertices have bounded odds.
+    check_pullback(&with_noise(8.0));
+}
+
+fn check_pullback(chi: &Field<f64>) {
+    let level = 0.1;
+    let (fine, mesh) = surface(chi, level);
     let mut random = Random::new(8);
     let bars: Vec<[f64; 3]> = mesh
         .vertices()
@@ -205,7 +227,7 @@ fn pullback_is_the_derivative_by_every_cell_the_level_and_the_grid() {
         .map(|_| std::array::from_fn(|_| random.uniform() - 0.5))
         .collect();
     let mut chi_bar = vec![0.0; chi.grid().cells()];
-    let found = pullback(&chi, level, &fine, &mesh, &bars, &mut chi_bar);
+    let found = pullback(chi, level, &fine, &mesh, &bars, &mut chi_bar);
     assert_eq!(found.guarded, 0);
     assert!(mesh.midpoints().len() > 100);
     let loss = |chi: &Field<f64>, level: f64| -> f64 {
@@ -236,7 +258,7 @@ fn pullback_is_the_derivative_by_every_cell_the_level_and_the_grid() {
         let slope: f64 = chi_bar.iter().zip(&direction).map(|(bar, d)| bar * d).sum();
         close(slope, (at(step) - at(-step)) / (2.0 * step), "χ");
     }
-    let by_level = (loss(&chi, level + step) - loss(&chi, level - step)) / (2.0 * step);
+    let by_level = (loss(chi, level + step) - loss(chi, level - step)) / (2.0 * step);
     close(found.level, by_level, "level");
     let on = |lower: [f64; 3], spacing: f64| {
         let grid = Grid::new(lower, spacing, chi.grid().shape()).expect("a grid");
