@@ -1,7 +1,7 @@
 //! The spline along an edge of the refined lattice, and where its vertex lies.
 
 use crate::data::LatticeEdge;
-use crate::element::crossing::bounded;
+use crate::element::crossing::{bounded, crossing};
 use crate::element::stencil::{bspline, bspline_slope};
 use crate::isosurface::blocks::sides;
 use crate::{Field, Grid, Real};
@@ -13,7 +13,7 @@ const STEPS: usize = 30;
 const SKEW: f64 = 16.0;
 
 /// Length of an edge, in cells of the indicator.
-const LENGTH: f64 = 0.5;
+pub(super) const LENGTH: f64 = 0.5;
 
 /// An edge between the centers of two cells half as large as those of the indicator.
 pub(super) struct Edge {
@@ -47,7 +47,7 @@ impl Crossing {
 
 /// Where the odds are `skew` times those of linear interpolation.
 fn skewed([below, above]: [f64; 2], skew: f64) -> f64 {
-    skew * below / (skew * below - above)
+    crossing(skew * below, above, 0.0)
 }
 
 /// The spline at a place on an edge, as weights of 3 of the 4 cells along it.
@@ -106,11 +106,11 @@ impl Edge {
         }
     }
 
-    /// Where the spline has the level between ends where it is `below` and `above` less or more.
+    /// Where the spline has the level, as a fraction of the edge, from the spline less the level at both ends.
     #[inline(always)]
     fn root(&self, line: &[f64; 4], level: f64, [below, above]: [f64; 2]) -> f64 {
         let [mut low, mut high] = [0.0, 1.0];
-        let mut fraction = below / (below - above);
+        let mut fraction = crossing(below, above, 0.0);
         for _ in 0..STEPS {
             let at = self.at(fraction);
             let value = at.value(line) - level;
@@ -132,8 +132,8 @@ impl Edge {
         fraction
     }
 
-    /// The cotangents of the spline at some places of the edge, from that of a vertex along it, in cells of the indicator; and
-    /// whether a slope less than `smallest` counts as that much.
+    /// From the cotangent `bar` of the vertex along the edge, in cells of the indicator. A slope less than `smallest` counts as
+    /// that much.
     #[inline(always)]
     pub(super) fn pull(
         &self,
@@ -152,12 +152,13 @@ impl Edge {
             }
             Crossing::Bounded { ends, skew } => {
                 let [below, above] = ends;
-                let difference = skew * below - above;
-                let factor = skew * LENGTH * bar / bounded(difference, smallest);
+                let difference = above - skew * below;
+                let pull = LENGTH * bar / bounded(difference, smallest);
+                let fraction = crossing.fraction();
                 Pull {
                     parts: [
-                        (0.0, -factor * (above / difference)),
-                        (1.0, factor * (below / difference)),
+                        (0.0, pull * skew * (fraction - 1.0)),
+                        (1.0, -pull * fraction),
                     ],
                     is_guarded: difference.abs() < smallest && bar != 0.0,
                 }
@@ -199,11 +200,12 @@ impl Edge {
     }
 }
 
-/// What the cotangent of a vertex is worth.
+/// Cotangents of the spline on an edge, from that of its vertex.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pull {
-    /// Fractions of the edge, and cotangents of the spline there.
+    /// One or two places, as fractions of the edge, and the cotangent at each; 0 for none.
     pub parts: [(f64, f64); 2],
+    /// Whether a slope was bounded.
     pub is_guarded: bool,
 }
 

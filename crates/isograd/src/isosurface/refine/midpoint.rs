@@ -1,7 +1,7 @@
 //! The midpoint of a segment, moved onto the surface of the spline within a square of the refined lattice.
 
 use super::super::blocks::{Places, Square};
-use super::edge::{Edge, places};
+use super::edge::{Edge, LENGTH, places};
 use crate::data::blocks::BlockField;
 use crate::element::stencil::{bspline, bspline_slope};
 use crate::{Field, Grid, LatticeEdge, Real};
@@ -80,17 +80,16 @@ impl Patch {
     /// The spline at a place, from 0 to 1 along both sides.
     pub(super) fn at(&self, place: [f64; 2]) -> Place {
         Place([0, 1].map(|side| {
-            let at = self.start[side] + 0.5 * place[side];
+            let at = self.start[side] + LENGTH * place[side];
             let first = usize::from(at > 0.5);
             let offset = at - first as f64;
             let slopes: [f64; 3] = bspline_slope(offset).into();
             Row {
                 first,
-                // The square is half a cell wide.
                 weights: [
                     bspline(offset).into(),
-                    slopes.map(|slope| 0.5 * slope),
-                    BENDS.map(|bend| 0.25 * bend),
+                    slopes.map(|slope| LENGTH * slope),
+                    BENDS.map(|bend| LENGTH * LENGTH * bend),
                 ],
             }
         }))

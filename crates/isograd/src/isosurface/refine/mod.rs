@@ -19,15 +19,15 @@
 //! lattice they cut off up to 24 %, with midpoints up to 9 %.
 //!
 //! # Pullback
-//! With `ȳ` the cotangent of a vertex, and `χ' = e·∇χ` at it: `χ̄_o −= (ȳ·e) B_o/χ'`, `c̄ += (ȳ·e)/χ'`: [`pullback`]; of a vertex with
-//! bounded odds, by the spline at both ends of its edge. As for
+//! With `ȳ` the cotangent of a vertex, and `χ' = e·∇χ` at it: `χ̄_o −= (ȳ·e) B_o/χ'`, `c̄ += (ȳ·e)/χ'`: [`pullback`]. If its odds
+//! are bounded, the derivative is that of linear interpolation between the ends, one of them times the bound. As for
 //! [linear interpolation](super), a slope below a millionth of the range of `χ` counts as that much. The cotangent
 //! of a midpoint goes to both vertices, and by `F` and `g` to the cells round it.
 //!
 //! # Not differentiable
-//! Which blocks have values is held constant; those without have no crossing. Which triangulation a loop with
-//! midpoints has: the surface jumps by up to a hundredth of a cell where another one encloses as much and is not the same
-//! surface, and where a segment becomes split beside one whose midpoint lies inwards.
+//! - Which blocks have values is held constant; those without have no crossing.
+//! - Which triangulation a loop with midpoints has. The surface jumps by up to a hundredth of a cell where another one encloses
+//!   as much and is not the same surface, and where a segment becomes split beside one whose midpoint lies inwards.
 
 mod edge;
 mod midpoint;

@@ -100,10 +100,13 @@ impl<T: Real> Vertices<'_, T> {
         [(half / 2).saturating_sub(1), (half / 2 + 2).min(last)]
     }
 
+    /// The edge of a vertex.
+    #[inline(always)]
     fn edge(&self, vertex: usize) -> Edge {
         Edge::new(self.chi.grid(), self.refined, self.mesh.edges()[vertex])
     }
 
+    /// Cotangents of the spline on the edge of a vertex.
     #[inline(always)]
     fn pull(&self, vertex: usize) -> Pull {
         let edge = self.edge(vertex);
