@@ -307,7 +307,7 @@ def test_bad_arguments_are_refused_with_a_reason():
         (ValueError, "smoothing", lambda: isograd.Options(smoothing=-1)),
         (ValueError, "radius is 'cut:0'; give", lambda: isograd.Options(radius="cut:0")),
         (ValueError, "radius is 'wide'", lambda: isograd.Options(radius="wide")),
-        (ValueError, "surface is '0.5x'", lambda: isograd.Options(surface="0.5x")),
+        (ValueError, "surface is '65x'", lambda: isograd.Options(surface="65x")),
         (ValueError, "surface is 0", lambda: isograd.Options(surface=0)),
         (ValueError, "'sparse'", lambda: isograd.Options(solve="fast")),
         (ValueError, "screening", lambda: isograd.Options(screening=float("inf"))),

@@ -194,7 +194,7 @@ fn ends<T: Real>(points: &[[T; 3]], left_out: &[u32]) -> Option<[[usize; 2]; 3]>
 }
 
 /// The least number not below `n` with no prime factor above 7: lengths whose Fourier transform is fast.
-fn fast_length(n: usize) -> usize {
+pub(crate) fn fast_length(n: usize) -> usize {
     let smooth = |mut m: usize| {
         for p in [2, 3, 5, 7] {
             while m.is_multiple_of(p) {

@@ -5,7 +5,7 @@ pub(crate) mod cells;
 mod cloud;
 mod field;
 mod grid;
-mod grid_fit;
+pub(crate) mod grid_fit;
 mod mesh;
 mod outliers;
 #[cfg(test)]

@@ -82,7 +82,7 @@ pub enum Error {
     Smoothing(poisson::Smoothing),
     /// The resolution of the surface is out of range.
     #[error(
-        "the surface is {0:?}; give cells up to 64 times as fine as those of φ: a size above 0 in the cloud's unit, or a factor from 1 to 64"
+        "the surface is {0:?}; give cells up to 64 times as fine or as coarse as those of φ: a size above 0 in the cloud's unit, or a factor from 1/64 to 64"
     )]
     Surface(SurfaceResolution),
     /// The grid of the surface has too many or too small cells.

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use super::open::Open;
 use super::sparse::Sparse;
-use super::surface::with_shape;
 use super::{Error, Reconstruction, Reconstructor, Residuals, Solve, check_memory};
 use crate::data::blocks::BlockField;
 use crate::data::cells::{Cells, CellsMut};
@@ -12,7 +11,7 @@ use crate::data::{Field, Grid, PointCloud};
 use crate::isosurface::measure;
 use crate::isosurface::{Interpolation, Level, local_level};
 use crate::neighbors::{Neighborhoods, Radius};
-use crate::poisson::screened;
+use crate::poisson::{screened, walls};
 use crate::report::{Report, Stage, Warning};
 use crate::sheet::{self, Sheet};
 use crate::{Mesh, Real, distance, isosurface, neighbors, normals, orient, poisson, splat};
@@ -156,13 +155,15 @@ impl<T: Real> Reconstructor<T> {
         &self,
         held: Option<&Reconstruction<T>>,
     ) -> Result<(Grid<T>, usize), Error> {
-        let Reconstruction { sdf, options, .. } = &self.result;
+        let Reconstruction {
+            sdf,
+            options,
+            points,
+            ..
+        } = &self.result;
         if let Some(held) = held {
             let octaves = held.sparse.as_ref().map_or(0, |sparse| sparse.count());
-            return Ok((
-                with_shape(sdf.grid(), held.surface_grid().shape())?,
-                octaves,
-            ));
+            return Ok((held.surface_grid_like(sdf.grid())?, octaves));
         }
         let solve = match options.solve {
             Solve::Sparse if options.screening > 0.0 => {
@@ -173,7 +174,8 @@ impl<T: Real> Reconstructor<T> {
             solve => solve,
         };
         let spacing = self.result.sample_spacing();
-        options.surface.grid_and_octaves(sdf.grid(), spacing, solve)
+        let margin = walls::margin(points, sdf.grid());
+        (options.surface).grid_and_octaves(sdf.grid(), spacing, solve, margin)
     }
 
     /// Puts the indicator and the Poisson plan of a dense solve on the grid of the surface.

@@ -1,20 +1,25 @@
-//! Resolution of the surface: the grid of the indicator, which may be finer than the grid of φ.
+//! Resolution of the surface: the grid of the indicator, which may be finer or coarser than the grid of φ.
 
-use super::{Error, Solve};
+use super::{Error, Reconstruction, Solve};
+use crate::data::grid_fit::fast_length;
+use crate::poisson::walls;
 use crate::{Grid, GridError, Real};
 
-/// Cells of the surface's grid per sample spacing with [`SurfaceResolution::Auto`]. Mean distance from the surface to the
+/// Most cells of the surface's grid per sample spacing with [`SurfaceResolution::Auto`]. Mean distance from the surface to the
 /// true mesh with 0.8, 1.2 and 1.6 of them, in cells of φ (128 on the longest side): an airliner 0.0060, 0.0046, 0.0045; a
-/// tray of plates 0.0041, 0.0049, 0.0068; a machined part 0.012, 0.020, 0.033.
+/// tray of plates 0.0041, 0.0049, 0.0068; a machined part 0.012, 0.020, 0.033. And with more than about 1.3 thin parts are torn.
 const CELLS_PER_SPACING: f64 = 1.2;
 
-/// Automatic ratios of the cell sizes. Few, so that the ratio seldom changes as the points move. Mean distance
-/// from the surface to the true mesh with 2, 3 and 4, in cells of φ (64 on the longest side): an airliner 0.0112, 0.0056,
-/// 0.0040; a flying wing 0.0237, 0.0128, 0.0081; an aorta 0.0077, 0.0046, 0.0037.
-const AUTO_FACTORS: [f64; 5] = [1.25, 1.5, 2.0, 3.0, 4.0];
+/// Automatic ratios of the cell sizes to an octave, evenly spaced: 1, 1.125, 1.25 and so on to 2.
+const RATIOS_PER_OCTAVE: i32 = 8;
+
+/// Octaves of automatic ratios from that of the grid of φ on, to either side. Mean distance from the surface to the true mesh with
+/// ratios of 2, 3 and 4, in cells of φ (64 on the longest side): an airliner 0.0112, 0.0056, 0.0040; a flying wing 0.0237,
+/// 0.0128, 0.0081; an aorta 0.0077, 0.0046, 0.0037.
+const AUTO_OCTAVES: i32 = 2;
 
 /// Automatic ratio up to which the solve may be sparse.
-const SPARSE_FACTOR: f64 = 2.0;
+const SPARSE_RATIO: f64 = 2.0;
 
 /// Largest number of cells of a dense solve that is chosen automatically: 2²⁵, 0.6 GB in `f32`.
 const MAX_DENSE_CELLS: usize = 1 << 25;
@@ -22,27 +27,28 @@ const MAX_DENSE_CELLS: usize = 1 << 25;
 /// Cells of the coarsest grid of a sparse solve, approximately.
 const COARSE_CELLS: usize = 1 << 22;
 
-/// Largest ratio of the two cell sizes.
+/// Largest ratio of the two cell sizes, and one over the smallest.
 const MAX_FACTOR: f64 = 64.0;
 
-/// How much larger than asked for a refinement may be, for lengths that a Fourier transform is quick for.
+/// How much larger than asked for a refinement may be that has to fill the box.
 const SLACK: f64 = 1.1;
 
-/// How fine the surface is. Splat, Poisson, iso-value and isosurface run on a grid of their own, which fills the box of
-/// the grid of φ with cubic cells that are smaller by a ratio of whole numbers; φ is the exact distance to that surface.
-/// Time and memory grow with the number of these cells.
+/// How fine the surface is. Splat, Poisson, iso-value and isosurface run on a grid of their own, with cubic cells
+/// of another size in the box of the grid of φ; φ is the exact distance to that surface. Where no sample reaches a
+/// [wall](crate::poisson::Walls), the last cells may lie beyond that box. Time and memory grow with the number of these cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum SurfaceResolution {
-    /// Cells of about the distance between samples, as far as that is affordable: as fine as the grid of φ or up to twice
-    /// as fine, and up to four times where these are at most 2²⁵ cells. The ratio of the cell sizes is a step function of
+    /// Cells a little smaller than the distance between samples, 0.83 to 0.95 of it. Smaller ones would tear thin parts, larger ones
+    /// lose them. They are at most four times as coarse as those of φ, and so that there are 4 of them between samples and walls; and
+    /// at most twice as fine, or four times where they are at most 2²⁵. The ratio of the cell sizes is a step function of
     /// the points, and the pullback holds it constant: prefer [`Self::Spacing`] or [`Self::Factor`] for a time series.
     #[default]
     Auto,
     /// The grid of φ itself.
     Grid,
-    /// Cells of at most this size, in the cloud's unit, at least 1/64 of those of φ.
+    /// Cells of at most this size, in the cloud's unit, from 1/64 of those of φ to 64 times as large.
     Spacing(f64),
-    /// Cells smaller by at least this factor, 1 or more.
+    /// Cells smaller by at least this factor, from 1/64 to 64.
     Factor(f64),
 }
 
@@ -52,103 +58,214 @@ impl SurfaceResolution {
         match self {
             Self::Grid | Self::Auto => true,
             Self::Spacing(spacing) => spacing > 0.0 && spacing.is_finite(),
-            Self::Factor(factor) => (1.0..=MAX_FACTOR).contains(&factor),
+            Self::Factor(factor) => is_allowed(factor),
         }
     }
 
-    /// Like [`Self::grid`], and the number of octaves of the sparse solve, 0 for a dense one. A sparse one may have smaller
-    /// cells.
+    /// The grid of the surface for samples that are `sample_spacing` apart, with the lower corner of `grid`, and the number of
+    /// octaves of the sparse solve, 0 for a dense one. A sparse one may have cells smaller by a tenth. All samples are at least
+    /// `margin` cells of `grid` off its walls.
     ///
     /// # Errors
-    /// As [`Self::grid`].
+    /// [`Error::Surface`] for cells more than 64 times as fine or as coarse, [`Error::Grid`] for too many or too small cells.
     pub(super) fn grid_and_octaves<T: Real>(
         self,
         grid: &Grid<T>,
         sample_spacing: f64,
         solve: Solve,
+        margin: f64,
     ) -> Result<(Grid<T>, usize), Error> {
-        let fine = self.grid(grid, sample_spacing, solve)?;
+        let refine = Refine { grid, margin };
+        let fine = self.grid(refine, sample_spacing, solve)?;
         if solve == Solve::Dense || solve == Solve::Auto && fine.cells() <= MAX_DENSE_CELLS {
             return Ok((dense(fine)?, 0));
         }
-        let parts = grid.shape().into_iter().fold(0, gcd);
-        let count = fine.shape()[0] / (grid.shape()[0] / parts);
         let wanted = (1..8)
             .find(|octaves| fine.cells() >> (3 * octaves) <= COARSE_CELLS)
             .unwrap_or(8);
-        let rounded = |octaves: usize| count.next_multiple_of(1 << octaves);
-        let thinnest = grid.shape().into_iter().min().unwrap_or(0) / parts;
-        let fits = |&octaves: &usize| {
-            let is_close = rounded(octaves) as f64 <= SLACK * count as f64;
-            is_close && (thinnest * rounded(octaves)) >> octaves >= Grid::<T>::MIN_CELLS
-        };
-        match (1..=wanted).rev().find(fits) {
-            None if solve == Solve::Auto => Ok((dense(fine)?, 0)),
-            octaves => {
-                let octaves = octaves.unwrap_or(1);
-                let scaled = grid.shape().map(|n| n / parts * rounded(octaves));
-                Ok((with_shape(grid, scaled)?, octaves))
+        for octaves in (1..=wanted).rev() {
+            if let Some(halved) = refine.halved(&fine, octaves) {
+                return Ok((halved?, octaves));
+            }
+        }
+        match solve {
+            Solve::Auto => Ok((dense(fine)?, 0)),
+            _ => {
+                let count = fine.shape()[0].div_ceil(refine.scaled(1)[0]);
+                Ok((refine.filled(count.next_multiple_of(2))?, 1))
             }
         }
     }
 
-    /// Grid of the surface in the box of `grid`, for samples that are `sample_spacing` apart.
-    ///
-    /// # Errors
-    /// [`Error::Surface`] for cells more than 64 times as fine, [`Error::Grid`] for too many or too small cells.
-    pub(super) fn grid<T: Real>(
+    fn grid<T: Real>(
         self,
-        grid: &Grid<T>,
+        refine: Refine<'_, T>,
         sample_spacing: f64,
         solve: Solve,
     ) -> Result<Grid<T>, Error> {
-        let spacing = grid.spacing().f64();
+        let spacing = refine.grid.spacing().f64();
         let factor = match self {
             Self::Grid => 1.0,
             Self::Auto => {
                 let wanted = CELLS_PER_SPACING * spacing / sample_spacing;
-                return Ok(automatic(grid, wanted, solve));
+                return Ok(refine.automatically(wanted, solve));
             }
             Self::Spacing(length) => spacing / length,
             Self::Factor(factor) => factor,
         };
         match factor {
-            _ if factor > MAX_FACTOR => Err(Error::Surface(self)),
-            _ if factor > 1.0 => Ok(refine(grid, factor)?),
-            _ => Ok(*grid),
+            _ if !is_allowed(factor) => Err(Error::Surface(self)),
+            _ => Ok(refine.by(factor)?),
         }
     }
 }
 
-/// The coarsest automatic grid with at least the wanted ratio of cell sizes, or else the finest affordable one.
-fn automatic<T: Real>(grid: &Grid<T>, wanted: f64, solve: Solve) -> Grid<T> {
-    let mut finest = *grid;
-    for factor in AUTO_FACTORS {
-        if !(wanted > grid.spacing().f64() / finest.spacing().f64()) {
-            break;
+impl<T: Real> Reconstruction<T> {
+    /// The grid of the surface for another grid of φ of the same shape.
+    pub(super) fn surface_grid_like(&self, grid: &Grid<T>) -> Result<Grid<T>, GridError> {
+        let (surface, before) = (self.surface_grid(), self.sdf.grid());
+        if grid == before {
+            return Ok(*surface);
         }
-        let may_be_sparse = solve != Solve::Dense && factor <= SPARSE_FACTOR;
-        match refine(grid, factor) {
-            Ok(fine) if may_be_sparse || fine.cells() <= MAX_DENSE_CELLS => finest = fine,
-            _ => break,
-        }
+        let ratio = surface.spacing().f64() / before.spacing().f64();
+        let spacing = T::of(grid.spacing().f64() * ratio);
+        Grid::in_blocks(grid.lower(), spacing, surface.shape())
     }
-    finest
 }
 
-/// The grid of the same box whose cells are smaller by a factor of at least `factor` that gives each axis a whole number of
-/// them: preferably, within [`SLACK`], numbers without prime factors above 7.
-fn refine<T: Real>(grid: &Grid<T>, factor: f64) -> Result<Grid<T>, GridError> {
-    let shape = grid.shape();
-    let parts = shape.into_iter().fold(0, gcd);
-    let scaled = |count: usize| shape.map(|n| n / parts * count);
-    // A factor that is a ratio of whole numbers up to rounding is that ratio.
-    let least = (factor * parts as f64 * (1.0 - 1e-9)).ceil().max(1.0) as usize;
-    let most = (SLACK * factor * parts as f64) as usize;
-    let count = (least..=most)
-        .find(|&count| scaled(count).into_iter().all(is_smooth))
-        .unwrap_or(least);
-    with_shape(grid, scaled(count))
+/// Grids with the lower corner of another one, and smaller cells.
+#[derive(Clone, Copy)]
+struct Refine<'a, T> {
+    grid: &'a Grid<T>,
+    /// How far all samples are off the walls, in cells of that grid.
+    margin: f64,
+}
+
+impl<T: Real> Refine<'_, T> {
+    /// The finest affordable automatic one of at most the wanted ratio of cell sizes, or the coarsest one.
+    fn automatically(self, wanted: f64, solve: Solve) -> Grid<T> {
+        let least = (Grid::<T>::MARGIN_CELLS as f64 / self.margin).min(1.0);
+        let is_affordable = |ratio: f64, fine: &Grid<T>| {
+            let may_be_sparse = solve != Solve::Dense && ratio <= SPARSE_RATIO;
+            ratio <= 1.0 || may_be_sparse || fine.cells() <= MAX_DENSE_CELLS
+        };
+        let mut coarsest = *self.grid;
+        for ratio in automatic_ratios().take_while(|&ratio| ratio >= least) {
+            let Ok(fine) = self.by(ratio) else { continue };
+            // A little more than asked for, for the number of cells.
+            let ratio = self.grid.spacing().f64() / fine.spacing().f64();
+            if ratio <= wanted && is_affordable(ratio, &fine) {
+                return fine;
+            }
+            if wanted < ratio && ratio <= 1.0 {
+                coarsest = fine;
+            }
+        }
+        coarsest
+    }
+
+    /// With cells smaller by at least `factor`, which fill the box of the grid where they have to, or where numbers of cells without
+    /// prime factors above 7 do; else such numbers of cells that reach beyond it.
+    fn by(self, factor: f64) -> Result<Grid<T>, GridError> {
+        if factor == 1.0 {
+            return Ok(*self.grid);
+        }
+        let shape = self.grid.shape();
+        let longest = shape.into_iter().fold(0, usize::max) as f64;
+        // The same for the ratio that it leads to.
+        let ratio = fast_length(at_least(factor * longest)) as f64 / longest;
+        let parts = self.parts() as f64;
+        let first = at_least(factor * parts);
+        let last = (self.slack() * ratio * parts * (1.0 + 1e-9)) as usize;
+        let is_fast = |&count: &usize| {
+            let lengths = self.scaled(count);
+            lengths.into_iter().all(|n| fast_length(n) == n)
+        };
+        match (first..=last).find(is_fast) {
+            Some(count) => self.filled(count),
+            None if self.fills_box() => self.filled(first),
+            None => {
+                let beyond = shape.map(|n| fast_length(at_least(ratio * n as f64)));
+                let spacing = self.grid.spacing().f64() / ratio;
+                Grid::in_blocks(self.grid.lower(), T::of(spacing), beyond)
+            }
+        }
+    }
+
+    /// With cells like those of `fine`, a grid [`Self::by`] some factor, but as many along each axis as can be halved so many times;
+    /// `None` if cells that fill the box would be too small, and they must, or the coarsest cells are too few.
+    fn halved(self, fine: &Grid<T>, octaves: usize) -> Option<Result<Grid<T>, GridError>> {
+        let filled = self.count(fine).and_then(|count| {
+            let rounded = count.next_multiple_of(1 << octaves);
+            (rounded as f64 <= self.slack() * count as f64).then_some(rounded)
+        });
+        let beyond = |n: usize| fast_length(n.div_ceil(1 << octaves)) << octaves;
+        let shape = match filled {
+            Some(count) => self.scaled(count),
+            None if self.fills_box() => return None,
+            None => fine.shape().map(beyond),
+        };
+        let is_thick = shape.iter().all(|n| n >> octaves >= Grid::<T>::MIN_CELLS);
+        is_thick.then(|| match filled {
+            Some(count) => self.filled(count),
+            None => Grid::in_blocks(fine.lower(), fine.spacing(), shape),
+        })
+    }
+
+    /// Whether the upper corner must be that of the grid: a surface that may pass through a wall ends there.
+    fn fills_box(self) -> bool {
+        !(self.margin >= walls::REACH)
+    }
+
+    /// How many times as fine as needed cells may be to fill the box.
+    fn slack(self) -> f64 {
+        if self.fills_box() { SLACK } else { 1.0 }
+    }
+
+    /// Equal parts of all sides of the box that are whole cells.
+    fn parts(self) -> usize {
+        self.grid.shape().into_iter().fold(0, gcd)
+    }
+
+    /// Cells along each side, so many for each of the [`Self::parts`] in place of one.
+    fn scaled(self, count: usize) -> [usize; 3] {
+        let parts = self.parts();
+        self.grid.shape().map(|n| n / parts * count)
+    }
+
+    /// What leads to this grid by [`Self::scaled`], if it fills the box.
+    fn count(self, fine: &Grid<T>) -> Option<usize> {
+        let count = fine.shape()[0] / self.scaled(1)[0];
+        (self.scaled(count) == fine.shape()).then_some(count)
+    }
+
+    /// The box, filled with so many cells for each of the [`Self::parts`].
+    fn filled(self, count: usize) -> Result<Grid<T>, GridError> {
+        let (grid, shape) = (self.grid, self.scaled(count));
+        if shape == grid.shape() {
+            return Ok(*grid);
+        }
+        let spacing = grid.spacing().f64() * grid.shape()[0] as f64 / shape[0] as f64;
+        Grid::in_blocks(grid.lower(), T::of(spacing), shape)
+    }
+}
+
+fn is_allowed(factor: f64) -> bool {
+    (1.0 / MAX_FACTOR..=MAX_FACTOR).contains(&factor)
+}
+
+/// All automatic ratios, from the largest down.
+fn automatic_ratios() -> impl Iterator<Item = f64> {
+    let most = AUTO_OCTAVES * RATIOS_PER_OCTAVE;
+    (-most..=most).rev().map(|n| {
+        let step = f64::from(n.rem_euclid(RATIOS_PER_OCTAVE)) / f64::from(RATIOS_PER_OCTAVE);
+        f64::from(n.div_euclid(RATIOS_PER_OCTAVE)).exp2() * (1.0 + step)
+    })
+}
+
+/// The whole number above, or that which this is up to rounding.
+fn at_least(length: f64) -> usize {
+    (length * (1.0 - 1e-9)).ceil().max(1.0) as usize
 }
 
 /// A grid that is small enough to have a value at each cell.
@@ -156,28 +273,9 @@ fn dense<T: Real>(grid: Grid<T>) -> Result<Grid<T>, GridError> {
     Grid::new(grid.lower(), grid.spacing(), grid.shape())
 }
 
-/// The grid of the same box with `shape` cells, which must be cubes.
-pub(super) fn with_shape<T: Real>(grid: &Grid<T>, shape: [usize; 3]) -> Result<Grid<T>, GridError> {
-    if shape == grid.shape() {
-        return Ok(*grid);
-    }
-    let spacing = grid.spacing().f64() * grid.shape()[0] as f64 / shape[0] as f64;
-    Grid::in_blocks(grid.lower(), T::of(spacing), shape)
-}
-
 /// The greatest common divisor.
 fn gcd(a: usize, b: usize) -> usize {
     if b == 0 { a } else { gcd(b, a % b) }
-}
-
-/// Whether a number has no prime factor above 7.
-fn is_smooth(mut number: usize) -> bool {
-    for prime in [2, 3, 5, 7] {
-        while number.is_multiple_of(prime) {
-            number /= prime;
-        }
-    }
-    number == 1
 }
 
 #[cfg(test)]
@@ -188,14 +286,18 @@ mod tests {
         Grid::new([0.1, -0.2, 0.3], 0.05, shape).expect("valid")
     }
 
+    fn refined(shape: [usize; 3], factor: f64, margin: f64) -> Grid<f64> {
+        let surface = SurfaceResolution::Factor(factor);
+        let found = surface.grid_and_octaves(&grid(shape), f64::NAN, Solve::Dense, margin);
+        found.expect("fits").0
+    }
+
     #[test]
     fn a_refined_grid_fills_the_same_box_with_cubes_at_least_as_fine() {
         for shape in [[128, 64, 32], [338, 120, 151], [60, 48, 36], [97, 97, 97]] {
             let coarse = grid(shape);
             for factor in [1.0, 1.2, 1.5, 2.0, 3.0] {
-                let fine = SurfaceResolution::Factor(factor)
-                    .grid(&coarse, f64::NAN, Solve::Dense)
-                    .expect("fits");
+                let fine = refined(shape, factor, 0.0);
                 let ratio = coarse.spacing() / fine.spacing();
                 assert!(ratio >= factor * (1.0 - 1e-9), "{shape:?} {factor} {ratio}");
                 assert_eq!(fine.lower(), coarse.lower());
@@ -207,28 +309,51 @@ mod tests {
     }
 
     #[test]
+    fn a_grid_that_may_end_beyond_the_box_has_cells_as_asked_for_and_comes_of_its_own_ratio() {
+        for shape in [[128, 64, 32], [338, 120, 151], [63, 256, 90], [12, 97, 45]] {
+            let coarse = grid(shape);
+            for factor in [1.0, 1.25, 1.5, 1.85, 2.0, 3.0, 3.3] {
+                let fine = refined(shape, factor, 10.0);
+                let ratio = coarse.spacing() / fine.spacing();
+                let range = factor * (1.0 - 1e-9)..1.2 * factor;
+                assert!(range.contains(&ratio), "{shape:?} {factor} {ratio}");
+                assert_eq!(fine.lower(), coarse.lower());
+                for (a, b) in fine.shape().into_iter().zip(shape) {
+                    let (side, box_side) = (a as f64 / ratio, b as f64);
+                    let range = box_side - 1e-9..1.15 * box_side;
+                    assert!(range.contains(&side), "{shape:?} {factor} {side}");
+                }
+                let again = refined(shape, ratio, 10.0);
+                assert_eq!(again.shape(), fine.shape(), "{factor}");
+            }
+        }
+    }
+
+    #[test]
     fn lengths_suit_a_fourier_transform_where_the_box_allows() {
-        let fine = SurfaceResolution::Factor(1.3).grid(&grid([128; 3]), f64::NAN, Solve::Dense);
-        assert_eq!(fine.expect("fits").shape(), [168; 3]);
-        let fine =
-            SurfaceResolution::Factor(2.0).grid(&grid([338, 120, 151]), f64::NAN, Solve::Dense);
-        assert_eq!(fine.expect("fits").shape(), [676, 240, 302]);
+        assert_eq!(refined([128; 3], 1.3, 0.0).shape(), [168; 3]);
+        assert_eq!(refined([338, 120, 151], 2.0, 0.0).shape(), [676, 240, 302]);
+        assert_eq!(refined([256, 63, 90], 1.5, 10.0).shape(), [384, 96, 135]);
     }
 
     #[test]
     fn automatic_cells_follow_the_samples_as_far_as_is_affordable() {
         let cells = |shape, sample_spacing: f64, solve| {
-            let fine = SurfaceResolution::Auto.grid(&grid(shape), 0.05 * sample_spacing, solve);
-            fine.expect("fits").shape()
+            let (auto, spacing) = (SurfaceResolution::Auto, 0.05 * sample_spacing);
+            let found = auto.grid_and_octaves(&grid(shape), spacing, solve, 20.0);
+            found.expect("fits").0.shape()
         };
         let cube = [40; 3];
         for (sample_spacing, expected) in [
-            (1.3, 40),
-            (0.97, 50),
-            (0.9, 60),
-            (0.7, 80),
-            (0.5, 120),
-            (0.35, 160),
+            (9.0, 10),
+            (2.5, 18),
+            (1.3, 35),
+            (1.2, 40),
+            (0.97, 45),
+            (0.9, 50),
+            (0.7, 60),
+            (0.5, 90),
+            (0.35, 135),
             (1e-9, 160),
         ] {
             assert_eq!(cells(cube, sample_spacing, Solve::Dense), [expected; 3]);
@@ -239,7 +364,7 @@ mod tests {
             ([100; 3], [300; 3], [300; 3]),
             ([150; 3], [300; 3], [300; 3]),
             ([200; 3], [300; 3], [400; 3]),
-            ([338, 120, 151], [338, 120, 151], [676, 240, 302]),
+            ([338, 120, 151], [512, 189, 240], [676, 240, 302]),
         ] {
             assert_eq!(cells(shape, 0.1, Solve::Dense), dense);
             assert_eq!(cells(shape, 0.1, Solve::Auto), sparse);
@@ -248,27 +373,33 @@ mod tests {
 
     #[test]
     fn cells_of_a_sparse_solve_can_be_halved_and_hardly_shrink() {
-        let of = |shape, factor, solve| {
+        let of = |shape, factor, solve, margin| {
             let surface = SurfaceResolution::Factor(factor);
-            let found = surface.grid_and_octaves(&grid(shape), f64::NAN, solve);
+            let found = surface.grid_and_octaves(&grid(shape), f64::NAN, solve, margin);
             let (fine, octaves) = found.expect("fits");
             assert!(fine.shape().iter().all(|n| n % (1 << octaves) == 0));
             (fine.shape(), octaves)
         };
-        assert_eq!(of([128; 3], 2.0, Solve::Auto), ([256; 3], 0));
-        assert_eq!(of([128; 3], 4.0, Solve::Auto), ([512; 3], 2));
-        assert_eq!(of([128; 3], 4.0, Solve::Dense), ([512; 3], 0));
-        assert_eq!(of([128; 3], 1.0, Solve::Sparse), ([128; 3], 1));
-        assert_eq!(of([125; 3], 3.0, Solve::Auto), ([376; 3], 2));
-        assert_eq!(of([338, 120, 151], 3.0, Solve::Auto), ([1014, 360, 453], 0));
-        assert_eq!(of([338, 120, 151], 4.0, Solve::Auto), ([1352, 480, 604], 2));
+        let fish = [338, 120, 151];
+        for margin in [0.0, 10.0] {
+            assert_eq!(of([128; 3], 2.0, Solve::Auto, margin), ([256; 3], 0));
+            assert_eq!(of([128; 3], 4.0, Solve::Auto, margin), ([512; 3], 2));
+            assert_eq!(of([128; 3], 4.0, Solve::Dense, margin), ([512; 3], 0));
+            assert_eq!(of([128; 3], 1.0, Solve::Sparse, margin), ([128; 3], 1));
+        }
+        assert_eq!(of([125; 3], 3.0, Solve::Auto, 0.0), ([376; 3], 2));
+        assert_eq!(of([125; 3], 3.0, Solve::Auto, 10.0), ([384; 3], 2));
+        assert_eq!(of(fish, 3.0, Solve::Auto, 0.0), ([1014, 360, 453], 0));
+        assert_eq!(of(fish, 3.0, Solve::Auto, 10.0), ([1024, 384, 480], 2));
     }
 
     #[test]
     fn more_cells_than_can_be_indexed_are_an_error() {
-        let fine = SurfaceResolution::Spacing(1e-3).grid(&grid([600; 3]), f64::NAN, Solve::Dense);
-        assert!(matches!(fine, Err(Error::Grid(_))));
-        let fine = SurfaceResolution::Spacing(1e-300).grid(&grid([8; 3]), f64::NAN, Solve::Dense);
-        assert!(matches!(fine, Err(Error::Surface(_))));
+        let of = |shape, spacing| {
+            let surface = SurfaceResolution::Spacing(spacing);
+            surface.grid_and_octaves(&grid(shape), f64::NAN, Solve::Dense, 0.0)
+        };
+        assert!(matches!(of([600; 3], 1e-3), Err(Error::Grid(_))));
+        assert!(matches!(of([8; 3], 1e-300), Err(Error::Surface(_))));
     }
 }

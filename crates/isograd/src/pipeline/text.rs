@@ -110,7 +110,7 @@ impl FromStr for SurfaceResolution {
         value.filter(|v| v.is_valid()).ok_or(ParseOptionError {
             option: "surface",
             text: text.into(),
-            expected: "'grid', 'auto', a cell size above 0 in the cloud's unit, or a factor from 1x to 64x",
+            expected: "'grid', 'auto', a cell size above 0 in the cloud's unit, or how many times as fine as the grid of φ, from 1/64 to 64, such as 2x",
         })
     }
 }
@@ -238,8 +238,8 @@ mod tests {
             ),
             (r#"{"band": 1e999}"#, "number out of range"),
             (
-                r#"{"surface": "0.5x"}"#,
-                "surface is '0.5x'; give 'grid', 'auto'",
+                r#"{"surface": "65x"}"#,
+                "surface is '65x'; give 'grid', 'auto'",
             ),
             (r#"{"surface": -1}"#, "surface is '-1'"),
             (r#"{"solve": "fast"}"#, "give 'auto', 'dense' or 'sparse'"),

@@ -51,7 +51,7 @@ pub mod smoothing;
 pub mod spectrum;
 #[cfg(test)]
 pub(crate) mod tests;
-mod walls;
+pub(crate) mod walls;
 #[cfg(test)]
 mod walls_tests;
 

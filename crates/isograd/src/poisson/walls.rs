@@ -1,10 +1,12 @@
 //! Conditions at the walls of the grid.
 
+use rayon::prelude::*;
+
 use crate::{Grid, Real};
 
 /// Cells of φ from the wall within which a sample reaches it. Samples keep 2 cells off the walls, and a fitted grid keeps
 /// [`Grid::MARGIN_CELLS`] cells off the samples.
-const REACH: f64 = 3.5;
+pub(crate) const REACH: f64 = 3.5;
 
 /// Condition of the indicator χ at the walls of the grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,14 +26,20 @@ impl Walls {
     /// Whether the walls are closed, for samples at these points.
     pub fn are_closed<T: Real>(self, points: &[[T; 3]], grid: &Grid<T>) -> bool {
         match self {
-            Self::Auto => !points.iter().any(|&p| reaches(p, grid)),
+            Self::Auto => margin(points, grid) >= REACH,
             Self::Free => false,
             Self::Closed => true,
         }
     }
 }
 
-fn reaches<T: Real>(p: [T; 3], grid: &Grid<T>) -> bool {
-    let (x, shape) = (grid.to_index(p), grid.shape());
-    (0..3).any(|a| !(x[a].f64() >= REACH && x[a].f64() <= shape[a] as f64 - REACH))
+/// How far all points are off the walls, in cells.
+pub(crate) fn margin<T: Real>(points: &[[T; 3]], grid: &Grid<T>) -> f64 {
+    let shape = grid.shape();
+    let of = |&point: &[T; 3]| {
+        let x = grid.to_index(point);
+        let along = |a: usize| x[a].f64().min(shape[a] as f64 - x[a].f64());
+        (0..3).map(along).fold(f64::INFINITY, f64::min)
+    };
+    points.par_iter().map(of).reduce(|| f64::INFINITY, f64::min)
 }

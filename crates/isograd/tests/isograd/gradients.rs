@@ -271,10 +271,12 @@ fn all_results_are_pulled_back_to_all_inputs() {
         .clone()
         .surface(SurfaceResolution::Factor(1.25))
         .level(Level::Thin);
+    let coarse = estimated.clone().surface(SurfaceResolution::Factor(0.75));
     for options in [
         estimated,
         given,
         thin,
+        coarse,
         signs,
         plain,
         screened,

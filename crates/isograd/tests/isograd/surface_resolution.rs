@@ -110,7 +110,7 @@ fn plates_thinner_than_a_cell_of_phi_are_whole() {
         let thickness = cells * h;
         let cloud = plate(thickness, thickness / 3.0);
         let grid = Grid::new([-1.37, -1.11, -1.23], h, [28, 22, 25]).expect("a grid");
-        let surface = SurfaceResolution::Spacing(0.4 * thickness);
+        let surface = SurfaceResolution::Spacing(0.3 * thickness);
         let options = Options::default().surface(surface);
         let result = reconstruct(&cloud, grid, options);
         let measures = &result.report().surface;
@@ -141,5 +141,28 @@ fn an_automatic_surface_follows_the_samples() {
         result.surface_grid().shape()[0]
     };
     // 0.15, 0.08 and 0.03 apart, on cells of 0.1.
-    assert_eq!([300, 1000, 8000].map(fine), [24, 36, 96]);
+    assert_eq!([300, 1000, 8000].map(fine), [24, 30, 96]);
+}
+
+/// A grid of φ that is finer than the samples does not make the surface finer than they are, and parts that are hardly thicker
+/// than the distance between samples stay whole.
+#[test]
+fn a_surface_is_not_finer_than_its_samples() {
+    let (thickness, spacing) = (0.15, 0.1);
+    let cloud = plate(thickness, spacing);
+    for h in [0.021, 0.035, 0.05, 0.08] {
+        let cells = [2.9, 2.3, 2.6].map(|side: f64| (side / h).ceil() as usize);
+        let grid = Grid::new([-1.44, -1.15, -1.3], h, cells).expect("a grid");
+        let result = reconstruct(&cloud, grid, Options::default());
+        let in_spacings = result.surface_grid().spacing() / spacing;
+        let measures = &result.report().surface;
+        println!("{h}: {in_spacings}, {measures:?}");
+        assert!((0.6..1.0).contains(&in_spacings), "{h}: {in_spacings}");
+        assert_eq!((measures.components, measures.euler), (1, 2), "{h}");
+        assert_eq!(result.sdf().values().len(), grid.cells());
+        let expected = distances(result.mesh(), &grid);
+        for (&phi, &exact) in result.sdf().values().iter().zip(&expected) {
+            assert!((phi - exact).abs() < 1e-13, "{phi} for {exact}");
+        }
+    }
 }
