@@ -32,7 +32,7 @@ fn a_run_without_outputs_is_refused_before_the_input_is_read() {
         sandbox.run(line).says(2, &parts);
     }
     sandbox.done("info a.ply");
-    sandbox.done("gradcheck a.ply --resolution 16 -q");
+    sandbox.done("gradcheck a.ply --resolution 20 -q");
     assert_eq!(sandbox.files(), ["a.ply"]);
 }
 

@@ -30,12 +30,13 @@ const COARSE_CELLS: usize = 1 << 22;
 /// Largest ratio of the two cell sizes, and one over the smallest.
 const MAX_FACTOR: f64 = 64.0;
 
-/// How much larger than asked for a refinement may be that has to fill the box.
+/// How much larger than asked for a ratio may be, for lengths that a Fourier transform is quick for, where cells fill the box.
 const SLACK: f64 = 1.1;
 
 /// How fine the surface is. Splat, Poisson, iso-value and isosurface run on a grid of their own, with cubic cells
-/// of another size in the box of the grid of φ; φ is the exact distance to that surface. Where no sample reaches a
-/// [wall](crate::poisson::Walls), the last cells may lie beyond that box. Time and memory grow with the number of these cells.
+/// of another size in the box of the grid of φ; φ is the exact distance to that surface. Where a sample reaches a
+/// [wall](crate::poisson::Walls), they fill that box, and are smaller if whole cells have to be; else the last ones may lie beyond it.
+/// Time and memory grow with the number of these cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum SurfaceResolution {
     /// Cells a little smaller than the distance between samples, 0.83 to 0.95 of it. Smaller ones would tear thin parts, larger ones
@@ -133,7 +134,7 @@ impl<T: Real> Reconstruction<T> {
     }
 }
 
-/// Grids with the lower corner of another one, and smaller cells.
+/// Grids with the lower corner of another one, and cells of another size.
 #[derive(Clone, Copy)]
 struct Refine<'a, T> {
     grid: &'a Grid<T>,
@@ -152,12 +153,12 @@ impl<T: Real> Refine<'_, T> {
         let mut coarsest = *self.grid;
         for ratio in automatic_ratios().take_while(|&ratio| ratio >= least) {
             let Ok(fine) = self.by(ratio) else { continue };
-            // A little more than asked for, for the number of cells.
-            let ratio = self.grid.spacing().f64() / fine.spacing().f64();
-            if ratio <= wanted && is_affordable(ratio, &fine) {
+            // Of the cells themselves: a little more, for their number.
+            let found = self.grid.spacing().f64() / fine.spacing().f64();
+            if found <= wanted && is_affordable(ratio, &fine) {
                 return fine;
             }
-            if wanted < ratio && ratio <= 1.0 {
+            if wanted < found && found <= 1.0 {
                 coarsest = fine;
             }
         }
@@ -364,7 +365,7 @@ mod tests {
             ([100; 3], [300; 3], [300; 3]),
             ([150; 3], [300; 3], [300; 3]),
             ([200; 3], [300; 3], [400; 3]),
-            ([338, 120, 151], [512, 189, 240], [676, 240, 302]),
+            ([338, 120, 151], [560, 200, 252], [700, 252, 320]),
         ] {
             assert_eq!(cells(shape, 0.1, Solve::Dense), dense);
             assert_eq!(cells(shape, 0.1, Solve::Auto), sparse);
