@@ -181,11 +181,13 @@ def test_a_thousand_steps_compile_once_and_keep_their_memory():
 def test_a_window_that_follows_gives_the_body_of_the_whole_grid(x64):  # noqa: F811
     small = isograd.Grid((-0.8, -0.8, -0.8), H, (16, 16, 16))
     points, band = jnp.asarray(ball(600, 0.35)), 3 * H
+    # An automatic resolution depends on the numbers of cells.
+    options = isograd.Options(surface="2x")
 
     @jax.jit
     def in_window(center):
         cells = immersed.window(center, small, GRID)
-        near = immersed.staggered(points + center - H * cells, points, small, band=band)
+        near = immersed.staggered(points + center - H * cells, points, small, band=band, options=options)
         return immersed.paste(near, cells, small, GRID, band), cells
 
     seen = set()
@@ -194,7 +196,7 @@ def test_a_window_that_follows_gives_the_body_of_the_whole_grid(x64):  # noqa: F
         found, cells = in_window(center)
         seen.add(tuple(cells.tolist()))
         np.testing.assert_allclose(cells * H, center, atol=0.51 * H)
-        whole = immersed.staggered(points + center, points, GRID, band=band)
+        whole = immersed.staggered(points + center, points, GRID, band=band, options=options)
         for part, expected in zip(jax.tree.leaves(found), jax.tree.leaves(whole)):
             # The far field of χ depends a little on the walls of its grid.
             np.testing.assert_allclose(part, expected, atol=0.1 * H)
@@ -274,7 +276,8 @@ def test_the_derivative_of_a_force_in_every_point_agrees_with_differences(x64): 
         blended = immersed.blend(fluid, body, width=WIDTH, spacing=H, order=1)
         return immersed.loads(fluid, blended, body, spacing=H, dt=1.0).force @ jnp.array([1.0, 0.5, -0.7])
 
-    steps = {**REVERSE, "eps": 1e-7, "atol": 1e-5, "rtol": 1e-5}
+    # Velocities jump a little where the triangles change: so small a step seldom meets that.
+    steps = {**REVERSE, "eps": 1e-8, "atol": 1e-5, "rtol": 1e-5}
     check_grads(loss, (points, jnp.cross(jnp.array([0.2, 0.1, 1.0]), points)), **steps)
     # Growth alone: the derivative is the integral of the fluid over the area.
     slope = jax.grad(loss)(points, jnp.zeros_like(points))

@@ -18,6 +18,10 @@ const RATIOS_PER_OCTAVE: i32 = 8;
 /// 0.0128, 0.0081; an aorta 0.0077, 0.0046, 0.0037.
 const AUTO_OCTAVES: i32 = 2;
 
+/// How many times as many cells per sample spacing there may be where cells fill the box: few ratios then have whole cells, and
+/// with larger ones the surface is marched on cells half as large.
+const FILLING: f64 = 1.25;
+
 /// Automatic ratio up to which the solve may be sparse.
 const SPARSE_RATIO: f64 = 2.0;
 
@@ -39,8 +43,8 @@ const SLACK: f64 = 1.1;
 /// Time and memory grow with the number of these cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum SurfaceResolution {
-    /// Cells a little smaller than the distance between samples, 0.83 to 0.95 of it. Smaller ones would tear thin parts, larger ones
-    /// lose them. They are at most four times as coarse as those of φ, and so that there are 4 of them between samples and walls; and
+    /// Cells a little smaller than the distance between samples, 0.83 to 0.95 of it (from 0.67 on where they fill the box). Smaller
+    /// ones would tear thin parts, larger ones lose them. They are at most four times as coarse as those of φ, and so that there are 4 of them between samples and walls; and
     /// at most twice as fine, or four times where they are at most 2²⁵. The ratio of the cell sizes is a step function of
     /// the points, and the pullback holds it constant: prefer [`Self::Spacing`] or [`Self::Factor`] for a time series.
     #[default]
@@ -143,26 +147,38 @@ struct Refine<'a, T> {
 }
 
 impl<T: Real> Refine<'_, T> {
-    /// The finest affordable automatic one of at most the wanted ratio of cell sizes, or the coarsest one.
+    /// The finest affordable automatic one of at most the wanted ratio of cell sizes, or the coarsest one; of those that fill the
+    /// box, the coarsest of a little more.
     fn automatically(self, wanted: f64, solve: Solve) -> Grid<T> {
         let least = (Grid::<T>::MARGIN_CELLS as f64 / self.margin).min(1.0);
+        let most = if self.fills_box() {
+            FILLING * wanted
+        } else {
+            wanted
+        };
         let is_affordable = |ratio: f64, fine: &Grid<T>| {
             let may_be_sparse = solve != Solve::Dense && ratio <= SPARSE_RATIO;
             ratio <= 1.0 || may_be_sparse || fine.cells() <= MAX_DENSE_CELLS
         };
-        let mut coarsest = *self.grid;
+        let (mut above, mut coarsest) = (None, *self.grid);
         for ratio in automatic_ratios().take_while(|&ratio| ratio >= least) {
             let Ok(fine) = self.by(ratio) else { continue };
             // Of the cells themselves: a little more, for their number.
             let found = self.grid.spacing().f64() / fine.spacing().f64();
-            if found <= wanted && is_affordable(ratio, &fine) {
-                return fine;
+            if !is_affordable(ratio, &fine) {
+                continue;
+            }
+            if found <= wanted {
+                return above.unwrap_or(fine);
+            }
+            if found <= most {
+                above = Some(fine);
             }
             if wanted < found && found <= 1.0 {
                 coarsest = fine;
             }
         }
-        coarsest
+        above.unwrap_or(coarsest)
     }
 
     /// With cells smaller by at least `factor`, which fill the box of the grid where they have to, or where numbers of cells without
