@@ -20,7 +20,7 @@ const AUTO_OCTAVES: i32 = 2;
 
 /// How many times as many cells per sample spacing there may be where cells fill the box: few ratios then have whole cells, and
 /// with larger ones the surface is marched on cells half as large.
-const FILLING: f64 = 1.25;
+const FILLING: f64 = 1.3;
 
 /// Automatic ratio up to which the solve may be sparse.
 const SPARSE_RATIO: f64 = 2.0;
@@ -43,7 +43,7 @@ const SLACK: f64 = 1.1;
 /// Time and memory grow with the number of these cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum SurfaceResolution {
-    /// Cells a little smaller than the distance between samples, 0.83 to 0.95 of it (from 0.67 on where they fill the box). Smaller
+    /// Cells a little smaller than the distance between samples, 0.83 to 0.95 of it (from 0.64 on where they fill the box). Smaller
     /// ones would tear thin parts, larger ones lose them. They are at most four times as coarse as those of φ, and so that there are 4 of them between samples and walls; and
     /// at most twice as fine, or four times where they are at most 2²⁵. The ratio of the cell sizes is a step function of
     /// the points, and the pullback holds it constant: prefer [`Self::Spacing`] or [`Self::Factor`] for a time series.
