@@ -5,13 +5,14 @@ pub(crate) mod cells;
 mod cloud;
 mod field;
 mod grid;
-pub(crate) mod grid_fit;
+mod grid_fit;
 mod mesh;
 mod outliers;
 #[cfg(test)]
 mod outliers_tests;
 
 pub(crate) use cloud::bounds;
+pub(crate) use grid_fit::fast_length;
 
 pub use cloud::{Attribute, PointCloud, PointCloudError, Sensors};
 pub use field::{Field, FieldError};

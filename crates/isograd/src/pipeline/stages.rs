@@ -11,7 +11,7 @@ use crate::data::{Field, Grid, PointCloud};
 use crate::isosurface::measure;
 use crate::isosurface::{Interpolation, Level, local_level};
 use crate::neighbors::{Neighborhoods, Radius};
-use crate::poisson::{screened, walls};
+use crate::poisson::screened;
 use crate::report::{Report, Stage, Warning};
 use crate::sheet::{self, Sheet};
 use crate::{Mesh, Real, distance, isosurface, neighbors, normals, orient, poisson, splat};
@@ -174,7 +174,7 @@ impl<T: Real> Reconstructor<T> {
             solve => solve,
         };
         let spacing = self.result.sample_spacing();
-        let margin = walls::margin(points, sdf.grid());
+        let margin = poisson::margin(points, sdf.grid());
         (options.surface).grid_and_octaves(sdf.grid(), spacing, solve, margin)
     }
 

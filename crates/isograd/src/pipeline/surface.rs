@@ -1,8 +1,8 @@
 //! Resolution of the surface: the grid of the indicator, which may be finer or coarser than the grid of φ.
 
 use super::{Error, Reconstruction, Solve};
-use crate::data::grid_fit::fast_length;
-use crate::poisson::walls;
+use crate::data::fast_length;
+use crate::poisson::reaches_wall;
 use crate::{Grid, GridError, Real};
 
 /// Most cells of the surface's grid per sample spacing with [`SurfaceResolution::Auto`]. Mean distance from the surface to the
@@ -118,10 +118,10 @@ impl SurfaceResolution {
             Self::Spacing(length) => spacing / length,
             Self::Factor(factor) => factor,
         };
-        match factor {
-            _ if !is_allowed(factor) => Err(Error::Surface(self)),
-            _ => Ok(refine.by(factor)?),
+        if !is_allowed(factor) {
+            return Err(Error::Surface(self));
         }
+        Ok(refine.by(factor)?)
     }
 }
 
@@ -231,7 +231,7 @@ impl<T: Real> Refine<'_, T> {
 
     /// Whether the upper corner must be that of the grid: a surface that may pass through a wall ends there.
     fn fills_box(self) -> bool {
-        !(self.margin >= walls::REACH)
+        reaches_wall(self.margin)
     }
 
     /// How many times as fine as needed cells may be to fill the box.
@@ -250,7 +250,7 @@ impl<T: Real> Refine<'_, T> {
         self.grid.shape().map(|n| n / parts * count)
     }
 
-    /// What leads to this grid by [`Self::scaled`], if it fills the box.
+    /// Cells of `fine` for each of the [`Self::parts`]; `None` if it does not fill the box.
     fn count(self, fine: &Grid<T>) -> Option<usize> {
         let count = fine.shape()[0] / self.scaled(1)[0];
         (self.scaled(count) == fine.shape()).then_some(count)

@@ -51,7 +51,7 @@ pub mod smoothing;
 pub mod spectrum;
 #[cfg(test)]
 pub(crate) mod tests;
-pub(crate) mod walls;
+mod walls;
 #[cfg(test)]
 mod walls_tests;
 
@@ -64,6 +64,7 @@ use crate::Real;
 pub use scratch::Scratch;
 pub use smoothing::Smoothing;
 pub use walls::Walls;
+pub(crate) use walls::{margin, reaches_wall};
 
 /// Errors of the Poisson stage.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

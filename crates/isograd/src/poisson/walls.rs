@@ -6,7 +6,7 @@ use crate::{Grid, Real};
 
 /// Cells of φ from the wall within which a sample reaches it. Samples keep 2 cells off the walls, and a fitted grid keeps
 /// [`Grid::MARGIN_CELLS`] cells off the samples.
-pub(crate) const REACH: f64 = 3.5;
+const REACH: f64 = 3.5;
 
 /// Condition of the indicator χ at the walls of the grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -26,14 +26,19 @@ impl Walls {
     /// Whether the walls are closed, for samples at these points.
     pub fn are_closed<T: Real>(self, points: &[[T; 3]], grid: &Grid<T>) -> bool {
         match self {
-            Self::Auto => margin(points, grid) >= REACH,
+            Self::Auto => !reaches_wall(margin(points, grid)),
             Self::Free => false,
             Self::Closed => true,
         }
     }
 }
 
-/// How far all points are off the walls, in cells.
+/// Whether a sample that is `margin` cells off a wall reaches it.
+pub(crate) fn reaches_wall(margin: f64) -> bool {
+    !(margin >= REACH)
+}
+
+/// How far the nearest of the points is off the walls, in cells.
 pub(crate) fn margin<T: Real>(points: &[[T; 3]], grid: &Grid<T>) -> f64 {
     let shape = grid.shape();
     let of = |&point: &[T; 3]| {
