@@ -117,7 +117,7 @@ fn conclusion(check: &GradientCheck, args: &args::Gradcheck) -> String {
     let advice = match verdict(check, tolerance) {
         Verdict::Good => "",
         Verdict::Check => {
-            "; larger steps differ: take smaller ones, use more cells (--resolution) or known normals (--orient signs)"
+            "; larger steps differ: take smaller ones, a finer surface (--surface) or known normals (--orient signs)"
         }
         Verdict::Bad => {
             "; what the row counts as changed has no derivative: try --orient signs, --radius or --resolution"

@@ -14,7 +14,7 @@ use crate::orient::rim;
 use crate::report::{Report, TOLERATED_SHARE, Warning};
 use crate::{Field, Real, distance, vector};
 
-/// Samples further apart than this many cells leave holes between the supports of their splats.
+/// Samples further apart than this many cells of the surface leave holes between the supports of their splats.
 const SPARSE_CELLS: f64 = 1.25;
 /// Depth below a sample at which its own side must still be the nearest, in cells.
 const THIN_DEPTH: f64 = 2.0;
@@ -44,7 +44,7 @@ impl Report {
         let (warnings, spacing) = (&mut self.warnings, self.surface_spacing);
         warnings.extend(thin(counts.thin, points.len()));
         warnings.extend(missed(counts, points.len()));
-        warnings.extend(sparse(self.sample_spacing, sdf.grid().spacing().f64()));
+        warnings.extend(sparse(self.sample_spacing, spacing));
         warnings.extend(inside_out(&self.surface));
         if self.surface.components > 1 {
             let pieces = Pieces::new(mesh, scratch);
@@ -170,7 +170,7 @@ fn missed(counts: Counts, points: usize) -> Option<Warning> {
     (share.max(far) > TOLERATED_SHARE).then_some(Warning::Missed { share, far })
 }
 
-/// Samples further apart than the grid resolves.
+/// Samples further apart than the surface's cells resolve.
 fn sparse(sample_spacing: f64, spacing: f64) -> Option<Warning> {
     (sample_spacing > SPARSE_CELLS * spacing).then_some(Warning::Sparse {
         sample_spacing,

@@ -28,11 +28,11 @@ pub enum Warning {
         /// Share of the samples that lie on such parts, from 0 to 1.
         share: f64,
     },
-    /// Samples are further apart than the cells are wide.
+    /// Samples are further apart than the cells of the surface are wide.
     Sparse {
         /// Typical distance between samples.
         sample_spacing: f64,
-        /// Cell size.
+        /// Cell size of the surface.
         spacing: f64,
     },
     /// The samples end at a rim, or are missing in places: they do not enclose a volume.
@@ -140,10 +140,14 @@ impl Warning {
                 "outliers=\"keep\" (--outliers keep) if they are part of the shape"
             }
             Self::Thin { .. } if level != Level::Thin => {
-                "level=\"thin\" (--level thin), which keeps them whole, or more cells (resolution, --resolution)"
+                "level=\"thin\" (--level thin), which keeps them whole, or smaller cells of the surface (surface, --surface)"
             }
-            Self::Thin { .. } => "more cells (resolution, --resolution) if these parts matter",
-            Self::Sparse { .. } => "fewer cells (resolution, --resolution) or more samples",
+            Self::Thin { .. } => {
+                "more samples, or smaller cells of the surface (surface, --surface), if these parts matter"
+            }
+            Self::Sparse { .. } => {
+                "surface=\"auto\" (--surface auto), whose cells follow the samples, or more samples"
+            }
             Self::Open { .. } => {
                 "samples in the gaps; sheet=THICKNESS (--sheet) for a membrane or sail; trim=\"auto\" (--trim auto) for a mesh without what was guessed"
             }
@@ -154,17 +158,19 @@ impl Warning {
                 "a larger thickness (sheet, --sheet) or smaller cells (surface, --surface)"
             }
             Self::Fragments { .. } if level != Level::Thin => {
-                "level=\"thin\" (--level thin), more cells (resolution, --resolution) or more samples there"
+                "level=\"thin\" (--level thin), more samples there, or smaller cells of the surface (surface, --surface)"
             }
-            Self::Fragments { .. } => "more cells (resolution, --resolution) or more samples there",
+            Self::Fragments { .. } => {
+                "more samples there, or smaller cells of the surface (surface, --surface)"
+            }
             Self::InsideOut { .. } => {
                 "orient=\"auto\" (--orient auto), or normals that point outward"
             }
             Self::Missed { .. } if level != Level::Thin => {
-                "level=\"thin\" (--level thin), more cells (resolution, --resolution), fewer outliers, or known normals (orient, --orient)"
+                "level=\"thin\" (--level thin), smaller cells of the surface (surface, --surface), fewer outliers, or known normals (orient, --orient)"
             }
             Self::Missed { .. } => {
-                "more cells (resolution, --resolution), fewer outliers, or known normals (orient, --orient)"
+                "more samples, smaller cells of the surface (surface, --surface), fewer outliers, or known normals (orient, --orient)"
             }
             Self::DoubtfulSigns { doubt, .. } => doubtful_remedy(doubt.main_reason()),
             Self::Guarded { .. } => {
@@ -194,7 +200,7 @@ impl fmt::Display for Warning {
                 spacing,
             } => write!(
                 f,
-                "samples are {:.1} cells apart (spacing {sample_spacing:.3e}, cells {spacing:.3e})",
+                "samples are {:.1} cells of the surface apart (spacing {sample_spacing:.3e}, cells {spacing:.3e})",
                 sample_spacing / spacing
             ),
             Self::Open { samples, guessed } => write!(

@@ -4,7 +4,8 @@ use isograd::isosurface::Level;
 use isograd::orient::Method;
 use isograd::orient::doubt::Reason;
 use isograd::{
-    Error, Grid, Options, PointCloud, Reconstructor, Report, Resolution, Verdict, Warning,
+    Error, Grid, Options, PointCloud, Reconstructor, Report, Resolution, SurfaceResolution,
+    Verdict, Warning,
 };
 
 use crate::common::{TORUS, Uniform};
@@ -150,10 +151,16 @@ fn a_plate_of_two_cells_of_the_surface_is_called_thin() {
 }
 
 #[test]
-fn few_samples_on_a_fine_grid_are_called_sparse() {
-    let warnings = report(sphere(400, -1.0, [0.0; 3], 1.0), 64).warnings;
-    let sparse = warnings.iter().any(|w| matches!(w, Warning::Sparse { .. }));
-    assert!(sparse, "{warnings:?}");
+fn few_samples_on_a_fine_surface_are_called_sparse() {
+    let cloud = PointCloud::new(sphere(400, -1.0, [0.0; 3], 1.0)).expect("finite points");
+    for (surface, is_sparse) in [
+        (SurfaceResolution::Grid, true),
+        (SurfaceResolution::Auto, false),
+    ] {
+        let warnings = report_with(&cloud, 64, Options::default().surface(surface)).warnings;
+        let found = warnings.iter().any(|w| matches!(w, Warning::Sparse { .. }));
+        assert_eq!(found, is_sparse, "{surface:?}: {warnings:?}");
+    }
 }
 
 #[test]
