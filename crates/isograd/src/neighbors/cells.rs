@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::candidates::Candidates;
-use super::cell_index::{CellIndex, Node, Place, TASK};
+use super::cell_index::{CellIndex, Place, TASK};
 use crate::{Real, simd};
 
 /// What is looked for: points within a radius, with values that they carry, arrays in sorted order.
@@ -26,16 +26,55 @@ impl<T: Real> CellIndex<T> {
     ) {
         debug_assert_eq!(out.len(), self.len());
         if !self.is_empty() {
-            let walk = Walk {
-                index: self,
-                search: Search { radius, values },
-                limit: radius * radius,
-                arch: pulp::Arch::new(),
-                fill,
-            };
-            let mut buffers = Buffers::new(&[self.root()]);
-            walk.below(self.root(), 0..1, out, &mut buffers);
+            let (limit, arch) = (radius * radius, pulp::Arch::new());
+            let leaf =
+                |at: Place, near: &[Place], candidates: &mut Candidates<T, M>, out: &mut [U]| {
+                    simd::vectorized!(arch, self.collect(at, near, values, limit, candidates));
+                    fill(at.start..at.end, candidates, out);
+                };
+            self.for_each_leaf(limit, out, &leaf);
         }
+    }
+
+    /// Collects the points of the cells `near` that are within a distance of the box of `at`, whose square is `limit`.
+    #[inline(always)]
+    fn collect<const M: usize>(
+        &self,
+        at: Place,
+        near: &[Place],
+        values: [&[T]; M],
+        limit: T,
+        candidates: &mut Candidates<T, M>,
+    ) {
+        let corners = self.nodes[at.node].corners();
+        candidates.clear();
+        for place in near {
+            let cell = place.start..place.end;
+            let points = self.coordinates_of(cell.clone());
+            let values = values.map(
+                #[inline(always)]
+                |values| &values[cell.clone()],
+            );
+            candidates.extend_near(points, values, corners, limit);
+        }
+        candidates.fill_last_lanes();
+    }
+
+    /// Calls `leaf(cell, cells near to it, scratch, out of that cell)` for every cell, in parallel; `out` has a place for
+    /// each point in sorted order, and `limit` is the square of the distance up to which a cell is near.
+    pub(super) fn for_each_leaf<S: Default, U: Send>(
+        &self,
+        limit: T,
+        out: &mut [U],
+        leaf: &(impl Fn(Place, &[Place], &mut S, &mut [U]) + Sync),
+    ) {
+        let walk = Walk {
+            index: self,
+            limit,
+            leaf,
+        };
+        let mut buffers = Buffers::new(&[self.root()]);
+        walk.below(self.root(), 0..1, out, &mut buffers);
     }
 
     /// All points within the radius of a point.
@@ -61,49 +100,42 @@ impl<T: Real> CellIndex<T> {
 
 /// A walk down the tree that hands on what is near: the nodes near to a child are children of the nodes
 /// near to its parent.
-struct Walk<'a, T, const M: usize, F> {
+struct Walk<'a, T, F> {
     index: &'a CellIndex<T>,
-    search: Search<'a, T, M>,
-    /// The squared radius.
+    /// The square of the distance up to which nodes are near.
     limit: T,
-    arch: pulp::Arch,
-    fill: &'a F,
+    leaf: &'a F,
 }
 
 /// Memory of one task.
-struct Buffers<T, const M: usize> {
+struct Buffers<S> {
     /// Nodes near to the one at hand, after those near to the nodes above it.
     near: Vec<Place>,
-    candidates: Candidates<T, M>,
+    scratch: S,
 }
 
-impl<T: Real, const M: usize> Buffers<T, M> {
+impl<S: Default> Buffers<S> {
     fn new(near: &[Place]) -> Self {
         Self {
             near: near.to_vec(),
-            candidates: Candidates::default(),
+            scratch: S::default(),
         }
     }
 }
 
-impl<T: Real, const M: usize, F> Walk<'_, T, M, F> {
-    fn node(&self, place: Place) -> &Node<T> {
-        &self.index.nodes[place.node]
-    }
-
-    /// Fills the cells below `at`; `near` are the places in the buffer of the nodes near to it.
-    fn below<U: Send>(
+impl<T: Real, F> Walk<'_, T, F> {
+    /// Visits the cells below `at`; `near` are the places in the buffer of the nodes near to it.
+    fn below<S: Default, U: Send>(
         &self,
         at: Place,
         near: Range<usize>,
         out: &mut [U],
-        buffers: &mut Buffers<T, M>,
+        buffers: &mut Buffers<S>,
     ) where
-        F: Fn(Range<usize>, &Candidates<T, M>, &mut [U]) + Sync,
+        F: Fn(Place, &[Place], &mut S, &mut [U]) + Sync,
     {
         if at.levels == 0 {
-            self.collect(at, near, buffers);
-            (self.fill)(at.start..at.end, &buffers.candidates, out);
+            (self.leaf)(at, &buffers.near[near], &mut buffers.scratch, out);
             return;
         }
         let [left, right] = at.children();
@@ -119,46 +151,25 @@ impl<T: Real, const M: usize, F> Walk<'_, T, M, F> {
     }
 
     /// Goes on below `at`, where `near` are the nodes near to its parent.
-    fn enter<U: Send>(
+    fn enter<S: Default, U: Send>(
         &self,
         at: Place,
         near: Range<usize>,
         out: &mut [U],
-        buffers: &mut Buffers<T, M>,
+        buffers: &mut Buffers<S>,
     ) where
-        F: Fn(Range<usize>, &Candidates<T, M>, &mut [U]) + Sync,
+        F: Fn(Place, &[Place], &mut S, &mut [U]) + Sync,
     {
-        let (first, own) = (buffers.near.len(), self.node(at));
+        let nodes = &self.index.nodes;
+        let (first, own) = (buffers.near.len(), &nodes[at.node]);
         for i in near {
             for child in buffers.near[i].children() {
-                if own.box_distance_squared(self.node(child)) <= self.limit {
+                if own.box_distance_squared(&nodes[child.node]) <= self.limit {
                     buffers.near.push(child);
                 }
             }
         }
         self.below(at, first..buffers.near.len(), out, buffers);
         buffers.near.truncate(first);
-    }
-
-    /// The points of the cells `near` that are within the radius of the box of `at`.
-    fn collect(&self, at: Place, near: Range<usize>, buffers: &mut Buffers<T, M>) {
-        let Buffers {
-            near: places,
-            candidates,
-        } = buffers;
-        let corners = self.node(at).corners();
-        candidates.clear();
-        simd::vectorized!(self.arch, {
-            for place in &places[near.clone()] {
-                let cell = place.start..place.end;
-                let points = self.index.coordinates_of(cell.clone());
-                let values = self.search.values.map(
-                    #[inline(always)]
-                    |values| &values[cell.clone()],
-                );
-                candidates.extend_near(points, values, corners, self.limit);
-            }
-        });
-        candidates.fill_last_lanes();
     }
 }

@@ -26,6 +26,7 @@ mod cells;
 mod census;
 mod gather;
 mod nearest;
+mod nearest_of_all;
 #[cfg(test)]
 mod order_tests;
 mod radius;

@@ -12,16 +12,20 @@ impl<T: Real> CellIndex<T> {
     /// a query near the points, in a cluster or far outside; only where nearly all points are equally far (the center of
     /// a sphere) does it have to look at most of them.
     pub fn nearest(&self, query: [T; 3], k: usize, out: &mut Vec<(u32, T)>) {
-        out.clear();
-        if k > 0 && !self.is_empty() {
-            self.nearest_below(self.root(), query, k, out);
-        }
+        self.nearest_positions(query, k, out);
         let order = self.order();
         out.iter_mut()
             .for_each(|(found, _)| *found = order[*found as usize]);
     }
 
     /// Like [`Self::nearest`], with sorted positions in the place of input indices.
+    pub(super) fn nearest_positions(&self, query: [T; 3], k: usize, out: &mut Vec<(u32, T)>) {
+        out.clear();
+        if k > 0 && !self.is_empty() {
+            self.nearest_below(self.root(), query, k, out);
+        }
+    }
+
     fn nearest_below(&self, at: Place, query: [T; 3], k: usize, out: &mut Vec<(u32, T)>) {
         if at.levels == 0 {
             for position in at.start..at.end {

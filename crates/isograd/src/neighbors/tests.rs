@@ -157,6 +157,29 @@ fn nearest_agrees_with_brute_force_in_f32_and_f64() {
     nearest_agrees_with_brute_force::<f64>();
 }
 
+fn nearest_of_all_agree_with_single_searches<T: Real>() {
+    for (name, points) in ugly_clouds::<T>() {
+        let index = CellIndex::new(&points);
+        let (mut all, mut found) = (vec![[0; 5]; points.len()], Vec::new());
+        for radius in [0.0, 1e-3, 0.1, 0.3, 1e3] {
+            index.nearest_of_all(T::of(radius), &mut all);
+            for (position, others) in all.iter().enumerate().step_by(7) {
+                index.nearest_positions(index.point(position), 6, &mut found);
+                let mut expected: Vec<_> = found.iter().map(|&(other, _)| other).collect();
+                expected.retain(|&other| other as usize != position);
+                expected.resize(5, position as u32);
+                assert_eq!(others[..], expected, "{name}, radius {radius}");
+            }
+        }
+    }
+}
+
+#[test]
+fn nearest_of_all_agree_with_single_searches_in_f32_and_f64() {
+    nearest_of_all_agree_with_single_searches::<f32>();
+    nearest_of_all_agree_with_single_searches::<f64>();
+}
+
 #[test]
 fn points_within_a_radius_agree_with_brute_force() {
     for (name, points) in ugly_clouds::<f32>() {

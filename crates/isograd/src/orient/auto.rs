@@ -21,8 +21,10 @@ pub(super) struct Auto {
     clusters: Clusters,
     fill: Fill,
     evidence: Evidence,
-    /// Beliefs of the next round.
-    next: Vec<f32>,
+    /// Evidence and beliefs for each [`Interpretation`], and beliefs of the next round.
+    observed: Vec<[f32; 2]>,
+    beliefs: Vec<[f32; 2]>,
+    next: Vec<[f32; 2]>,
     signs: Signs,
     reaches: Vec<f32>,
 }
@@ -81,22 +83,23 @@ impl Auto {
             let order = sites.order().iter();
             of_sensors.extend(order.map(|&i| of_view(views[i as usize])));
         }
-        let (graph, observed, next) = (&self.graph, &self.evidence, &mut self.next);
         let sensors = views.is_some();
-        let ambiguous = !sensors && observed.is_ambiguous();
-        self.signs.find(
-            graph,
-            &place,
-            sensors,
-            ambiguous,
-            |interpretation, evidence, belief| {
-                evidence.clear();
-                let all = 0..graph.near.len();
-                evidence.extend(all.map(|p| observed.total(p, graph.side[p], interpretation)));
-                graph.relax(evidence, belief, next);
-            },
-        );
+        let ambiguous = !sensors && self.evidence.is_ambiguous();
+        self.spread();
+        let observed = (&*self.observed, &*self.beliefs);
+        let graph = &self.graph;
+        self.signs.find(graph, &place, sensors, ambiguous, observed);
         self.sites = sites;
+    }
+
+    /// Spreads the evidence of both interpretations at once: reading the graph takes longer than what is done with it.
+    fn spread(&mut self) {
+        let (graph, collected) = (&self.graph, &self.evidence);
+        let both = [Interpretation::Careful, Interpretation::Bold];
+        let total = |p: usize| both.map(|of| collected.total(p, graph.side[p], of));
+        let all = (0..graph.near.len()).into_par_iter();
+        all.map(total).collect_into_vec(&mut self.observed);
+        graph.relax(&self.observed, &mut self.beliefs, &mut self.next);
     }
 
     /// Input index and sign of every point.

@@ -52,6 +52,8 @@ pub struct Graph {
     pub(super) sheets: Sheets,
     /// Scratch for medians.
     pub(super) values: Vec<f32>,
+    /// `(N, 16)` positions of the nearest other samples in the neighbor index, in its order.
+    pub(super) nearest: Vec<[u32; NEIGHBORS]>,
 }
 
 impl Graph {
@@ -92,11 +94,11 @@ impl Graph {
         sites: &Sites,
     ) {
         let order = sites.order();
-        self.axis.clear();
-        self.axis.extend(order.iter().map(|&i| {
+        let unit = |&i: &u32| {
             let axis = vector::normalized(vector::to_f64(axes.normals[i as usize]));
             axis.unwrap_or([0.0; 3]).map(|a| a as f32)
-        }));
+        };
+        order.par_iter().map(unit).collect_into_vec(&mut self.axis);
         let spacing = neighborhoods.spacing().f64();
         let scatter = |&i: &u32| {
             let i = i as usize;
@@ -109,41 +111,28 @@ impl Graph {
                 _ => (0.0, 0.0),
             }
         };
-        self.spread.clear();
-        self.side.clear();
-        for (spread, side) in order.iter().map(scatter) {
-            self.spread.push(spread);
-            self.side.push(side);
-        }
+        order
+            .par_iter()
+            .map(scatter)
+            .unzip_into_vecs(&mut self.spread, &mut self.side);
     }
 
     fn find_neighbors<T: Real>(&mut self, neighborhoods: &Neighborhoods<T>, sites: &Sites) {
         let index = &neighborhoods.index;
-        let place = |site: usize| index.point(sites.position(site));
+        self.nearest.resize(index.len(), [0; NEIGHBORS]);
+        index.nearest_of_all(neighborhoods.common_radius, &mut self.nearest);
         let unit = 1.0 / neighborhoods.spacing().f64();
-        let near = self.near.par_chunks_mut(CHUNK);
-        let offset = self.offset.par_chunks_mut(CHUNK);
-        near.zip(offset)
-            .enumerate()
-            .for_each_init(Vec::new, |nearest, (chunk, (near, offset))| {
-                for (k, (near, offset)) in near.iter_mut().zip(offset).enumerate() {
-                    let own = chunk * CHUNK + k;
-                    let point = place(own);
-                    index.nearest(point, NEIGHBORS + 1, nearest);
-                    *near = [own as u32; NEIGHBORS];
-                    *offset = [[0.0; 3]; NEIGHBORS];
-                    let others = nearest.iter().map(|&(i, _)| sites.of(i));
-                    for (slot, other) in others
-                        .filter(|&q| q as usize != own)
-                        .take(NEIGHBORS)
-                        .enumerate()
-                    {
-                        near[slot] = other;
-                        let d = vector::sub(place(other as usize), point);
-                        offset[slot] = d.map(|x| (x.f64() * unit) as f32);
-                    }
-                }
-            });
+        let nearest = &self.nearest;
+        let near = self.near.par_iter_mut().zip(&mut self.offset);
+        near.enumerate().for_each(|(site, (near, offset))| {
+            let own = sites.position(site);
+            let point = index.point(own);
+            for (slot, &other) in nearest[own].iter().enumerate() {
+                near[slot] = sites.of(index.order()[other as usize]);
+                let d = vector::sub(index.point(other as usize), point);
+                offset[slot] = d.map(|x| (x.f64() * unit) as f32);
+            }
+        });
     }
 
     /// Takes the axis of its own sheet for each point whose neighbors lie on several.
@@ -294,15 +283,23 @@ impl Graph {
         coupling::sheet_evidence(signed, total)
     }
 
-    /// Propagates the evidence `(N,)`, in −1..1: repeated means of the beliefs of the neighbors of a point, weighted by
-    /// coupling, and its own evidence, weighted by its magnitude. `next` is scratch.
+    /// Propagates some kinds of evidence `(N, K)`, in −1..1, each by itself: repeated means of the beliefs of the neighbors
+    /// of a point, weighted by coupling, and its own evidence, weighted by its magnitude. `next` is scratch.
     ///
     /// # Panics
     /// There is evidence of fewer or of more than the points of the graph.
-    pub fn relax(&self, evidence: &[f32], belief: &mut Vec<f32>, next: &mut Vec<f32>) {
+    pub fn relax<const K: usize>(
+        &self,
+        evidence: &[[f32; K]],
+        belief: &mut Vec<[f32; K]>,
+        next: &mut Vec<[f32; K]>,
+    ) {
+        assert_eq!(evidence.len(), self.coupling.len());
+        let samples = evidence.par_iter().zip(&self.coupling);
+        let weights: Vec<[f32; K]> = samples.map(|(own, ties)| weight(own, ties)).collect();
         belief.clear();
         belief.extend_from_slice(evidence);
-        next.resize(belief.len(), 0.0);
+        next.resize(belief.len(), [0.0; K]);
         for _ in 0..ROUNDS {
             let before = &*belief;
             next.par_chunks_mut(CHUNK)
@@ -310,7 +307,8 @@ impl Graph {
                 .for_each(|(chunk, next)| {
                     for (k, next) in next.iter_mut().enumerate() {
                         let p = chunk * CHUNK + k;
-                        *next = spread(evidence[p], &self.coupling[p], &self.near[p], before);
+                        let sum = spread(&evidence[p], &self.coupling[p], &self.near[p], before);
+                        *next = std::array::from_fn(|e| coupling::belief(sum[e], weights[p][e]));
                     }
                 });
             std::mem::swap(belief, next);
@@ -318,15 +316,26 @@ impl Graph {
     }
 }
 
+/// The weights of the own evidence and of all neighbors, in the order in which [`spread`] adds what they weight.
+fn weight<const K: usize>(own: &[f32; K], coupling: &[f32; NEIGHBORS]) -> [f32; K] {
+    own.map(|own| coupling.iter().fold(own.abs(), |sum, tie| sum + tie.abs()))
+}
+
 #[inline(always)]
-fn spread(own: f32, coupling: &[f32; NEIGHBORS], near: &[u32; NEIGHBORS], belief: &[f32]) -> f32 {
-    let mut sum = coupling::held(own);
-    let mut weight = own.abs();
-    for slot in 0..NEIGHBORS {
-        sum += coupling[slot] * belief[near[slot] as usize];
-        weight += coupling[slot].abs();
+fn spread<const K: usize>(
+    own: &[f32; K],
+    coupling: &[f32; NEIGHBORS],
+    near: &[u32; NEIGHBORS],
+    belief: &[[f32; K]],
+) -> [f32; K] {
+    let mut sum = own.map(coupling::held);
+    for (&tie, &q) in coupling.iter().zip(near) {
+        let other = &belief[q as usize];
+        for (sum, other) in sum.iter_mut().zip(other) {
+            *sum += tie * other;
+        }
     }
-    coupling::belief(sum, weight)
+    sum
 }
 
 /// Spread of the samples about the plane round one of them, in spacings, and the side of it on which that one lies.

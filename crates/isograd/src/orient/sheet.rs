@@ -59,18 +59,29 @@ impl Sheet {
 
 type Offsets = [[f32; 3]; NEIGHBORS];
 
+/// Offsets, an array for each axis.
+type ByAxis = [[f32; NEIGHBORS]; 3];
+
+/// Bits of numbers that are not negative: ordered as they are, and compared without branches or masks.
+type Bits = [i32; NEIGHBORS];
+
 /// The sheet through a sample, from the offsets to its neighbors and the axis of all of them together;
 /// `None` where one plane serves for all, or none stands out.
+#[inline(always)]
 pub(super) fn find(offset: &Offsets, axis: [f32; 3]) -> Option<Sheet> {
-    let together = residuals(offset, axis);
-    let (normal, fit) = best_plane(offset, axis, quantile(together, QUORUM));
-    let apart = residuals(offset, normal);
-    let rest = quantile(apart, REST).max(quantile(together, REST));
+    let by_axis = std::array::from_fn(|a| std::array::from_fn(|k| offset[k][a]));
+    let together = residuals(&by_axis, axis);
+    let (normal, fit) = best_plane(offset, &by_axis, axis, quantile(&together, QUORUM));
+    let apart = residuals(&by_axis, normal);
+    let rest = quantile(&apart, REST).max(quantile(&together, REST));
     if !stands_out(fit, rest) {
         return None;
     }
     let limit = largest_residual(fit, rest);
-    let on = offset.iter().zip(apart).filter(|&(_, r)| r <= limit);
+    let on = offset
+        .iter()
+        .zip(apart)
+        .filter(|&(_, r)| number(r) <= limit);
     let (found, scatter) = plane(on.map(|(d, _)| *d));
     let sheet = Sheet {
         axis: found,
@@ -80,20 +91,18 @@ pub(super) fn find(offset: &Offsets, axis: [f32; 3]) -> Option<Sheet> {
 }
 
 /// Of the given plane and those spanned by two near neighbors, the one closest to a quorum, and how close.
-fn best_plane(offset: &Offsets, axis: [f32; 3], fit: f32) -> ([f32; 3], f32) {
+#[inline(always)]
+fn best_plane(offset: &Offsets, by_axis: &ByAxis, axis: [f32; 3], fit: f32) -> ([f32; 3], f32) {
     let mut best = (axis, fit);
     for j in 0..SPANNING {
         for k in j + 1..SPANNING {
             let normal = vector::cross(offset[j], offset[k]);
             let square = vector::norm_squared(normal);
             let squares = vector::norm_squared(offset[j]) * vector::norm_squared(offset[k]);
-            if !spans(square, squares) {
-                continue;
-            }
             let normal = vector::scale(normal, 1.0 / square.sqrt());
-            let r = residuals(offset, normal);
-            if r.iter().filter(|&&r| r < best.1).count() >= QUORUM {
-                best = (normal, quantile(r, QUORUM));
+            let r = residuals(by_axis, normal);
+            if spans(square, squares) & (below(&r, best.1) >= QUORUM as i32) {
+                best = (normal, quantile(&r, QUORUM));
             }
         }
     }
@@ -119,13 +128,41 @@ fn plane(offsets: impl Iterator<Item = [f32; 3]>) -> ([f32; 3], f32) {
 
 /// Distances of the neighbors from a plane through the sample.
 #[inline(always)]
-fn residuals(offset: &Offsets, normal: [f32; 3]) -> [f32; NEIGHBORS] {
-    offset.map(|d| vector::dot(d, normal).abs())
+fn residuals([x, y, z]: &ByAxis, normal: [f32; 3]) -> Bits {
+    let residual = |k: usize| vector::dot([x[k], y[k], z[k]], normal).abs();
+    std::array::from_fn(|k| residual(k).to_bits() as i32)
 }
 
-/// The value of the given rank, from 1.
-fn quantile(mut values: [f32; NEIGHBORS], rank: usize) -> f32 {
-    *values.select_nth_unstable_by(rank - 1, f32::total_cmp).1
+#[inline(always)]
+fn number(bits: i32) -> f32 {
+    f32::from_bits(bits as u32)
+}
+
+/// −1 if the first of two numbers is less, else 0.
+#[inline(always)]
+fn less(a: i32, b: i32) -> i32 {
+    (a - b) >> 31
+}
+
+/// How many of the values are less than one.
+#[inline(always)]
+fn below(values: &Bits, value: f32) -> i32 {
+    let value = value.to_bits() as i32;
+    -values.iter().map(|&x| less(x, value)).sum::<i32>()
+}
+
+/// The value of the given rank, from 1: the largest that has fewer below it.
+#[inline(always)]
+fn quantile(values: &Bits, rank: usize) -> f32 {
+    let mut below = [0; NEIGHBORS];
+    for &other in values {
+        for (below, &value) in below.iter_mut().zip(values) {
+            *below -= less(other, value);
+        }
+    }
+    let candidates = values.iter().zip(below);
+    let candidates = candidates.map(|(&value, below)| value & less(below, rank as i32));
+    number(candidates.fold(0, i32::max))
 }
 
 /// Whether two offsets span a plane, by the square of their cross product and the product of their squares.

@@ -8,7 +8,8 @@ use rayon::prelude::*;
 
 use super::coupling::{self, NEIGHBORS};
 use super::sheet::{self, Sheet};
-use crate::vector;
+use crate::parallel::CHUNK;
+use crate::{simd, vector};
 
 /// Neighbors that must have found the same sheet to confirm it.
 const CONFIRMING: usize = 4;
@@ -45,9 +46,17 @@ pub(super) struct Sheets {
 impl Sheets {
     /// Finds, confirms and extends the sheets. `axes` `(N, 3)` are those of whole neighborhoods.
     pub(super) fn find(&mut self, near: Near<'_>, axes: &[[f32; 3]]) {
-        let found = |p: usize| sheet::find(&near.offset[p], axes[p]).unwrap_or_default();
-        let all = (0..axes.len()).into_par_iter();
-        all.map(found).collect_into_vec(&mut self.sheets);
+        let arch = pulp::Arch::new();
+        self.sheets.resize(axes.len(), Sheet::default());
+        let chunks = self.sheets.par_chunks_mut(CHUNK);
+        let neighbors = near.offset.par_chunks(CHUNK).zip(axes.par_chunks(CHUNK));
+        chunks.zip(neighbors).for_each(|(sheets, (offset, axes))| {
+            simd::vectorized!(arch, {
+                for ((sheet, offset), &axis) in sheets.iter_mut().zip(offset).zip(axes) {
+                    *sheet = sheet::find(offset, axis).unwrap_or_default();
+                }
+            });
+        });
         self.update(|sheets, p| {
             let sheet = sheets[p];
             let confirmed = sheet.is_known() && near.agreeing(sheets, p, sheet) >= CONFIRMING;
@@ -130,12 +139,12 @@ pub(super) fn interleaved(offset: &[[f32; 3]; NEIGHBORS], sheet: Sheet) -> f32 {
     let on = offset.map(|d| sheet.holds(d));
     let is_beyond = |q: usize, r: usize| {
         let cosine = vector::dot(along[q], along[r]);
-        on[r] && square[r] > square[q] && cosine > TOWARD * (square[q] * square[r]).sqrt()
+        on[r] & (square[r] > square[q]) & (cosine > TOWARD * (square[q] * square[r]).sqrt())
     };
     let (mut off, mut under) = (0u8, 0u8);
     for q in (0..NEIGHBORS).filter(|&q| !on[q]) {
         off += 1;
-        under += u8::from((0..NEIGHBORS).any(|r| is_beyond(q, r)));
+        under += u8::from((0..NEIGHBORS).fold(false, |any, r| any | is_beyond(q, r)));
     }
     f32::from(under) / f32::from(off.max(1))
 }

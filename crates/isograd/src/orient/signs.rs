@@ -110,20 +110,24 @@ struct Solution {
 }
 
 impl Signs {
-    /// Finds the sign of each axis. `collect` writes, for an interpretation, the evidence and the beliefs of the samples,
-    /// from −1 to 1. With `ambiguous` evidence both interpretations are solved. With `sensors`, whose evidence is more
-    /// reliable than the winding number, that is not used.
+    /// Finds the sign of each axis, from the `evidence` and the `belief` of each sample, from −1 to 1, for each
+    /// [`Interpretation`]. With `ambiguous` evidence both are solved. With `sensors`, whose evidence is more reliable than the
+    /// winding number, that is not used.
     pub fn find(
         &mut self,
         graph: &Graph,
         place: &impl Place,
         sensors: bool,
         ambiguous: bool,
-        mut collect: impl FnMut(Interpretation, &mut Vec<f32>, &mut Vec<f32>),
+        (evidence, belief): (&[[f32; 2]], &[[f32; 2]]),
     ) {
         let winding = if sensors { 0.0 } else { WINDING };
-        let mut solve = |signs: &mut Self, interpretation| {
-            collect(interpretation, &mut signs.evidence, &mut signs.belief);
+        let solve = |signs: &mut Self, interpretation: Interpretation| {
+            let of_one = |both: &[f32; 2]| both[interpretation as usize];
+            signs.evidence.clear();
+            signs.evidence.extend(evidence.iter().map(of_one));
+            signs.belief.clear();
+            signs.belief.extend(belief.iter().map(of_one));
             let observed = (&*signs.evidence, &*signs.belief);
             signs.domains.run(graph, observed, winding, place);
         };

@@ -26,8 +26,8 @@ const NOISY: f64 = 0.2;
 /// as often wrong as right.
 const GAIN: f64 = 1.0;
 
-/// Levels of coupling between [`STRONG`] and 1, strongest first, by which segments grow.
-const LEVELS: u32 = 16;
+/// Levels of coupling between [`STRONG`] and 1, by which segments grow, from the strongest on.
+const LEVELS: usize = 16;
 
 impl DomainSigns {
     /// Corrects the signs of patches within domains. `evidence` and `winding` as in [`DomainSigns::run`].
@@ -75,20 +75,30 @@ impl DomainSigns {
         let n = self.sign.len();
         let mut parent: Vec<u32> = (0..n as u32).collect();
         let mut size = vec![1; n];
-        for level in (0..LEVELS).rev() {
-            let least = STRONG + (1.0 - STRONG) * level as f32 / LEVELS as f32;
-            for p in 0..n {
-                for (q, _) in self.agreements(graph, p).filter(|&(_, a)| a >= least) {
-                    let (a, b) = (root(&mut parent, p as u32), root(&mut parent, q));
-                    let (low, high) = (a.min(b) as usize, a.max(b) as usize);
-                    if low != high && size[low] + size[high] <= limit {
-                        parent[high] = low as u32;
-                        size[low] += size[high];
-                    }
-                }
+        // What a level joins, or is too large to be joined, stays so: each coupling counts on its own level alone.
+        for (p, q) in self.by_level(graph).into_iter().rev().flatten() {
+            let (a, b) = (root(&mut parent, p), root(&mut parent, q));
+            let (low, high) = (a.min(b) as usize, a.max(b) as usize);
+            if low != high && size[low] + size[high] <= limit {
+                parent[high] = low as u32;
+                size[low] += size[high];
             }
         }
         number(&mut self.domain, n as u32, |p| root(&mut parent, p))
+    }
+
+    /// Samples and neighbors of strong couplings that the signs agree with, for each level.
+    fn by_level(&self, graph: &Graph) -> [Vec<(u32, u32)>; LEVELS] {
+        let mut couplings = [(); LEVELS].map(|()| Vec::new());
+        for p in 0..self.sign.len() {
+            for (q, agreement) in self.agreements(graph, p) {
+                if agreement >= STRONG {
+                    let level = (agreement - STRONG) / (1.0 - STRONG) * LEVELS as f32;
+                    couplings[(level as usize).min(LEVELS - 1)].push((p as u32, q));
+                }
+            }
+        }
+        couplings
     }
 
     /// Turns the segments whose sign in `outcome` is −1, relative to the evidence, if these are at least so many samples
