@@ -13,7 +13,7 @@ use super::regions::{self, Regions};
 use super::sight::{self, RAYS, STEPS};
 use super::visibility::Visibility;
 use crate::parallel::CHUNK;
-use crate::vector;
+use crate::{simd, vector};
 
 /// Free cells on each side of a body.
 const MARGIN: f64 = 3.0;
@@ -24,6 +24,9 @@ const FEWEST: usize = 216;
 /// Planes of the grid drawn by one task, and more than the radius of any disc in cells: what one task draws
 /// comes from its own samples and those of the tasks beside it.
 const SLAB: usize = 8;
+
+/// Most cells of a row that a disc may cover: the diameter of the largest, and one more.
+const LONGEST: usize = 16;
 
 /// A cubic grid round a part of the cloud, in user coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -149,11 +152,16 @@ impl Fill {
         self.occupied.resize(lattice.size(), 0);
         let (discs, by_slab) = (&self.discs, &self.by_slab);
         let slabs = self.occupied.par_chunks_mut(SLAB * ny * nz);
+        let arch = pulp::Arch::new();
         slabs.enumerate().for_each(|(slab, cells)| {
             let nearby = slab.saturating_sub(1)..(slab + 2).min(by_slab.len());
-            for &m in by_slab[nearby].iter().flatten() {
-                discs[m as usize].draw(slab * SLAB, [ny, nz], cells);
-            }
+            simd::vectorized!(arch, {
+                for nearby in &by_slab[nearby.clone()] {
+                    for &m in nearby {
+                        discs[m as usize].draw(slab * SLAB, [ny, nz], cells);
+                    }
+                }
+            });
         });
     }
 
@@ -256,6 +264,7 @@ impl Disc {
 
     /// Marks the cells whose center is in the disc, and the cell of its own center, in the planes from
     /// `first_plane` on that `cells` holds.
+    #[inline(always)]
     fn draw(&self, first_plane: usize, [ny, nz]: [usize; 2], cells: &mut [u8]) {
         let planes = first_plane..first_plane + cells.len() / (ny * nz);
         let own = self.center.map(|c| c as usize);
@@ -270,19 +279,27 @@ impl Disc {
         for x in span(0, planes.start, planes.end) {
             for y in span(1, 0, ny) {
                 let row = ((x - first_plane) * ny + y) * nz;
-                for z in span(2, 0, nz) {
-                    if self.covers([x, y, z]) {
-                        cells[row + z] = 1;
-                    }
+                let along = span(2, 0, nz);
+                let covered = self.covers([x, y, along.start]);
+                let cells = &mut cells[row + along.start..row + along.end];
+                for (cell, covered) in cells.iter_mut().zip(covered) {
+                    *cell |= covered;
                 }
             }
         }
     }
 
+    /// 1 for each cell of a row, from the first on, that is covered.
     #[inline(always)]
-    fn covers(&self, cell: [usize; 3]) -> bool {
-        let d = [0, 1, 2].map(|a| cell[a] as f32 + 0.5 - self.center[a]);
-        let height = vector::dot(d, self.axis);
-        disc::covers(vector::norm_squared(d), height, self.half, self.radius)
+    fn covers(&self, [x, y, first]: [usize; 3]) -> [u8; LONGEST] {
+        let [ax, ay, az] = self.axis;
+        let d = |a: usize, i: usize| i as f32 + 0.5 - self.center[a];
+        let (dx, dy) = (d(0, x), d(1, y));
+        std::array::from_fn(|k| {
+            let dz = d(2, first + k);
+            let square = dx * dx + dy * dy + dz * dz;
+            let height = dx * ax + dy * ay + dz * az;
+            u8::from(disc::covers(square, height, self.half, self.radius))
+        })
     }
 }

@@ -5,7 +5,7 @@
 //! there are sensors.
 
 use super::confidence;
-use super::domains::DomainSigns;
+use super::domains::{self, DomainSigns};
 use super::graph::Graph;
 use crate::vector;
 
@@ -134,10 +134,14 @@ impl Signs {
         solve(self, Interpretation::Careful);
         self.keep();
         if ambiguous && !sensors {
-            let careful = self.domains.misfit(graph, place);
             solve(self, Interpretation::Bold);
-            if self.domains.misfit(graph, place) < careful {
-                self.keep();
+            let signs = [&self.domains.sign, &self.best.sign];
+            // Mostly they agree.
+            if signs[0] != signs[1] {
+                let [bold, careful] = signs.map(|signs| domains::misfit(graph, place, signs));
+                if bold < careful {
+                    self.keep();
+                }
             }
         }
         let Solution { sign, belief, .. } = &self.best;

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::graph::Graph;
 use super::signs::{Domains, Place};
-use crate::vector;
+use crate::{simd, vector};
 use tree::{Dipole, Tree};
 
 mod tree;
@@ -34,11 +34,12 @@ fn numbers(graph: &Graph, place: &impl Place, domains: &Domains<'_>, probes: &[u
         let dipoles: Vec<Dipole> = members.iter().map(dipole).collect();
         Tree::new(dipoles)
     };
-    let trees: Vec<Tree> = domains.members().into_iter().map(of_domain).collect();
+    let members = domains.members().into_par_iter();
+    let trees: Vec<Tree> = members.map(of_domain).collect();
     let arch = pulp::Arch::new();
     let at_probe = |&probe: &u32| -> Vec<f64> {
         let at = place.in_spacings(probe as usize);
-        let winding = |tree: &Tree| crate::simd::vectorized!(arch, tree.winding_number(at));
+        let winding = |tree: &Tree| simd::vectorized!(arch, tree.winding_number(at));
         trees.iter().map(winding).collect()
     };
     let rows: Vec<Vec<f64>> = probes.par_iter().map(at_probe).collect();
@@ -73,16 +74,24 @@ impl Misfit {
         }
         let mut gram = vec![0.0; count * count];
         let rows = gram.par_chunks_mut((ROWS * count).max(1)).enumerate();
+        let arch = pulp::Arch::new();
         rows.for_each(|(chunk, rows)| {
-            for (weight, winding) in weighted() {
-                for (a, row) in (chunk * ROWS..).zip(rows.chunks_exact_mut(count)) {
-                    let own = weight * winding[a];
-                    for (sum, other) in row.iter_mut().zip(winding) {
-                        *sum += own * other;
+            simd::vectorized!(arch, {
+                for (weight, winding) in weighted() {
+                    for (a, row) in (chunk * ROWS..).zip(rows.chunks_exact_mut(count)) {
+                        let own = weight * winding[a];
+                        for (sum, other) in row[..=a].iter_mut().zip(winding) {
+                            *sum += own * other;
+                        }
                     }
                 }
-            }
+            });
         });
+        for a in 0..count {
+            for b in 0..a {
+                gram[b * count + a] = gram[a * count + b];
+            }
+        }
         Self {
             gram,
             pull,

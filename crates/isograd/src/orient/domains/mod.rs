@@ -254,12 +254,6 @@ impl DomainSigns {
         large
     }
 
-    /// Deviation of the winding number of the whole from that of a body.
-    pub(super) fn misfit(&self, graph: &Graph, place: &impl Place) -> f64 {
-        let whole = vec![0; self.sign.len()];
-        Misfit::new(graph, place, &self.signed(&whole, 1)).total()
-    }
-
     /// Marks the domains whose signs contradict most beliefs of their points, because of the winding number of all
     /// domains together or of their neighbors.
     fn find_overruled(&mut self, domains: usize, belief: &[f32]) {
@@ -309,6 +303,16 @@ impl DomainSigns {
             }
         }
     }
+}
+
+/// Deviation of the winding number of the whole, with these signs of the axes, from that of a body.
+pub(super) fn misfit(graph: &Graph, place: &impl Place, sign: &[f32]) -> f64 {
+    let whole = Domains {
+        domain: &vec![0; sign.len()],
+        sign,
+        count: 1,
+    };
+    Misfit::new(graph, place, &whole).total()
 }
 
 /// Numbers sets of points 0, 1, … in `domain`, from the root of each point, and returns how many there are.
