@@ -1,30 +1,58 @@
-//! The nearest others of every point at once.
+//! The nearest others of all points.
 //!
-//! Most points have enough others within the radius of a neighborhood. These are compared with each other, all with
-//! all: of so few that is vector code, and takes a fifth of the time of a search for each point.
+//! What is near to a cell is gathered once for all of its points. The few of these that may be among the nearest of one
+//! point are compared with each other, all with all. That is vector code, and sooner than a search for each point.
 
+use std::cell::Cell;
+use std::ops::Range;
+
+use super::candidates::LANES;
 use super::cell_index::{CellIndex, Place, distance_squared};
 use crate::{Real, simd};
 
-/// Most points within the radius that are compared with each other.
-const MOST: usize = 64;
+/// Most points that are compared with each other.
+const MOST: usize = 96;
+
+/// Most points that are gathered for a cell: where some lie much closer together than others, single searches are sooner.
+const MANY: usize = 1024;
+
+/// The `k`-th nearest of the points of a cell are sought within this many times the distance to that of one of them; of nearly
+/// all they are nearer.
+const REACHES: f64 = 1.4;
+
+/// More than rounding makes of a length.
+const MARGIN: f64 = 1.001;
 
 /// Memory of one task.
 struct Scratch<T> {
-    /// Sorted positions of the points near to a cell, their coordinates, and their squared distances from one point.
+    /// Whether all points near to a cell were gathered.
+    are_all: bool,
+    /// Their sorted positions, their coordinates, and their squared distances from one point.
     positions: Vec<u32>,
     coordinates: [Vec<T>; 3],
     squares: Vec<T>,
+    /// Points of the cell and the distances to their `k`-th nearest.
+    reaches: Vec<([T; 3], T)>,
     /// For a search.
     found: Vec<(u32, T)>,
+}
+
+impl<T> Scratch<T> {
+    fn clear(&mut self) {
+        self.are_all = true;
+        self.positions.clear();
+        self.coordinates.iter_mut().for_each(Vec::clear);
+    }
 }
 
 impl<T> Default for Scratch<T> {
     fn default() -> Self {
         Self {
+            are_all: true,
             positions: Vec::new(),
             coordinates: Default::default(),
             squares: Vec::new(),
+            reaches: Vec::new(),
             found: Vec::new(),
         }
     }
@@ -48,7 +76,10 @@ impl<T: Real> CellIndex<T> {
         }
         let (limit, arch) = (radius * radius, pulp::Arch::new());
         self.for_each_leaf(limit, out, &|at, near, scratch: &mut Scratch<T>, out| {
-            self.gather(near, scratch);
+            scratch.clear();
+            for cell in near {
+                self.gather(cell.start..cell.end, at, limit, scratch);
+            }
             for (position, out) in (at.start..at.end).zip(out) {
                 let is_found = simd::vectorized!(arch, {
                     let others = self.others(position, limit, scratch);
@@ -61,25 +92,89 @@ impl<T: Real> CellIndex<T> {
         });
     }
 
-    /// Collects the points of some cells.
-    fn gather(&self, cells: &[Place], scratch: &mut Scratch<T>) {
-        scratch.positions.clear();
-        scratch.coordinates.iter_mut().for_each(Vec::clear);
-        for cell in cells {
-            let cell = cell.start..cell.end;
-            let to = scratch.coordinates.iter_mut();
-            for (to, from) in to.zip(self.coordinates_of(cell.clone())) {
-                to.extend_from_slice(from);
+    /// Writes the squared distance from every point to its `k`-th nearest, itself included, or to the farthest of all where
+    /// there are fewer, into `out`, which has a place for each point in sorted order: the numbers of
+    /// [`Self::reach_squared`].
+    pub(super) fn reaches_squared(&self, k: usize, out: &mut [T]) {
+        debug_assert_eq!(out.len(), self.len());
+        let k = k.min(self.len());
+        if k == 0 {
+            return;
+        }
+        let arch = pulp::Arch::new();
+        let search = |position: usize, scratch: &mut Scratch<T>| {
+            self.reach_squared(self.point(position), k, &mut scratch.squares)
+        };
+        self.for_each_leaf(T::zero(), out, &|at, _, scratch: &mut Scratch<T>, out| {
+            let positions = at.start..at.end;
+            let middle = at.start + positions.len() / 2;
+            let reach = search(middle, scratch).sqrt();
+            let most = reach * T::of(REACHES);
+            self.gather_within(at, most, scratch);
+            scratch.reaches.clear();
+            scratch.reaches.push((self.point(middle), reach));
+            for (position, out) in positions.zip(out) {
+                let found = simd::vectorized!(arch, {
+                    let limit = self.bound(position, &scratch.reaches).min(most);
+                    let others = self.others(position, limit * limit, scratch);
+                    others.and_then(|others| others.smallest(k - 1))
+                });
+                *out = found.unwrap_or_else(|| search(position, scratch));
+                scratch.reaches.push((self.point(position), out.sqrt()));
             }
-            scratch
-                .positions
-                .extend(cell.map(|position| position as u32));
+        });
+    }
+
+    /// An upper bound of the distance from a point to its `k`-th nearest, from those of other points: by the way to one of
+    /// them and its own.
+    #[inline(always)]
+    fn bound(&self, position: usize, reaches: &[([T; 3], T)]) -> T {
+        let own = self.point(position);
+        let by_way = reaches
+            .iter()
+            .map(|&(point, reach)| distance_squared(point, own).sqrt() + reach);
+        by_way.fold(T::infinity(), T::min) * T::of(MARGIN)
+    }
+
+    /// Collects the points within a distance of the box of a cell.
+    fn gather_within(&self, at: Place, distance: T, scratch: &mut Scratch<T>) {
+        let (own, limit) = (&self.nodes[at.node], distance * distance);
+        scratch.clear();
+        let met = Cell::new(0);
+        self.walk(
+            &mut |node| met.get() <= MANY && node.box_distance_squared(own) <= limit,
+            &mut |cell| {
+                met.set(met.get() + cell.len());
+                self.gather(cell, at, limit, scratch);
+            },
+        );
+    }
+
+    /// Adds the points of a cell within a distance of the box of `at`, whose square is `limit`, to those gathered, unless
+    /// these are too many.
+    fn gather(&self, cell: Range<usize>, at: Place, limit: T, scratch: &mut Scratch<T>) {
+        scratch.are_all &= scratch.positions.len() + cell.len() <= MANY;
+        if scratch.are_all {
+            let own = &self.nodes[at.node];
+            for position in cell {
+                let point = self.point(position);
+                if own.distance_squared(point) <= limit {
+                    scratch.positions.push(position as u32);
+                    for (to, x) in scratch.coordinates.iter_mut().zip(point) {
+                        to.push(x);
+                    }
+                }
+            }
         }
     }
 
-    /// The gathered points within a distance of another one, whose square is `limit`; `None` if they are too many.
+    /// The points within a distance of another one, whose square is `limit`, of those gathered; `None` if these or those are
+    /// too many.
     #[inline(always)]
     fn others(&self, position: usize, limit: T, scratch: &mut Scratch<T>) -> Option<Others<T>> {
+        if !scratch.are_all {
+            return None;
+        }
         let own = self.point(position);
         let Scratch {
             positions,
@@ -128,19 +223,25 @@ impl<T: Real> CellIndex<T> {
 }
 
 impl<T: Real> Others<T> {
-    /// Writes the `K` nearest into `out`, nearest first; returns whether there are so many, no two of them equally far.
+    /// The number of nearer ones, for each.
     #[inline(always)]
-    fn sort<const K: usize>(&self, out: &mut [u32; K]) -> bool {
-        // The place of each is the number of nearer ones.
-        let mut rank = [0u32; MOST];
+    fn ranks(&self) -> [u32; MOST] {
+        let mut ranks = [0; MOST];
+        let filled = self.len.next_multiple_of(LANES);
         for &nearer in &self.squares[..self.len] {
-            for (rank, &square) in rank.iter_mut().zip(&self.squares) {
+            for (rank, &square) in ranks[..filled].iter_mut().zip(&self.squares) {
                 *rank += u32::from(nearer < square);
             }
         }
+        ranks
+    }
+
+    /// Writes the `K` nearest into `out`, nearest first; returns whether there are so many, no two of them equally far.
+    #[inline(always)]
+    fn sort<const K: usize>(&self, out: &mut [u32; K]) -> bool {
         let mut count = 0;
         *out = [u32::MAX; K];
-        for (&rank, &position) in rank.iter().zip(&self.positions).take(self.len) {
+        for (&rank, &position) in self.ranks().iter().zip(&self.positions).take(self.len) {
             if let Some(out) = out.get_mut(rank as usize) {
                 if *out != u32::MAX {
                     return false;
@@ -150,5 +251,14 @@ impl<T: Real> Others<T> {
             }
         }
         count == K
+    }
+
+    /// The `k`-th smallest square: the largest that has fewer below it. 0 for `k = 0`; `None` if there are fewer.
+    #[inline(always)]
+    fn smallest(&self, k: usize) -> Option<T> {
+        let ranks = self.ranks();
+        let low = ranks.iter().zip(&self.squares).take(self.len);
+        let low = low.filter(|&(&rank, _)| (rank as usize) < k);
+        (self.len >= k).then(|| low.fold(T::zero(), |largest, (_, &square)| largest.max(square)))
     }
 }

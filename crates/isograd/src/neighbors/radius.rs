@@ -333,13 +333,8 @@ fn automatic_radius<T: Real>(out: &mut Neighborhoods<T>) -> T {
         ..
     } = out;
     let n = index.len();
-    let reach = |distances: &mut Vec<T>, position: usize| {
-        index.reach_squared(index.point(position), AUTO_NEIGHBORS, distances)
-    };
-    let positions = (0..n).into_par_iter();
-    positions
-        .map_init(Vec::new, reach)
-        .collect_into_vec(squares);
+    squares.resize(n, T::zero());
+    index.reaches_squared(AUTO_NEIGHBORS, squares);
     let found = rule::middle_half(squares, scratch);
     out.middle = found.map(|(middle, _)| middle);
     rule::automatic(found.map(|(_, mean)| mean), n, out.index.bounds().into())

@@ -160,6 +160,14 @@ fn nearest_agrees_with_brute_force_in_f32_and_f64() {
 fn nearest_of_all_agree_with_single_searches<T: Real>() {
     for (name, points) in ugly_clouds::<T>() {
         let index = CellIndex::new(&points);
+        let (mut reaches, mut distances) = (vec![T::zero(); points.len()], Vec::new());
+        for k in [1, 2, 8, 24, 80, 1000] {
+            index.reaches_squared(k, &mut reaches);
+            for (position, &reach) in reaches.iter().enumerate().step_by(3) {
+                let expected = index.reach_squared(index.point(position), k, &mut distances);
+                assert_eq!(reach, expected, "{name}, k = {k}");
+            }
+        }
         let (mut all, mut found) = (vec![[0; 5]; points.len()], Vec::new());
         for radius in [0.0, 1e-3, 0.1, 0.3, 1e3] {
             index.nearest_of_all(T::of(radius), &mut all);
@@ -330,6 +338,10 @@ fn heavily_clustered_clouds_take_no_quadratic_time() {
             index.nearest(query, 8, &mut found);
             assert_eq!(found.len(), 8);
             index.reach_squared(query, 8, &mut distances);
+        }
+        index.reaches_squared(8, &mut vec![0.0; n]);
+        for radius in [1e-6, 1.0] {
+            index.nearest_of_all(radius, &mut vec![[0; 7]; n]);
         }
     }
 }
