@@ -67,10 +67,16 @@ struct Others<T> {
 
 impl<T: Real> CellIndex<T> {
     /// Writes the sorted positions of the `K` nearest others of every point, nearest first as by [`CellIndex::nearest`],
-    /// into `out`, which has a place for each point in sorted order; where there are too few, the point itself stands for
-    /// the rest. The result does not depend on `radius`, within which most points have `K` others or a few more.
-    pub(crate) fn nearest_of_all<const K: usize>(&self, radius: T, out: &mut [[u32; K]]) {
-        debug_assert_eq!(out.len(), self.len());
+    /// into `out`, in the order of [`CellIndex::positions_by_place`], which is `by_place`; where there are too few, the
+    /// point itself stands for the rest. The result does not depend on `radius`, within which most points have `K` others
+    /// or a few more.
+    pub(crate) fn nearest_of_all<const K: usize>(
+        &self,
+        radius: T,
+        by_place: &[u32],
+        out: &mut [[u32; K]],
+    ) {
+        debug_assert_eq!((out.len(), by_place.len()), (self.len(), self.len()));
         if self.is_empty() {
             return;
         }
@@ -80,7 +86,8 @@ impl<T: Real> CellIndex<T> {
             for cell in near {
                 self.gather(cell.start..cell.end, at, limit, scratch);
             }
-            for (position, out) in (at.start..at.end).zip(out) {
+            for (&position, out) in by_place[at.start..at.end].iter().zip(out) {
+                let position = position as usize;
                 let is_found = simd::vectorized!(arch, {
                     let others = self.others(position, limit, scratch);
                     others.is_some_and(|others| others.sort(out))

@@ -169,9 +169,12 @@ fn nearest_of_all_agree_with_single_searches<T: Real>() {
             }
         }
         let (mut all, mut found) = (vec![[0; 5]; points.len()], Vec::new());
+        let mut by_place = Vec::new();
+        index.positions_by_place(&mut by_place);
         for radius in [0.0, 1e-3, 0.1, 0.3, 1e3] {
-            index.nearest_of_all(T::of(radius), &mut all);
-            for (position, others) in all.iter().enumerate().step_by(7) {
+            index.nearest_of_all(T::of(radius), &by_place, &mut all);
+            for (&position, others) in by_place.iter().zip(&all).step_by(7) {
+                let position = position as usize;
                 index.nearest_positions(index.point(position), 6, &mut found);
                 let mut expected: Vec<_> = found.iter().map(|&(other, _)| other).collect();
                 expected.retain(|&other| other as usize != position);
@@ -340,8 +343,10 @@ fn heavily_clustered_clouds_take_no_quadratic_time() {
             index.reach_squared(query, 8, &mut distances);
         }
         index.reaches_squared(8, &mut vec![0.0; n]);
+        let mut by_place = Vec::new();
+        index.positions_by_place(&mut by_place);
         for radius in [1e-6, 1.0] {
-            index.nearest_of_all(radius, &mut vec![[0; 7]; n]);
+            index.nearest_of_all(radius, &by_place, &mut vec![[0; 7]; n]);
         }
     }
 }

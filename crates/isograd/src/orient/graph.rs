@@ -52,8 +52,6 @@ pub struct Graph {
     pub(super) sheets: Sheets,
     /// Scratch for medians.
     pub(super) values: Vec<f32>,
-    /// `(N, 16)` positions of the nearest other samples in the neighbor index, in its order.
-    pub(super) nearest: Vec<[u32; NEIGHBORS]>,
 }
 
 impl Graph {
@@ -119,18 +117,16 @@ impl Graph {
 
     fn find_neighbors<T: Real>(&mut self, neighborhoods: &Neighborhoods<T>, sites: &Sites) {
         let index = &neighborhoods.index;
-        self.nearest.resize(index.len(), [0; NEIGHBORS]);
-        index.nearest_of_all(neighborhoods.common_radius, &mut self.nearest);
+        let radius = neighborhoods.common_radius;
+        index.nearest_of_all(radius, sites.positions(), &mut self.near);
         let unit = 1.0 / neighborhoods.spacing().f64();
-        let nearest = &self.nearest;
         let near = self.near.par_iter_mut().zip(&mut self.offset);
         near.enumerate().for_each(|(site, (near, offset))| {
-            let own = sites.position(site);
-            let point = index.point(own);
-            for (slot, &other) in nearest[own].iter().enumerate() {
-                near[slot] = sites.of(index.order()[other as usize]);
-                let d = vector::sub(index.point(other as usize), point);
-                offset[slot] = d.map(|x| (x.f64() * unit) as f32);
+            let point = index.point(sites.position(site));
+            for (near, offset) in near.iter_mut().zip(offset) {
+                let d = vector::sub(index.point(*near as usize), point);
+                *offset = d.map(|x| (x.f64() * unit) as f32);
+                *near = sites.of(index.order()[*near as usize]);
             }
         });
     }

@@ -36,6 +36,11 @@ impl Sites {
         &self.order
     }
 
+    /// `(N,)` sorted position of each site in the neighbor index.
+    pub fn positions(&self) -> &[u32] {
+        &self.position
+    }
+
     /// Sorted position of a site in the neighbor index.
     ///
     /// # Panics
