@@ -114,13 +114,16 @@ impl<T: Real> Reconstruction<T> {
         self.pull_extensions(cotangent, scratch, out)?;
         if cotangent.reaches_indicator() {
             self.pull_distance(cotangent, scratch);
-            // From the cell size of the grid of φ to that of the grid of the surface, and back at the end.
+            // From the grid of φ to that of the surface, and back at the end.
+            let of_sdf = scratch.samples.grid.lower;
             scratch.samples.grid.spacing /= ratio;
             scratch.samples.grid.add(&of_mesh);
             self.pull_thickened(scratch, |scratch| {
                 self.pull_indicator(cotangent, scratch, out)
             })?;
+            let of_surface = vector::sub(scratch.samples.grid.lower, of_sdf);
             scratch.samples.grid.spacing *= ratio;
+            scratch.samples.grid.spacing += vector::dot(of_surface, self.surface_offset());
         }
         self.pull_samples(scratch, out);
         out.grid = GridCotangent {

@@ -13,10 +13,13 @@ const CELLS_PER_SPACING: f64 = 1.2;
 /// Automatic ratios of the cell sizes to an octave, evenly spaced: 1, 1.125, 1.25 and so on to 2.
 const RATIOS_PER_OCTAVE: i32 = 8;
 
-/// Octaves of automatic ratios from that of the grid of φ on, to either side. Mean distance from the surface to the true mesh with
+/// Octaves of automatic ratios finer than the grid of φ. Mean distance from the surface to the true mesh with
 /// ratios of 2, 3 and 4, in cells of φ (64 on the longest side): an airliner 0.0112, 0.0056, 0.0040; a flying wing 0.0237,
 /// 0.0128, 0.0081; an aorta 0.0077, 0.0046, 0.0037.
-const AUTO_OCTAVES: i32 = 2;
+const FINER_OCTAVES: i32 = 2;
+
+/// Octaves of automatic ratios coarser than it.
+const COARSER_OCTAVES: i32 = 6;
 
 /// How many times as many cells per sample spacing there may be where cells fill the box: few ratios then have whole cells, and
 /// with larger ones the surface is marched on cells half as large.
@@ -44,8 +47,8 @@ const SLACK: f64 = 1.1;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum SurfaceResolution {
     /// Cells a little smaller than the distance between samples, 0.83 to 0.95 of it (from 0.64 on where they fill the box). Smaller
-    /// ones would tear thin parts, larger ones lose them. They are at most four times as coarse as those of φ, and so that there are 4 of them between samples and walls; and
-    /// at most twice as fine, or four times where they are at most 2²⁵. The ratio of the cell sizes is a step function of
+    /// ones would tear thin parts, larger ones lose them. They are at most 64 times as coarse as those of φ, and lie beyond its
+    /// box where there would be fewer than 4 of them between samples and walls; and at most twice as fine, or four times where they are at most 2²⁵. The ratio of the cell sizes is a step function of
     /// the points, and the pullback holds it constant: prefer [`Self::Spacing`] or [`Self::Factor`] for a time series.
     #[default]
     Auto,
@@ -67,8 +70,8 @@ impl SurfaceResolution {
         }
     }
 
-    /// The grid of the surface for samples that are `sample_spacing` apart, with the lower corner of `grid`, and the number of
-    /// octaves of the sparse solve, 0 for a dense one. A sparse one may have cells smaller by a tenth. All samples are at least
+    /// The grid of the surface for samples that are `sample_spacing` apart, with the lower corner of `grid` or whole cells off
+    /// it, and the number of octaves of the sparse solve, 0 for a dense one. A sparse one may have cells smaller by a tenth. All samples are at least
     /// `margin` cells of `grid` off its walls.
     ///
     /// # Errors
@@ -133,12 +136,22 @@ impl<T: Real> Reconstruction<T> {
             return Ok(*surface);
         }
         let ratio = surface.spacing().f64() / before.spacing().f64();
-        let spacing = T::of(grid.spacing().f64() * ratio);
-        Grid::in_blocks(grid.lower(), spacing, surface.shape())
+        let spacing = grid.spacing().f64();
+        let offset = self.surface_offset();
+        let lower = std::array::from_fn(|a| T::of(grid.lower()[a].f64() + spacing * offset[a]));
+        Grid::in_blocks(lower, T::of(spacing * ratio), surface.shape())
+    }
+
+    /// From the lower corner of the grid of φ to that of the grid of the surface, in cells of the former: 0, or negative where
+    /// coarse cells of the surface need room.
+    pub(super) fn surface_offset(&self) -> [f64; 3] {
+        let (surface, grid) = (self.surface_grid(), self.sdf.grid());
+        let offset = |a: usize| surface.lower()[a].f64() - grid.lower()[a].f64();
+        std::array::from_fn(|a| offset(a) / grid.spacing().f64())
     }
 }
 
-/// Grids with the lower corner of another one, and cells of another size.
+/// Grids over the box of another one, with cells of another size.
 #[derive(Clone, Copy)]
 struct Refine<'a, T> {
     grid: &'a Grid<T>,
@@ -150,11 +163,9 @@ impl<T: Real> Refine<'_, T> {
     /// The finest affordable automatic one of at most the wanted ratio of cell sizes, or the coarsest one; of those that fill the
     /// box, the coarsest of a little more.
     fn automatically(self, wanted: f64, solve: Solve) -> Grid<T> {
-        let least = (Grid::<T>::MARGIN_CELLS as f64 / self.margin).min(1.0);
-        let most = if self.fills_box() {
-            FILLING * wanted
-        } else {
-            wanted
+        let (least, most) = match self.fills_box() {
+            true => (1.0, FILLING * wanted),
+            false => (0.0, wanted),
         };
         let is_affordable = |ratio: f64, fine: &Grid<T>| {
             let may_be_sparse = solve != Solve::Dense && ratio <= SPARSE_RATIO;
@@ -182,7 +193,7 @@ impl<T: Real> Refine<'_, T> {
     }
 
     /// With cells smaller by at least `factor`, which fill the box of the grid where they have to, or where numbers of cells without
-    /// prime factors above 7 do; else such numbers of cells that reach beyond it.
+    /// prime factors above 7 do and leave room for the samples; else such numbers of cells that reach beyond it.
     fn by(self, factor: f64) -> Result<Grid<T>, GridError> {
         if factor == 1.0 {
             return Ok(*self.grid);
@@ -198,14 +209,27 @@ impl<T: Real> Refine<'_, T> {
             let lengths = self.scaled(count);
             lengths.into_iter().all(|n| fast_length(n) == n)
         };
+        let room = self.room(ratio);
         match (first..=last).find(is_fast) {
-            Some(count) => self.filled(count),
+            Some(count) if room == 0 => self.filled(count),
             None if self.fills_box() => self.filled(first),
-            None => {
-                let beyond = shape.map(|n| fast_length(at_least(ratio * n as f64)));
+            _ => {
+                let beyond = shape.map(|n| fast_length(at_least(ratio * n as f64) + 2 * room));
                 let spacing = self.grid.spacing().f64() / ratio;
-                Grid::in_blocks(self.grid.lower(), T::of(spacing), beyond)
+                let lower = self.grid.lower();
+                let lower = lower.map(|x| T::of(x.f64() - room as f64 * spacing));
+                Grid::in_blocks(lower, T::of(spacing), beyond)
             }
+        }
+    }
+
+    /// How many cells coarser than those of the grid must lie beyond each side of the box, so that there are
+    /// [`Grid::MARGIN_CELLS`] between samples and walls.
+    fn room(self, ratio: f64) -> usize {
+        let missing = Grid::<T>::MARGIN_CELLS as f64 - ratio * self.margin;
+        match self.fills_box() || ratio >= 1.0 {
+            true => 0,
+            false => missing.max(0.0).ceil() as usize,
         }
     }
 
@@ -253,7 +277,8 @@ impl<T: Real> Refine<'_, T> {
     /// Cells of `fine` for each of the [`Self::parts`]; `None` if it does not fill the box.
     fn count(self, fine: &Grid<T>) -> Option<usize> {
         let count = fine.shape()[0] / self.scaled(1)[0];
-        (self.scaled(count) == fine.shape()).then_some(count)
+        let is_box = self.scaled(count) == fine.shape() && fine.lower() == self.grid.lower();
+        is_box.then_some(count)
     }
 
     /// The box, filled with so many cells for each of the [`Self::parts`].
@@ -273,8 +298,8 @@ fn is_allowed(factor: f64) -> bool {
 
 /// All automatic ratios, from the largest down.
 fn automatic_ratios() -> impl Iterator<Item = f64> {
-    let most = AUTO_OCTAVES * RATIOS_PER_OCTAVE;
-    (-most..=most).rev().map(|n| {
+    let numbers = -COARSER_OCTAVES * RATIOS_PER_OCTAVE..=FINER_OCTAVES * RATIOS_PER_OCTAVE;
+    numbers.rev().map(|n| {
         let step = f64::from(n.rem_euclid(RATIOS_PER_OCTAVE)) / f64::from(RATIOS_PER_OCTAVE);
         f64::from(n.div_euclid(RATIOS_PER_OCTAVE)).exp2() * (1.0 + step)
     })
@@ -347,6 +372,23 @@ mod tests {
     }
 
     #[test]
+    fn coarse_cells_leave_room_between_samples_and_walls() {
+        for (factor, margin) in [(0.5, 4.0), (0.3, 6.5), (0.1, 5.0), (0.9, 4.0), (0.5, 20.0)] {
+            let fine = grid([100, 61, 47]);
+            let coarse = refined(fine.shape(), factor, margin);
+            let ratio = fine.spacing() / coarse.spacing();
+            assert!((factor..1.2 * factor).contains(&ratio), "{ratio}");
+            for a in 0..3 {
+                let below = (fine.lower()[a] - coarse.lower()[a]) / coarse.spacing();
+                let above = (coarse.upper()[a] - fine.upper()[a]) / coarse.spacing();
+                assert!((below - below.round()).abs() < 1e-9);
+                assert!(below.min(above) + margin * ratio >= 4.0 - 1e-9, "{factor}");
+                assert!(below + margin * ratio < 5.0f64.max(1.0 + margin * ratio));
+            }
+        }
+    }
+
+    #[test]
     fn lengths_suit_a_fourier_transform_where_the_box_allows() {
         assert_eq!(refined([128; 3], 1.3, 0.0).shape(), [168; 3]);
         assert_eq!(refined([338, 120, 151], 2.0, 0.0).shape(), [676, 240, 302]);
@@ -362,7 +404,7 @@ mod tests {
         };
         let cube = [40; 3];
         for (sample_spacing, expected) in [
-            (9.0, 10),
+            (9.0, 9),
             (2.5, 18),
             (1.3, 35),
             (1.2, 40),

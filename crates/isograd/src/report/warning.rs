@@ -146,7 +146,7 @@ impl Warning {
                 "more samples, or smaller cells of the surface (surface, --surface), if these parts matter"
             }
             Self::Sparse { .. } => {
-                "surface=\"auto\" (--surface auto), and room for its cells (padding, --padding); or more samples"
+                "surface=\"auto\" (--surface auto), whose cells follow the samples, or more samples"
             }
             Self::Open { .. } => {
                 "samples in the gaps; sheet=THICKNESS (--sheet) for a membrane or sail; trim=\"auto\" (--trim auto) for a mesh without what was guessed"

@@ -292,7 +292,8 @@ fn all_results_are_pulled_back_to_all_inputs() {
         let pulled = weighted.pull(&base, &extended);
         assert_eq!(pulled.guarded, 0);
         let cells = base.surface_grid().shape()[0] as f64 / base.sdf().grid().shape()[0] as f64;
-        println!("a surface {cells} times as fine");
+        let lower = [base.surface_grid(), base.sdf().grid()].map(|grid| grid.lower()[0]);
+        println!("a surface {cells} times as fine from {lower:?} on");
         assert_eq!(pulled.normals.is_empty(), options.orient != Method::Given);
         let direction = Direction::new(&cloud);
         let step = STEP * base.sdf().grid().spacing();

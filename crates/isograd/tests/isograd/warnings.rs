@@ -16,11 +16,7 @@ fn report(points: Vec<[f64; 3]>, cells: usize) -> Report {
 }
 
 fn report_with(cloud: &PointCloud<f64>, cells: usize, options: Options) -> Report {
-    report_within(cloud, cells, 0.1, options)
-}
-
-fn report_within(cloud: &PointCloud<f64>, cells: usize, padding: f64, options: Options) -> Report {
-    let grid = Grid::fit(cloud, Resolution::Cells(cells), padding).expect("fits");
+    let grid = Grid::fit(cloud, Resolution::Cells(cells), 0.1).expect("fits");
     let mut plan = Reconstructor::new(grid, options).expect("valid options");
     plan.reconstruct(cloud)
         .expect("reconstructs")
@@ -157,16 +153,13 @@ fn a_plate_of_two_cells_of_the_surface_is_called_thin() {
 #[test]
 fn few_samples_on_a_fine_surface_are_called_sparse() {
     let cloud = PointCloud::new(sphere(400, -1.0, [0.0; 3], 1.0)).expect("finite points");
-    // Between samples and walls there is room for cells as large as the samples are far apart, or there is not.
-    for (surface, padding, is_sparse) in [
-        (SurfaceResolution::Grid, 0.5, true),
-        (SurfaceResolution::Auto, 0.1, true),
-        (SurfaceResolution::Auto, 0.5, false),
+    for (surface, is_sparse) in [
+        (SurfaceResolution::Grid, true),
+        (SurfaceResolution::Auto, false),
     ] {
-        let options = Options::default().surface(surface);
-        let warnings = report_within(&cloud, 64, padding, options).warnings;
+        let warnings = report_with(&cloud, 64, Options::default().surface(surface)).warnings;
         let found = warnings.iter().any(|w| matches!(w, Warning::Sparse { .. }));
-        assert_eq!(found, is_sparse, "{surface:?}, {padding}: {warnings:?}");
+        assert_eq!(found, is_sparse, "{surface:?}: {warnings:?}");
     }
 }
 
