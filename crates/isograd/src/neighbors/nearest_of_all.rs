@@ -112,7 +112,9 @@ impl<T: Real> CellIndex<T> {
         let search = |position: usize, scratch: &mut Scratch<T>| {
             self.reach_squared(self.point(position), k, &mut scratch.squares)
         };
-        self.for_each_leaf(T::zero(), out, &|at, _, scratch: &mut Scratch<T>, out| {
+        // What is near to a cell is known only there: none is handed on.
+        let none = -T::one();
+        self.for_each_leaf(none, out, &|at, _, scratch: &mut Scratch<T>, out| {
             let positions = at.start..at.end;
             let middle = at.start + positions.len() / 2;
             let reach = search(middle, scratch).sqrt();
