@@ -149,19 +149,16 @@ impl<T: Real> CellIndex<T> {
     fn gather_within(&self, at: Place, distance: T, scratch: &mut Scratch<T>) {
         let (own, limit) = (&self.nodes[at.node], distance * distance);
         scratch.clear();
-        let met = Cell::new(0);
+        let are_all = Cell::new(true);
         self.walk(
-            &mut |node| met.get() <= MANY && node.box_distance_squared(own) <= limit,
-            &mut |cell| {
-                met.set(met.get() + cell.len());
-                self.gather(cell, at, limit, scratch);
-            },
+            &mut |node| are_all.get() && node.box_distance_squared(own) <= limit,
+            &mut |cell| are_all.set(self.gather(cell, at, limit, scratch)),
         );
     }
 
     /// Adds the points of a cell within a distance of the box of `at`, whose square is `limit`, to those gathered, unless
-    /// these are too many.
-    fn gather(&self, cell: Range<usize>, at: Place, limit: T, scratch: &mut Scratch<T>) {
+    /// these are too many; returns whether all were added so far.
+    fn gather(&self, cell: Range<usize>, at: Place, limit: T, scratch: &mut Scratch<T>) -> bool {
         scratch.are_all &= scratch.positions.len() + cell.len() <= MANY;
         if scratch.are_all {
             let own = &self.nodes[at.node];
@@ -175,6 +172,7 @@ impl<T: Real> CellIndex<T> {
                 }
             }
         }
+        scratch.are_all
     }
 
     /// The points within a distance of another one, whose square is `limit`, of those gathered; `None` if these or those are

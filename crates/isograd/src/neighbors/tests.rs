@@ -157,6 +157,22 @@ fn nearest_agrees_with_brute_force_in_f32_and_f64() {
     nearest_agrees_with_brute_force::<f64>();
 }
 
+/// In a volume the cells near to another one hold far more points than are near to it.
+#[test]
+fn reaches_in_a_volume_agree_with_single_searches() {
+    let mut random = Random::new(3);
+    let points: Vec<[f64; 3]> = (0..8000).map(|_| random.point(1.0)).collect();
+    let index = CellIndex::new(&points);
+    let (mut reaches, mut distances) = (vec![0.0; points.len()], Vec::new());
+    for k in [24, 40, 60, 90] {
+        index.reaches_squared(k, &mut reaches);
+        for (position, &reach) in reaches.iter().enumerate() {
+            let expected = index.reach_squared(index.point(position), k, &mut distances);
+            assert_eq!(reach, expected, "k = {k}, position {position}");
+        }
+    }
+}
+
 fn nearest_of_all_agree_with_single_searches<T: Real>() {
     for (name, points) in ugly_clouds::<T>() {
         let index = CellIndex::new(&points);
