@@ -1,7 +1,7 @@
 //! The nearest others of all points.
 //!
-//! What is near to a cell is gathered once for all of its points. The few of these that may be among the nearest of one
-//! point are compared with each other, all with all. That is vector code, and sooner than a search for each point.
+//! Points near a cell are gathered once for all of its own points. The few that may be among the nearest of one point are
+//! compared with each other, all with all: vector code, and faster than one search per point.
 
 use std::cell::Cell;
 use std::ops::Range;
@@ -20,10 +20,11 @@ const MANY: usize = 1024;
 /// all they are nearer.
 const REACHES: f64 = 1.4;
 
-/// More than rounding makes of a length.
+/// Relative margin of a bound, above its rounding error.
 const MARGIN: f64 = 1.001;
 
-/// Memory of one task.
+/// Scratch buffers of one task.
+#[derive(Default)]
 struct Scratch<T> {
     /// Whether all points near to a cell were gathered.
     are_all: bool,
@@ -42,19 +43,6 @@ impl<T> Scratch<T> {
         self.are_all = true;
         self.positions.clear();
         self.coordinates.iter_mut().for_each(Vec::clear);
-    }
-}
-
-impl<T> Default for Scratch<T> {
-    fn default() -> Self {
-        Self {
-            are_all: true,
-            positions: Vec::new(),
-            coordinates: Default::default(),
-            squares: Vec::new(),
-            reaches: Vec::new(),
-            found: Vec::new(),
-        }
     }
 }
 
@@ -112,7 +100,7 @@ impl<T: Real> CellIndex<T> {
         let search = |position: usize, scratch: &mut Scratch<T>| {
             self.reach_squared(self.point(position), k, &mut scratch.squares)
         };
-        // What is near to a cell is known only there: none is handed on.
+        // Each cell has a distance of its own, so no cells near its parent are passed down.
         let none = -T::one();
         self.for_each_leaf(none, out, &|at, _, scratch: &mut Scratch<T>, out| {
             let positions = at.start..at.end;

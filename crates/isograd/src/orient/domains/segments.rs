@@ -75,7 +75,7 @@ impl DomainSigns {
         let n = self.sign.len();
         let mut parent: Vec<u32> = (0..n as u32).collect();
         let mut size = vec![1; n];
-        // What a level joins, or is too large to be joined, stays so: each coupling counts on its own level alone.
+        // Segments that are joined, or too large to be joined, stay so: each coupling is examined on its own level alone.
         for (p, q) in self.by_level(graph).into_iter().rev().flatten() {
             let (a, b) = (root(&mut parent, p), root(&mut parent, q));
             let (low, high) = (a.min(b) as usize, a.max(b) as usize);
