@@ -1,6 +1,8 @@
 //! Results, wherever they were made.
 
-use isograd::distance::extend;
+#[cfg(feature = "gpu")]
+use isograd::distance::Query;
+use isograd::distance::{Hit, extend};
 use isograd::{Attribute, CloudCotangent, Cotangent, Field, Grid, Mesh, Reconstruction, Report};
 #[cfg(feature = "gpu")]
 use isograd_gpu::host;
@@ -160,6 +162,28 @@ impl<'a, T: Number> View<'a, T> {
                 let band = isograd::Real::f64(self.grid().spacing());
                 let (extension, _) = of.extend_with_residual(attribute, band)?;
                 Ok(extension.vertices)
+            }
+        }
+    }
+
+    /// Distance, gradient and closest point of the surface at any points: see [`Reconstruction::query`]. A device searches
+    /// everywhere, and has the signs of φ where these agree.
+    ///
+    /// # Errors
+    /// Errors of the stage or the device.
+    pub fn query(self, points: &[[T; 3]], within: f64) -> Result<Vec<Hit<T>>, Error> {
+        match self.0 {
+            Of::Cpu(of) => Ok(of.query(points, within).map_err(isograd::Error::from)?),
+            #[cfg(feature = "gpu")]
+            Of::Device(of, _) => {
+                let query = Query::new(of.mesh()?.clone()).map_err(isograd::Error::from)?;
+                let mut hits = query.query(points, Some(of.sdf()?));
+                for (hit, &point) in hits.iter_mut().zip(points) {
+                    if isograd::Real::f64(hit.distance) > within {
+                        *hit = Hit::beyond(point, within);
+                    }
+                }
+                Ok(hits)
             }
         }
     }

@@ -11,6 +11,7 @@ mod open_tests;
 mod options;
 mod orienter;
 mod pullback;
+mod query;
 mod restore;
 mod scaling;
 mod selection;

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ._options import Fill, check_fill
-from ._places import NO_FACE, Offset, are_centers, axes_at, band_width, is_many, near_surface, on_grids, shaped
+from ._places import NO_FACE, Offset, are_centers, axes_at, band_width, is_many, on_grids, shaped
 from ._xla import Plan, call, floats, like, pair, prepare
 
 if TYPE_CHECKING:
@@ -109,8 +109,7 @@ def surface(
     regular = on_grids(places, grid)
     # At cell centers φ and the closest faces on the grid save the search.
     at_centers = are_centers(regular, grid)
-    options = options if at_centers else near_surface(options, width, grid)
-    plan, points, normals = prepare(points, grid, normals, options, "cpu")
+    plan, points, normals = prepare(points, grid, normals, options, "cpu", sdf=at_centers)
     plan = replace(plan, band=width)
     values, is_scalar = sample_values(values, points)
     positions, shapes = _positions(places, regular, points.dtype)

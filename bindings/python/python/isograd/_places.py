@@ -8,7 +8,7 @@ import numpy as np
 
 from ._grid import Grid
 from ._numbers import number
-from ._options import Options, length, resolve
+from ._options import length
 
 Offset = tuple[float, float, float]
 CENTER: Offset = (0.5, 0.5, 0.5)
@@ -26,17 +26,6 @@ def band_width(band: object, grid: Grid, cells: float, *words: str) -> float:
     if isinstance(width, str):
         return cells * grid.spacing if width == "auto" else np.inf
     return width
-
-
-def near_surface(options: Options | None, width: float, grid: Grid) -> Options:
-    """Options that compute φ at cell centers no farther than what tells places within a band from others.
-
-    Raises:
-        TypeError: as for :func:`resolve`.
-    """
-    options = resolve(options, {})
-    is_wide = options.band == "full" and np.isfinite(width)
-    return resolve(options, {"band": width + grid.spacing}) if is_wide else options
 
 
 def axes_at(grid: Grid, offset: Offset, dtype: np.typing.DTypeLike) -> list[np.ndarray]:

@@ -12,8 +12,9 @@ from ._grid import Grid
 from ._options import Options, Orient, check_known, resolve
 
 
-def encode(grid: Grid, options: Options | None = None, backend: str = "cpu") -> str:
-    """The JSON text that the extension module reads; numbers read back to the same bits.
+def encode(grid: Grid, options: Options | None = None, backend: str = "cpu", sdf: bool = True) -> str:
+    """The JSON text that the extension module reads; numbers read back to the same bits. Without ``sdf`` the CPU finds the
+    surface alone.
 
     Raises:
         TypeError: ``grid`` or ``options`` is of another type.
@@ -23,11 +24,11 @@ def encode(grid: Grid, options: Options | None = None, backend: str = "cpu") -> 
     options = Options() if options is None else options
     if not isinstance(options, Options):
         raise TypeError(f"options is a {type(options).__name__}; give an isograd.Options")
-    return json.dumps({"grid": asdict(grid), "options": asdict(options), "backend": backend})
+    return json.dumps({"grid": asdict(grid), "options": {**asdict(options), "sdf": sdf}, "backend": backend})
 
 
 def encode_pure(
-    grid: Grid, options: Options | None, normals_are_given: bool, backend: str, double: bool
+    grid: Grid, options: Options | None, normals_are_given: bool, backend: str, double: bool, sdf: bool = True
 ) -> str:
     """The text for a function that returns arrays only, in double or single precision: there is no report, so checks
     are off.
@@ -41,8 +42,8 @@ def encode_pure(
     check_pure(options)
     check_known(options.orient, normals_are_given)
     if check_backend(backend) == "cpu":
-        return encode(grid, options)
-    settings = encode(grid, options, backend)
+        return encode(grid, options, sdf=sdf)
+    settings = encode(grid, options, backend, sdf)
     warn_note(_core.open_backend(settings, double))
     return settings
 

@@ -27,10 +27,10 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 # The text is the same whenever grid and options are: the compiler need not look inside.
 @torch.compiler.assume_constant_result
 def encode(
-    grid: Grid, options: Options | None, normals_are_given: bool, backend: str, double: bool
+    grid: Grid, options: Options | None, normals_are_given: bool, backend: str, double: bool, sdf: bool
 ) -> str:
     """Grid, options and backend as one text: see :func:`isograd._settings.encode_pure`."""
-    return _settings.encode_pure(grid, options, normals_are_given, backend, double)
+    return _settings.encode_pure(grid, options, normals_are_given, backend, double, sdf)
 
 
 def checked(values: Tensor, name: str, columns: int | None = 3) -> Tensor:
@@ -57,9 +57,9 @@ def checked(values: Tensor, name: str, columns: int | None = 3) -> Tensor:
 
 
 def prepare(
-    points: Tensor, grid: Grid, normals: Tensor | None, options: Options | None, backend: str
+    points: Tensor, grid: Grid, normals: Tensor | None, options: Options | None, backend: str, sdf: bool = True
 ) -> tuple[Tensor, Tensor | None, str]:
-    """Points and normals as :func:`checked`, and grid, options and backend as one text.
+    """Points and normals as :func:`checked`, and grid, options and backend as one text. Without ``sdf``, φ is not needed.
 
     Raises:
         TypeError, ValueError, RuntimeError: as :func:`checked` and :func:`encode`.
@@ -67,7 +67,7 @@ def prepare(
     points = checked(points, "points")
     if normals is not None:
         normals = checked(normals, "normals").to(points.dtype)
-    return points, normals, encode(grid, options, normals is not None, backend, points.dtype == torch.float64)
+    return points, normals, encode(grid, options, normals is not None, backend, points.dtype == torch.float64, sdf)
 
 
 def rows(values: Tensor | None, points: Tensor) -> tuple[Tensor, bool | None]:

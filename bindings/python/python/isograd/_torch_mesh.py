@@ -66,7 +66,7 @@ def query(
     Raises:
         TypeError, ValueError, RuntimeError: as for :func:`isograd.torch.signed_distance`.
     """
-    points, normals, settings = prepare(points, grid, normals, options, backend)
+    points, normals, settings = prepare(points, grid, normals, options, backend, sdf=False)
     queries = checked(queries, "queries").to(points.dtype)
     distance: Tensor = _query(points, queries, normals, settings, 0.0, False, [])[0]
     return distance
@@ -102,7 +102,7 @@ def mesh(
     Raises:
         TypeError, ValueError, RuntimeError: as for :func:`isograd.torch.signed_distance`.
     """
-    points, normals, settings = prepare(points, grid, normals, options, backend)
+    points, normals, settings = prepare(points, grid, normals, options, backend, sdf=False)
     if (max_vertices is None) != (max_faces is None):
         raise ValueError("give both max_vertices and max_faces, or neither")
     if max_vertices is not None and max_faces is not None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ._grid import Grid
 from ._options import Fill, Options, check_fill
-from ._places import Offset, are_centers, axes_at, band_width, is_many, near_surface, on_grids, shaped
+from ._places import Offset, are_centers, axes_at, band_width, is_many, on_grids, shaped
 from ._pure import grid_shape
 from ._torch import Tensor, call, checked, in_batches, one_by_one, prepare, rows, torch
 
@@ -90,8 +90,7 @@ def surface(
     width = band_width(band, grid, 4, "full")
     regular = on_grids(places, grid)
     at_centers = are_centers(regular, grid)
-    options = options if at_centers else near_surface(options, width, grid)
-    points, normals, settings = prepare(points, grid, normals, options, "cpu")
+    points, normals, settings = prepare(points, grid, normals, options, "cpu", sdf=at_centers)
     columns, is_scalar = rows(values, points)
     positions, shapes = _positions(places, regular, points.dtype)
     given = positions[:0] if at_centers else positions

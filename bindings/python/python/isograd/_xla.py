@@ -56,8 +56,9 @@ def prepare(
     normals: ArrayLike | None,
     options: Options | None,
     backend: str,
+    sdf: bool = True,
 ) -> tuple[Plan, jax.Array, jax.Array | None]:
-    """Checks the arguments that are known while tracing.
+    """Checks the arguments that are known while tracing. Without ``sdf``, φ is not needed.
 
     Raises:
         TypeError: an argument of another type.
@@ -68,7 +69,7 @@ def prepare(
     if normals is not None:
         normals = floats(normals, "normals", points.shape, points.dtype)
     double = points.dtype == jnp.float64
-    settings = _settings.encode_pure(grid, options, normals is not None, backend, double)
+    settings = _settings.encode_pure(grid, options, normals is not None, backend, double, sdf)
     return Plan(settings, grid.shape), points, normals
 
 

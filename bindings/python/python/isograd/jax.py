@@ -128,7 +128,7 @@ def query(
     Raises:
         TypeError, ValueError, RuntimeError, jax.errors.JaxRuntimeError: as for :func:`signed_distance`.
     """
-    plan, points, normals = prepare(points, grid, normals, options, backend)
+    plan, points, normals = prepare(points, grid, normals, options, backend, sdf=False)
     queries = floats(queries, "queries", (None, 3), points.dtype)
     return _query(plan, points, queries, normals)
 
@@ -212,7 +212,7 @@ def mesh(
     Raises:
         TypeError, ValueError, RuntimeError, jax.errors.JaxRuntimeError: as for :func:`signed_distance`.
     """
-    plan, points, normals = prepare(points, grid, normals, options, backend)
+    plan, points, normals = prepare(points, grid, normals, options, backend, sdf=False)
     sizes = (_size(max_vertices, "max_vertices"), _size(max_faces, "max_faces"))
     found: Any = _mesh(plan, sizes, points, normals)
     vertices, faces, counts = found

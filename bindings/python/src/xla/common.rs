@@ -1,8 +1,8 @@
 //! Steps shared by the targets: run a plan on a cloud, save what a pullback needs, and restore the reconstruction
 //! from it.
 
+use isograd::distance::Hit;
 use isograd::distance::extend::Region;
-use isograd::distance::{Hit, Query};
 use isograd::{Attribute, CloudCotangent, Cotangent, PointCloud, Real, Saved};
 use isograd_backend::View;
 use rayon::prelude::*;
@@ -58,23 +58,6 @@ pub fn saved_hits<T: Float>(call: &mut Call<'_>) -> Result<Vec<Hit<T>>, Failure>
         barycentric: barycentric[i],
     };
     Ok((0..triangle.len()).map(hit).collect())
-}
-
-/// Hits at any places on the surface of a reconstruction.
-///
-/// # Errors
-/// Errors of the device, and those of [`Query::new`].
-pub fn search<T: Float>(result: View<'_, T>, places: &[[T; 3]]) -> Result<Vec<Hit<T>>, Failure> {
-    if places.is_empty() {
-        return Ok(Vec::new());
-    }
-    // Parts of a finer surface may lie between the cell centers of φ.
-    let signs = match result.surface_grid() == result.grid() {
-        true => Some(result.sdf()?),
-        false => None,
-    };
-    let query = Query::new(result.mesh()?.clone()).map_err(|e| e.to_string())?;
-    Ok(query.query(places, signs))
 }
 
 /// Copies an array into one of the same length.

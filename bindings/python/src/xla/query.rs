@@ -5,7 +5,7 @@ use isograd::distance::{Hit, pull_hits};
 
 use super::Target;
 use super::buffers::Call;
-use super::common::{Float, cloud, copy, copy_part, saved_hits, search};
+use super::common::{Float, cloud, copy, copy_part, saved_hits};
 use crate::backend::Failure;
 
 /// Inputs: points, queries, optionally normals. Outputs: distances, alone or with what the pullback needs.
@@ -24,7 +24,7 @@ impl Target for Forward {
             _ => Some((hit_outputs(&mut call)?, call.saved_outputs()?)),
         };
         call.reconstruct(&cloud, |result| {
-            let hits = search(result, queries)?;
+            let hits = result.query(queries, f64::INFINITY)?;
             copy_part("the distances", &hits, distance, |hit| hit.distance)?;
             let Some((hit_outputs, saved)) = saved else {
                 return Ok(());

@@ -1,15 +1,15 @@
 //! Distance, direction, closest point and values of the surface at cell centers or any places, and their pullback.
 
-use isograd::distance::interpolate::{self, VertexValues};
+use isograd::distance::interpolate::{self, Bars, VertexValues};
 use isograd::distance::triangle::{closest_point, unit_normal};
-use isograd::distance::{Hit, NO_TRIANGLE, pull_hits};
+use isograd::distance::{Hit, NO_TRIANGLE};
 use isograd::{Cotangent, ExtensionCotangent, Grid, Mesh, Real};
 use isograd_backend::View;
 use rayon::prelude::*;
 
 use super::Target;
 use super::buffers::Call;
-use super::common::{Float, attribute, cloud, copy, copy_part, saved_hits, search};
+use super::common::{Float, attribute, cloud, copy, copy_part, saved_hits};
 use crate::backend::Failure;
 
 /// Inputs: points, places, `(N, C)` values, optionally normals. Outputs: distances, directions, closest points, values
@@ -40,7 +40,7 @@ impl Target for Forward {
             let mesh = surface(result)?;
             let hits = match places.is_empty() && !distance.is_empty() {
                 true => at_centers(result, mesh, band)?,
-                false => at_places(result, band, places)?,
+                false => result.query(places, band)?,
             };
             let vertex_values = match attribute.components {
                 0 => Vec::new(),
@@ -94,7 +94,9 @@ impl Target for Pullback {
             };
             let vertex_values = extension.as_ref().map_or(&[][..], |(e, _)| &e.vertices);
             let interpolated = of_vertices(mesh, vertex_values, attribute.components);
-            let bar = to_vertices(interpolated, places, &hits, bars)?;
+            let mut bar = interpolate::Cotangent::default();
+            let pulled = interpolated.pullback(places, &hits, bars, &mut bar);
+            pulled.map_err(|e| e.to_string())?;
             if !are_centers {
                 copy("the places' cotangent", &bar.points, places_out)?;
             }
@@ -117,36 +119,6 @@ impl Target for Pullback {
             out.fill(cloud_bar)
         })
     }
-}
-
-/// Cotangents of the results at the places.
-struct Bars<'a, T> {
-    distance: &'a [T],
-    point: &'a [[T; 3]],
-    values: &'a [T],
-}
-
-/// Cotangents of the places, of the vertices of the mesh and of the values there.
-fn to_vertices<T: Real>(
-    interpolated: VertexValues<'_, T>,
-    places: &[[T; 3]],
-    hits: &[Hit<T>],
-    bars: Bars<'_, T>,
-) -> Result<interpolate::Cotangent<T>, Failure> {
-    let mut bar = interpolate::Cotangent::default();
-    let pulled = interpolated.pullback(places, hits, bars.values, &mut bar);
-    pulled.map_err(|e| e.to_string())?;
-    let pulled = pull_hits(
-        interpolated.mesh,
-        places,
-        hits,
-        bars.distance,
-        Some(bars.point),
-        &mut bar.points,
-        &mut bar.vertices,
-    );
-    pulled.map_err(|e| e.to_string())?;
-    Ok(bar)
 }
 
 /// The mesh that distances are measured from.
@@ -192,61 +164,15 @@ fn at_centers<T: Float>(
     let mut hits: Vec<Hit<T>> = (0..sdf.len())
         .into_par_iter()
         .map(|i| match is_far(i) || !has_face(i) {
-            true => beyond(center(i), band.min(sdf[i].f64())),
+            true => Hit::beyond(center(i), band.min(sdf[i].f64())),
             false => on_face(mesh, closest[i], grid.center_f64(grid.cell(i)), sdf[i]),
         })
         .collect();
     let places: Vec<[T; 3]> = deep.iter().map(|&i| center(i)).collect();
-    for (&i, hit) in deep.iter().zip(search(result, &places)?) {
+    for (&i, hit) in deep.iter().zip(result.query(&places, f64::INFINITY)?) {
         hits[i] = hit;
     }
     Ok(hits)
-}
-
-/// Hits at any places, by a search where φ at the closest cell center does not show that a place is outside the band.
-fn at_places<T: Float>(
-    result: View<'_, T>,
-    band: f64,
-    places: &[[T; 3]],
-) -> Result<Vec<Hit<T>>, Failure> {
-    let (sdf, grid) = (result.sdf()?.values(), result.grid());
-    let (lower, spacing, shape) = (grid.lower(), grid.spacing().f64(), grid.shape());
-    // The distance changes by no more than the way, and rounding.
-    let is_far = |place: [T; 3]| {
-        let cell: [usize; 3] = std::array::from_fn(|a| {
-            let at = (place[a].f64() - lower[a].f64()) / spacing;
-            (at.max(0.0) as usize).min(shape[a] - 1)
-        });
-        let center = grid.center_f64(cell);
-        let way: f64 = (0..3).map(|a| (place[a].f64() - center[a]).powi(2)).sum();
-        sdf[grid.index(cell)].f64() - way.sqrt() > band + 1e-3 * spacing
-    };
-    let near: Vec<usize> = (0..places.len())
-        .into_par_iter()
-        .filter(|&i| !is_far(places[i]))
-        .collect();
-    let searched: Vec<[T; 3]> = near.iter().map(|&i| places[i]).collect();
-    let mut hits: Vec<Hit<T>> = places
-        .par_iter()
-        .map(|&place| beyond(place, band))
-        .collect();
-    for (&i, hit) in near.iter().zip(search(result, &searched)?) {
-        if !(hit.distance.f64() > band) {
-            hits[i] = hit;
-        }
-    }
-    Ok(hits)
-}
-
-/// The hit of a place outside the band.
-fn beyond<T: Real>(place: [T; 3], band: f64) -> Hit<T> {
-    Hit {
-        distance: T::of(band),
-        gradient: [T::zero(); 3],
-        point: place,
-        triangle: NO_TRIANGLE,
-        barycentric: [T::zero(); 3],
-    }
 }
 
 /// The hit of a place whose closest face and distance are known.

@@ -7,8 +7,8 @@
 //! The hits.
 //!
 //! # Pullback
-//! To the values, `ū_k += β_k ū`; to the query and the corners through `β`, with `G`, `γ` and `o` as in
-//! [`extend`](super::extend).
+//! [`VertexValues::pullback`], together with that of the distances and the closest points: to the values, `ū_k += β_k ū`; to
+//! the query and the corners through `β`, with `G`, `γ` and `o` as in [`extend`](super::extend).
 //!
 //! # Not differentiable
 //! Where the closest point passes to another face; a direction in which a face is much thinner than the distance is
@@ -17,12 +17,8 @@
 use rayon::prelude::*;
 
 use super::query::Hit;
-use super::query_pullback::{by_vertex, check, corners_of, gather};
-use super::tangent::{Tangent, tangent};
-use super::triangle::closest_point;
+use super::query_pullback::{check, corners_of};
 use super::{Error, NO_TRIANGLE};
-use crate::gather::{Buckets, add_to};
-use crate::vector::{norm, to_f64};
 use crate::{Mesh, Real};
 
 /// Values at the vertices of a mesh.
@@ -34,6 +30,17 @@ pub struct VertexValues<'a, T> {
     pub values: &'a [T],
     /// Components per value.
     pub components: usize,
+}
+
+/// Cotangents of hits and of the values at them. An empty list is one of zeros.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Bars<'a, T> {
+    /// `(M,)` of the signed distances.
+    pub distance: &'a [T],
+    /// `(M, 3)` of the closest points.
+    pub point: &'a [[T; 3]],
+    /// `(M, components)` of the values, row by row.
+    pub values: &'a [T],
 }
 
 /// Cotangents of the inputs of an interpolation, which the pullback adds to.
@@ -71,89 +78,12 @@ impl<T: Real> VertexValues<'_, T> {
         Ok(out)
     }
 
-    /// Pulls the cotangents `values_bar` `(M, components)` of [`Self::at`] back, adding to `out`, whose lists are first
-    /// extended with zeros. Returns the number of guarded hits. The bits are the same for any number of threads.
-    ///
-    /// # Errors
-    /// [`Error::Mismatch`] and [`Error::Face`]; nothing is then written.
-    pub fn pullback(
-        &self,
-        points: &[[T; 3]],
-        hits: &[Hit<T>],
-        values_bar: &[T],
-        out: &mut Cotangent<T>,
-    ) -> Result<usize, Error> {
-        check(points.len(), "the list of hits", hits.len())?;
-        let length = hits.len() * self.components;
-        check(length, "the cotangent of the values", values_bar.len())?;
-        let row = |i: usize| &values_bar[i * self.components..][..self.components];
-        let corners = self.corners(hits)?;
-        let shares: Vec<Tangent> = (0..hits.len())
-            .into_par_iter()
-            .map(|i| match hits[i].triangle {
-                NO_TRIANGLE => Tangent::default(),
-                _ => self.share(points[i], corners[i], row(i)),
-            })
-            .collect();
-        let guarded = shares.par_iter().filter(|share| share.guarded).count();
-
-        let hits_of = by_vertex(self.mesh, &corners);
-        out.points.resize(points.len(), [T::zero(); 3]);
-        out.vertices
-            .resize(self.mesh.vertices().len(), [T::zero(); 3]);
-        out.values.resize(self.values.len(), T::zero());
-        let at_vertex = |vertex| gather(&hits_of, &corners, vertex, |hit| &shares[hit].corners);
-        let bounded =
-            add_to(&mut out.points, |i| shares[i].query) + add_to(&mut out.vertices, at_vertex);
-        self.add_to_values(&corners, &hits_of, hits, values_bar, &mut out.values);
-        Ok(guarded + bounded)
-    }
-
-    /// Adds `β_k ū` to the cotangents of the values at the corners of each hit.
-    fn add_to_values(
-        &self,
-        corners: &[[u32; 3]],
-        hits_of: &Buckets,
-        hits: &[Hit<T>],
-        values_bar: &[T],
-        out: &mut [T],
-    ) {
-        if self.components == 0 {
-            return;
-        }
-        let rows = out.par_chunks_exact_mut(self.components).enumerate();
-        rows.for_each(|(vertex, sums)| {
-            for (c, sum) in sums.iter_mut().enumerate() {
-                let mut total = sum.f64();
-                hits_of.for_each_corner(corners, vertex, |hit, corner| {
-                    let bar = values_bar[hit * self.components + c].f64();
-                    total += hits[hit].barycentric[corner].f64() * bar;
-                });
-                *sum = T::of(total);
-            }
-        });
-    }
-
-    /// Cotangents through `β` of one hit.
-    fn share(&self, point: [T; 3], face: [u32; 3], bar: &[T]) -> Tangent {
-        let corners = face.map(|v| to_f64(self.mesh.vertices()[v as usize]));
-        let rise = |k: usize| -> f64 {
-            let terms = bar.iter().enumerate();
-            terms
-                .map(|(c, u)| u.f64() * (self.value(face[k], c) - self.value(face[0], c)))
-                .sum()
-        };
-        let closest = closest_point(to_f64(point), corners);
-        let thinnest = T::epsilon().f64().sqrt() * norm(closest.offset);
-        tangent(&closest, corners, [0.0, rise(1), rise(2)], thinnest)
-    }
-
-    fn value(&self, vertex: u32, component: usize) -> f64 {
+    pub(super) fn value(&self, vertex: u32, component: usize) -> f64 {
         self.values[vertex as usize * self.components + component].f64()
     }
 
     /// [`corners_of`] the hits, with as many values as vertices.
-    fn corners(&self, hits: &[Hit<T>]) -> Result<Vec<[u32; 3]>, Error> {
+    pub(super) fn corners(&self, hits: &[Hit<T>]) -> Result<Vec<[u32; 3]>, Error> {
         let length = self.mesh.vertices().len() * self.components;
         check(length, "the list of values", self.values.len())?;
         corners_of(self.mesh, hits)

@@ -43,8 +43,8 @@ mod winding;
 mod tests;
 
 pub use lattice::{Band, NO_TRIANGLE, Scratch, Sign};
-use query::corners_agree;
 pub use query::{Hit, Query};
+pub(crate) use query::{cell_agrees, corners_agree, hits_within};
 pub use query_pullback::pull_hits;
 
 /// Errors of the distance stage.

@@ -15,6 +15,9 @@ use crate::{Field, Mesh, Real};
 /// Packets of points per task: a fixed number, so that the result does not depend on the threads.
 pub(super) const PACKETS_PER_TASK: usize = 16;
 
+/// Share by which a limit of a search exceeds the distance meant, so that rounding changes nothing.
+const MARGIN: f64 = 1.001;
+
 /// Signed distance to a mesh at any point. The distance is defined for any mesh; the sign needs a closed mesh whose
 /// faces share their vertices, or a field with the same inside.
 #[derive(Clone, Debug)]
@@ -70,26 +73,59 @@ impl<T: Real> Query<T> {
     ///
     /// A point that is not finite, or whose squared distance overflows, gets NaN and no triangle.
     pub fn query(&self, points: &[[T; 3]], signs: Option<&Field<T>>) -> Vec<Hit<T>> {
-        let nearest = nearest_triangles(&self.bvh, points);
-        points
-            .par_iter()
-            .zip(nearest)
-            .map(|(&point, place)| self.surface().hit(point, place, signs))
-            .collect()
-    }
-
-    fn surface(&self) -> Surface<'_, T> {
-        Surface {
+        let surface = Surface {
             mesh: &self.mesh,
             bvh: &self.bvh,
             pseudonormals: &self.pseudonormals,
+        };
+        surface.hits(points, f64::INFINITY, |point| {
+            signs.and_then(|field| corners_agree(field.into(), T::zero(), point))
+        })
+    }
+}
+
+/// Distance, gradient and closest point of `mesh` at any points, like [`Query::query`]. `is_inside` says on which side a
+/// point is, where it can. Outside, a point farther than `within` has that distance and [no face](Hit::beyond).
+///
+/// # Errors
+/// [`Error::Empty`] and [`Error::Range`].
+pub(crate) fn hits_within<T: Real>(
+    mesh: &Mesh<T>,
+    points: &[[T; 3]],
+    within: f64,
+    is_inside: impl Fn([f64; 3]) -> Option<bool> + Sync,
+) -> Result<Vec<Hit<T>>, Error> {
+    let mut bvh = Bvh::default();
+    bvh.rebuild(mesh)?;
+    let surface = Surface {
+        mesh,
+        bvh: &bvh,
+        pseudonormals: &Pseudonormals::new(mesh),
+    };
+    Ok(surface.hits(points, within, is_inside))
+}
+
+impl<T: Real> Hit<T> {
+    /// The hit of a point that is farther than `distance` from the surface, outside: no face, no gradient, and the point
+    /// itself in place of the closest one.
+    pub fn beyond(point: [T; 3], distance: f64) -> Self {
+        Self {
+            distance: T::of(distance),
+            gradient: [T::zero(); 3],
+            point,
+            triangle: NO_TRIANGLE,
+            barycentric: [T::zero(); 3],
         }
     }
 }
 
-/// Place in the tree of the triangle closest to each point. The points are taken in packets of neighbors
-/// along a Morton curve.
-pub(super) fn nearest_triangles<T: Real>(bvh: &Bvh, points: &[[T; 3]]) -> Vec<u32> {
+/// Place in the tree of the triangle closest to each point, of those that are nearer than the square root of `limit(i)`.
+/// The points are taken in packets of neighbors along a Morton curve.
+pub(super) fn nearest_triangles<T: Real>(
+    bvh: &Bvh,
+    points: &[[T; 3]],
+    limit: impl Fn(usize) -> f64 + Sync,
+) -> Vec<u32> {
     let order = morton_order(bvh, points);
     let arch = Arch::new();
     let mut sorted = vec![NOWHERE; order.len()];
@@ -101,6 +137,7 @@ pub(super) fn nearest_triangles<T: Real>(bvh: &Bvh, points: &[[T; 3]]) -> Vec<u3
                 bvh,
                 points,
                 order,
+                limit: &limit,
                 found,
             });
         });
@@ -130,8 +167,44 @@ pub(super) struct Surface<'a, T> {
 }
 
 impl<T: Real> Surface<'_, T> {
+    /// [`hits_within`].
+    fn hits(
+        &self,
+        points: &[[T; 3]],
+        within: f64,
+        is_inside: impl Fn([f64; 3]) -> Option<bool> + Sync,
+    ) -> Vec<Hit<T>> {
+        let is_inside = |point: &[T; 3]| is_inside(to_f64(*point));
+        let sides: Vec<Option<bool>> = points.par_iter().map(is_inside).collect();
+        let limit = |i: usize| match sides[i] {
+            Some(false) => (MARGIN * within).powi(2),
+            _ => f64::INFINITY,
+        };
+        let is_near = |&i: &usize| {
+            let limit = limit(i);
+            limit == f64::INFINITY || self.bvh.has_box_within(to_f64(points[i]), limit)
+        };
+        let near: Vec<usize> = (0..points.len()).into_par_iter().filter(is_near).collect();
+        let searched: Vec<[T; 3]> = near.iter().map(|&i| points[i]).collect();
+        let places = nearest_triangles(self.bvh, &searched, |k| limit(near[k]));
+        let found: Vec<Hit<T>> = (near.par_iter().zip(places))
+            .map(|(&i, place)| match place {
+                NOWHERE if limit(i) < f64::INFINITY => Hit::beyond(points[i], within),
+                _ => self.hit(points[i], place, sides[i]),
+            })
+            .collect();
+        let beyond = points.par_iter().map(|&point| Hit::beyond(point, within));
+        let mut hits: Vec<Hit<T>> = beyond.collect();
+        for (&i, hit) in near.iter().zip(found) {
+            if !(hit.distance.f64() > within) {
+                hits[i] = hit;
+            }
+        }
+        hits
+    }
+
     /// Result of a query whose closest triangle is at `place` of the tree.
-    pub(super) fn hit(&self, point: [T; 3], place: u32, signs: Option<&Field<T>>) -> Hit<T> {
+    pub(super) fn hit(&self, point: [T; 3], place: u32, is_inside: Option<bool>) -> Hit<T> {
         if place == NOWHERE {
             return Hit {
                 distance: T::nan(),
@@ -143,9 +216,7 @@ impl<T: Real> Surface<'_, T> {
         }
         let face = self.bvh.face(place);
         let found = closest_point(to_f64(point), corners(self.mesh, face));
-        let inside = signs
-            .and_then(|field| corners_agree(field.into(), T::zero(), to_f64(point)))
-            .unwrap_or_else(|| self.is_inside(face, &found));
+        let inside = is_inside.unwrap_or_else(|| self.is_inside(face, &found));
         let sign = if inside { -1.0 } else { 1.0 };
         Hit {
             distance: T::of(sign * found.distance),
@@ -175,7 +246,7 @@ impl<T: Real> Surface<'_, T> {
 }
 
 /// Whether a point is below the level `c` of a field, where the eight values round it are there and agree.
-pub(super) fn corners_agree<T: Real>(field: Cells<'_, T>, c: T, point: [f64; 3]) -> Option<bool> {
+pub(crate) fn corners_agree<T: Real>(field: Cells<'_, T>, c: T, point: [f64; 3]) -> Option<bool> {
     let grid = field.grid();
     let (lower, spacing) = (to_f64(grid.lower()), grid.spacing().f64());
     let mut cell = [0; 3];
@@ -189,6 +260,11 @@ pub(super) fn corners_agree<T: Real>(field: Cells<'_, T>, c: T, point: [f64; 3])
             return None;
         }
     }
+    cell_agrees(field, c, cell)
+}
+
+/// Whether the values at the eight centers from `cell` on are below the level `c`, where they are there and agree.
+pub(crate) fn cell_agrees<T: Real>(field: Cells<'_, T>, c: T, cell: [usize; 3]) -> Option<bool> {
     let below = |corner: usize| {
         let at = std::array::from_fn(|a| cell[a] + (corner >> a & 1));
         field.at(at).map(|value| value < c)
@@ -218,15 +294,17 @@ pub(super) fn packet<T: Real>(points: &[[T; 3]; LANES]) -> Points {
 }
 
 /// Finds the closest triangles of some packets of points.
-struct Packets<'a, T> {
+struct Packets<'a, T, L> {
     bvh: &'a Bvh,
     points: &'a [[T; 3]],
     /// Morton code and index of each point.
     order: &'a [(u64, u32)],
+    /// Squared distance of a point beyond which nothing is looked for.
+    limit: &'a L,
     found: &'a mut [u32],
 }
 
-impl<T: Real> WithSimd for Packets<'_, T> {
+impl<T: Real, L: Fn(usize) -> f64> WithSimd for Packets<'_, T, L> {
     type Output = ();
 
     #[inline(always)]
@@ -234,12 +312,13 @@ impl<T: Real> WithSimd for Packets<'_, T> {
         let mut stack = Stack::new();
         for (order, found) in self.order.chunks(LANES).zip(self.found.chunks_mut(LANES)) {
             // The last packet repeats its last point.
-            let points = std::array::from_fn(|l| {
-                let (_, index) = order[l.min(order.len() - 1)];
-                self.points[index as usize]
-            });
-            let packet = packet(&points);
-            let mut nearest = NearestTriangles::NOTHING;
+            let index: [usize; LANES] =
+                std::array::from_fn(|l| order[l.min(order.len() - 1)].1 as usize);
+            let packet = packet(&index.map(|i| self.points[i]));
+            let mut nearest = NearestTriangles {
+                squared: index.map(self.limit),
+                ..NearestTriangles::NOTHING
+            };
             self.bvh.nearest(&packet, &mut nearest, &mut stack);
             found.copy_from_slice(&nearest.triangle[..found.len()]);
         }

@@ -1,12 +1,14 @@
-//! The pullback of a query: cotangents of distances and closest points → points and vertices.
+//! The pullback of a query: cotangents of distances, closest points and values there → points, vertices and their values.
 
 use rayon::prelude::*;
 
+use super::interpolate::{Bars, Cotangent, VertexValues};
 use super::query::{Hit, Query};
 use super::tangent::tangent;
 use super::triangle::closest_point;
 use super::{Error, NO_TRIANGLE};
-use crate::gather::{Buckets, add_to};
+use crate::gather::{Buckets, add_to, bounded};
+use crate::parallel::CHUNK;
 use crate::vector::{add, dot, norm, scale, sub, to_f64};
 use crate::{Mesh, Real};
 
@@ -61,26 +63,183 @@ pub fn pull_hits<T: Real>(
     points_bar: &mut Vec<[T; 3]>,
     vertices_bar: &mut Vec<[T; 3]>,
 ) -> Result<usize, Error> {
-    let (n, distances) = (points.len(), distance_bar.len());
-    let point_bars = point_bar.map_or(n, <[_]>::len);
-    check(n, "the list of hits", hits.len())?;
-    check(n, "the cotangent of the distances", distances)?;
-    check(n, "the cotangent of the closest points", point_bars)?;
-    let corners = corners_of(mesh, hits)?;
-    let shares: Vec<Share> = (0..n)
-        .into_par_iter()
-        .map(|i| {
-            let point_bar = point_bar.map_or([0.0; 3], |bar| to_f64(bar[i]));
-            Share::new(mesh, points[i], &hits[i], distance_bar[i].f64(), point_bar)
-        })
-        .collect();
-    let guarded = shares.par_iter().filter(|share| share.guarded).count();
+    check(
+        points.len(),
+        "the cotangent of the distances",
+        distance_bar.len(),
+    )?;
+    let of = VertexValues {
+        mesh,
+        values: &[],
+        components: 0,
+    };
+    let bars = Bars {
+        distance: distance_bar,
+        point: point_bar.unwrap_or_default(),
+        values: &[],
+    };
+    let mut out = Cotangent {
+        points: std::mem::take(points_bar),
+        vertices: std::mem::take(vertices_bar),
+        values: Vec::new(),
+    };
+    let done = of.pullback(points, hits, bars, &mut out);
+    (*points_bar, *vertices_bar) = (out.points, out.vertices);
+    done
+}
 
-    let hits_of = by_vertex(mesh, &corners);
-    points_bar.resize(n, [T::zero(); 3]);
-    vertices_bar.resize(mesh.vertices().len(), [T::zero(); 3]);
-    let at_vertex = |vertex| gather(&hits_of, &corners, vertex, |hit| &shares[hit].corners);
-    Ok(guarded + add_to(points_bar, |i| shares[i].point) + add_to(vertices_bar, at_vertex))
+impl<T: Real> VertexValues<'_, T> {
+    /// Pulls cotangents of `hits`, the result of a query at `(M, 3)` points, and of the values [there](Self::at) back,
+    /// adding to `out`, whose lists are first extended with zeros. Held constant and guarded is what [`pull_hits`] says;
+    /// the number of guarded hits is returned. The bits are the same for any number of threads.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] and [`Error::Face`]; nothing is then written.
+    pub fn pullback(
+        &self,
+        points: &[[T; 3]],
+        hits: &[Hit<T>],
+        bars: Bars<'_, T>,
+        out: &mut Cotangent<T>,
+    ) -> Result<usize, Error> {
+        check(points.len(), "the list of hits", hits.len())?;
+        bars.check(points.len(), self.components)?;
+        let corners = self.corners(hits)?;
+        // In a band, few of many points have a face.
+        let found: Vec<u32> = (0..hits.len() as u32)
+            .filter(|&i| hits[i as usize].triangle != NO_TRIANGLE)
+            .collect();
+        let corners: Vec<[u32; 3]> = found.iter().map(|&i| corners[i as usize]).collect();
+        let share = |k: usize| {
+            let i = found[k] as usize;
+            self.share(points[i], &hits[i], corners[k], bars.of(i, self.components))
+        };
+        let shares: Vec<Share> = (0..found.len()).into_par_iter().map(share).collect();
+        let guarded = shares.par_iter().filter(|share| share.guarded).count();
+
+        let vertices = self.mesh.vertices().len();
+        let mut hits_of = Buckets::default();
+        hits_of.fill(vertices, corners.len(), |k| corners[k]);
+        out.points.resize(points.len(), [T::zero(); 3]);
+        out.vertices.resize(vertices, [T::zero(); 3]);
+        out.values.resize(self.values.len(), T::zero());
+        let at_vertex = |vertex| {
+            let mut sum = [0.0; 3];
+            hits_of.for_each_corner(&corners, vertex, |k, corner| {
+                sum = add(sum, shares[k].corners[corner]);
+            });
+            sum
+        };
+        let bounded = add_to_some(&mut out.points, &found, |k| shares[k].point)
+            + add_to(&mut out.vertices, at_vertex);
+        let rows = out.values.par_chunks_exact_mut(self.components.max(1));
+        rows.enumerate().for_each(|(vertex, sums)| {
+            for (c, sum) in sums.iter_mut().enumerate() {
+                let mut total = sum.f64();
+                hits_of.for_each_corner(&corners, vertex, |k, corner| {
+                    let i = found[k] as usize;
+                    let bar = bars.of(i, self.components).values;
+                    let weight = hits[i].barycentric[corner].f64();
+                    total += bar.get(c).map_or(0.0, |bar| weight * bar.f64());
+                });
+                *sum = T::of(total);
+            }
+        });
+        Ok(guarded + bounded)
+    }
+
+    /// Cotangents from one hit: of its distance with `β` held constant, of `Σ β_k y_k` and of `Σ β_k u_k` with the terms
+    /// of `β`.
+    fn share(&self, point: [T; 3], hit: &Hit<T>, face: [u32; 3], bar: Bar<'_, T>) -> Share {
+        let mut share = Share::default();
+        let beta = hit.barycentric.map(T::f64);
+        if bar.distance != 0.0 {
+            share.point = scale(to_f64(hit.gradient), bar.distance);
+            share.corners = beta.map(|beta| scale(share.point, -beta));
+        }
+        if bar.point == [0.0; 3] && bar.values.iter().all(|bar| *bar == T::zero()) {
+            return share;
+        }
+        let corners = face.map(|v| to_f64(self.mesh.vertices()[v as usize]));
+        let rise = |k: usize| {
+            let of_value = |c: usize| self.value(face[k], c) - self.value(face[0], c);
+            let of_values = bar.values.iter().enumerate();
+            let of_values: f64 = of_values.map(|(c, bar)| bar.f64() * of_value(c)).sum();
+            dot(bar.point, sub(corners[k], corners[0])) + of_values
+        };
+        let closest = closest_point(to_f64(point), corners);
+        let thinnest = T::epsilon().f64().sqrt() * norm(closest.offset);
+        let through_beta = tangent(&closest, corners, [0.0, rise(1), rise(2)], thinnest);
+        share.guarded = through_beta.guarded;
+        share.point = add(share.point, through_beta.query);
+        for k in 0..3 {
+            let own = scale(bar.point, closest.barycentric[k]);
+            let own = add(through_beta.corners[k], own);
+            share.corners[k] = add(share.corners[k], own);
+        }
+        share
+    }
+}
+
+/// Cotangents of one hit.
+struct Bar<'a, T> {
+    distance: f64,
+    point: [f64; 3],
+    /// None if they are zero.
+    values: &'a [T],
+}
+
+impl<'a, T: Real> Bars<'a, T> {
+    fn of(&self, hit: usize, components: usize) -> Bar<'a, T> {
+        Bar {
+            distance: self.distance.get(hit).map_or(0.0, |bar| bar.f64()),
+            point: self.point.get(hit).map_or([0.0; 3], |&bar| to_f64(bar)),
+            values: match self.values.is_empty() {
+                true => &[],
+                false => &self.values[hit * components..][..components],
+            },
+        }
+    }
+
+    fn check(&self, hits: usize, components: usize) -> Result<(), Error> {
+        let lists = [
+            ("the cotangent of the distances", self.distance.len(), hits),
+            (
+                "the cotangent of the closest points",
+                self.point.len(),
+                hits,
+            ),
+            (
+                "the cotangent of the values",
+                self.values.len(),
+                hits * components,
+            ),
+        ];
+        let mut given = lists.into_iter().filter(|&(_, length, _)| length > 0);
+        given.try_for_each(|(what, length, expected)| check(expected, what, length))
+    }
+}
+
+/// Adds `term(k)` to entry `places[k]`, where the places are ascending. Returns the number of values out of range, which
+/// are left out.
+fn add_to_some<T: Real>(
+    out: &mut [[T; 3]],
+    places: &[u32],
+    term: impl Fn(usize) -> [f64; 3] + Sync,
+) -> usize {
+    let chunks = out.par_chunks_mut(CHUNK).enumerate();
+    let add_to_chunk = |(chunk, out): (usize, &mut [[T; 3]])| {
+        let (start, mut guarded) = (chunk * CHUNK, 0);
+        let first = places.partition_point(|&i| (i as usize) < start);
+        for (k, &i) in places.iter().enumerate().skip(first) {
+            let Some(out) = out.get_mut(i as usize - start) else {
+                break;
+            };
+            *out = add(*out, term(k).map(|x| bounded(x, &mut guarded)));
+        }
+        guarded
+    };
+    chunks.map(add_to_chunk).sum()
 }
 
 /// The vertices of the face of each hit; one past the last for a hit without a triangle.
@@ -95,80 +254,12 @@ pub(super) fn corners_of<T: Real>(mesh: &Mesh<T>, hits: &[Hit<T>]) -> Result<Vec
     hits.iter().map(of_hit).collect()
 }
 
-/// Hits by vertex, from the result of [`corners_of`]. One bucket more than vertices, for hits without a triangle.
-pub(super) fn by_vertex<T: Real>(mesh: &Mesh<T>, corners: &[[u32; 3]]) -> Buckets {
-    let mut hits_of = Buckets::default();
-    hits_of.fill(mesh.vertices().len() + 1, corners.len(), |hit| corners[hit]);
-    hits_of
-}
-
-/// Cotangent of a vertex: the sum of those of the corners of its hits.
-pub(super) fn gather<'a>(
-    hits_of: &Buckets,
-    corners: &[[u32; 3]],
-    vertex: usize,
-    bars_of: impl Fn(usize) -> &'a [[f64; 3]; 3],
-) -> [f64; 3] {
-    let mut sum = [0.0; 3];
-    hits_of.for_each_corner(corners, vertex, |hit, corner| {
-        sum = add(sum, bars_of(hit)[corner]);
-    });
-    sum
-}
-
 /// Cotangents from one hit.
 #[derive(Clone, Copy, Debug, Default)]
 struct Share {
     point: [f64; 3],
     corners: [[f64; 3]; 3],
     guarded: bool,
-}
-
-impl Share {
-    fn new<T: Real>(
-        mesh: &Mesh<T>,
-        point: [T; 3],
-        hit: &Hit<T>,
-        distance_bar: f64,
-        point_bar: [f64; 3],
-    ) -> Self {
-        let mut share = Self::default();
-        if hit.triangle == NO_TRIANGLE {
-            return share;
-        }
-        let beta = hit.barycentric.map(T::f64);
-        if distance_bar != 0.0 {
-            share.point = scale(to_f64(hit.gradient), distance_bar);
-            share.corners = beta.map(|beta| scale(share.point, -beta));
-        }
-        if point_bar != [0.0; 3] {
-            let corners = mesh.corners(hit.triangle as usize).map(to_f64);
-            let thinnest = T::epsilon().f64().sqrt();
-            share.add_closest_point(to_f64(point), corners, thinnest, point_bar);
-        }
-        share
-    }
-
-    /// Pullback of the closest point `Σ β_k y_k`: `β_k` times the cotangent for each corner, plus the terms of `β`.
-    /// `thinnest` is in distances.
-    fn add_closest_point(
-        &mut self,
-        point: [f64; 3],
-        corners: [[f64; 3]; 3],
-        thinnest: f64,
-        bar: [f64; 3],
-    ) {
-        let closest = closest_point(point, corners);
-        let from_first = |k: usize| dot(bar, sub(corners[k], corners[0]));
-        let rises = [0.0, from_first(1), from_first(2)];
-        let through_beta = tangent(&closest, corners, rises, thinnest * norm(closest.offset));
-        self.guarded = through_beta.guarded;
-        self.point = add(self.point, through_beta.query);
-        for k in 0..3 {
-            let own = add(through_beta.corners[k], scale(bar, closest.barycentric[k]));
-            self.corners[k] = add(self.corners[k], own);
-        }
-    }
 }
 
 pub(super) fn check(expected: usize, what: &'static str, length: usize) -> Result<(), Error> {

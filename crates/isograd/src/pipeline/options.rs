@@ -61,6 +61,9 @@ options! {
     outliers: crate::Outliers = crate::Outliers::default(),
     /// Region in which φ is computed.
     band: distance::Band = distance::Band::default(),
+    /// Whether φ is computed, by the CPU. If not, it is 0 without closest faces, and nothing is checked: for those who
+    /// need the surface alone. A [trimmed](Self::trim) surface and a [sheet](Self::sheet) always have it.
+    sdf: bool = true,
     /// Whether to measure the result and to check whether it can be trusted.
     checks: bool = true,
 }

@@ -363,6 +363,12 @@ impl<T: Real> Reconstructor<T> {
             closest,
             ..
         } = &mut self.result;
+        if !options.sdf && open.is_none() {
+            sdf.values_mut().fill(T::zero());
+            closest.clear();
+            closest.resize(sdf.values().len(), distance::NO_TRIANGLE);
+            return Ok(());
+        }
         if let (Some(open), Some(thickness)) = (open, options.sheet.thickness()) {
             let scratch = &mut self.scratch.distance;
             let sheet = open.trimmed();
@@ -383,7 +389,8 @@ impl<T: Real> Reconstructor<T> {
 
     /// Measures the result and checks whether it can be trusted.
     fn check(&mut self) {
-        if !self.result.options.checks {
+        let options = &self.result.options;
+        if !options.checks || !options.sdf {
             return;
         }
         let Reconstruction {
@@ -424,7 +431,14 @@ impl<T: Real> Reconstructor<T> {
     }
 }
 
-/// The indicator whose surface the mesh is.
+impl<T: Real> Reconstruction<T> {
+    /// The indicator whose surface the mesh is.
+    pub(super) fn marched(&self) -> Cells<'_, T> {
+        marched(&self.indicator, &self.sparse, &self.refined)
+    }
+}
+
+/// [`Reconstruction::marched`].
 fn marched<'a, T: Real>(
     indicator: &'a Field<T>,
     sparse: &'a Option<Sparse<T>>,

@@ -7,6 +7,7 @@ mod finite;
 mod gradients;
 mod orientation;
 mod pinned_bits;
+mod query;
 mod sparse_solve;
 mod surface_resolution;
 mod thin_parts;

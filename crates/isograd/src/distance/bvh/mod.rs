@@ -163,6 +163,19 @@ impl Bvh {
         best.1
     }
 
+    /// Whether the box of some leaf is closer to a point than the square root of `within`.
+    pub(super) fn has_box_within(&self, q: [f64; 3], within: f64) -> bool {
+        self.has_box_below(self.levels.len() - 1, 0, q, within)
+    }
+
+    fn has_box_below(&self, level: usize, index: usize, q: [f64; 3], within: f64) -> bool {
+        let squared = self.levels[level][index].distances_from(q);
+        (0..WIDTH).any(|slot| {
+            squared[slot] < within
+                && (level == 0 || self.has_box_below(level - 1, index * WIDTH + slot, q, within))
+        })
+    }
+
     #[inline(always)]
     fn nearest_in_leaf(&self, points: &Points, leaf: u32, found: &mut NearestTriangles) {
         for place in self.leaf(leaf) {

@@ -1,7 +1,7 @@
 use super::query_pullback::support;
 use super::{Random, soup, torus};
 use crate::Mesh;
-use crate::distance::interpolate::{Cotangent, VertexValues};
+use crate::distance::interpolate::{Bars, Cotangent, VertexValues};
 use crate::distance::{Error, Hit, Query};
 use crate::testing::{assert_same_bits, inner};
 use crate::vector::{add, of_f64, scale};
@@ -21,6 +21,13 @@ fn hits(mesh: &Mesh<f64>, points: &[[f64; 3]]) -> Vec<Hit<f64>> {
 fn moved(at: &[[f64; 3]], way: &[[f64; 3]], t: f64) -> Vec<[f64; 3]> {
     let pairs = at.iter().zip(way);
     pairs.map(|(&p, &d)| add(p, scale(d, t))).collect()
+}
+
+fn of_values<'a>(values: &'a [[f64; 3]]) -> Bars<'a, f64> {
+    Bars {
+        values: values.as_flattened(),
+        ..Bars::default()
+    }
 }
 
 fn at(mesh: &Mesh<f64>, values: &[[f64; 3]], points: &[[f64; 3]]) -> Vec<f64> {
@@ -95,12 +102,12 @@ fn points_vertices_and_values_get_the_transpose() {
         components: 3,
     };
     let mut out = Cotangent::default();
-    let guarded = of.pullback(&points, &middle, bar.as_flattened(), &mut out);
+    let guarded = of.pullback(&points, &middle, of_values(&bar), &mut out);
     assert_eq!(guarded, Ok(0));
-    let of_values = out.values.as_chunks::<3>().0;
+    let values_bar = out.values.as_chunks::<3>().0;
     let found = inner(&out.points, &point_way)
         + inner(&out.vertices, &vertex_way)
-        + inner(of_values, &value_way);
+        + inner(values_bar, &value_way);
     let expected = (loss(step, &high) - loss(-step, &low)) / (2.0 * step);
     // Rounding of sums of 1800 terms, 1e-13, divided by the step.
     assert!(
@@ -129,7 +136,7 @@ fn ugly_meshes_give_finite_cotangents_and_misses_give_none() {
     let bar = vectors(points.len(), 1.0, 11);
     let pull = || {
         let mut out = Cotangent::default();
-        let guarded = of.pullback(&points, &hits, bar.as_flattened(), &mut out);
+        let guarded = of.pullback(&points, &hits, of_values(&bar), &mut out);
         guarded.map(|_| out)
     };
     let out = pull().expect("matching lengths");
@@ -156,7 +163,11 @@ fn lengths_that_do_not_match_are_errors() {
         ..of
     };
     let mut out = Cotangent::default();
-    let short = of.pullback(&[[0.0; 3]; 5], &hits, &[1.0; 4], &mut out);
+    let short = Bars {
+        values: &[1.0; 4],
+        ..Bars::default()
+    };
+    let short = of.pullback(&[[0.0; 3]; 5], &hits, short, &mut out);
     assert!(matches!(short, Err(Error::Mismatch { .. })));
     assert_eq!(out, Cotangent::default());
     let mut wrong = hits;
