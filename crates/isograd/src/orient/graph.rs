@@ -68,16 +68,6 @@ impl Graph {
         let n = neighborhoods.index.len();
         self.take_axes(axes, neighborhoods, sites);
         self.near.resize(n, [0; NEIGHBORS]);
-        self.offset.resize(n, [[0.0; 3]; NEIGHBORS]);
-        self.coupling.resize(n, [0.0; NEIGHBORS]);
-        for lengths in [
-            &mut self.area,
-            &mut self.reach,
-            &mut self.ring,
-            &mut self.thickness,
-        ] {
-            lengths.resize(n, 0.0);
-        }
         self.find_neighbors(neighborhoods, sites);
         self.find_sheets();
         self.measure();
@@ -120,15 +110,16 @@ impl Graph {
         let radius = neighborhoods.common_radius;
         index.nearest_of_all(radius, sites.positions(), &mut self.near);
         let unit = 1.0 / neighborhoods.spacing().f64();
-        let near = self.near.par_iter_mut().zip(&mut self.offset);
-        near.enumerate().for_each(|(site, (near, offset))| {
+        let offsets = |(site, near): (usize, &mut [u32; NEIGHBORS])| {
             let point = index.point(sites.position(site));
-            for (near, offset) in near.iter_mut().zip(offset) {
+            near.each_mut().map(|near| {
                 let d = vector::sub(index.point(*near as usize), point);
-                *offset = d.map(|x| (x.f64() * unit) as f32);
                 *near = sites.of(index.order()[*near as usize]);
-            }
-        });
+                d.map(|x| (x.f64() * unit) as f32)
+            })
+        };
+        let near = self.near.par_iter_mut().enumerate();
+        near.map(offsets).collect_into_vec(&mut self.offset);
     }
 
     /// Takes the axis of its own sheet for each point whose neighbors lie on several.
@@ -156,44 +147,40 @@ impl Graph {
     /// Reach and thickness of every point.
     fn measure(&mut self) {
         let (offset, axis) = (&self.offset, &self.axis);
-        self.ring.par_iter_mut().enumerate().for_each(|(p, ring)| {
-            *ring = vector::norm(offset[p][RING - 1]);
+        let ring = offset
+            .par_iter()
+            .map(|offset| vector::norm(offset[RING - 1]));
+        ring.collect_into_vec(&mut self.ring);
+        let thickness = offset.par_iter().zip(axis).map(|(offset, &axis)| {
+            let mut height = [0.0; NEIGHBORS / 2];
+            for (height, &d) in height.iter_mut().zip(offset) {
+                *height = vector::dot(d, axis).abs();
+            }
+            median(&mut height)
         });
-        self.thickness
-            .par_iter_mut()
-            .enumerate()
-            .for_each(|(p, thickness)| {
-                let mut height = [0.0; NEIGHBORS / 2];
-                for (height, &d) in height.iter_mut().zip(&offset[p]) {
-                    *height = vector::dot(d, axis[p]).abs();
-                }
-                *thickness = median(&mut height);
-            });
-        let (ring, near) = (&self.ring, &self.near);
-        self.reach
-            .par_iter_mut()
-            .enumerate()
-            .for_each(|(p, reach)| {
-                let mut around = [0.0; RING];
-                for (around, &q) in around.iter_mut().zip(&near[p]) {
-                    *around = ring[q as usize];
-                }
-                *reach = coupling::reach(ring[p], median(&mut around));
-            });
+        thickness.collect_into_vec(&mut self.thickness);
+        let ring = &self.ring;
+        let reach = ring.par_iter().zip(&self.near).map(|(&own, near)| {
+            let mut around = [0.0; RING];
+            for (around, &q) in around.iter_mut().zip(near) {
+                *around = ring[q as usize];
+            }
+            coupling::reach(own, median(&mut around))
+        });
+        reach.collect_into_vec(&mut self.reach);
     }
 
     fn couple(&mut self) {
         let mut coupling = std::mem::take(&mut self.coupling);
         let this = &*self;
-        coupling
-            .par_iter_mut()
-            .enumerate()
-            .for_each(|(p, coupling)| {
-                for (slot, coupling) in coupling.iter_mut().enumerate() {
-                    let q = this.near[p][slot] as usize;
-                    *coupling = if q == p { 0.0 } else { this.tie(p, q, slot) };
-                }
-            });
+        let couplings = |(p, near): (usize, &[u32; NEIGHBORS])| {
+            std::array::from_fn(|slot| match near[slot] as usize {
+                q if q == p => 0.0,
+                q => this.tie(p, q, slot),
+            })
+        };
+        let near = this.near.par_iter().enumerate();
+        near.map(couplings).collect_into_vec(&mut coupling);
         self.coupling = coupling;
     }
 
@@ -242,14 +229,15 @@ impl Graph {
 
     fn measure_areas(&mut self) {
         let (near, coupling, axis, reach) = (&self.near, &self.coupling, &self.axis, &self.reach);
-        self.area.par_iter_mut().enumerate().for_each(|(p, area)| {
+        let area = (0..near.len()).into_par_iter().map(|p| {
             let same = |&(slot, &q): &(usize, &u32)| {
                 let parallel = vector::dot(axis[p], axis[q as usize]);
                 coupling::on_same_sheet(coupling[p][slot], parallel)
             };
             let same = near[p].iter().enumerate().filter(same).count();
-            *area = coupling::area(reach[p], same as f32);
+            coupling::area(reach[p], same as f32)
         });
+        area.collect_into_vec(&mut self.area);
         self.values.clone_from(&self.area);
         if !self.values.is_empty() {
             let median = median(&mut self.values);

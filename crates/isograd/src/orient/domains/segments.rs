@@ -6,8 +6,11 @@
 //! the winding number decide between them as between domains: first large segments, then smaller ones. Signs change
 //! only if that is clearly better by the sum of all three.
 
+use rayon::prelude::*;
+
 use super::super::regions::root;
 use super::{DomainSigns, Graph, Place, STRONG, Ties, number};
+use crate::parallel::{self, CHUNK};
 
 /// A segment holds at most one sample in so many, first and then.
 const SHARES: [usize; 3] = [50, 200, 500];
@@ -60,13 +63,12 @@ impl DomainSigns {
     }
 
     fn is_contradicted(&self, graph: &Graph) -> bool {
-        let (mut against, mut all) = (0.0, 0.0);
-        for p in 0..self.sign.len() {
-            for (_, agreement) in self.agreements(graph, p) {
-                against += f64::from((-agreement).max(0.0));
-                all += f64::from(agreement.abs());
-            }
-        }
+        let [against, all] = parallel::sum_array(self.sign.len(), |p| {
+            let agreements = self.agreements(graph, p).map(|(_, a)| f64::from(a));
+            agreements.fold([0.0; 2], |[against, all], a| {
+                [against + (-a).max(0.0), all + a.abs()]
+            })
+        });
         against * (self.sign.len() as f64).sqrt() > CONTRADICTED * all
     }
 
@@ -76,7 +78,9 @@ impl DomainSigns {
         let mut parent: Vec<u32> = (0..n as u32).collect();
         let mut size = vec![1; n];
         // Segments that are joined, or too large to be joined, stay so: each coupling is examined on its own level alone.
-        for (p, q) in self.by_level(graph).into_iter().rev().flatten() {
+        let couplings = self.by_level(graph);
+        let on_level = |level: usize| couplings.iter().flat_map(move |part| &part[level]);
+        for &(p, q) in (0..LEVELS).rev().flat_map(on_level) {
             let (a, b) = (root(&mut parent, p), root(&mut parent, q));
             let (low, high) = (a.min(b) as usize, a.max(b) as usize);
             if low != high && size[low] + size[high] <= limit {
@@ -87,18 +91,24 @@ impl DomainSigns {
         number(&mut self.domain, n as u32, |p| root(&mut parent, p))
     }
 
-    /// Samples and neighbors of strong couplings that the signs agree with, for each level.
-    fn by_level(&self, graph: &Graph) -> [Vec<(u32, u32)>; LEVELS] {
-        let mut couplings = [(); LEVELS].map(|()| Vec::new());
-        for p in 0..self.sign.len() {
-            for (q, agreement) in self.agreements(graph, p) {
-                if agreement >= STRONG {
-                    let level = (agreement - STRONG) / (1.0 - STRONG) * LEVELS as f32;
-                    couplings[(level as usize).min(LEVELS - 1)].push((p as u32, q));
+    /// Samples and neighbors of strong couplings that the signs agree with, for some samples after the other, and for each
+    /// level.
+    fn by_level(&self, graph: &Graph) -> Vec<[Vec<(u32, u32)>; LEVELS]> {
+        let n = self.sign.len();
+        let of_samples = |first: usize| {
+            let mut couplings = [(); LEVELS].map(|()| Vec::new());
+            for p in first..n.min(first + CHUNK) {
+                for (q, agreement) in self.agreements(graph, p) {
+                    if agreement >= STRONG {
+                        let level = (agreement - STRONG) / (1.0 - STRONG) * LEVELS as f32;
+                        couplings[(level as usize).min(LEVELS - 1)].push((p as u32, q));
+                    }
                 }
             }
-        }
-        couplings
+            couplings
+        };
+        let firsts = (0..n).into_par_iter().step_by(CHUNK);
+        firsts.map(of_samples).collect()
     }
 
     /// Turns the segments whose sign in `outcome` is −1, relative to the evidence, if these are at least so many samples

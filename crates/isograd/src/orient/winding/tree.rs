@@ -39,6 +39,9 @@ type Block = [[f32; WIDTH]; 6];
 /// Samples of the smallest clusters, at most.
 const LEAF: usize = 4 * WIDTH;
 
+/// More samples are worth two tasks.
+const MANY: usize = 1 << 17;
+
 /// A cluster acts as one sample from this many times its radius on.
 const FAR: f32 = 4.0;
 
@@ -64,22 +67,53 @@ pub(super) struct Tree {
 impl Tree {
     /// The tree of samples, in any order.
     pub(super) fn new(mut dipoles: Vec<Dipole>) -> Self {
-        let mut tree = Self::default();
-        if !dipoles.is_empty() {
-            tree.add(&mut dipoles);
+        match dipoles.is_empty() {
+            true => Self::default(),
+            false => Self::of(&mut dipoles),
         }
+    }
+
+    /// The tree of one sample or more. The halves of many are built side by side.
+    fn of(dipoles: &mut [Dipole]) -> Self {
+        let mut tree = Self::default();
+        if dipoles.len() <= MANY {
+            tree.add(dipoles);
+            return tree;
+        }
+        tree.push(dipoles);
+        let (low, high) = halves(dipoles);
+        let (low, high) = rayon::join(|| Self::of(low), || Self::of(high));
+        tree.append(low);
+        tree.append(high);
+        tree.clusters[0].next = tree.clusters.len() as u32;
         tree
     }
 
-    fn add(&mut self, dipoles: &mut [Dipole]) {
+    /// Adds the cluster of some samples, without its parts.
+    fn push(&mut self, dipoles: &[Dipole]) {
         let (whole, radius) = combined(dipoles);
-        let (place, first) = (self.clusters.len(), self.blocks.len());
         self.clusters.push(Cluster {
             whole,
             far: (FAR * radius).powi(2),
-            blocks: [first as u32; 2],
+            blocks: [self.blocks.len() as u32; 2],
             next: 0,
         });
+    }
+
+    fn append(&mut self, part: Self) {
+        let (clusters, blocks) = (self.clusters.len() as u32, self.blocks.len() as u32);
+        self.blocks.extend(part.blocks);
+        self.clusters
+            .extend(part.clusters.iter().map(|cluster| Cluster {
+                blocks: cluster.blocks.map(|block| block + blocks),
+                next: cluster.next + clusters,
+                ..*cluster
+            }));
+    }
+
+    fn add(&mut self, dipoles: &mut [Dipole]) {
+        let place = self.clusters.len();
+        self.push(dipoles);
         if dipoles.len() > LEAF {
             let (low, high) = halves(dipoles);
             self.add(low);
