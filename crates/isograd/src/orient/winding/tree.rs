@@ -13,7 +13,7 @@ use crate::vector;
 const SOFT: f32 = 0.3;
 
 /// A sample as a piece of surface; lengths in sample spacings.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Dipole {
     position: [f32; 3],
     /// Area times normal over 4π.
@@ -39,14 +39,14 @@ type Block = [[f32; WIDTH]; 6];
 /// Samples of the smallest clusters, at most.
 const LEAF: usize = 4 * WIDTH;
 
-/// More samples are worth two tasks.
+/// The halves of more samples are worth a task each.
 const MANY: usize = 1 << 17;
 
 /// A cluster acts as one sample from this many times its radius on.
 const FAR: f32 = 4.0;
 
 /// A cluster of samples, and the one that stands for them from afar.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Cluster {
     whole: Dipole,
     /// Square of the distance from which on it stands for them.
@@ -58,7 +58,7 @@ struct Cluster {
 }
 
 /// The samples of a domain: clusters, each before its two halves.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Tree {
     blocks: Vec<Block>,
     clusters: Vec<Cluster>,
@@ -69,20 +69,20 @@ impl Tree {
     pub(super) fn new(mut dipoles: Vec<Dipole>) -> Self {
         match dipoles.is_empty() {
             true => Self::default(),
-            false => Self::of(&mut dipoles),
+            false => Self::of(&mut dipoles, MANY),
         }
     }
 
-    /// The tree of one sample or more. The halves of many are built side by side.
-    fn of(dipoles: &mut [Dipole]) -> Self {
+    /// The tree of one sample or more. The halves of more than `many` are built side by side.
+    fn of(dipoles: &mut [Dipole], many: usize) -> Self {
         let mut tree = Self::default();
-        if dipoles.len() <= MANY {
+        if dipoles.len() <= many {
             tree.add(dipoles);
             return tree;
         }
         tree.push(dipoles);
         let (low, high) = halves(dipoles);
-        let (low, high) = rayon::join(|| Self::of(low), || Self::of(high));
+        let (low, high) = rayon::join(|| Self::of(low, many), || Self::of(high, many));
         tree.append(low);
         tree.append(high);
         tree.clusters[0].next = tree.clusters.len() as u32;
@@ -237,6 +237,21 @@ fn share(along: f32, square: f32, root: f32) -> f32 {
 mod tests {
     use super::super::super::shapes::sphere;
     use super::*;
+
+    #[test]
+    fn halves_built_side_by_side_make_the_same_tree() {
+        let (points, normals) = sphere(3001, [1.0, 2.0, 3.0], 9.0, 5);
+        let samples = points.iter().zip(&normals);
+        let dipole = |(&x, &n): (&[f64; 3], &[f64; 3])| {
+            Dipole::new(vector::of_f64(x), vector::of_f64(n), 1.0)
+        };
+        let ball: Vec<Dipole> = samples.map(dipole).collect();
+        let build = |many: usize| Tree::of(&mut ball.clone(), many);
+        let whole = build(usize::MAX);
+        for many in [LEAF, 500, 2000] {
+            assert_eq!(build(many), whole);
+        }
+    }
 
     #[test]
     fn the_sums_are_those_of_one_sample_after_the_other() {
