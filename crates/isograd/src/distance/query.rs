@@ -95,6 +95,9 @@ pub(crate) fn hits_within<T: Real>(
     within: f64,
     is_inside: impl Fn([f64; 3]) -> Option<bool> + Sync,
 ) -> Result<Vec<Hit<T>>, Error> {
+    if points.is_empty() {
+        return Ok(Vec::new());
+    }
     let mut bvh = Bvh::default();
     bvh.rebuild(mesh)?;
     let surface = Surface {
