@@ -72,7 +72,8 @@ fn copy_workspace(published: &[String], copy: &Path) -> Outcome {
 fn unpack(target: &Path, name: &str, crates: &Path) -> Outcome {
     let version = env!("CARGO_PKG_VERSION");
     let mut tar = Command::new("tar");
-    tar.arg("-xzf")
+    // With the time of now: by those in the package, older than all that was built before, Cargo would take that for it.
+    tar.arg("-xmzf")
         .arg(target.join(format!("package/{name}-{version}.crate")));
     process::run(tar.arg("-C").arg(crates))?;
     let unpacked = crates.join(name);
@@ -104,10 +105,14 @@ fn install_source_distribution(target: &Path) -> Result<(), Obstacle> {
         .and_then(|mut entries| entries.next()?.ok())
         .ok_or("maturin made no source distribution".to_owned())?
         .path();
+    forget_builds()?;
     let clean = Environment::create(folder.join("environment"))?;
     let settings = [
         ("CARGO_TARGET_DIR", target.display().to_string()),
-        ("MATURIN_PEP517_ARGS", PEP517.to_owned()),
+        (
+            "MATURIN_PEP517_ARGS",
+            format!("--features pyo3/extension-module --profile {PROFILE}"),
+        ),
     ];
     clean.install(&[&archive], &settings)?;
     let mut script = Command::new(&clean.python);
@@ -116,8 +121,18 @@ fn install_source_distribution(target: &Path) -> Result<(), Obstacle> {
     Ok(())
 }
 
-/// Options of the build within pip: a profile that builds in the least time.
-const PEP517: &str = "--features pyo3/extension-module --profile package-test";
+/// Removes what earlier tests of the source distribution built of its crates: its files are older than that, so Cargo would
+/// take it for theirs.
+fn forget_builds() -> Outcome {
+    let mut clean = process::cargo(["clean", "--quiet", "--profile", PROFILE]);
+    for name in Workspace::load()?.default_members {
+        clean.args(["--package", &name]);
+    }
+    process::run(&mut clean)
+}
+
+/// The profile of the build within pip, which takes the least time.
+const PROFILE: &str = "package-test";
 
 /// Runs with the package and NumPy alone.
 const SCRIPT: &str = "\
