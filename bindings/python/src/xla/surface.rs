@@ -75,9 +75,9 @@ impl Target for Pullback {
         let hits = saved_hits(&mut call)?;
         let saved = call.saved()?;
         let bars = Bars {
-            distance: call.input("the cotangent of the distances", 1)?,
-            point: call.vectors("the cotangent of the closest points")?,
-            values: call.input("the cotangent of the values", 2)?,
+            distance: Some(call.input("the cotangent of the distances", 1)?),
+            point: Some(call.vectors("the cotangent of the closest points")?),
+            values: Some(call.input("the cotangent of the values", 2)?),
         };
         let normals = call.normals()?;
         let places_out = call.vectors_out("the cotangent of the places")?;

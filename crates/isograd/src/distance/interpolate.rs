@@ -32,15 +32,15 @@ pub struct VertexValues<'a, T> {
     pub components: usize,
 }
 
-/// Cotangents of hits and of the values at them. An empty list is one of zeros.
+/// Cotangents of hits and of the values at them; zeros where there are none.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Bars<'a, T> {
     /// `(M,)` of the signed distances.
-    pub distance: &'a [T],
+    pub distance: Option<&'a [T]>,
     /// `(M, 3)` of the closest points.
-    pub point: &'a [[T; 3]],
+    pub point: Option<&'a [[T; 3]]>,
     /// `(M, components)` of the values, row by row.
-    pub values: &'a [T],
+    pub values: Option<&'a [T]>,
 }
 
 /// Cotangents of the inputs of an interpolation, which the pullback adds to.

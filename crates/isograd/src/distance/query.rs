@@ -129,7 +129,11 @@ pub(super) fn nearest_triangles<T: Real>(
     points: &[[T; 3]],
     limit: impl Fn(usize) -> f64 + Sync,
 ) -> Vec<u32> {
-    let order = morton_order(bvh, points);
+    let is_near = |i: usize| {
+        let limit = limit(i);
+        limit == f64::INFINITY || bvh.has_box_within(to_f64(points[i]), limit)
+    };
+    let order = morton_order(bvh, points, is_near);
     let arch = Arch::new();
     let mut sorted = vec![NOWHERE; order.len()];
     sorted
@@ -144,18 +148,23 @@ pub(super) fn nearest_triangles<T: Real>(
                 found,
             });
         });
-    let mut nearest = vec![NOWHERE; order.len()];
+    let mut nearest = vec![NOWHERE; points.len()];
     for (&(_, index), place) in order.iter().zip(sorted) {
         nearest[index as usize] = place;
     }
     nearest
 }
 
-/// Morton codes and indices of points, sorted: neighbors in space are neighbors in the list.
-pub(super) fn morton_order<T: Real>(bvh: &Bvh, points: &[[T; 3]]) -> Vec<(u64, u32)> {
+/// Morton codes and indices of those points that are wanted, sorted: neighbors in space are neighbors in the list.
+pub(super) fn morton_order<T: Real>(
+    bvh: &Bvh,
+    points: &[[T; 3]],
+    is_wanted: impl Fn(usize) -> bool + Sync,
+) -> Vec<(u64, u32)> {
     let mut order: Vec<(u64, u32)> = points
         .par_iter()
         .enumerate()
+        .filter(|&(index, _)| is_wanted(index))
         .map(|(index, &p)| (morton_code(bvh.to_morton(to_f64(p))), index as u32))
         .collect();
     order.par_sort_unstable();
@@ -183,27 +192,19 @@ impl<T: Real> Surface<'_, T> {
             Some(false) => (MARGIN * within).powi(2),
             _ => f64::INFINITY,
         };
-        let is_near = |&i: &usize| {
-            let limit = limit(i);
-            limit == f64::INFINITY || self.bvh.has_box_within(to_f64(points[i]), limit)
-        };
-        let near: Vec<usize> = (0..points.len()).into_par_iter().filter(is_near).collect();
-        let searched: Vec<[T; 3]> = near.iter().map(|&i| points[i]).collect();
-        let places = nearest_triangles(self.bvh, &searched, |k| limit(near[k]));
-        let found: Vec<Hit<T>> = (near.par_iter().zip(places))
-            .map(|(&i, place)| match place {
-                NOWHERE if limit(i) < f64::INFINITY => Hit::beyond(points[i], within),
-                _ => self.hit(points[i], place, sides[i]),
-            })
-            .collect();
-        let beyond = points.par_iter().map(|&point| Hit::beyond(point, within));
-        let mut hits: Vec<Hit<T>> = beyond.collect();
-        for (&i, hit) in near.iter().zip(found) {
-            if !(hit.distance.f64() > within) {
-                hits[i] = hit;
+        let nearest = nearest_triangles(self.bvh, points, limit);
+        let all = points.par_iter().zip(nearest).enumerate();
+        all.map(|(i, (&point, place))| {
+            if place == NOWHERE && limit(i) < f64::INFINITY {
+                return Hit::beyond(point, within);
             }
-        }
-        hits
+            let hit = self.hit(point, place, sides[i]);
+            match hit.distance.f64() > within {
+                true => Hit::beyond(point, within),
+                false => hit,
+            }
+        })
+        .collect()
     }
 
     /// Result of a query whose closest triangle is at `place` of the tree.

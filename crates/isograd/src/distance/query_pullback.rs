@@ -63,20 +63,15 @@ pub fn pull_hits<T: Real>(
     points_bar: &mut Vec<[T; 3]>,
     vertices_bar: &mut Vec<[T; 3]>,
 ) -> Result<usize, Error> {
-    check(
-        points.len(),
-        "the cotangent of the distances",
-        distance_bar.len(),
-    )?;
     let of = VertexValues {
         mesh,
         values: &[],
         components: 0,
     };
     let bars = Bars {
-        distance: distance_bar,
-        point: point_bar.unwrap_or_default(),
-        values: &[],
+        distance: Some(distance_bar),
+        point: point_bar,
+        values: None,
     };
     let mut out = Cotangent {
         points: std::mem::take(points_bar),
@@ -132,15 +127,17 @@ impl<T: Real> VertexValues<'_, T> {
         };
         let bounded = add_to_some(&mut out.points, &found, |k| shares[k].point)
             + add_to(&mut out.vertices, at_vertex);
+        let Some(values) = bars.values else {
+            return Ok(guarded + bounded);
+        };
         let rows = out.values.par_chunks_exact_mut(self.components.max(1));
         rows.enumerate().for_each(|(vertex, sums)| {
             for (c, sum) in sums.iter_mut().enumerate() {
                 let mut total = sum.f64();
                 hits_of.for_each_corner(&corners, vertex, |k, corner| {
                     let i = found[k] as usize;
-                    let bar = bars.of(i, self.components).values;
-                    let weight = hits[i].barycentric[corner].f64();
-                    total += bar.get(c).map_or(0.0, |bar| weight * bar.f64());
+                    let bar = values[i * self.components + c].f64();
+                    total += hits[i].barycentric[corner].f64() * bar;
                 });
                 *sum = T::of(total);
             }
@@ -192,31 +189,33 @@ struct Bar<'a, T> {
 impl<'a, T: Real> Bars<'a, T> {
     fn of(&self, hit: usize, components: usize) -> Bar<'a, T> {
         Bar {
-            distance: self.distance.get(hit).map_or(0.0, |bar| bar.f64()),
-            point: self.point.get(hit).map_or([0.0; 3], |&bar| to_f64(bar)),
-            values: match self.values.is_empty() {
-                true => &[],
-                false => &self.values[hit * components..][..components],
-            },
+            distance: self.distance.map_or(0.0, |bars| bars[hit].f64()),
+            point: self.point.map_or([0.0; 3], |bars| to_f64(bars[hit])),
+            values: (self.values).map_or(&[], |bars| &bars[hit * components..][..components]),
         }
     }
 
     fn check(&self, hits: usize, components: usize) -> Result<(), Error> {
         let lists = [
-            ("the cotangent of the distances", self.distance.len(), hits),
+            (
+                "the cotangent of the distances",
+                self.distance.map(<[_]>::len),
+                hits,
+            ),
             (
                 "the cotangent of the closest points",
-                self.point.len(),
+                self.point.map(<[_]>::len),
                 hits,
             ),
             (
                 "the cotangent of the values",
-                self.values.len(),
+                self.values.map(<[_]>::len),
                 hits * components,
             ),
         ];
-        let mut given = lists.into_iter().filter(|&(_, length, _)| length > 0);
-        given.try_for_each(|(what, length, expected)| check(expected, what, length))
+        lists.into_iter().try_for_each(|(what, length, expected)| {
+            check(expected, what, length.unwrap_or(expected))
+        })
     }
 }
 

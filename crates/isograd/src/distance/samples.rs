@@ -52,7 +52,7 @@ pub(crate) fn count<T: Real>(
 ) -> Result<Counts, Error> {
     let mut own = Bvh::default();
     let bvh = tree_of(mesh, built, &mut own)?;
-    let order = morton_order(bvh, samples.points);
+    let order = morton_order(bvh, samples.points, |_| true);
     let surface = Surface {
         mesh,
         bvh,

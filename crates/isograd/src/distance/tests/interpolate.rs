@@ -25,7 +25,7 @@ fn moved(at: &[[f64; 3]], way: &[[f64; 3]], t: f64) -> Vec<[f64; 3]> {
 
 fn of_values<'a>(values: &'a [[f64; 3]]) -> Bars<'a, f64> {
     Bars {
-        values: values.as_flattened(),
+        values: Some(values.as_flattened()),
         ..Bars::default()
     }
 }
@@ -164,7 +164,7 @@ fn lengths_that_do_not_match_are_errors() {
     };
     let mut out = Cotangent::default();
     let short = Bars {
-        values: &[1.0; 4],
+        values: Some(&[1.0; 4]),
         ..Bars::default()
     };
     let short = of.pullback(&[[0.0; 3]; 5], &hits, short, &mut out);
