@@ -238,14 +238,19 @@ mod tests {
     use super::super::super::shapes::sphere;
     use super::*;
 
-    #[test]
-    fn halves_built_side_by_side_make_the_same_tree() {
-        let (points, normals) = sphere(3001, [1.0, 2.0, 3.0], 9.0, 5);
+    /// Samples of a sphere of radius 9.
+    fn ball(samples: usize) -> Vec<Dipole> {
+        let (points, normals) = sphere(samples, [1.0, 2.0, 3.0], 9.0, 5);
         let samples = points.iter().zip(&normals);
         let dipole = |(&x, &n): (&[f64; 3], &[f64; 3])| {
             Dipole::new(vector::of_f64(x), vector::of_f64(n), 1.0)
         };
-        let ball: Vec<Dipole> = samples.map(dipole).collect();
+        samples.map(dipole).collect()
+    }
+
+    #[test]
+    fn halves_built_side_by_side_make_the_same_tree() {
+        let ball = ball(3001);
         let build = |many: usize| Tree::of(&mut ball.clone(), many);
         let whole = build(usize::MAX);
         for many in [LEAF, 500, 2000] {
@@ -255,12 +260,7 @@ mod tests {
 
     #[test]
     fn the_sums_are_those_of_one_sample_after_the_other() {
-        let (points, normals) = sphere(1003, [1.0, 2.0, 3.0], 9.0, 5);
-        let samples = points.iter().zip(&normals);
-        let dipole = |(&x, &n): (&[f64; 3], &[f64; 3])| {
-            Dipole::new(vector::of_f64(x), vector::of_f64(n), 1.0)
-        };
-        let ball: Vec<Dipole> = samples.map(dipole).collect();
+        let ball = ball(1003);
         let one = |d: &Dipole, at: [f32; 3]| {
             let r = vector::to_f64(vector::sub(d.position, at));
             let square = vector::norm_squared(r) + f64::from(SOFT * SOFT);
