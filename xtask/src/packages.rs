@@ -87,15 +87,15 @@ fn unpack(target: &Path, name: &str, crates: &Path) -> Outcome {
 
 /// Installs the Python package from its source distribution into an empty environment, and reconstructs a cloud.
 pub fn source_distribution() -> Outcome<Vec<String>> {
-    let target = Workspace::load()?.target;
-    match install_source_distribution(&target) {
+    match install_source_distribution(&Workspace::load()?) {
         Ok(()) => Ok(Vec::new()),
         Err(Obstacle::Absent(reason)) => Ok(vec![format!("SKIPPED source distribution: {reason}")]),
         Err(Obstacle::Failure(failure)) => Err(failure),
     }
 }
 
-fn install_source_distribution(target: &Path) -> Result<(), Obstacle> {
+fn install_source_distribution(workspace: &Workspace) -> Result<(), Obstacle> {
+    let target = &workspace.target;
     let folder = target.join("xtask/sdist");
     environment::remove_folder(&folder)?;
     let mut sdist = python::environment(target)?.module("maturin", &["sdist", "--out"]);
@@ -105,7 +105,7 @@ fn install_source_distribution(target: &Path) -> Result<(), Obstacle> {
         .and_then(|mut entries| entries.next()?.ok())
         .ok_or("maturin made no source distribution".to_owned())?
         .path();
-    forget_builds()?;
+    forget_builds(&workspace.default_members)?;
     let clean = Environment::create(folder.join("environment"))?;
     let settings = [
         ("CARGO_TARGET_DIR", target.display().to_string()),
@@ -123,10 +123,10 @@ fn install_source_distribution(target: &Path) -> Result<(), Obstacle> {
 
 /// Removes what earlier tests of the source distribution built of its crates: its files are older than that, so Cargo would
 /// take it for theirs.
-fn forget_builds() -> Outcome {
+fn forget_builds(packages: &[String]) -> Outcome {
     let mut clean = process::cargo(["clean", "--quiet", "--profile", PROFILE]);
-    for name in Workspace::load()?.default_members {
-        clean.args(["--package", &name]);
+    for name in packages {
+        clean.args(["--package", name]);
     }
     process::run(&mut clean)
 }
