@@ -248,6 +248,19 @@ pub(super) fn distance_squared<F: Float>(frame: Frame<F>, q: Vector3<F>) -> F {
     z * z + in_plane.squared
 }
 
+/// The point of the triangle that is closest to `q`, as exact as the frame.
+#[cube]
+pub(super) fn foot<F: Float>(frame: Frame<F>, q: Vector3<F>) -> Vector3<F> {
+    let p = q.sub(frame.origin);
+    let (x, y) = (frame.u.dot(p), frame.v.dot(p));
+    let w = weights::<F>(frame, planar::<F>(frame, x, y), x, y);
+    let along = w.y * (frame.foot + frame.back) + w.z * frame.foot;
+    frame
+        .origin
+        .add(frame.u.scale(along))
+        .add(frame.v.scale(w.z * frame.height))
+}
+
 /// The point of the triangle that is closest to `q`, in all seven regions (C. Ericson, *Real-Time Collision
 /// Detection*, §5.1.5, in an orthonormal frame). The offset is taken from the nearest corner, where the least
 /// is lost to cancellation.

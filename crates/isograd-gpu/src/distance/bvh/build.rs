@@ -1,59 +1,60 @@
 //! A hierarchy of boxes over triangles, made on the device.
 //!
 //! The triangles are put in the order of the Morton codes of their centers (30 bits; equal codes stay in the
-//! order of the faces), and the hierarchy is the radix tree of that order, every node of it made on its own
-//! (T. Karras, *Maximizing parallelism in the construction of BVHs, octrees, and k-d trees*, 2012). The box of
-//! a node is that of a run of triangles, put together from the aligned runs of a pyramid: nothing waits for
-//! anything, and there are no atomics.
+//! order of the faces), and the hierarchy is a pyramid of aligned runs of that order, which lies as a heap does: entry 1
+//! is that of all, and under entry `i` are `2i` and `2i + 1`. Nothing waits for anything, and there are no atomics.
+//!
+//! A box that leans is thick, and from afar hundreds of them seem to be as near as the closest triangle. So short runs
+//! also have a slab: bounds of their corners along their mean normal, and how far the corners are from its axis.
 
 use cubecl::prelude::*;
 use isograd::Grid;
 
-use super::super::triangle::{FRAME, corners, frame, store_frame};
+use super::super::triangle::{FRAME, corners, frame, load_frame, store_frame};
 use super::super::{Error, Mesh, MeshArrays};
 use super::morton::face_order;
 use crate::device::{argument, launch};
 use crate::grid::{Lattice, low_corner};
 use crate::primitives::ends::ends;
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
-/// Stands in `lowest` where there is no triangle; and for a cell without a seed or a result.
+/// Stands for a cell without a seed or a result.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// Marks a child that is a run of triangles: above it, one less than their number, from bit 28 on; below, the
-/// first of them.
-pub(super) const LEAF: u32 = 1 << 31;
-
 /// Triangles of a run that is not cut further.
-const RUN: u32 = 2;
+pub(super) const RUN: u32 = 2;
+
+/// Triangles of the longest run that has a slab, a power of two.
+pub(super) const SLAB_RUN: u32 = 128;
+
+/// Numbers of a slab: normal, bounds along it from the center of the box, distance from its axis.
+pub(super) const SLAB: u32 = 6;
 
 /// The hierarchy. Places are seen from the low corner of a grid.
 pub(crate) struct Tree<T> {
-    /// For each node the boxes of its two children: low corner, high corner. Node 0 is the root.
-    pub boxes: Buffer<T>,
-    /// For each node: its two children, and the lowest face below each.
-    pub children: Buffer<u32>,
+    /// Boxes of aligned runs of triangles: low corner, high corner.
+    pub pyramid: Buffer<T>,
+    /// Slabs of those of at most [`SLAB_RUN`] triangles; see [`SLAB`].
+    pub slabs: Buffer<T>,
     /// The frame of each triangle, in Morton order.
     pub frames: Buffer<T>,
     /// Its face.
     pub faces: Buffer<u32>,
-    /// Boxes of aligned runs of them, as a heap: entry 1 is that of all.
-    pub pyramid: Buffer<T>,
 }
 
 /// [`Tree`] in kernels.
 #[derive(CubeLaunch, CubeType)]
 pub(crate) struct TreeArrays<F: Float + CubeElement> {
-    pub boxes: Array<F>,
-    pub children: Array<u32>,
+    pub pyramid: Array<F>,
+    pub slabs: Array<F>,
     pub frames: Array<F>,
     pub faces: Array<u32>,
-    pub pyramid: Array<F>,
 }
 
 argument!(
     Tree<T> => TreeArraysLaunch<T, R>:
-    |of| of.boxes.arg(), of.children.arg(), of.frames.arg(), of.faces.arg(), of.pyramid.arg()
+    |of| of.pyramid.arg(), of.slabs.arg(), of.frames.arg(), of.faces.arg()
 );
 
 impl<T: Scalar> Tree<T> {
@@ -63,66 +64,35 @@ impl<T: Scalar> Tree<T> {
         mesh: &Mesh<T>,
         grid: &Grid<T>,
     ) -> Result<Self, Error> {
-        let triangles = mesh.check()?;
+        mesh.check()?;
         let bounds = ends(device, &mesh.vertices, 3)?;
-        let order = face_order(device, mesh, &bounds)?;
-        let placed = Placed::new(device, mesh, grid, &order.places)?;
-        let leaves = placed.faces.len();
-        let boxes = device.empty((leaves - 1) * 12)?;
-        let children = device.empty((leaves - 1) * 4)?;
-        launch!(device, leaves - 1 => make_nodes<T>(
-            order.keys, placed.pyramid, placed.lowest, boxes, children, leaves as u32,
-            triangles as u32, RUN,
+        let places = face_order(device, mesh, &bounds)?.places;
+        // A lone triangle stands twice, so that there is a run.
+        let leaves = places.len().max(2);
+        let width = leaves.next_power_of_two();
+        let tree = Self {
+            pyramid: device.empty(2 * width * 6)?,
+            slabs: device.empty(width * SLAB as usize)?,
+            frames: device.empty(leaves * FRAME)?,
+            faces: device.empty(leaves)?,
+        };
+        launch!(device, width => place_triangles<T>(
+            mesh, places, tree.frames, tree.faces, tree.pyramid, grid,
         ));
-        Ok(Self {
-            boxes,
-            children,
-            frames: placed.frames,
-            faces: placed.faces,
-            pyramid: placed.pyramid,
-        })
+        let mut level = width / 2;
+        while level > 0 {
+            launch!(device, level => join_pairs<T>(tree.pyramid, level as u32));
+            level /= 2;
+        }
+        launch!(device, width => find_slabs<T>(
+            tree.pyramid, tree.frames, tree.slabs, leaves as u32, width as u32,
+        ));
+        Ok(tree)
     }
 
     /// Triangles that the pyramid has room for, a power of two.
     pub fn width(&self) -> usize {
         self.pyramid.len() / 12
-    }
-}
-
-/// The triangles in their order, and the pyramid over them.
-struct Placed<T> {
-    frames: Buffer<T>,
-    faces: Buffer<u32>,
-    pyramid: Buffer<T>,
-    /// The lowest face in each entry of the pyramid.
-    lowest: Buffer<u32>,
-}
-
-impl<T: Scalar> Placed<T> {
-    fn new<R: Runtime>(
-        device: &Device<R>,
-        mesh: &Mesh<T>,
-        grid: &Grid<T>,
-        places: &Buffer<u32>,
-    ) -> Result<Self, Error> {
-        // A lone triangle stands twice, so that there is a node.
-        let leaves = places.len().max(2);
-        let width = leaves.next_power_of_two();
-        let placed = Self {
-            frames: device.empty(leaves * FRAME)?,
-            faces: device.empty(leaves)?,
-            pyramid: device.empty(2 * width * 6)?,
-            lowest: device.empty(2 * width)?,
-        };
-        launch!(device, width => place_triangles<T>(
-            mesh, places, placed.frames, placed.faces, placed.pyramid, placed.lowest, grid,
-        ));
-        let mut level = width / 2;
-        while level > 0 {
-            launch!(device, level => join_pairs<T>(placed.pyramid, placed.lowest, level as u32));
-            level /= 2;
-        }
-        Ok(placed)
     }
 }
 
@@ -134,10 +104,9 @@ fn place_triangles<F: Float + CubeElement>(
     frames: &mut Array<F>,
     face_of: &mut Array<u32>,
     pyramid: &mut Array<F>,
-    lowest: &mut Array<u32>,
     grid: Lattice<F>,
 ) {
-    let width = lowest.len() / 2;
+    let width = pyramid.len() / 12;
     if ABSOLUTE_POS < width {
         let at = width + ABSOLUTE_POS;
         if ABSOLUTE_POS < face_of.len() {
@@ -145,7 +114,6 @@ fn place_triangles<F: Float + CubeElement>(
             let t = corners::<F>(mesh, face, low_corner::<F>(&grid));
             store_frame::<F>(frames, ABSOLUTE_POS, frame::<F>(t));
             face_of[ABSOLUTE_POS] = face;
-            lowest[at] = face;
             pyramid[at * 6] = min(t.a.x, min(t.b.x, t.c.x));
             pyramid[at * 6 + 1] = min(t.a.y, min(t.b.y, t.c.y));
             pyramid[at * 6 + 2] = min(t.a.z, min(t.b.z, t.c.z));
@@ -153,7 +121,6 @@ fn place_triangles<F: Float + CubeElement>(
             pyramid[at * 6 + 4] = max(t.a.y, max(t.b.y, t.c.y));
             pyramid[at * 6 + 5] = max(t.a.z, max(t.b.z, t.c.z));
         } else {
-            lowest[at] = NONE;
             for axis in 0..3usize {
                 pyramid[at * 6 + axis] = F::new(3e38);
                 pyramid[at * 6 + 3 + axis] = F::new(-3e38);
@@ -162,9 +129,9 @@ fn place_triangles<F: Float + CubeElement>(
     }
 }
 
-/// The pyramid lies as a heap does: entry 1 is the box of all, and under entry `i` are `2i` and `2i + 1`.
+/// Boxes of a level of the pyramid from those of the level below.
 #[cube(launch)]
-fn join_pairs<F: Float>(pyramid: &mut Array<F>, lowest: &mut Array<u32>, level: u32) {
+fn join_pairs<F: Float>(pyramid: &mut Array<F>, level: u32) {
     if ABSOLUTE_POS < level as usize {
         let at = level as usize + ABSOLUTE_POS;
         let (a, b) = (at * 12, at * 12 + 6);
@@ -172,147 +139,66 @@ fn join_pairs<F: Float>(pyramid: &mut Array<F>, lowest: &mut Array<u32>, level: 
             pyramid[at * 6 + axis] = min(pyramid[a + axis], pyramid[b + axis]);
             pyramid[at * 6 + 3 + axis] = max(pyramid[a + 3 + axis], pyramid[b + 3 + axis]);
         }
-        lowest[at] = min(lowest[at * 2], lowest[at * 2 + 1]);
     }
 }
 
-/// One more than the leading bits that the keys of two places in the order share, and 0 where the second is
-/// none: of the codes, and of the places where these are equal.
-#[cube]
-fn shared_bits(codes: &Array<u32>, a: i32, b: i32, leaves: i32, triangles: i32) -> i32 {
-    let mut bits = 0i32.runtime();
-    if b >= 0i32 && b < leaves {
-        let last = triangles - 1i32;
-        let differ = codes[min(a, last) as usize] ^ codes[min(b, last) as usize];
-        if differ == 0u32 {
-            bits = 33i32 + u32::leading_zeros(a as u32 ^ b as u32) as i32;
-        } else {
-            bits = 1i32 + u32::leading_zeros(differ) as i32;
-        }
-    }
-    bits
-}
-
-/// The node that begins or ends at place `ABSOLUTE_POS`: how far it reaches, and where it is cut in two.
+/// The slab of entry `ABSOLUTE_POS` of the pyramid, where its run is short enough.
 #[cube(launch)]
-fn make_nodes<F: Float>(
-    codes: &Array<u32>,
+fn find_slabs<F: Float + CubeElement>(
     pyramid: &Array<F>,
-    lowest: &Array<u32>,
-    boxes: &mut Array<F>,
-    children: &mut Array<u32>,
+    frames: &Array<F>,
+    slabs: &mut Array<F>,
     leaves: u32,
-    triangles: u32,
-    #[comptime] run: u32,
-) {
-    if ABSOLUTE_POS < leaves as usize - 1 {
-        let width = (lowest.len() / 2) as u32;
-        let (n, m) = (leaves as i32, triangles as i32);
-        let i = ABSOLUTE_POS as i32;
-        let after = shared_bits(codes, i, i + 1i32, n, m);
-        let before = shared_bits(codes, i, i - 1i32, n, m);
-        let way = select(after > before, 1i32, 0i32 - 1i32);
-        let outside = min(after, before);
-        // The reach: a bound by doubling, then bisection.
-        let mut bound = 2i32.runtime();
-        while shared_bits(codes, i, i + bound * way, n, m) > outside {
-            bound *= 2i32;
-        }
-        let mut reach = 0i32.runtime();
-        let mut step = bound / 2i32;
-        while step > 0i32 {
-            if shared_bits(codes, i, i + (reach + step) * way, n, m) > outside {
-                reach += step;
-            }
-            step /= 2i32;
-        }
-        let end = i + reach * way;
-        // The cut: the last place that shares more with this one than the end does.
-        let inside = shared_bits(codes, i, end, n, m);
-        let mut split = 0i32.runtime();
-        let mut half = reach;
-        let mut going = true;
-        while going {
-            half = (half + 1i32) / 2i32;
-            if shared_bits(codes, i, i + (split + half) * way, n, m) > inside {
-                split += half;
-            }
-            going = half > 1i32;
-        }
-        let cut = (i + split * way + min(way, 0i32)) as u32;
-        let first = min(i, end) as u32;
-        let last = max(i, end) as u32;
-        let node = ABSOLUTE_POS;
-        children[node * 4] = name_child(first, cut, cut, run);
-        children[node * 4 + 1] = name_child(cut + 1u32, last, cut + 1u32, run);
-        children[node * 4 + 2] =
-            join_range::<F>(pyramid, lowest, boxes, node * 12, first, cut, width);
-        children[node * 4 + 3] = join_range::<F>(
-            pyramid,
-            lowest,
-            boxes,
-            node * 12 + 6,
-            cut + 1u32,
-            last,
-            width,
-        );
-    }
-}
-
-/// A child that has the places from `first` to `last`: a run, or the node `node`.
-#[cube]
-fn name_child(first: u32, last: u32, node: u32, #[comptime] run: u32) -> u32 {
-    let more = last - first;
-    select(more < run, LEAF | (more << 28u32) | first, node)
-}
-
-/// Writes the box of the places from `first` to `last` at `to`, and returns the lowest face among them.
-#[cube]
-fn join_range<F: Float>(
-    pyramid: &Array<F>,
-    lowest: &Array<u32>,
-    boxes: &mut Array<F>,
-    to: usize,
-    first: u32,
-    last: u32,
     width: u32,
-) -> u32 {
-    let mut low = Array::<F>::new(3usize);
-    let mut high = Array::<F>::new(3usize);
-    for axis in 0..3usize {
-        low[axis] = F::new(3e38);
-        high[axis] = F::new(-3e38);
-    }
-    let mut face = NONE.runtime();
-    // The aligned runs that make up the range, from both its ends.
-    let mut left = first + width;
-    let mut right = last + width + 1u32;
-    while left < right {
-        if left % 2u32 == 1u32 {
-            join_entry::<F>(pyramid, &mut low, &mut high, left);
-            face = min(face, lowest[left as usize]);
-            left += 1u32;
+) {
+    let entry = ABSOLUTE_POS as u32;
+    if entry < width && entry * comptime!(SLAB_RUN) >= width {
+        // Of the run: as often as the entry can be doubled within the width.
+        let mut run = 1u32.runtime();
+        while entry * run < width {
+            run *= 2u32;
         }
-        if right % 2u32 == 1u32 {
-            right -= 1u32;
-            join_entry::<F>(pyramid, &mut low, &mut high, right);
-            face = min(face, lowest[right as usize]);
+        let first = entry * run - width;
+        let end = min(first + run, leaves);
+        let middle = center_of_box::<F>(pyramid, entry);
+        let mut sum = Vector3::<F>::zero();
+        for place in first..end {
+            let t = load_frame::<F>(frames, place);
+            let own = t.u.cross(t.v).scale((t.foot + t.back) * t.height);
+            sum.x += own.x;
+            sum.y += own.y;
+            sum.z += own.z;
         }
-        left /= 2u32;
-        right /= 2u32;
+        let normal = sum.direction();
+        let mut low = F::new(0.0);
+        let mut high = F::new(0.0);
+        let mut across = F::new(0.0);
+        for place in first..end {
+            let t = load_frame::<F>(frames, place);
+            let a = t.origin.sub(middle);
+            let b = a.add(t.u.scale(t.foot + t.back));
+            let c = a.add(t.u.scale(t.foot)).add(t.v.scale(t.height));
+            let (x, y, z) = (normal.dot(a), normal.dot(b), normal.dot(c));
+            let begins = place == first;
+            let (least, most) = (min(x, min(y, z)), max(x, max(y, z)));
+            low = select(begins, least, min(low, least));
+            high = select(begins, most, max(high, most));
+            across = max(across, a.sub(normal.scale(x)).norm());
+            across = max(across, b.sub(normal.scale(y)).norm());
+            across = max(across, c.sub(normal.scale(z)).norm());
+        }
+        let at = (entry * comptime!(SLAB)) as usize;
+        normal.store(slabs, at);
+        slabs[at + 3] = low;
+        slabs[at + 4] = high;
+        slabs[at + 5] = across;
     }
-    for axis in 0..3usize {
-        boxes[to + axis] = low[axis];
-        boxes[to + 3 + axis] = high[axis];
-    }
-    face
 }
 
+/// The center of the box of an entry.
 #[cube]
-fn join_entry<F: Float>(pyramid: &Array<F>, low: &mut Array<F>, high: &mut Array<F>, entry: u32) {
-    let at = entry as usize * 6;
-    for axis in 0..3usize {
-        low[axis] = min(low[axis], pyramid[at + axis]);
-        high[axis] = max(high[axis], pyramid[at + 3 + axis]);
-    }
+pub(super) fn center_of_box<F: Float>(pyramid: &Array<F>, entry: u32) -> Vector3<F> {
+    let low = Vector3::<F>::at(pyramid, (entry * 2u32) as usize);
+    let high = Vector3::<F>::at(pyramid, (entry * 2u32 + 1u32) as usize);
+    low.add(high).scale(F::new(0.5))
 }

@@ -1,35 +1,32 @@
-//! The closest triangle of cells, by descent into a [`Tree`].
+//! The closest triangle of cells.
 //!
-//! The cells of a brick of 4 × 4 × 4 begin with the triangle that is closest to the center of the brick, found
-//! in the same way on a lattice of the bricks, and so on up to a few bricks: a bound that is never further off
-//! than the brick is wide.
+//! A group of units has a brick of 4 × 4 × 4 cells, and a foot: the point of the triangle that is closest to the center of
+//! the brick. It [lists](super::list) the triangles that may be closest to some cell, and each unit tries these for its own.
 //!
-//! Near the center of a sphere all triangles are about equally far, and a descent would try them all. One that
-//! takes too many steps is given up, and a whole group of units settles its cell.
+//! The triangle that is closest to the center of a brick is found [by a group](super::single) that begins with the one of
+//! two bricks along each axis, and so on up to a few, which begin with the closest of some triangles.
+//!
+//! Near the center of a sphere all triangles are about equally far. Where the list has no room for them, groups
+//! [settle](super::settle) one cell each.
 
 use cubecl::prelude::*;
 
-use super::super::triangle::{distance_squared, load_frame};
+use super::super::triangle::{foot, load_frame};
 use super::super::{Error, FAR};
-use super::build::{LEAF, NONE, Tree, TreeArrays};
+use super::build::{NONE, Tree, TreeArrays};
+use super::list::{ROOM, Region, UNITS, list_triangles, new_list};
 use super::settle::settle;
+use super::single::{Nearest, nearest_of_centers, try_place};
 use crate::device::{Ready, launch};
 use crate::grid::{Cell, cell_at};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
-/// Cells along the side of a brick, and units of a group, one a cell.
+/// Cells along the side of a brick; a unit has one of them.
 const BRICK: usize = 4;
-const UNITS: usize = 64;
 
-/// The coarsest lattice has at most so many cells: they begin with nothing.
+/// The coarsest lattice has at most so many cells.
 const COARSEST: usize = 64;
-
-/// Children that may wait: one for each bit of a key in the radix tree, 30 of the code and 32 of the place.
-const STACK: usize = 64;
-
-/// Steps of a descent before it is given up.
-const STEPS: u32 = 2048;
 
 /// A result that is not the last word: above it, the place found so far, or [`NOTHING_YET`].
 pub(super) const UNPROVEN: u32 = 1 << 31;
@@ -52,6 +49,8 @@ pub(crate) struct Centers<F: Float + CubeElement> {
     pub nz: u32,
     pub spacing: F,
     pub bound: F,
+    /// Share of a squared distance by which rounding may have made a bound too large.
+    pub rounding: F,
 }
 
 impl Level {
@@ -59,7 +58,8 @@ impl Level {
     pub(super) fn arg<R: Runtime, T: Scalar>(&self) -> Ready<CentersLaunch<T, R>> {
         let [nx, ny, nz] = self.shape.map(|n| n as u32);
         let (spacing, bound) = (T::of(self.spacing), T::of(self.bound));
-        Ready::new(CentersLaunch::new(nx, ny, nz, spacing, bound))
+        let rounding = T::of(32.0 * T::epsilon().f64());
+        Ready::new(CentersLaunch::new(nx, ny, nz, spacing, bound, rounding))
     }
 }
 
@@ -79,10 +79,11 @@ pub(crate) fn cells<T: Scalar, R: Runtime>(
         spacing,
         bound: bound(0.0),
     }];
-    let (mut shape, mut spacing) = (shape, spacing);
-    while shape.iter().product::<usize>() > COARSEST {
-        shape = shape.map(|n| n.div_ceil(BRICK));
-        spacing *= BRICK as f64;
+    let (mut shape, mut spacing, mut side) = (shape, spacing, BRICK);
+    while levels.len() == 1 || shape.iter().product::<usize>() > COARSEST {
+        shape = shape.map(|n| n.div_ceil(side));
+        spacing *= side as f64;
+        side = 2;
         levels.push(Level {
             shape,
             spacing,
@@ -90,13 +91,14 @@ pub(crate) fn cells<T: Scalar, R: Runtime>(
             bound: bound(0.87 * spacing),
         });
     }
-    let mut seeds = None;
+    let mut found = None;
     while let Some(level) = levels.pop() {
-        seeds = Some(solve_level(device, tree, level, seeds, levels.is_empty())?);
+        found = Some(solve_level(device, tree, level, found, levels.is_empty())?);
     }
-    Ok(seeds.unwrap_or(device.empty(0)?))
+    Ok(found.unwrap_or(device.empty(0)?))
 }
 
+/// Places of the triangles closest to the cells of a lattice, or their faces on the last one.
 fn solve_level<T: Scalar, R: Runtime>(
     device: &Device<R>,
     tree: &Tree<T>,
@@ -104,161 +106,99 @@ fn solve_level<T: Scalar, R: Runtime>(
     seeds: Option<Buffer<u32>>,
     last: bool,
 ) -> Result<Buffer<u32>, Error> {
-    let found = device.empty(level.shape.iter().product())?;
-    let bricks: usize = level.shape.iter().map(|n| n.div_ceil(BRICK)).product();
-    let seeded = seeds.is_some();
-    let seeds = seeds.unwrap_or(device.empty(0)?);
-    launch!(device, bricks * UNITS, UNITS => nearest_of_cells<T>(
-        tree, seeds, found, level.arg::<R, T>(), seeded, last,
-    ));
+    let count = level.shape.iter().product();
+    let found = device.empty(count)?;
+    let centers = level.arg::<R, T>();
+    match seeds {
+        None => launch!(device, count * UNITS, UNITS => nearest_of_centers<T>(
+            tree, device.empty::<u32>(0)?, found, centers, count as u32, false,
+        )),
+        Some(seeds) if last => {
+            let bricks: usize = level.shape.iter().map(|n| n.div_ceil(BRICK)).product();
+            launch!(device, bricks * UNITS, UNITS => nearest_of_bricks<T>(
+                tree, seeds, found, centers, bricks as u32,
+            ));
+        }
+        Some(seeds) => launch!(device, count * UNITS, UNITS => nearest_of_centers<T>(
+            tree, seeds, found, centers, count as u32, true,
+        )),
+    }
     settle(device, tree, level, last, &found)?;
     Ok(found)
 }
 
-/// Squared distance from a place to the box whose low corner is vector `at` of `boxes`.
+/// Squared distance from a place to the box of an entry of the pyramid.
 #[cube]
-pub(super) fn box_distance_squared<F: Float>(boxes: &Array<F>, at: u32, q: Vector3<F>) -> F {
-    let low = Vector3::<F>::at(boxes, at as usize);
-    let high = Vector3::<F>::at(boxes, (at + 1u32) as usize);
+pub(super) fn box_distance_squared<F: Float>(pyramid: &Array<F>, entry: u32, q: Vector3<F>) -> F {
+    let low = Vector3::<F>::at(pyramid, (entry * 2u32) as usize);
+    let high = Vector3::<F>::at(pyramid, (entry * 2u32 + 1u32) as usize);
     q.to_box_squared(low, high)
 }
 
-/// The triangle closest to `q`, as its place in Morton order: not further than the root of `bound`, else
-/// [`NONE`]; [`UNPROVEN`] where the descent was given up. `seed` is a guess or [`NONE`]. Of triangles equally far the
-/// one of the lowest face, so that the seed does not matter.
-#[cube]
-fn nearest<F: Float + CubeElement>(
-    tree: &TreeArrays<F>,
-    q: Vector3<F>,
-    bound: F,
-    seed: u32,
-) -> u32 {
-    let mut best = NONE.runtime();
-    let mut best_face = NONE.runtime();
-    let mut least = bound;
-    if seed != NONE {
-        let d = distance_squared::<F>(load_frame::<F>(&tree.frames, seed), q);
-        if d <= least {
-            least = d;
-            best = seed;
-            best_face = tree.faces[seed as usize];
-        }
-    }
-    let mut waiting = Array::<u32>::new(STACK);
-    let mut distances = Array::<F>::new(STACK);
-    waiting[0] = 0u32;
-    distances[0] = F::new(0.0);
-    let mut height = 1u32.runtime();
-    let mut steps = 0u32.runtime();
-    while height > 0u32 && steps < STEPS {
-        height -= 1u32;
-        steps += 1u32;
-        let node = waiting[height as usize];
-        if distances[height as usize] <= least {
-            if node >= LEAF {
-                let first = node & 0x0fff_ffffu32;
-                let count = ((node >> 28u32) & 7u32) + 1u32;
-                for place in first..first + count {
-                    let d = distance_squared::<F>(load_frame::<F>(&tree.frames, place), q);
-                    if d <= least {
-                        let face = tree.faces[place as usize];
-                        if d < least || face < best_face {
-                            best = place;
-                            best_face = face;
-                        }
-                        least = d;
-                    }
-                }
-            } else {
-                let at = node as usize * 4;
-                let a = box_distance_squared::<F>(&tree.boxes, node * 4u32, q);
-                let b = box_distance_squared::<F>(&tree.boxes, node * 4u32 + 2u32, q);
-                let mut wanted_a = a < least;
-                let mut wanted_b = b < least;
-                if a == least {
-                    wanted_a = tree.children[at + 2] < best_face;
-                }
-                if b == least {
-                    wanted_b = tree.children[at + 3] < best_face;
-                }
-                // The nearer one on top.
-                let b_first = b < a;
-                let (left, right) = (tree.children[at], tree.children[at + 1]);
-                height = push::<F>(
-                    &mut waiting,
-                    &mut distances,
-                    height,
-                    wanted_a && b_first,
-                    left,
-                    a,
-                );
-                height = push::<F>(&mut waiting, &mut distances, height, wanted_b, right, b);
-                height = push::<F>(
-                    &mut waiting,
-                    &mut distances,
-                    height,
-                    wanted_a && !b_first,
-                    left,
-                    a,
-                );
-            }
-        }
-    }
-    if height > 0u32 {
-        best = UNPROVEN | min(best, NOTHING_YET);
-    }
-    best
-}
-
-/// Puts a child on the stack if it is wanted, and returns the height.
-#[cube]
-fn push<F: Float>(
-    waiting: &mut Array<u32>,
-    distances: &mut Array<F>,
-    height: u32,
-    wanted: bool,
-    child: u32,
-    distance: F,
-) -> u32 {
-    if wanted {
-        waiting[height as usize] = child;
-        distances[height as usize] = distance;
-    }
-    select(wanted, height + 1u32, height)
-}
-
-/// A group is a brick of cells; `seeds` has one place a brick. Places are written for the lattice below, faces
-/// on the last one.
+/// A group is a brick of cells; `seeds` has the triangle closest to the center of each, or [`NONE`] where no cell of it is
+/// within the bound. Writes the faces closest to the cells, or what is known where the list has no room.
 #[cube(launch)]
-fn nearest_of_cells<F: Float + CubeElement>(
+fn nearest_of_bricks<F: Float + CubeElement>(
     tree: &TreeArrays<F>,
     seeds: &Array<u32>,
     found: &mut Array<u32>,
-    level: Centers<F>,
-    #[comptime] seeded: bool,
-    #[comptime] last: bool,
+    cells: Centers<F>,
+    bricks: u32,
 ) {
-    let (nx, ny, nz) = (level.nx, level.ny, level.nz);
-    let across_y = (ny - 1u32) / 4u32 + 1u32;
-    let across_z = (nz - 1u32) / 4u32 + 1u32;
+    let mut list = new_list();
     let brick = CUBE_POS as u32;
-    let i = brick / (across_y * across_z) * 4u32 + UNIT_POS / 16u32;
-    let j = brick / across_z % across_y * 4u32 + UNIT_POS / 4u32 % 4u32;
-    let k = brick % across_z * 4u32 + UNIT_POS % 4u32;
-    if i < nx && j < ny && k < nz {
-        let q = center_of::<F>(Cell { i, j, k }, level.spacing);
-        let mut seed = NONE.runtime();
-        if comptime!(seeded) {
-            seed = seeds[brick as usize];
-        }
+    if brick < bricks {
+        let (nx, ny, nz) = (cells.nx, cells.ny, cells.nz);
+        let across_y = (ny - 1u32) / 4u32 + 1u32;
+        let across_z = (nz - 1u32) / 4u32 + 1u32;
+        let i = brick / (across_y * across_z) * 4u32;
+        let j = brick / across_z % across_y * 4u32;
+        let k = brick % across_z * 4u32;
+        let seed = seeds[brick as usize];
+        let first = center_of::<F>(Cell { i, j, k }, cells.spacing);
+        let half = F::new(1.5) * cells.spacing;
+        let center = Vector3::<F> {
+            x: first.x + half,
+            y: first.y + half,
+            z: first.z + half,
+        };
+        let i = i + UNIT_POS / 16u32;
+        let j = j + UNIT_POS / 4u32 % 4u32;
+        let k = k + UNIT_POS % 4u32;
+        let q = center_of::<F>(Cell { i, j, k }, cells.spacing);
         let mut result = NONE.runtime();
-        if seed != NONE || !seeded {
-            result = nearest::<F>(tree, q, level.bound, seed);
+        if seed != NONE {
+            let foot = foot::<F>(load_frame::<F>(&tree.frames, seed), center);
+            let from = foot.sub(center);
+            let listed = list_triangles::<F>(
+                tree,
+                &mut list,
+                Region::<F> {
+                    center,
+                    half,
+                    foot,
+                    away: from.dot(from),
+                    rounding: cells.rounding,
+                },
+            );
+            let mut best = Nearest::<F> {
+                place: NONE.runtime(),
+                face: NONE.runtime(),
+                squared: cells.bound,
+            };
+            if listed.count <= comptime!(ROOM) {
+                for index in 0..listed.count {
+                    let place = list.entries[(listed.first + index) as usize];
+                    try_place::<F>(&mut best, tree, place, q);
+                }
+                result = best.face;
+            } else {
+                result = UNPROVEN | seed;
+            }
         }
-        if last && result < UNPROVEN {
-            result = tree.faces[result as usize];
+        if i < nx && j < ny && k < nz {
+            found[((i * ny + j) * nz + k) as usize] = result;
         }
-        found[((i * ny + j) * nz + k) as usize] = result;
     }
 }
 
@@ -269,7 +209,7 @@ pub(crate) fn center<F: Float>(cell: u32, spacing: F, ny: u32, nz: u32) -> Vecto
 }
 
 #[cube]
-fn center_of<F: Float>(cell: Cell, spacing: F) -> Vector3<F> {
+pub(super) fn center_of<F: Float>(cell: Cell, spacing: F) -> Vector3<F> {
     let half = F::new(0.5);
     Vector3::<F> {
         x: spacing * (F::cast_from(cell.i) + half),

@@ -1,11 +1,14 @@
-//! The closest triangle where a descent would try nearly all of them: a group of units for each query.
+//! The closest triangles of the cells of bricks whose lists have no room: a group of units for each cell, which lists again,
+//! from its own center, and where that has no room tries nearly all triangles.
 
 use cubecl::prelude::*;
 
 use super::super::Error;
 use super::super::triangle::{distance_squared, load_frame};
 use super::build::{NONE, Tree, TreeArrays};
+use super::list::UNITS;
 use super::search::{Centers, Level, NOTHING_YET, UNPROVEN, box_distance_squared, center};
+use super::single::{nearest_by_group, new_group};
 use crate::device::launch;
 use crate::primitives::scan::exclusive_sum;
 use crate::vector::Vector3;
@@ -19,7 +22,7 @@ const TAKEN: usize = 64;
 /// Mask of the place in a result marked [`UNPROVEN`].
 const NOT_UNPROVEN: u32 = UNPROVEN - 1;
 
-/// Solves what descents to the cells of `level` have left in `found`, a group each; faces are written where `last`.
+/// Solves the cells of `level` that are left in `found`, a group each; faces are written where `last`.
 pub(super) fn settle<T: Scalar, R: Runtime>(
     device: &Device<R>,
     tree: &Tree<T>,
@@ -33,6 +36,9 @@ pub(super) fn settle<T: Scalar, R: Runtime>(
     let before = exclusive_sum(device, &flags)?;
     let left: Buffer<u32> = device.empty(count)?;
     launch!(device, count => list_left(found, before, left));
+    launch!(device, [SETTLERS; UNITS] => search_left<T>(
+        tree, left, before, found, level.arg::<R, T>(), last,
+    ));
     let taken = tree.width().min(TAKEN);
     launch!(device, [SETTLERS; SETTLER_UNITS] => settle_left<T>(
         tree, left, before, found, level.arg::<R, T>(), (tree.width() / taken) as u32, taken as u32,
@@ -41,12 +47,16 @@ pub(super) fn settle<T: Scalar, R: Runtime>(
     Ok(())
 }
 
-/// 1 where a descent was given up.
+#[cube]
+fn is_left(result: u32) -> bool {
+    result >= UNPROVEN && result != NONE
+}
+
+/// 1 where a cell is left.
 #[cube(launch)]
 fn flag_left(found: &Array<u32>, flags: &mut Array<u32>) {
     if ABSOLUTE_POS < found.len() {
-        let result = found[ABSOLUTE_POS];
-        flags[ABSOLUTE_POS] = select(result >= UNPROVEN && result != NONE, 1u32, 0u32);
+        flags[ABSOLUTE_POS] = u32::cast_from(is_left(found[ABSOLUTE_POS]));
     }
 }
 
@@ -58,6 +68,35 @@ fn list_left(found: &Array<u32>, before: &Array<u32>, left: &mut Array<u32>) {
         if before[ABSOLUTE_POS + 1] > own {
             left[own as usize] = ABSOLUTE_POS as u32;
         }
+    }
+}
+
+/// A group lists the runs that matter for one cell after another.
+#[cube(launch)]
+fn search_left<F: Float + CubeElement>(
+    tree: &TreeArrays<F>,
+    left: &Array<u32>,
+    before: &Array<u32>,
+    found: &mut Array<u32>,
+    cells: Centers<F>,
+    #[comptime] last: bool,
+) {
+    let mut group = new_group::<F>();
+    let count = before[before.len() - 1];
+    let mut turn = CUBE_POS as u32;
+    while turn < count {
+        let cell = left[turn as usize];
+        let q = center::<F>(cell, cells.spacing, cells.ny, cells.nz);
+        let guess = found[cell as usize] & NOT_UNPROVEN;
+        let mut result = nearest_by_group::<F>(tree, &mut group, q, cells, guess);
+        if last && result < UNPROVEN {
+            result = tree.faces[result as usize];
+        }
+        sync_cube();
+        if UNIT_POS == 0 {
+            found[cell as usize] = result;
+        }
+        turn += SETTLERS;
     }
 }
 
@@ -82,30 +121,34 @@ fn settle_left<F: Float + CubeElement>(
     let mut turn = CUBE_POS as u32;
     while turn < count {
         let query = left[turn as usize];
-        let q = center::<F>(query, cells.spacing, cells.ny, cells.nz);
-        let guess = found[query as usize] & NOT_UNPROVEN;
-        let own = try_runs::<F>(tree, q, cells.bound, guess, level, taken);
-        least_of[unit] = own.least;
-        face_of[unit] = own.face;
-        place_of[unit] = own.place;
+        let known = found[query as usize];
         sync_cube();
-        let mut half = (SETTLER_UNITS / 2).runtime();
-        while half > 0 {
-            if unit < half {
-                let (a, b) = (least_of[unit], least_of[unit + half]);
-                if b < a || (b == a && face_of[unit + half] < face_of[unit]) {
-                    least_of[unit] = b;
-                    face_of[unit] = face_of[unit + half];
-                    place_of[unit] = place_of[unit + half];
+        if is_left(known) {
+            let q = center::<F>(query, cells.spacing, cells.ny, cells.nz);
+            let guess = known & NOT_UNPROVEN;
+            let own = try_runs::<F>(tree, q, cells.bound, guess, level, taken);
+            least_of[unit] = own.least;
+            face_of[unit] = own.face;
+            place_of[unit] = own.place;
+            sync_cube();
+            let mut half = (SETTLER_UNITS / 2).runtime();
+            while half > 0 {
+                if unit < half {
+                    let (a, b) = (least_of[unit], least_of[unit + half]);
+                    if b < a || (b == a && face_of[unit + half] < face_of[unit]) {
+                        least_of[unit] = b;
+                        face_of[unit] = face_of[unit + half];
+                        place_of[unit] = place_of[unit + half];
+                    }
                 }
+                sync_cube();
+                half /= 2;
+            }
+            if unit == 0 {
+                found[query as usize] = select(last, face_of[0], place_of[0]);
             }
             sync_cube();
-            half /= 2;
         }
-        if unit == 0 {
-            found[query as usize] = select(last, face_of[0], place_of[0]);
-        }
-        sync_cube();
         turn += SETTLERS;
     }
 }
@@ -140,7 +183,7 @@ fn try_runs<F: Float + CubeElement>(
     }
     let mut run = UNIT_POS;
     while run < level {
-        if box_distance_squared::<F>(&tree.pyramid, (level + run) * 2u32, q) <= least {
+        if box_distance_squared::<F>(&tree.pyramid, level + run, q) <= least {
             let end = min((run + 1u32) * taken, tree.faces.len() as u32);
             for place in run * taken..end {
                 let d = distance_squared::<F>(load_frame::<F>(&tree.frames, place), q);

@@ -55,7 +55,7 @@ fn distance_is_that_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
         ("fish", meshes::fish(12), along),
         (
             "sphere",
-            // More triangles than a descent takes.
+            // More triangles than the list of a group has room for.
             meshes::sphere(50, 51),
             grid([-0.95; 3], 0.1, [19; 3]),
         ),
