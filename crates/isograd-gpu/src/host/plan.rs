@@ -10,7 +10,8 @@ use isograd::orient::Method;
 use isograd::poisson::Walls;
 use isograd::sheet::Sheet;
 use isograd::{
-    Backend, Grid, Options, PointCloud, Report, Saved, Seconds, Solve, Stage, SurfaceResolution,
+    Backend, Grid, Options, PointCloud, Report, RestoreError, Seconds, Solve, Stage,
+    SurfaceResolution,
 };
 
 use super::work::{CallStart, Work};
@@ -126,19 +127,25 @@ impl<T: Number> Plan<T> {
         Ok(result)
     }
 
-    /// The result again that a plan with the same grid and options made of `cloud`: [`isograd::Reconstructor::restore`].
-    /// Only the saved normals are used, for the signs; all else is computed anew.
+    /// The result again that a plan with the same grid and options made of `cloud`, with these normals: as
+    /// [`isograd::Reconstructor::restore`], but the normals are enough, for the signs; all else is computed anew.
     ///
     /// # Errors
-    /// As [`Self::reconstruct`]; saved data of another result.
+    /// As [`Self::reconstruct`]; another number of normals.
     pub fn restore(
         &self,
         cloud: &PointCloud<T>,
-        saved: &Saved<'_, T>,
+        normals: &[[T; 3]],
     ) -> Result<Reconstruction<T>, Error> {
-        saved.check(self.grid.cells(), cloud.len())?;
+        if normals.len() != cloud.len() {
+            return Err(Error::Restore(RestoreError::Length {
+                what: "list of normals",
+                found: normals.len(),
+                expected: cloud.len(),
+            }));
+        }
         let (selection, used) = self.options.outliers.apply(cloud);
-        let mut result = self.restore_used(&used, selection.gather(saved.normals, 1))?;
+        let mut result = self.restore_used(&used, selection.gather(normals, 1))?;
         result.set_selection(selection);
         Ok(result)
     }

@@ -6,43 +6,54 @@ use isograd::orient::Method;
 use isograd::poisson::Walls;
 use isograd::{
     Attribute, Backend, Cotangent, ExtensionCotangent, Grid, Options, PointCloud, PullbackError,
-    Real, Reconstructor, Resolution, Saved, Solve, Stage, SurfaceResolution,
+    Real, Reconstructor, Resolution, Solve, Stage, SurfaceResolution,
 };
 use isograd_gpu::host::{Choice, Error, Number, Plan, choose};
 use isograd_shapes::Sampling;
 
-/// Whether there is a Vulkan device for this number type.
-fn is_here<T: Number>() -> bool {
-    let device = isograd_gpu::Device::vulkan().and_then(|device| device.check_number::<T>());
-    device
-        .inspect_err(|error| println!("SKIPPED {}: {error}", T::NAME))
-        .is_ok()
+/// The backends whose device is there for this number type.
+fn backends<T: Number>() -> Vec<Backend> {
+    let mut found = Vec::new();
+    #[cfg(feature = "wgpu")]
+    found.push((Backend::Vulkan, vulkan::<T>()));
+    #[cfg(feature = "cuda")]
+    found.push((Backend::Cuda(0), cuda::<T>()));
+    found.retain(|(backend, device)| {
+        let reason = device.as_ref().err();
+        reason.inspect(|error| println!("SKIPPED on {backend} in {}: {error}", T::NAME));
+        reason.is_none()
+    });
+    found.into_iter().map(|(backend, _)| backend).collect()
 }
 
-/// Tests where there is a Vulkan device, and tests in each of its number types.
-macro_rules! on_vulkan {
+#[cfg(feature = "wgpu")]
+fn vulkan<T: Number>() -> Result<(), isograd_gpu::Error> {
+    isograd_gpu::Device::vulkan()?.check_number::<T>()
+}
+
+#[cfg(feature = "cuda")]
+fn cuda<T: Number>() -> Result<(), isograd_gpu::Error> {
+    isograd_gpu::Device::cuda(0)?.check_number::<T>()
+}
+
+/// Tests on each backend, and tests on each backend in each of its number types.
+macro_rules! on_each_backend {
     ($($test:ident),+; $($typed:ident),+) => {
-        mod on_vulkan {
+        mod on_each_backend {
             $(#[test]
             fn $test() {
-                if super::is_here::<f32>() {
-                    super::$test();
-                }
+                super::backends::<f32>().into_iter().for_each(super::$test);
             })+
             $(#[test]
             fn $typed() {
-                if super::is_here::<f32>() {
-                    super::$typed::<f32>();
-                }
-                if super::is_here::<f64>() {
-                    super::$typed::<f64>();
-                }
+                super::backends::<f32>().into_iter().for_each(super::$typed::<f32>);
+                super::backends::<f64>().into_iter().for_each(super::$typed::<f64>);
             })+
         }
     };
 }
 
-on_vulkan! {
+on_each_backend! {
     previous_takes_the_sides_of_the_call_before,
     a_call_with_other_points_finds_their_sides_anew,
     sensors_tell_the_sides_as_on_the_cpu,
@@ -99,13 +110,13 @@ fn relative<T: Number>(found: &[T], expected: &[T]) -> f64 {
     pairs.fold(0.0f64, |m, (&a, &b)| m.max(Real::f64(a - b).abs())) / largest
 }
 
-fn outliers_are_left_out_as_on_the_cpu<T: Number>() {
+fn outliers_are_left_out_as_on_the_cpu<T: Number>(backend: Backend) {
     let clean = cloud::<T>(2000);
     let grid = grid(&clean);
     let mut points = clean.points().to_vec();
     points.insert(5, [real(90.0), real(0.0), real(-3.0)]);
     let spoilt = PointCloud::new(points).unwrap();
-    let mut plan = Plan::new(Backend::Vulkan, grid, options()).unwrap();
+    let mut plan = Plan::new(backend, grid, options()).unwrap();
     let expected = plan.reconstruct(&clean).unwrap();
     let found = plan.reconstruct(&spoilt).unwrap();
     assert_eq!(found.outliers(), [5]);
@@ -122,14 +133,15 @@ fn outliers_are_left_out_as_on_the_cpu<T: Number>() {
     assert_eq!(pulled, expected.pullback(&cotangent).unwrap());
 }
 
-fn all_that_is_asked_for_is_what_the_cpu_gives<T: Number>() {
+fn all_that_is_asked_for_is_what_the_cpu_gives<T: Number>(backend: Backend) {
     let tolerance = if T::NAME == "f32" { 2e-4 } else { 1e-9 };
     let cloud = cloud::<T>(2000);
     let grid = grid(&cloud);
     let mut plan = Reconstructor::new(grid, options()).unwrap();
     let expected = plan.reconstruct(&cloud).unwrap();
-    let mut plan = Plan::new(Backend::Vulkan, grid, options()).unwrap();
-    assert!(plan.name().starts_with("vulkan: "), "{}", plan.name());
+    let mut plan = Plan::new(backend, grid, options()).unwrap();
+    let name = plan.name();
+    assert!(name.starts_with(&format!("{backend}: ")), "{name}");
     let found = plan.reconstruct(&cloud).unwrap();
     let close = |what: &str, found: &[T], expected: &[T]| {
         let difference = relative(found, expected);
@@ -182,13 +194,14 @@ fn all_that_is_asked_for_is_what_the_cpu_gives<T: Number>() {
     }
 }
 
-fn any_cotangent_comes_back_as_on_the_cpu<T: Number>() {
-    let tolerance = if T::NAME == "f32" { 2e-3 } else { 1e-8 };
+fn any_cotangent_comes_back_as_on_the_cpu<T: Number>(backend: Backend) {
+    // A cell that is about as far from two faces may be given either, in single precision.
+    let tolerance = if T::NAME == "f32" { 5e-3 } else { 1e-8 };
     let cloud = cloud::<T>(1500);
     let grid = grid(&cloud);
     let mut plan = Reconstructor::new(grid, options()).unwrap();
     let expected = plan.reconstruct(&cloud).unwrap();
-    let mut plan = Plan::new(Backend::Vulkan, grid, options()).unwrap();
+    let mut plan = Plan::new(backend, grid, options()).unwrap();
     let found = plan.reconstruct(&cloud).unwrap();
     let near = |phi: &T| Real::f64(*phi).abs() < 1.5 * Real::f64(grid.spacing());
     let sdf = expected.sdf().values().iter();
@@ -216,6 +229,7 @@ fn any_cotangent_comes_back_as_on_the_cpu<T: Number>() {
         assert_eq!(back.guarded, wanted.guarded, "{what}");
         let (a, b) = (back.points.as_flattened(), wanted.points.as_flattened());
         let difference = relative(a, b);
+        println!("{what} in {} on {backend}: {difference:.1e}", T::NAME);
         assert!(difference < tolerance, "{what} {}: {difference:e}", T::NAME);
     }
     let refused = found.pullback(&only(|bar| bar.sdf = Some(&sdf[1..])));
@@ -225,7 +239,7 @@ fn any_cotangent_comes_back_as_on_the_cpu<T: Number>() {
     ));
 }
 
-fn attributes_are_extended_and_pulled_back_as_on_the_cpu<T: Number>() {
+fn attributes_are_extended_and_pulled_back_as_on_the_cpu<T: Number>(backend: Backend) {
     let tolerance = if T::NAME == "f32" { 2e-4 } else { 1e-9 };
     let cloud = cloud::<T>(1500);
     let turning = |p: &[T; 3]| [real::<T>(0.3) - p[1], p[0], p[0] * p[2]];
@@ -244,7 +258,7 @@ fn attributes_are_extended_and_pulled_back_as_on_the_cpu<T: Number>() {
     expected
         .extend_into(&attribute, band, scratch, &mut residual, &mut extension)
         .unwrap();
-    let mut plan = Plan::new(Backend::Vulkan, grid, options()).unwrap();
+    let mut plan = Plan::new(backend, grid, options()).unwrap();
     let found = plan.reconstruct(&cloud).unwrap();
     let (made, kept) = found.extend_with_residual(&attribute, band).unwrap();
     assert_eq!(found.extend(&cloud, "velocity", band).unwrap(), made);
@@ -323,12 +337,12 @@ fn attributes_are_extended_and_pulled_back_as_on_the_cpu<T: Number>() {
     ));
 }
 
-fn previous_takes_the_sides_of_the_call_before() {
+fn previous_takes_the_sides_of_the_call_before(backend: Backend) {
     let cloud = cloud::<f32>(1500);
     let options = options().orient(Method::Previous);
     // Room for it to turn.
     let grid = Grid::new([-1.6; 3], 0.1, [32; 3]).unwrap();
-    let mut plan = Plan::new(Backend::Vulkan, grid, options).unwrap();
+    let mut plan = Plan::new(backend, grid, options).unwrap();
     let first = plan.reconstruct(&cloud).unwrap();
     let second = plan.reconstruct(&cloud).unwrap();
     let method = |of: &isograd_gpu::host::Reconstruction<f32>| of.report().unwrap().orientation;
@@ -347,22 +361,22 @@ fn previous_takes_the_sides_of_the_call_before() {
     assert_eq!(third.normals().unwrap().len(), 1400);
 }
 
-fn a_call_with_other_points_finds_their_sides_anew() {
+fn a_call_with_other_points_finds_their_sides_anew(backend: Backend) {
     let cloud = cloud::<f32>(1500);
     let reversed = cloud.points().iter().rev().copied().collect();
     let reversed = PointCloud::new(reversed).unwrap();
-    let mut plan = Plan::new(Backend::Vulkan, grid(&cloud), options()).unwrap();
+    let mut plan = Plan::new(backend, grid(&cloud), options()).unwrap();
     plan.reconstruct(&cloud).unwrap();
     let again = plan.reconstruct(&reversed).unwrap();
     assert!(again.report().unwrap().surface.closed);
 }
 
-fn sensors_tell_the_sides_as_on_the_cpu() {
+fn sensors_tell_the_sides_as_on_the_cpu(backend: Backend) {
     let sensors = isograd::Sensors::Any(vec![[0.0, 0.0, 6.0], [0.0, 0.0, -6.0]]);
     let cloud = cloud::<f32>(1500).with_sensors(sensors).unwrap();
     let options = options().orient(Method::Sensors);
     let grid = grid(&cloud);
-    let mut plan = Plan::new(Backend::Vulkan, grid, options.clone()).unwrap();
+    let mut plan = Plan::new(backend, grid, options.clone()).unwrap();
     let found = plan.reconstruct(&cloud).unwrap();
     assert_eq!(found.report().unwrap().orientation, "sensors");
     let mut plan = Reconstructor::new(grid, options).unwrap();
@@ -371,11 +385,11 @@ fn sensors_tell_the_sides_as_on_the_cpu() {
     assert!(relative(phi, expected.sdf().values()) < 2e-4);
 }
 
-fn given_normals_are_taken_and_have_cotangents() {
+fn given_normals_are_taken_and_have_cotangents(backend: Backend) {
     let cloud = cloud::<f32>(2000);
     let grid = grid(&cloud);
     let options = options().orient(Method::Given);
-    let mut plan = Plan::new(Backend::Vulkan, grid, options.clone()).unwrap();
+    let mut plan = Plan::new(backend, grid, options.clone()).unwrap();
     let text = plan.reconstruct(&cloud).err().expect("refused").to_string();
     assert!(text.contains("no normals"), "{text}");
     // A little off, and of length 2.
@@ -403,7 +417,7 @@ fn given_normals_are_taken_and_have_cotangents() {
     }
 }
 
-fn a_result_is_found_again_from_its_normals() {
+fn a_result_is_found_again_from_its_normals(backend: Backend) {
     let given = sampled::<f32>(1500).normals().unwrap().to_vec();
     let bare = cloud::<f32>(1500);
     let with_normals = bare.clone().with_normals(given).unwrap();
@@ -414,35 +428,26 @@ fn a_result_is_found_again_from_its_normals() {
     ] {
         let options = options().orient(orientation);
         let grid = grid(cloud);
-        let mut plan = Plan::new(Backend::Vulkan, grid, options.clone()).unwrap();
+        let mut plan = Plan::new(backend, grid, options.clone()).unwrap();
         let first = plan.reconstruct(cloud).unwrap();
-        let (sdf, closest) = (first.sdf().unwrap().values(), first.closest().unwrap());
-        let saved = Saved {
-            sdf,
-            closest,
-            normals: first.normals().unwrap(),
-        };
+        let (sdf, normals) = (first.sdf().unwrap().values(), first.normals().unwrap());
         // A plan that has never seen the cloud.
-        let other = Plan::new(Backend::Vulkan, grid, options).unwrap();
-        let again = other.restore(cloud, &saved).unwrap();
+        let other = Plan::new(backend, grid, options).unwrap();
+        let again = other.restore(cloud, normals).unwrap();
         assert_eq!(again.sdf().unwrap().values(), sdf, "{orientation:?}");
         assert_eq!(again.mesh().unwrap(), first.mesh().unwrap());
         let bar = only(|bar| bar.sdf = Some(sdf));
         let (a, b) = (again.pullback(&bar).unwrap(), first.pullback(&bar).unwrap());
         assert_eq!((&a.points, &a.normals), (&b.points, &b.normals));
-        let short = Saved {
-            normals: &saved.normals[1..],
-            ..saved
-        };
-        let refused = other.restore(cloud, &short);
+        let refused = other.restore(cloud, &normals[1..]);
         assert!(matches!(refused, Err(Error::Restore(_))));
     }
 }
 
-fn what_devices_do_not_have_is_named() {
+fn what_devices_do_not_have_is_named(backend: Backend) {
     let cloud = cloud::<f32>(500);
     let refused = |options: Options| {
-        let plan = Plan::new(Backend::Vulkan, grid(&cloud), options);
+        let plan = Plan::new(backend, grid(&cloud), options);
         plan.err().expect("refused").to_string()
     };
     let text = refused(options().screening(-1.0));
@@ -479,11 +484,11 @@ fn a_choice_that_is_left_to_the_program_never_fails() {
     }
 }
 
-fn an_observer_that_breaks_stops_the_work() {
+fn an_observer_that_breaks_stops_the_work(backend: Backend) {
     use std::ops::ControlFlow::{Break, Continue};
     let cloud = cloud::<f32>(500);
     for stop in [Stage::Normals, Stage::Orient, Stage::Splat, Stage::Distance] {
-        let mut plan = Plan::new(Backend::Vulkan, grid(&cloud), options()).unwrap();
+        let mut plan = Plan::new(backend, grid(&cloud), options()).unwrap();
         let mut seen = Vec::new();
         let mut observer = |stage| {
             seen.push(stage);

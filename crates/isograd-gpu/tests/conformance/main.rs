@@ -4,7 +4,6 @@ mod areas;
 mod clouds;
 mod devices;
 mod distance;
-#[cfg(feature = "wgpu")]
 mod host;
 mod iso_value;
 mod isosurface;

@@ -67,7 +67,8 @@ fn worst<R: Runtime, T: Scalar>(
 }
 
 /// What twelve motions of each triangle on its own are worth: moved along an axis, or stretched or sheared. The
-/// single corners of a needle, or of a triangle without area, have cotangents that rounding shares out.
+/// single corners of a needle, or of a triangle without area, have cotangents that rounding shares out; so has a triangle
+/// that names one vertex of theirs.
 fn of_affine_motions<T: Real>(mesh: &Mesh<T>, bars: &[f64]) -> Vec<f64> {
     let of_face = |face: &[u32; 3]| {
         let mut work = [0.0; 12];
@@ -80,7 +81,9 @@ fn of_affine_motions<T: Real>(mesh: &Mesh<T>, bars: &[f64]) -> Vec<f64> {
         }
         work
     };
-    mesh.faces().iter().flat_map(of_face).collect()
+    let are_different = |[a, b, c]: &&[u32; 3]| a != b && b != c && c != a;
+    let faces = mesh.faces().iter().filter(are_different);
+    faces.flat_map(of_face).collect()
 }
 
 fn relative(found: &[f64], expected: &[f64]) -> f64 {
@@ -110,7 +113,8 @@ fn cotangents_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
         ("line", meshes::line(), coarse, Band::Full),
         ("point", meshes::point(3), coarse, Band::Full),
     ] {
-        let error = worst(device, &mesh, grid, band, name == "soup");
+        let thin = matches!(name, "soup" | "line");
+        let error = worst(device, &mesh, grid, band, thin);
         println!("{name} in {}: {error:.1e}", T::NAME);
         assert!(
             error <= tolerance::<T>(),

@@ -123,7 +123,7 @@ fn cotangents_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
         // Across a line or a plane of samples, slopes are bounded by the ridge alone: 1e-5 of their spread, by which the
         // rounding of both sides is divided, and that of `g·s` twice.
         let tolerance = match (scene.name, T::NAME) {
-            ("four places", _) => 10.0 * tolerance,
+            ("four places", _) => 20.0 * tolerance,
             ("a flat square", "f64") => 100.0 * tolerance,
             _ => tolerance,
         };
