@@ -30,8 +30,8 @@ mod vector;
 
 include!(concat!(env!("OUT_DIR"), "/element.rs"));
 
-#[cfg(feature = "cuda")]
-pub use device::Cuda;
 #[cfg(feature = "wgpu")]
 pub use device::Vulkan;
 pub use device::{Buffer, Device, Effort, Error, Memory, Scalar};
+#[cfg(feature = "cuda")]
+pub use device::{Cuda, DeviceArray};

@@ -1,6 +1,6 @@
 //! Memory on a device.
 //!
-//! The one module with unsafe code: a kernel is handed an array as a handle and a length, and only whoever
+//! Unsafe because a kernel is handed an array as a handle and a length, and only whoever
 //! made the handle knows that the length is right. Here both are set together, once.
 #![allow(unsafe_code)]
 

@@ -2,10 +2,13 @@
 
 mod buffer;
 mod effort;
+#[cfg(feature = "cuda")]
+mod foreign;
 mod launch;
 #[cfg(feature = "cuda")]
 mod libraries;
 mod open;
+mod stream;
 
 use cubecl::prelude::*;
 
@@ -14,6 +17,8 @@ pub(crate) use launch::{argument, launch};
 
 pub use buffer::Buffer;
 pub use effort::Effort;
+#[cfg(feature = "cuda")]
+pub use foreign::{DeviceArray, SharedMemory};
 pub(crate) use launch::{Argument, BLOCK, Ready};
 #[cfg(feature = "cuda")]
 pub use open::Cuda;
@@ -75,6 +80,12 @@ pub enum Error {
         /// Smoothing passed by the caller, in cells.
         smoothing: f64,
     },
+    /// An array is on another device.
+    #[error("an array is on another device than {device}, which was to compute; use that device")]
+    Elsewhere {
+        /// Name of the device.
+        device: String,
+    },
     /// The device failed while it worked.
     #[error("{device} failed: {reason}")]
     Failed {
@@ -108,7 +119,8 @@ pub struct Device<R: Runtime> {
 
 impl<R: Runtime> Device<R> {
     /// A device of any runtime of CubeCL.
-    pub fn new(client: ComputeClient<R>, name: String) -> Self {
+    pub fn new(mut client: ComputeClient<R>, name: String) -> Self {
+        stream::share(&mut client);
         let double = f64::as_type_native_unchecked().elem_type();
         Self {
             has_f64: client.properties().supports_type(double),

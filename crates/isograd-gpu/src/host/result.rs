@@ -14,6 +14,8 @@ use isograd::{
 
 use super::work::{RadiiCotangents, Work, vectors_of};
 use super::{Error, Number};
+#[cfg(feature = "cuda")]
+use crate::DeviceArray;
 use crate::pipeline::RadiiAndSigns;
 use crate::{Buffer, pipeline};
 
@@ -254,19 +256,60 @@ impl<T: Number> Reconstruction<T> {
     /// # Errors
     /// Errors of the device; a cotangent of another length, or that is not finite; an extension of another result.
     pub fn pullback(&self, cotangent: &Cotangent<'_, T>) -> Result<CloudCotangent<T>, Error> {
+        self.pull(cotangent, None)
+    }
+
+    /// [`Self::pullback`] of a cotangent of φ in an array of another program on the device, which is not checked.
+    ///
+    /// # Errors
+    /// Errors of the device; an array on another one, or of another length.
+    #[cfg(feature = "cuda")]
+    pub fn pullback_on_device(&self, sdf: &DeviceArray<T>) -> Result<CloudCotangent<T>, Error> {
+        self.pull(&Cotangent::default(), Some(self.device.import(sdf)?))
+    }
+
+    /// Copies φ into an array of another program on the device.
+    ///
+    /// # Errors
+    /// As [`Self::pullback_on_device`].
+    #[cfg(feature = "cuda")]
+    pub fn sdf_into(&self, array: &DeviceArray<T>) -> Result<(), Error> {
+        self.device.export_numbers(&self.result.sdf, array)
+    }
+
+    /// Copies the closest faces into an array of another program on the device.
+    ///
+    /// # Errors
+    /// As [`Self::pullback_on_device`].
+    #[cfg(feature = "cuda")]
+    pub fn closest_into(&self, array: &DeviceArray<u32>) -> Result<(), Error> {
+        self.device.export_indices(self.result.closest(), array)
+    }
+
+    /// To all samples.
+    fn pull(
+        &self,
+        cotangent: &Cotangent<'_, T>,
+        sdf: Option<Buffer<T>>,
+    ) -> Result<CloudCotangent<T>, Error> {
         let vertices = self.result.surface.vertices.len() / 3;
         cotangent.check([self.grid.cells(); 2], vertices, self.points())?;
+        let pull = |cotangent: &Cotangent<'_, T>| self.pull_used(cotangent, sdf);
         let mut found = match self.selection.is_all() {
-            true => self.pull_used(cotangent)?,
-            false => (self.selection).pull(cotangent, |cotangent| self.pull_used(cotangent))?,
+            true => pull(cotangent)?,
+            false => self.selection.pull(cotangent, pull)?,
         };
         found.guarded += self.begun.guarded;
         Ok(found)
     }
 
     /// To the samples that are used.
-    fn pull_used(&self, cotangent: &Cotangent<'_, T>) -> Result<CloudCotangent<T>, Error> {
-        let (mut found, bars) = self.device.pullback(&self.result, cotangent)?;
+    fn pull_used(
+        &self,
+        cotangent: &Cotangent<'_, T>,
+        sdf: Option<Buffer<T>>,
+    ) -> Result<CloudCotangent<T>, Error> {
+        let (mut found, bars) = self.device.pullback(&self.result, cotangent, sdf)?;
         if !self.held.has_moved {
             self.pull_radii(bars, &mut found.points)?;
         }

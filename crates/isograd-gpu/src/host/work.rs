@@ -13,6 +13,8 @@ use isograd::{
 
 use super::Error;
 use super::extend::{self, Uploaded};
+#[cfg(feature = "cuda")]
+use crate::device::{DeviceArray, SharedMemory};
 use crate::orient as on_device;
 use crate::pipeline::{
     self, Options, RadiiAndSigns, Reconstruction, Reconstructor, SampleAxes, SearchResult, Start,
@@ -51,11 +53,13 @@ pub trait Work<T: Scalar>: Send + Sync {
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
     ) -> Result<Reconstruction<T>, Error>;
 
-    /// Cotangents in the host's memory to such cotangents, at fixed radii, and to the radii.
+    /// Cotangents in the host's memory to such cotangents, at fixed radii, and to the radii. That of φ may be on the device
+    /// instead, as `sdf`.
     fn pullback(
         &self,
         result: &Reconstruction<T>,
         cotangent: &Cotangent<'_, T>,
+        sdf: Option<Buffer<T>>,
     ) -> Result<(CloudCotangent<T>, RadiiCotangents<T>), Error>;
 
     /// An attribute on the surface and round it.
@@ -71,6 +75,18 @@ pub trait Work<T: Scalar>: Send + Sync {
 
     /// A copy of indices.
     fn indices(&self, buffer: &Buffer<u32>) -> Result<Vec<u32>, Error>;
+
+    /// A copy of an array of another program on the same device.
+    #[cfg(feature = "cuda")]
+    fn import(&self, array: &DeviceArray<T>) -> Result<Buffer<T>, Error>;
+
+    /// Copies numbers into such an array.
+    #[cfg(feature = "cuda")]
+    fn export_numbers(&self, buffer: &Buffer<T>, array: &DeviceArray<T>) -> Result<(), Error>;
+
+    /// Copies indices into such an array.
+    #[cfg(feature = "cuda")]
+    fn export_indices(&self, buffer: &Buffer<u32>, array: &DeviceArray<u32>) -> Result<(), Error>;
 }
 
 /// Start of a reconstruction.
@@ -139,7 +155,13 @@ fn open<T: Scalar>(
     }
 }
 
-fn on<R: Runtime, T: Scalar>(
+/// Runtimes of plans.
+#[cfg(not(feature = "cuda"))]
+trait SharedMemory: Runtime {}
+#[cfg(not(feature = "cuda"))]
+impl<R: Runtime> SharedMemory for R {}
+
+fn on<R: SharedMemory, T: Scalar>(
     device: Device<R>,
     grid: Grid<T>,
     options: Options,
@@ -148,7 +170,7 @@ fn on<R: Runtime, T: Scalar>(
     Ok(Arc::new(Reconstructor::new(device, grid, options)?))
 }
 
-impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
+impl<R: SharedMemory, T: Scalar> Work<T> for Reconstructor<R, T> {
     fn name(&self) -> &str {
         self.device().name()
     }
@@ -249,11 +271,16 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
         &self,
         result: &Reconstruction<T>,
         bars: &Cotangent<'_, T>,
+        sdf: Option<Buffer<T>>,
     ) -> Result<(CloudCotangent<T>, RadiiCotangents<T>), Error> {
         let device = self.device();
         let vectors = |given: Option<&[[T; 3]]>| upload(device, given.map(<[_]>::as_flattened));
         let level = (bars.iso_value != T::of(0.0)).then_some([bars.iso_value]);
-        let (sdf, indicator) = (upload(device, bars.sdf)?, upload(device, bars.indicator)?);
+        let sdf = match sdf {
+            None => upload(device, bars.sdf)?,
+            sdf => sdf,
+        };
+        let indicator = upload(device, bars.indicator)?;
         let (areas, level) = (
             upload(device, bars.areas)?,
             upload(device, level.as_ref().map(|l| &l[..]))?,
@@ -330,6 +357,21 @@ impl<R: Runtime, T: Scalar> Work<T> for Reconstructor<R, T> {
 
     fn indices(&self, buffer: &Buffer<u32>) -> Result<Vec<u32>, Error> {
         Ok(self.device().download(buffer)?)
+    }
+
+    #[cfg(feature = "cuda")]
+    fn import(&self, array: &DeviceArray<T>) -> Result<Buffer<T>, Error> {
+        Ok(R::import(self.device(), array)?)
+    }
+
+    #[cfg(feature = "cuda")]
+    fn export_numbers(&self, buffer: &Buffer<T>, array: &DeviceArray<T>) -> Result<(), Error> {
+        Ok(R::export(self.device(), buffer, array)?)
+    }
+
+    #[cfg(feature = "cuda")]
+    fn export_indices(&self, buffer: &Buffer<u32>, array: &DeviceArray<u32>) -> Result<(), Error> {
+        Ok(R::export(self.device(), buffer, array)?)
     }
 }
 
