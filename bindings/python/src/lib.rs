@@ -55,6 +55,9 @@ mod _core {
     use shape::{Shape, shapes};
     #[pymodule_export]
     use threads::{get_num_threads, set_num_threads};
+    #[cfg(feature = "cuda")]
+    #[pymodule_export]
+    use xla::call_target_on_cuda;
     #[pymodule_export]
     use xla::{call_target, xla_targets};
 

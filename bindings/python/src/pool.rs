@@ -27,7 +27,25 @@ pub struct Plan<T: Number> {
 struct Idle {
     settings: String,
     type_name: &'static str,
-    plan: Box<dyn Any + Send>,
+    plan: Box<dyn Pooled>,
+}
+
+/// A plan of either number type.
+trait Pooled: Send {
+    /// Lets go of the last result on a device.
+    fn release(&mut self);
+
+    fn into_any(self: Box<Self>) -> Box<dyn Any>;
+}
+
+impl<T: Number> Pooled for Plan<T> {
+    fn release(&mut self) {
+        self.plan.release();
+    }
+
+    fn into_any(self: Box<Self>) -> Box<dyn Any> {
+        self
+    }
 }
 
 static POOL: Mutex<Vec<Idle>> = Mutex::new(Vec::new());
@@ -46,7 +64,6 @@ pub fn with_plan<T: Number, R>(
         None => Box::new(create::<T>(settings)?),
     };
     let result = work(&mut plan);
-    plan.plan.release();
     put_back(settings, plan);
     Ok(result)
 }
@@ -62,7 +79,7 @@ fn take<T: Number>(settings: &str) -> Option<Box<Plan<T>>> {
     let mut pool = POOL.lock().unwrap_or_else(PoisonError::into_inner);
     let fits = |idle: &Idle| idle.settings == settings && idle.type_name == T::NAME;
     let place = pool.iter().rposition(fits)?;
-    pool.remove(place).plan.downcast().ok()
+    pool.remove(place).plan.into_any().downcast().ok()
 }
 
 fn put_back<T: Number>(settings: &str, plan: Box<Plan<T>>) {
@@ -72,6 +89,10 @@ fn put_back<T: Number>(settings: &str, plan: Box<Plan<T>>) {
         plan,
     };
     let mut pool = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+    // One result is enough: of two, the memory may be wanted.
+    for other in pool.iter_mut() {
+        other.plan.release();
+    }
     pool.push(idle);
     // Dropped after the lock: a plan is large.
     let oldest = (pool.len() > CAPACITY).then(|| pool.remove(0));

@@ -3,6 +3,7 @@
 import re
 
 import numpy as np
+import pure
 import pytest
 
 jax = pytest.importorskip("jax", reason="SKIPPED: JAX is not installed")
@@ -10,7 +11,7 @@ jax = pytest.importorskip("jax", reason="SKIPPED: JAX is not installed")
 import isograd  # noqa: E402
 import isograd.jax as ij  # noqa: E402
 import jax.numpy as jnp  # noqa: E402
-from isograd import _core, _pure, _settings  # noqa: E402
+from isograd import _core, _settings  # noqa: E402
 from jax.test_util import check_grads  # noqa: E402
 
 def torus(seed=0, count=1500, dtype=np.float64):
@@ -60,9 +61,9 @@ def loss(points, normals=None, options=None):
 def without_jax(points, normals, options):
     """φ and the cotangents of points and normals for the loss, from the functions for NumPy."""
     settings = _settings.encode(GRID, options)
-    saved = _pure.forward(settings, points, normals)
+    saved = pure.forward(settings, points, normals)
     bar = WEIGHTS.astype(points.dtype)
-    return saved[0], _pure.pullback(settings, points, normals, saved, bar)
+    return saved[0], pure.pullback(settings, points, normals, saved, bar)
 
 
 @pytest.mark.parametrize("orient", ["auto", "given", "signs"])
@@ -279,7 +280,7 @@ def test_values_are_refused_with_the_text_of_the_core(by, monkeypatch):
     phi = jax.jit(lambda p: ij.signed_distance(p, GRID))
     for bad in (nan, far, huge, points[:0], points[:2], 0 * points, on_a_line):
         with pytest.raises(ValueError) as expected:
-            _pure.forward(settings, bad)
+            pure.forward(settings, bad)
         with pytest.raises((ValueError, jax.errors.JaxRuntimeError)) as found:
             phi(bad).block_until_ready()
         assert str(expected.value) in str(found.value)

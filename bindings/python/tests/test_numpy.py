@@ -10,10 +10,11 @@ import threading
 import time
 
 import numpy as np
+import pure
 import pytest
 
 import isograd
-from isograd import _core, _pure, _settings
+from isograd import _core, _settings
 
 TYPES = [np.float32, np.float64]
 SPHERE = isograd.sample("sphere", 3000, radius=1.0).points
@@ -182,11 +183,11 @@ def test_the_pullback_of_a_filled_inside_is_its_transpose():
 def test_saved_arrays_pull_back_to_the_same_bits(dtype):
     points = SPHERE.astype(dtype)
     settings = _settings.encode(GRID, isograd.Options(checks=False))
-    saved = _pure.forward(settings, points)
+    saved = pure.forward(settings, points)
     sdf, closest, _ = saved
     result = isograd.reconstruct(points, GRID)
     assert bits(sdf) == bits(result.sdf) and bits(closest) == bits(result.closest)
-    (bar,) = _pure.pullback(settings, points, None, saved, sdf)
+    (bar,) = pure.pullback(settings, points, None, saved, sdf)
     assert bits(bar) == bits(result.pullback(sdf).points)
 
 
@@ -483,8 +484,8 @@ def test_memory_is_flat():
     for k in range(200):
         result = plan(points)
         result.pullback(result.sdf)
-        saved = _pure.forward(settings, points)
-        _pure.pullback(settings, points, None, saved, saved[0])
+        saved = pure.forward(settings, points)
+        pure.pullback(settings, points, None, saved, saved[0])
         if k in (60, 199):
             sizes.append(resident())
     # 139 calls of about 0.3 MB each would be 42 MB.

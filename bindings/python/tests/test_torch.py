@@ -1,9 +1,10 @@
 """isograd.torch: the numbers are those of isograd._core, and PyTorch's own checks pass."""
 
 import numpy as np
+import pure
 import pytest
 
-from isograd import Grid, Options, _pure, _settings
+from isograd import Grid, Options, _settings
 
 torch = pytest.importorskip("torch", reason="PyTorch is not here: its tests are left out", exc_type=ImportError)
 
@@ -40,8 +41,8 @@ def gradient(points, **arguments):
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
 def test_phi_and_its_gradient_are_the_core_s_bit_for_bit(dtype):
     points, settings = sphere(dtype=dtype), _settings.encode(GRID, Options(checks=False))
-    saved = _pure.forward(settings, points.numpy())
-    (expected,) = _pure.pullback(settings, points.numpy(), None, saved, weights(dtype).numpy())
+    saved = pure.forward(settings, points.numpy())
+    (expected,) = pure.pullback(settings, points.numpy(), None, saved, weights(dtype).numpy())
     phi = signed_distance(points, GRID)
     assert phi.dtype == dtype and phi.shape == GRID.shape
     assert np.array_equal(phi.numpy(), saved[0])

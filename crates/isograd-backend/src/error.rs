@@ -10,6 +10,10 @@ pub enum Error {
     /// A backend that this program was built without.
     #[error("{} is not built into this program", names(*.0).0)]
     NotBuilt(Backend),
+    /// Arrays on a device, for the CPU.
+    #[cfg(feature = "cuda")]
+    #[error("the arrays are on a CUDA device, and the CPU computes: choose the backend cuda")]
+    OnDevice,
     /// The grid, the options or a stage.
     #[error(transparent)]
     Reconstruct(#[from] isograd::Error),

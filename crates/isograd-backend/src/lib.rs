@@ -33,6 +33,10 @@ pub use isograd::Backend;
 pub use plan::Plan;
 pub use view::{Made, View};
 
+/// An array on a CUDA device that another program owns.
+#[cfg(feature = "cuda")]
+pub use isograd_gpu::DeviceArray;
+
 /// `f32` or `f64`, wherever there are plans for it.
 #[cfg(feature = "gpu")]
 pub use isograd_gpu::host::Number;

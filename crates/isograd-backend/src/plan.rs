@@ -17,7 +17,29 @@ enum On<T: Number> {
     Cpu(Box<Reconstructor<T>>, Option<String>),
     /// With what it made last.
     #[cfg(feature = "gpu")]
-    Device(Box<host::Plan<T>>, Option<Box<host::Reconstruction<T>>>),
+    Device(Box<host::Plan<T>>, Option<Box<Last<T>>>),
+}
+
+/// A cloud, and what a device made of it.
+#[cfg(feature = "gpu")]
+struct Last<T: Number> {
+    cloud: PointCloud<T>,
+    result: host::Reconstruction<T>,
+}
+
+#[cfg(feature = "gpu")]
+impl<T: Number> Last<T> {
+    /// Whether it is what a cloud and its normals after orientation would give again.
+    fn is_of(&self, cloud: &PointCloud<T>, normals: &[[T; 3]]) -> bool {
+        let inputs = |of: &PointCloud<T>| {
+            (
+                of.points() == cloud.points(),
+                of.normals() == cloud.normals(),
+            )
+        };
+        inputs(&self.cloud) == (true, true)
+            && self.result.normals().is_ok_and(|found| found == normals)
+    }
 }
 
 impl<T: Number> Plan<T> {
@@ -77,11 +99,11 @@ impl<T: Number> Plan<T> {
         match &mut self.0 {
             On::Cpu(plan, _) => Ok(View(Of::Cpu(plan.reconstruct_observed(cloud, observer)?))),
             #[cfg(feature = "gpu")]
-            On::Device(plan, made) => {
+            On::Device(plan, last) => {
                 // Its memory is free before that of the next is asked for.
-                *made = None;
+                *last = None;
                 let result = plan.reconstruct_observed(cloud, observer)?;
-                Ok(View(Of::Device(made.insert(Box::new(result)), plan.name())))
+                Ok(keep(plan, last, cloud, result))
             }
         }
     }
@@ -109,12 +131,13 @@ impl<T: Number> Plan<T> {
     /// plan.
     pub fn release(&mut self) {
         #[cfg(feature = "gpu")]
-        if let On::Device(_, made) = &mut self.0 {
-            *made = None;
+        if let On::Device(_, last) = &mut self.0 {
+            *last = None;
         }
     }
 
-    /// Finds a result of the same grid, options and cloud again, to the bit.
+    /// Finds a result of the same grid, options and cloud again, to the bit: at once if it is the last one, else by a
+    /// reconstruction.
     ///
     /// # Errors
     /// What a stage or the device says; what was saved of another result.
@@ -126,13 +149,57 @@ impl<T: Number> Plan<T> {
         match &mut self.0 {
             On::Cpu(plan, _) => Ok(View(Of::Cpu(plan.restore(cloud, saved)?))),
             #[cfg(feature = "gpu")]
-            On::Device(plan, made) => {
-                *made = None;
-                let result = plan.restore(cloud, saved)?;
-                Ok(View(Of::Device(made.insert(Box::new(result)), plan.name())))
+            On::Device(plan, last) => {
+                saved.check(plan.grid().cells(), cloud.len())?;
+                restore(plan, last, cloud, saved.normals)
             }
         }
     }
+
+    /// [`Self::restore`] on a device, from the `(N, 3)` normals alone.
+    ///
+    /// # Errors
+    /// As [`Self::restore`]; a plan of the CPU.
+    #[cfg(feature = "cuda")]
+    pub fn restore_from_normals(
+        &mut self,
+        cloud: &PointCloud<T>,
+        normals: &[[T; 3]],
+    ) -> Result<View<'_, T>, Error> {
+        match &mut self.0 {
+            On::Cpu(..) => Err(Error::OnDevice),
+            On::Device(plan, last) => restore(plan, last, cloud, normals),
+        }
+    }
+}
+
+#[cfg(feature = "gpu")]
+fn restore<'a, T: Number>(
+    plan: &'a host::Plan<T>,
+    last: &'a mut Option<Box<Last<T>>>,
+    cloud: &PointCloud<T>,
+    normals: &[[T; 3]],
+) -> Result<View<'a, T>, Error> {
+    if !last.as_ref().is_some_and(|last| last.is_of(cloud, normals)) {
+        *last = None;
+        let result = plan.restore(cloud, normals)?;
+        return Ok(keep(plan, last, cloud, result));
+    }
+    let last = last.as_ref().expect("a result, as was asked");
+    Ok(View(Of::Device(&last.result, plan.name())))
+}
+
+/// Keeps a result, to look at.
+#[cfg(feature = "gpu")]
+fn keep<'a, T: Number>(
+    plan: &'a host::Plan<T>,
+    last: &'a mut Option<Box<Last<T>>>,
+    cloud: &PointCloud<T>,
+    result: host::Reconstruction<T>,
+) -> View<'a, T> {
+    let cloud = cloud.clone();
+    let last = last.insert(Box::new(Last { cloud, result }));
+    View(Of::Device(&last.result, plan.name()))
 }
 
 impl<T: Number> On<T> {

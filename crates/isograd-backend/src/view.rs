@@ -188,6 +188,44 @@ impl<'a, T: Number> View<'a, T> {
         }
     }
 
+    /// Copies φ into an array of another program on the same device.
+    ///
+    /// # Errors
+    /// A result of the CPU, an array on another device or of another length, errors of the device.
+    #[cfg(feature = "cuda")]
+    pub fn sdf_into(self, array: &crate::DeviceArray<T>) -> Result<(), Error> {
+        Ok(self.on_device()?.sdf_into(array)?)
+    }
+
+    /// Copies the closest faces into such an array.
+    ///
+    /// # Errors
+    /// As [`Self::sdf_into`].
+    #[cfg(feature = "cuda")]
+    pub fn closest_into(self, array: &crate::DeviceArray<u32>) -> Result<(), Error> {
+        Ok(self.on_device()?.closest_into(array)?)
+    }
+
+    /// Cotangents of the inputs, from that of φ in such an array; it is not checked.
+    ///
+    /// # Errors
+    /// As [`Self::sdf_into`].
+    #[cfg(feature = "cuda")]
+    pub fn pullback_on_device(
+        self,
+        sdf: &crate::DeviceArray<T>,
+    ) -> Result<CloudCotangent<T>, Error> {
+        Ok(self.on_device()?.pullback_on_device(sdf)?)
+    }
+
+    #[cfg(feature = "cuda")]
+    fn on_device(self) -> Result<&'a host::Reconstruction<T>, Error> {
+        match self.0 {
+            Of::Cpu(_) => Err(Error::OnDevice),
+            Of::Device(of, _) => Ok(of),
+        }
+    }
+
     /// Cotangents of the inputs: see [`Reconstruction::pullback`].
     ///
     /// # Errors

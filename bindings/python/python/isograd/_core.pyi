@@ -272,8 +272,8 @@ def get_num_threads() -> int:
 
 # XLA.
 
-def xla_targets() -> dict[str, object]:
-    """``{name: capsule}`` for ``jax.ffi.register_ffi_target``."""
+def xla_targets() -> dict[str, dict[str, object]]:
+    """``{platform: {name: capsule}}`` for ``jax.ffi.register_ffi_target``."""
 
 def call_target(
     name: str,
@@ -285,6 +285,18 @@ def call_target(
 ) -> None:
     """Calls a target with NumPy arrays, and writes its results into ``outputs``: float32, float64 or uint32, in C
     order."""
+
+def call_target_on_cuda(
+    name: str,
+    inputs: Sequence[tuple[int, Sequence[int], str]],
+    outputs: Sequence[tuple[int, Sequence[int], str]],
+    stream: int,
+    settings: str,
+    band: float | None = None,
+    inside: bool = False,
+) -> None:
+    """Calls a target with arrays on a CUDA device, each as its address, its shape and the name of its type. Built with
+    CUDA only."""
 
 # Command line.
 

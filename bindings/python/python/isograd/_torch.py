@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import json
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar, cast
 
@@ -19,9 +20,12 @@ try:
 except ImportError as error:
     raise ImportError(f"isograd.torch needs PyTorch ({error}); install it by `pip install torch`") from error
 
-__all__ = ["Tensor", "array", "call", "checked", "in_batches", "one_by_one", "prepare", "rows", "torch"]
+__all__ = ["DEVICES", "Tensor", "array", "call", "checked", "grid_shape", "in_batches", "one_by_one", "prepare", "rows", "torch"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+# Types of the devices whose tensors operators take.
+DEVICES = ("cpu", "cuda") if hasattr(_core, "call_target_on_cuda") else ("cpu",)
 
 
 # The text is the same whenever grid and options are: the compiler need not look inside.
@@ -42,8 +46,9 @@ def checked(values: Tensor, name: str, columns: int | None = 3) -> Tensor:
     """
     if not isinstance(values, Tensor):
         raise TypeError(f"{name} is a {type(values).__name__}; give a torch.Tensor")
-    if values.device.type != "cpu":
-        raise ValueError(f"{name} is on {values.device}; isograd takes tensors of the CPU: pass {name}.cpu()")
+    if values.device.type not in DEVICES:
+        has = " and of CUDA devices" if "cuda" in DEVICES else ""
+        raise ValueError(f"{name} is on {values.device}; isograd takes tensors of the CPU{has}: pass {name}.cpu()")
     if values.layout != torch.strided:
         raise ValueError(f"{name} is of the layout {values.layout}; pass {name}.to_dense()")
     if values.ndim != 2 or columns not in (None, values.shape[1]):
@@ -130,7 +135,18 @@ def call(
     band: float | None = None,
     inside: bool = False,
 ) -> None:
-    """Calls a target. PyTorch hardly supports uint32: faces are int32 with the same bits."""
+    """Calls a target, on a GPU in the current stream. PyTorch hardly supports uint32: faces are int32 with the same bits.
+
+    Raises:
+        ValueError: tensors on different devices.
+    """
+    everything = [*(tensor for tensor in inputs if tensor is not None), *outputs]
+    devices = {tensor.device for tensor in everything}
+    if len(devices) > 1:
+        raise ValueError(f"the tensors are on {' and '.join(sorted(map(str, devices)))}; move them to one device")
+    if everything[0].is_cuda:
+        _call_on_cuda(name, inputs, outputs, settings, band, inside)
+        return
 
     def bits(tensor: Tensor) -> np.ndarray:
         found = array(tensor)
@@ -138,6 +154,33 @@ def call(
 
     given = [bits(tensor) for tensor in inputs if tensor is not None]
     _core.call_target(name, given, [bits(tensor) for tensor in outputs], settings, band, inside)
+
+
+def _call_on_cuda(
+    name: str,
+    inputs: Sequence[Tensor | None],
+    outputs: Sequence[Tensor],
+    settings: str,
+    band: float | None,
+    inside: bool,
+) -> None:
+    # Kept until the call is done.
+    given = [tensor.detach().resolve_neg().contiguous() for tensor in inputs if tensor is not None]
+    kinds = {torch.float32: "float32", torch.float64: "float64", torch.int32: "uint32"}
+
+    def described(tensor: Tensor) -> tuple[int, list[int], str]:
+        return tensor.data_ptr(), list(tensor.shape), kinds[tensor.dtype]
+
+    stream = torch.cuda.current_stream(outputs[0].device).cuda_stream
+    written = [described(tensor) for tensor in outputs]
+    _core.call_target_on_cuda(
+        name, [described(tensor) for tensor in given], written, stream, settings, band, inside
+    )
+
+
+def grid_shape(settings: str) -> tuple[int, int, int]:
+    """Cells along each axis."""
+    return tuple(json.loads(settings)["grid"]["shape"])
 
 
 def one_by_one(operator: Any) -> Any:

@@ -11,8 +11,7 @@ from ._grid import Grid
 from ._numbers import whole
 from ._options import Fill, Options, Orient, check_fill
 from ._places import band_width
-from ._pure import grid_shape
-from ._torch import Tensor, call, checked, in_batches, one_by_one, prepare, rows, torch
+from ._torch import DEVICES, Tensor, call, checked, grid_shape, in_batches, one_by_one, prepare, rows, torch
 
 
 class Mesh(NamedTuple):
@@ -197,7 +196,7 @@ def _size(value: object, name: str) -> int:
     return found
 
 
-def _saved(points: Tensor, settings: str) -> tuple[Tensor, ...]:
+def saved(points: Tensor, settings: str) -> tuple[Tensor, Tensor, Tensor]:
     """φ, closest faces and normals, which a pullback needs besides its inputs."""
     shape = grid_shape(settings)
     return points.new_empty(shape), points.new_empty(shape, dtype=torch.int32), points.new_empty(points.shape)
@@ -208,19 +207,19 @@ def _of_query(points: Tensor, queries: Tensor, settings: str, _sizes: Sequence[i
     count = len(queries)
     vectors = points.new_empty((count, 3)), points.new_empty((count, 3))
     faces = points.new_empty(count, dtype=torch.int32)
-    return points.new_empty(count), vectors[0], faces, vectors[1], *_saved(points, settings)
+    return points.new_empty(count), vectors[0], faces, vectors[1], *saved(points, settings)
 
 
 def _of_mesh(points: Tensor, _none: None, settings: str, sizes: Sequence[int]) -> tuple[Tensor, ...]:
     """Vertices, faces, and the numbers of both."""
     faces = points.new_empty((sizes[1], 3), dtype=torch.int32)
     counts = points.new_empty(2, dtype=torch.int32)
-    return points.new_empty((sizes[0], 3)), faces, counts, *_saved(points, settings)
+    return points.new_empty((sizes[0], 3)), faces, counts, *saved(points, settings)
 
 
 def _of_extend(points: Tensor, values: Tensor, settings: str, _sizes: Sequence[int]) -> tuple[Tensor, ...]:
     """Values at all cells."""
-    return points.new_empty((*grid_shape(settings), values.shape[1])), *_saved(points, settings)
+    return points.new_empty((*grid_shape(settings), values.shape[1])), *saved(points, settings)
 
 
 def _operator(name: str, outputs: Callable[..., tuple[Tensor, ...]], count: int, bars: int, kept: int) -> Any:
@@ -239,7 +238,7 @@ def _operator(name: str, outputs: Callable[..., tuple[Tensor, ...]], count: int,
     @torch.library.custom_op(
         f"isograd::{name}",
         mutates_args=(),
-        device_types="cpu",
+        device_types=DEVICES,
         schema=f"({inputs}{how}, int[] sizes) -> ({results})",
     )
     def forward(
@@ -252,7 +251,7 @@ def _operator(name: str, outputs: Callable[..., tuple[Tensor, ...]], count: int,
     @torch.library.custom_op(
         f"isograd::{name}_pullback",
         mutates_args=(),
-        device_types="cpu",
+        device_types=DEVICES,
         schema=f"({inputs}Tensor[] saved, Tensor[] bars, {how}) -> Tensor[]",
     )
     def pullback(
@@ -294,7 +293,7 @@ _mesh = _operator("mesh", _of_mesh, count=6, bars=1, kept=3)
 _extend = _operator("extend", _of_extend, count=4, bars=2, kept=1)
 
 
-@torch.library.custom_op("isograd::orient", mutates_args=(), device_types="cpu")
+@torch.library.custom_op("isograd::orient", mutates_args=(), device_types=DEVICES)
 def _orient(points: Tensor, before: Tensor, settings: str) -> Tensor:
     normals = torch.empty_like(points, memory_format=torch.contiguous_format)
     call("isograd_orient", [points, before], [normals], settings)

@@ -10,8 +10,7 @@ import numpy as np
 from ._grid import Grid
 from ._options import Fill, Options, check_fill
 from ._places import Offset, are_centers, axes_at, band_width, is_many, on_grids, shaped
-from ._pure import grid_shape
-from ._torch import Tensor, call, checked, in_batches, one_by_one, prepare, rows, torch
+from ._torch import DEVICES, Tensor, call, checked, grid_shape, in_batches, one_by_one, prepare, rows, torch
 
 
 class Surface(NamedTuple):
@@ -133,7 +132,7 @@ def _outputs(points: Tensor, values: Tensor, settings: str, count: int) -> tuple
     )
 
 
-@torch.library.custom_op("isograd::surface", mutates_args=(), device_types="cpu")
+@torch.library.custom_op("isograd::surface", mutates_args=(), device_types=DEVICES)
 def _surface(
     points: Tensor,
     places: Tensor,
@@ -153,7 +152,7 @@ def _(points: Tensor, places: Any, values: Tensor, given: Any, settings: str, ba
     return _outputs(points, values, settings, count)
 
 
-@torch.library.custom_op("isograd::surface_pullback", mutates_args=(), device_types="cpu")
+@torch.library.custom_op("isograd::surface_pullback", mutates_args=(), device_types=DEVICES)
 def _pullback(
     inputs: list[Tensor], saved: list[Tensor], bars: list[Tensor], settings: str, band: float
 ) -> list[Tensor]:

@@ -129,7 +129,12 @@ def call(
 
     if not _has_handlers():
         return by_callback(*present)
-    return tuple(jax.lax.platform_dependent(*present, cpu=by_handler, default=by_refusal))
+    handlers = {_PLATFORMS[name]: by_handler for name in _core.xla_targets()}
+    return tuple(jax.lax.platform_dependent(*present, **handlers, default=by_refusal))
+
+
+# Names of XLA's platforms in JAX.
+_PLATFORMS = {"cpu": "cpu", "CUDA": "cuda"}
 
 
 def refuse(*_arrays: ArrayLike) -> tuple[np.ndarray, ...]:
@@ -139,8 +144,8 @@ def refuse(*_arrays: ArrayLike) -> tuple[np.ndarray, ...]:
         ValueError: always.
     """
     raise ValueError(
-        "isograd.jax takes arrays of the CPU, whatever the backend, and these are on another device: put them on "
-        'jax.devices("cpu")[0], or set ISOGRAD_JAX_CALLBACK=1 in the environment, and they are copied to the CPU '
+        "isograd.jax takes arrays of the CPU, and with CUDA built in those of a CUDA device, and these are on another one: "
+        'put them on jax.devices("cpu")[0], or set ISOGRAD_JAX_CALLBACK=1 in the environment, and they are copied to the CPU '
         "and back at every call"
     )
 
@@ -179,8 +184,9 @@ def _has_handlers() -> bool:
 
 def _register() -> bool:
     try:
-        for name, capsule in _core.xla_targets().items():
-            jax.ffi.register_ffi_target(name, capsule, platform="cpu")
+        for platform, targets in _core.xla_targets().items():
+            for name, capsule in targets.items():
+                jax.ffi.register_ffi_target(name, capsule, platform=platform)
     except Exception as error:  # any exception of another version of JAX
         warnings.warn(
             f"this JAX does not take isograd's handlers ({error}); jax.pure_callback is used instead, "

@@ -5,11 +5,11 @@
     >>> gradient = jax.jit(jax.grad(loss))(points)   # (N, 3)
 
 Points and normals are traced; grid and options are static. float32 and float64 are unchanged (float64 needs
-``jax_enable_x64``), half precision becomes float32, integers JAX's default float. XLA calls the handlers without Python,
-with arrays on the CPU. Arrays on other devices are errors, unless the environment has ``ISOGRAD_JAX_CALLBACK=1``: then
-they are copied, and computed through ``jax.pure_callback``, with the same bits. With ``backend="cuda"`` or ``"vulkan"``
-the handlers compute on that device: points, φ and their cotangents are copied at every call, and the pullback
-reconstructs again.
+``jax_enable_x64``), half precision becomes float32, integers JAX's default float. XLA calls the handlers without Python.
+With ``backend="cuda"`` or ``"vulkan"`` they compute on that device: arrays of the CPU are copied at every call; of
+arrays on a CUDA device, which need ``backend="cuda"``, φ and its cotangent stay there. Other arrays are errors, unless
+the environment has ``ISOGRAD_JAX_CALLBACK=1``: then they are copied, and computed through ``jax.pure_callback``, with
+the same bits.
 
 Invalid types and shapes raise ``TypeError`` or ``ValueError`` at once. Invalid values (a point that is not finite or off
 the grid) raise ``jax.errors.JaxRuntimeError`` or, as JAX chooses, ``ValueError``, with the message of the NumPy

@@ -1,8 +1,9 @@
 """Signed distance and surface of points for PyTorch: the functions of ``isograd.jax``, inside ``autograd``, ``vmap`` and
 ``torch.compile``.
 
-Tensors are on the CPU, and computations use their number type. With another ``backend``, points, φ and their cotangents
-are copied to the device and back at every call. The operators are registered with
+Computations use the number type of the tensors. With another ``backend``, points, φ and their cotangents
+are copied to the device and back at every call. Tensors on a CUDA device need ``backend="cuda"``: then φ and its cotangent
+stay there, and the points, a few numbers each, are copied to the CPU. The operators are registered with
 ``torch.library``, such as ``isograd::signed_distance`` and ``isograd::signed_distance_pullback``. ``torch.func.grad``
 does not support custom operators: call ``torch.autograd.grad``. Needs PyTorch 2.5.
 
@@ -14,13 +15,10 @@ from __future__ import annotations
 
 from typing import Any, Optional
 
-import numpy as np
-
-from . import _pure
 from ._grid import Grid
 from ._options import Options
-from ._torch import Tensor, array, in_batches, one_by_one, prepare, torch
-from ._torch_mesh import Extension, Mesh, extend, mesh, orient, query
+from ._torch import DEVICES, Tensor, call, in_batches, one_by_one, prepare, torch
+from ._torch_mesh import Extension, Mesh, extend, mesh, orient, query, saved
 from ._torch_surface import Surface, surface
 
 __all__ = ["Extension", "Mesh", "Surface", "extend", "mesh", "orient", "query", "signed_distance", "surface"]
@@ -41,13 +39,13 @@ def signed_distance(
     the normals, where a change makes φ jump, and which face is closest to a cell.
 
     Args:
-        points: ``(N, 3)``, float32 or float64, on the CPU. float16 and bfloat16 become float32. A batch of clouds is
+        points: ``(N, 3)``, float32 or float64. float16 and bfloat16 become float32. A batch of clouds is
             ``(B, N, 3)``: they are computed one after the other, and the results are stacked.
         grid: grid of φ.
         normals: ``(N, 3)`` outward normals, for the orientations ``"given"`` and ``"signs"``; of a batch ``(B, N, 3)``, or
             the same for all.
         options: options; ``checks`` has no effect, since there is no report.
-        backend: as for :func:`isograd.reconstruct`. On a device the pullback reconstructs again.
+        backend: as for :func:`isograd.reconstruct`; ``"cuda"`` for tensors on a CUDA device.
 
     Returns:
         ``(nx, ny, nz)`` or ``(B, nx, ny, nz)`` tensor of φ at the centers of the cells, in the unit of the points: negative inside.
@@ -64,24 +62,22 @@ def signed_distance(
 
 
 # Operators say Optional and not `| None`: PyTorch reads their annotations, in every version the former.
-@torch.library.custom_op("isograd::signed_distance", mutates_args=(), device_types="cpu")
+@torch.library.custom_op("isograd::signed_distance", mutates_args=(), device_types=DEVICES)
 def _signed_distance(
     points: Tensor, given: Optional[Tensor], settings: str
 ) -> tuple[Tensor, Tensor, Tensor]:
     """φ, and what its pullback needs: closest faces and normals."""
-    sdf, closest, normals = _pure.forward(settings, array(points), None if given is None else array(given))
-    # PyTorch hardly supports uint32: the same bits as int32.
-    return torch.from_numpy(sdf), torch.from_numpy(closest.view(np.int32)), torch.from_numpy(normals)
+    found = saved(points, settings)
+    call("isograd_forward", [points, given], found, settings)
+    return found
 
 
 @_signed_distance.register_fake
 def _(points: Tensor, given: Optional[Tensor], settings: str) -> tuple[Tensor, Tensor, Tensor]:
-    shape = _pure.grid_shape(settings)
-    closest = points.new_empty(shape, dtype=torch.int32)
-    return points.new_empty(shape), closest, points.new_empty(points.shape)
+    return saved(points, settings)
 
 
-@torch.library.custom_op("isograd::signed_distance_pullback", mutates_args=(), device_types="cpu")
+@torch.library.custom_op("isograd::signed_distance_pullback", mutates_args=(), device_types=DEVICES)
 def _pullback(
     points: Tensor,
     given: Optional[Tensor],
@@ -92,14 +88,14 @@ def _pullback(
     settings: str,
 ) -> tuple[Tensor, Tensor]:
     """Cotangents of the points and of the given normals; the latter has no rows where none were given."""
-    saved = (array(sdf), array(closest).view(np.uint32), array(normals))
-    bars = _pure.pullback(settings, array(points), None if given is None else array(given), saved, array(sdf_bar))
-    given_bar = torch.from_numpy(bars[1]) if len(bars) > 1 else points.new_empty((0, 3))
-    return torch.from_numpy(bars[0]), given_bar
+    points_bar, given_bar = _empty_bars(points, given)
+    bars = [points_bar] if given is None else [points_bar, given_bar]
+    call("isograd_pullback", [points, sdf, closest, normals, sdf_bar, given], bars, settings)
+    return points_bar, given_bar
 
 
 @_pullback.register_fake
-def _(points: Tensor, given: Optional[Tensor], *_others: Any) -> tuple[Tensor, Tensor]:
+def _empty_bars(points: Tensor, given: Optional[Tensor], *_others: Any) -> tuple[Tensor, Tensor]:
     given_shape = (0, 3) if given is None else given.shape
     return points.new_empty(points.shape), points.new_empty(given_shape)
 

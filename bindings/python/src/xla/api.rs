@@ -11,10 +11,14 @@ use std::ffi::{CString, c_char, c_int, c_void};
 use std::mem::offset_of;
 use std::ptr;
 
+#[cfg(feature = "cuda")]
+use isograd_backend::DeviceArray;
 use pyo3::prelude::*;
 
 use super::Target;
 use super::buffers::{Array, Batch, Data, DataMut};
+#[cfg(feature = "cuda")]
+use super::cuda::Pointer;
 use crate::backend::Failure;
 use crate::background::guard;
 
@@ -138,6 +142,19 @@ struct Api {
     version: ApiVersion,
     internal: *const c_void,
     error_create: unsafe extern "C" fn(*mut ErrorCreate) -> Status,
+    #[cfg(feature = "cuda")]
+    others: [*const c_void; 3],
+    #[cfg(feature = "cuda")]
+    stream_get: unsafe extern "C" fn(*mut StreamGet) -> Status,
+}
+
+#[cfg(feature = "cuda")]
+#[repr(C)]
+struct StreamGet {
+    struct_size: usize,
+    extension: *mut Extension,
+    context: *mut c_void,
+    stream: *mut c_void,
 }
 
 /// Handles a call of XLA: a query for the version, or a call of the target. A panic becomes an error.
@@ -146,25 +163,67 @@ struct Api {
 /// `frame` is what XLA passes to a handler.
 pub unsafe extern "C" fn handler<W: Target>(frame: *mut CallFrame) -> Status {
     // SAFETY: the caller's promise; the frame and all it points to outlive this call.
-    let frame = unsafe { &*frame };
-    // SAFETY: as above.
-    if let Some(metadata) = unsafe { frame.metadata() } {
-        return unsafe { frame.write_version(metadata) };
-    }
-    if frame.stage != STAGE_EXECUTE {
-        return frame.error(INTERNAL, "isograd's handlers can only be executed");
-    }
-    // SAFETY: as above.
-    let guarded = guard(|| W::run_batch(unsafe { frame.batch() }?));
-    match guarded {
-        Ok(Ok(())) => ptr::null_mut(),
-        Ok(Err(Failure::Value(text))) => frame.error(INVALID_ARGUMENT, &text),
-        Ok(Err(Failure::Device(text))) => frame.error(INTERNAL, &text),
-        Err(defect) => frame.error(INTERNAL, &defect),
+    unsafe { (*frame).handle(|frame| W::run_batch(frame.batch(Place::Host)?)) }
+}
+
+/// [`handler`] of calls with arrays on a CUDA device.
+///
+/// # Safety
+/// As for [`handler`].
+#[cfg(feature = "cuda")]
+pub unsafe extern "C" fn handler_on_cuda<W: Target>(frame: *mut CallFrame) -> Status {
+    // SAFETY: as for `handler`.
+    unsafe {
+        (*frame).handle(|frame| {
+            let stream = frame.stream()?;
+            W::run_on_cuda(frame.batch(Place::Cuda(stream))?)
+        })
     }
 }
 
+/// Memory that the arrays of a call are in.
+#[derive(Clone, Copy)]
+enum Place {
+    Host,
+    /// Of a CUDA device, with the stream of the call.
+    #[cfg(feature = "cuda")]
+    Cuda(usize),
+}
+
 impl CallFrame {
+    /// Answers a query for the version, or does the work.
+    unsafe fn handle(&self, work: impl FnOnce(&Self) -> Result<(), Failure>) -> Status {
+        // SAFETY: the frame and all it points to are XLA's, and outlive this call.
+        if let Some(metadata) = unsafe { self.metadata() } {
+            return unsafe { self.write_version(metadata) };
+        }
+        if self.stage != STAGE_EXECUTE {
+            return self.error(INTERNAL, "isograd's handlers can only be executed");
+        }
+        match guard(|| work(self)) {
+            Ok(Ok(())) => ptr::null_mut(),
+            Ok(Err(Failure::Value(text))) => self.error(INVALID_ARGUMENT, &text),
+            Ok(Err(Failure::Device(text))) => self.error(INTERNAL, &text),
+            Err(defect) => self.error(INTERNAL, &defect),
+        }
+    }
+
+    /// The CUDA stream of the call.
+    #[cfg(feature = "cuda")]
+    unsafe fn stream(&self) -> Result<usize, String> {
+        let mut args = StreamGet {
+            struct_size: size_of::<StreamGet>(),
+            extension: ptr::null_mut(),
+            context: self.context,
+            stream: ptr::null_mut(),
+        };
+        // SAFETY: XLA's function with its own structure.
+        match unsafe { ((*self.api).stream_get)(&mut args) }.is_null() {
+            true => Ok(args.stream as usize),
+            false => Err("XLA has no stream for this call".into()),
+        }
+    }
+
     /// The structure for the version, if XLA queries it.
     unsafe fn metadata(&self) -> Option<*mut Metadata> {
         let mut extension = self.extension;
@@ -202,12 +261,12 @@ impl CallFrame {
         unsafe { ((*self.api).error_create)(&mut args) }
     }
 
-    unsafe fn batch(&self) -> Result<Batch<'_>, String> {
+    unsafe fn batch(&self, place: Place) -> Result<Batch<'_>, String> {
         // SAFETY: the frame's arrays are as long as it says, and its results are borrowed nowhere else.
         unsafe {
-            let inputs = self.arguments.iter().map(|buffer| (*buffer?).input());
+            let inputs = self.arguments.iter().map(|buffer| (*buffer?).input(place));
             let inputs = inputs.collect::<Result<Vec<_>, _>>()?;
-            let outputs = self.results.iter().map(|buffer| (*buffer?).output());
+            let outputs = self.results.iter().map(|buffer| (*buffer?).output(place));
             let outputs = outputs.collect::<Result<Vec<_>, _>>()?;
             let settings = self.attributes.find("settings", STRING);
             let settings = settings.ok_or("the attribute 'settings' is missing")?;
@@ -240,14 +299,18 @@ impl Buffers {
 }
 
 impl Buffer {
-    unsafe fn input<'a>(&self) -> Result<Array<Data<'a>>, String> {
+    unsafe fn input<'a>(&self, place: Place) -> Result<Array<Data<'a>>, String> {
         // SAFETY: `data` has as many entries as the dimensions say.
         let data = unsafe {
-            match self.dtype {
-                F32 => Data::F32(self.slice()?),
-                F64 => Data::F64(self.slice()?),
-                U32 => Data::U32(self.slice()?),
-                other => return Err(unknown(other)),
+            match place {
+                Place::Host => match self.dtype {
+                    F32 => Data::F32(self.slice()?),
+                    F64 => Data::F64(self.slice()?),
+                    U32 => Data::U32(self.slice()?),
+                    other => return Err(unknown(other)),
+                },
+                #[cfg(feature = "cuda")]
+                Place::Cuda(stream) => Data::OnDevice(self.pointer(stream)?),
             }
         };
         Ok(Array {
@@ -256,20 +319,39 @@ impl Buffer {
         })
     }
 
-    unsafe fn output<'a>(&self) -> Result<Array<DataMut<'a>>, String> {
+    unsafe fn output<'a>(&self, place: Place) -> Result<Array<DataMut<'a>>, String> {
         // SAFETY: as for the inputs, and a result is given to nobody else during the call.
         let data = unsafe {
-            match self.dtype {
-                F32 => DataMut::F32(self.slice_mut()?),
-                F64 => DataMut::F64(self.slice_mut()?),
-                U32 => DataMut::U32(self.slice_mut()?),
-                other => return Err(unknown(other)),
+            match place {
+                Place::Host => match self.dtype {
+                    F32 => DataMut::F32(self.slice_mut()?),
+                    F64 => DataMut::F64(self.slice_mut()?),
+                    U32 => DataMut::U32(self.slice_mut()?),
+                    other => return Err(unknown(other)),
+                },
+                #[cfg(feature = "cuda")]
+                Place::Cuda(stream) => DataMut::OnDevice(self.pointer(stream)?),
             }
         };
         Ok(Array {
             dims: unsafe { self.dims() },
             data,
         })
+    }
+
+    /// The array, on a CUDA device.
+    #[cfg(feature = "cuda")]
+    unsafe fn pointer(&self, stream: usize) -> Result<Pointer, String> {
+        let kind = match self.dtype {
+            F32 => "float32",
+            F64 => "float64",
+            U32 => "uint32",
+            other => return Err(unknown(other)),
+        };
+        // SAFETY: XLA's own dimensions.
+        let dims = unsafe { self.dims() };
+        let pointer = pointer(self.data as u64, &dims, kind, stream);
+        pointer.ok_or_else(|| unknown(self.dtype))
     }
 
     unsafe fn dims(&self) -> Vec<usize> {
@@ -343,6 +425,21 @@ impl Scalar {
 
 fn unknown(dtype: c_int) -> String {
     format!("XLA passed an array or number of its type {dtype}; give float32 or float64")
+}
+
+/// An array on a CUDA device, whose caller promises what [`DeviceArray::new`] asks for; `None` for another type.
+#[cfg(feature = "cuda")]
+pub fn pointer(address: u64, dims: &[usize], kind: &str, stream: usize) -> Option<Pointer> {
+    let length = dims.iter().product();
+    // SAFETY: what XLA and PyTorch say of their arrays during a call.
+    unsafe {
+        match kind {
+            "float32" => Some(Pointer::F32(DeviceArray::new(address, length, stream))),
+            "float64" => Some(Pointer::F64(DeviceArray::new(address, length, stream))),
+            "uint32" => Some(Pointer::U32(DeviceArray::new(address, length, stream))),
+            _ => None,
+        }
+    }
 }
 
 /// A handler as `jax.ffi.register_ffi_target` takes it: an unnamed capsule that holds the function itself.

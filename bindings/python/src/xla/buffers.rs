@@ -2,6 +2,11 @@
 
 use std::vec::IntoIter;
 
+#[cfg(feature = "cuda")]
+use isograd_backend::DeviceArray;
+
+#[cfg(feature = "cuda")]
+use super::cuda::Pointer;
 use crate::backend::Failure;
 
 /// Values of an input.
@@ -12,6 +17,9 @@ pub enum Data<'a> {
     F64(&'a [f64]),
     /// `uint32`
     U32(&'a [u32]),
+    /// On a CUDA device.
+    #[cfg(feature = "cuda")]
+    OnDevice(Pointer),
 }
 
 /// Values of an output.
@@ -22,6 +30,9 @@ pub enum DataMut<'a> {
     F64(&'a mut [f64]),
     /// `uint32`
     U32(&'a mut [u32]),
+    /// On a CUDA device.
+    #[cfg(feature = "cuda")]
+    OnDevice(Pointer),
 }
 
 /// An array in C order: its dimensions, and as many values as their product.
@@ -43,6 +54,8 @@ impl<'a> Data<'a> {
             Self::F32(all) => Data::F32(part(all, k, count)),
             Self::F64(all) => Data::F64(part(all, k, count)),
             Self::U32(all) => Data::U32(part(all, k, count)),
+            #[cfg(feature = "cuda")]
+            Self::OnDevice(all) => Data::OnDevice(all.part(k, count)),
         }
     }
 }
@@ -58,6 +71,8 @@ impl DataMut<'_> {
             Self::F32(all) => DataMut::F32(part(all, k, count)),
             Self::F64(all) => DataMut::F64(part(all, k, count)),
             Self::U32(all) => DataMut::U32(part(all, k, count)),
+            #[cfg(feature = "cuda")]
+            Self::OnDevice(all) => DataMut::OnDevice(all.part(k, count)),
         }
     }
 }
@@ -70,6 +85,9 @@ pub trait Element: Copy {
     fn slice<'a>(data: Data<'a>) -> Option<&'a [Self]>;
     /// The values of an output of this type.
     fn slice_mut<'a>(data: DataMut<'a>) -> Option<&'a mut [Self]>;
+    /// An array of this type on a device.
+    #[cfg(feature = "cuda")]
+    fn on_device(pointer: Pointer) -> Option<DeviceArray<Self>>;
 }
 
 macro_rules! element {
@@ -85,6 +103,13 @@ macro_rules! element {
             fn slice_mut<'a>(data: DataMut<'a>) -> Option<&'a mut [Self]> {
                 match data {
                     DataMut::$variant(values) => Some(values),
+                    _ => None,
+                }
+            }
+            #[cfg(feature = "cuda")]
+            fn on_device(pointer: Pointer) -> Option<DeviceArray<Self>> {
+                match pointer {
+                    Pointer::$variant(array) => Some(array),
                     _ => None,
                 }
             }
@@ -112,7 +137,12 @@ pub struct Batch<'a> {
 impl Batch<'_> {
     /// Whether the first input, the points, is `float64`.
     pub fn is_double(&self) -> bool {
-        matches!(self.inputs.first(), Some(input) if matches!(input.data, Data::F64(_)))
+        match self.inputs.first().map(|input| &input.data) {
+            Some(Data::F64(_)) => true,
+            #[cfg(feature = "cuda")]
+            Some(Data::OnDevice(Pointer::F64(_))) => true,
+            _ => false,
+        }
     }
 
     /// Calls `work` for each cloud of the batch, in order.
@@ -195,6 +225,47 @@ impl<'a> Call<'a> {
         let output = self.outputs.next().ok_or_else(|| missing(name))?;
         check_rank(name, &output.dims, rank)?;
         E::slice_mut(output.data).ok_or_else(|| wrong_type::<E>(name))
+    }
+
+    /// The next input, of `rank` dimensions, on a device.
+    ///
+    /// # Errors
+    /// As [`Self::input`].
+    #[cfg(feature = "cuda")]
+    pub fn input_on_device<E: Element>(
+        &mut self,
+        name: &str,
+        rank: usize,
+    ) -> Result<DeviceArray<E>, String> {
+        let input = self.inputs.next().ok_or_else(|| missing(name))?;
+        check_rank(name, &input.dims, rank)?;
+        match input.data {
+            Data::OnDevice(pointer) => E::on_device(pointer),
+            _ => None,
+        }
+        .ok_or_else(|| wrong_type::<E>(name))
+    }
+
+    /// The next output, of `rank` dimensions, on a device.
+    #[cfg(feature = "cuda")]
+    pub fn output_on_device<E: Element>(
+        &mut self,
+        name: &str,
+        rank: usize,
+    ) -> Result<DeviceArray<E>, String> {
+        let output = self.outputs.next().ok_or_else(|| missing(name))?;
+        check_rank(name, &output.dims, rank)?;
+        match output.data {
+            DataMut::OnDevice(pointer) => E::on_device(pointer),
+            _ => None,
+        }
+        .ok_or_else(|| wrong_type::<E>(name))
+    }
+
+    /// Number of inputs that have not been taken.
+    #[cfg(feature = "cuda")]
+    pub fn inputs_left(&self) -> usize {
+        self.inputs.len()
     }
 
     /// The next input as `(N, 3)` vectors.

@@ -6,6 +6,8 @@
 mod api;
 mod buffers;
 mod common;
+#[cfg(feature = "cuda")]
+mod cuda;
 mod extend;
 mod field;
 mod mesh;
@@ -41,6 +43,13 @@ trait Target {
             false => batch.for_each(Self::run::<f32>),
         })
     }
+
+    /// [`Self::run_batch`] with arrays on a CUDA device: by copies in the host's memory, unless a target does better.
+    #[cfg(feature = "cuda")]
+    fn run_on_cuda(batch: Batch<'_>) -> Result<(), Failure> {
+        cuda::check_backend(batch.settings)?;
+        cuda::by_copies(batch, Self::run_batch)
+    }
 }
 
 /// A target: its function for XLA and its function for Python.
@@ -48,6 +57,10 @@ struct Entry {
     name: &'static str,
     handler: api::Handler,
     call: fn(Batch<'_>) -> Result<(), Failure>,
+    #[cfg(feature = "cuda")]
+    handler_on_cuda: api::Handler,
+    #[cfg(feature = "cuda")]
+    call_on_cuda: fn(Batch<'_>) -> Result<(), Failure>,
 }
 
 impl Entry {
@@ -56,6 +69,10 @@ impl Entry {
             name: W::NAME,
             handler: api::handler::<W>,
             call: W::run_batch,
+            #[cfg(feature = "cuda")]
+            handler_on_cuda: api::handler_on_cuda::<W>,
+            #[cfg(feature = "cuda")]
+            call_on_cuda: W::run_on_cuda,
         }
     }
 }
@@ -74,14 +91,26 @@ const TARGETS: &[Entry] = &[
     Entry::of::<surface::Pullback>(),
 ];
 
-/// `{name: capsule}` for `jax.ffi.register_ffi_target`.
+/// `{platform: {name: capsule}}` for `jax.ffi.register_ffi_target`.
 #[pyfunction]
 pub fn xla_targets(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
-    let targets = PyDict::new(py);
-    for target in TARGETS {
-        targets.set_item(target.name, api::capsule(py, target.handler)?)?;
-    }
-    Ok(targets)
+    let platforms = PyDict::new(py);
+    let targets = |handler: fn(&Entry) -> api::Handler| -> PyResult<_> {
+        let targets = PyDict::new(py);
+        for target in TARGETS {
+            targets.set_item(target.name, api::capsule(py, handler(target))?)?;
+        }
+        Ok(targets)
+    };
+    platforms.set_item("cpu", targets(|target| target.handler)?)?;
+    #[cfg(feature = "cuda")]
+    platforms.set_item("CUDA", targets(|target| target.handler_on_cuda)?)?;
+    Ok(platforms)
+}
+
+fn find(name: &str) -> PyResult<&'static Entry> {
+    let target = TARGETS.iter().find(|target| target.name == name);
+    target.ok_or_else(|| PyValueError::new_err(format!("no target '{name}'")))
 }
 
 /// Calls a target with NumPy arrays, and writes its results into `outputs`: float32, float64 or uint32, in C
@@ -98,8 +127,7 @@ pub fn call_target(
     inside: bool,
 ) -> PyResult<()> {
     background::check_process()?;
-    let target = TARGETS.iter().find(|target| target.name == name);
-    let target = target.ok_or_else(|| PyValueError::new_err(format!("no target '{name}'")))?;
+    let target = find(name)?;
     let inputs = inputs.iter().map(Readable::new);
     let inputs = inputs.collect::<PyResult<Vec<_>>>()?;
     let outputs = outputs.iter().map(Writable::new);
@@ -118,6 +146,57 @@ pub fn call_target(
             .collect::<PyResult<_>>()?,
     };
     let result = py.detach(|| background::guard(|| (target.call)(batch)));
+    Ok(result.map_err(PyRuntimeError::new_err)??)
+}
+
+/// Calls a target with arrays on a CUDA device, each as its address, its shape and the name of its type. `stream` is the
+/// one in which they are made and used, 0 for the default.
+#[cfg(feature = "cuda")]
+#[pyfunction]
+#[pyo3(signature = (name, inputs, outputs, stream, settings, band=None, inside=false))]
+#[allow(clippy::too_many_arguments)] // as Python passes them
+pub fn call_target_on_cuda(
+    py: Python<'_>,
+    name: &str,
+    inputs: Vec<(u64, Vec<usize>, String)>,
+    outputs: Vec<(u64, Vec<usize>, String)>,
+    stream: usize,
+    settings: &str,
+    band: Option<f64>,
+    inside: bool,
+) -> PyResult<()> {
+    background::check_process()?;
+    let target = find(name)?;
+    let array = |(address, dims, kind): (u64, Vec<usize>, String)| {
+        let data = api::pointer(address, &dims, &kind, stream);
+        data.map(|data| (dims, data)).ok_or_else(wrong_type)
+    };
+    let inputs = inputs
+        .into_iter()
+        .map(array)
+        .collect::<PyResult<Vec<_>>>()?;
+    let outputs = outputs
+        .into_iter()
+        .map(array)
+        .collect::<PyResult<Vec<_>>>()?;
+    let batch = Batch {
+        settings,
+        band,
+        inside,
+        inputs: (inputs.into_iter())
+            .map(|(dims, data)| Array {
+                dims,
+                data: Data::OnDevice(data),
+            })
+            .collect(),
+        outputs: (outputs.into_iter())
+            .map(|(dims, data)| Array {
+                dims,
+                data: DataMut::OnDevice(data),
+            })
+            .collect(),
+    };
+    let result = py.detach(|| background::guard(|| (target.call_on_cuda)(batch)));
     Ok(result.map_err(PyRuntimeError::new_err)??)
 }
 

@@ -1,4 +1,5 @@
-"""Reconstruction and pullback as a pair of pure functions of arrays, over the targets in Rust."""
+"""Reconstruction and pullback as a pair of pure functions of NumPy arrays, over the targets in Rust: what JAX and PyTorch
+are compared with."""
 
 from __future__ import annotations
 
@@ -6,7 +7,7 @@ import json
 
 import numpy as np
 
-from . import _core
+from isograd import _core
 
 Saved = tuple[np.ndarray, np.ndarray, np.ndarray]
 """φ, closest faces and normals: what the pullback needs besides its inputs."""
