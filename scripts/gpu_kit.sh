@@ -4,7 +4,8 @@
 #     ./run.sh [RESULT.json]
 #
 # Needs Linux on x86-64 and an NVIDIA driver; no compiler, no CUDA toolkit, no network. Where compute-sanitizer is
-# installed it checks memory accesses on a small case; where python3 has NumPy the wheel is tried.
+# installed it checks memory accesses and races on small cases; where python3 has NumPy the wheel is tried, with PyTorch and
+# JAX where they are there.
 #
 # Exit status: 0 everything passed, 1 something failed, 3 there is no NVIDIA device.
 set -uo pipefail
@@ -42,13 +43,16 @@ conformance="{\"passed\": $(count passed), \"failed\": $(count failed)}"
 echo "── compute-sanitizer"
 sanitizer=absent
 if command -v compute-sanitizer >/dev/null; then
-    # Exit status 9 for any invalid access.
-    if compute-sanitizer --error-exitcode 9 bin/conformance splat --test-threads 1 >"$work/sanitizer" 2>&1; then
-        sanitizer=passed
-    else
-        sanitizer=failed status=1
-        cp "$work/sanitizer" "$result.sanitizer.log"
-    fi
+    sanitizer=passed
+    for test in "memcheck splat" "memcheck distance_is_that_of_the_cpu" "racecheck distance_is_that_of_the_cpu"; do
+        read -r tool name <<<"$test"
+        # Exit status 9 for any invalid access or race.
+        if ! compute-sanitizer --tool "$tool" --error-exitcode 9 bin/conformance "$name" --test-threads 1 \
+            >"$work/sanitizer" 2>&1; then
+            sanitizer=failed status=1
+            cp "$work/sanitizer" "$result.$tool.$name.log"
+        fi
+    done
 fi
 echo "$sanitizer"
 
@@ -57,7 +61,7 @@ wheel=absent
 if python3 -c "import numpy" 2>/dev/null && python3 -m pip --version >/dev/null 2>&1; then
     wheel=passed
     python3 -m pip install --quiet --no-index --no-deps --target "$work/site" ./*.whl &&
-        PYTHONPATH=$work/site python3 wheel.py || { wheel=failed status=1; }
+        PYTHONPATH=$work/site python3 try_wheel.py || { wheel=failed status=1; }
 fi
 echo "$wheel"
 

@@ -43,7 +43,7 @@ pub fn pack() -> Outcome {
     )?;
     let scripts = process::root().join("scripts");
     environment::copy(&scripts.join("gpu_kit.sh"), &kit.join("run.sh"))?;
-    environment::copy(&scripts.join("gpu_kit_wheel.py"), &kit.join("wheel.py"))?;
+    environment::copy(&scripts.join("gpu_kit_wheel.py"), &kit.join("try_wheel.py"))?;
     match wheel(&target, &kit) {
         Ok(()) => {}
         Err(Obstacle::Absent(reason)) => println!("SKIPPED wheel: {reason}"),

@@ -107,6 +107,7 @@ pub fn measure<R: Runtime>(body: &Body, device: &Device<R>, repeats: usize) -> O
     };
     if repeats > 0 {
         set.time(&held, repeats, &mut size)?;
+        eprintln!("{size:?}");
     }
     Ok(size)
 }
