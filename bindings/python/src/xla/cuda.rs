@@ -91,7 +91,7 @@ pub fn check_backend(settings: &str) -> Result<(), Failure> {
     match backend {
         isograd::Backend::Cuda(_) => Ok(()),
         other => Err(Failure::Value(format!(
-            "the arrays are on a CUDA device and backend is \"{other}\": pass backend=\"cuda\", or arrays of the CPU"
+            "the arrays are on a CUDA device and backend is \"{other}\": pass backend=\"cuda\" or arrays of the CPU; for JAX, ISOGRAD_JAX_CALLBACK=1 in the environment has them copied"
         ))),
     }
 }

@@ -112,9 +112,6 @@ mod on_device {
             None => None,
         };
         call.check_all_taken()?;
-        if saved.len() != points.len() {
-            return Err("the saved normals are not those of the points".into());
-        }
         let cloud = cloud(&points, normals.as_deref())?;
         pool::with_plan::<T, _>(call.settings, |plan| {
             let result = plan.plan.restore_from_normals(&cloud, &saved)?;
