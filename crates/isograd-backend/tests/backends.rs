@@ -177,6 +177,14 @@ fn results_to_keep_and_results_found_again_are_the_same() {
         let again = other.restore(&cloud, &saved).unwrap();
         assert_eq!(again.sdf().unwrap(), &sdf);
         assert_eq!(again.mesh().unwrap(), kept.mesh().unwrap());
+        // The last result of the plan, and one that another came after.
+        let last = plan.restore(&cloud, &saved).unwrap();
+        assert_eq!(last.sdf().unwrap(), &sdf);
+        let moved = cloud.points().iter().map(|&[x, y, z]| [x, y, 0.9 * z]);
+        let other = PointCloud::new(moved.collect()).unwrap();
+        assert_ne!(plan.reconstruct(&other).unwrap().sdf().unwrap(), &sdf);
+        let again = plan.restore(&cloud, &saved).unwrap();
+        assert_eq!(again.sdf().unwrap(), &sdf);
         let short = Saved {
             closest: &saved.closest[1..],
             ..saved
