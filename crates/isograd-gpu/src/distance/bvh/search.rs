@@ -187,6 +187,8 @@ fn nearest_of_bricks<F: Float + CubeElement>(
                 squared: cells.bound,
             };
             if listed.count <= comptime!(ROOM) {
+                // Listed but for rounding: the foot is not quite on it.
+                try_place::<F>(&mut best, tree, seed, q);
                 for index in 0..listed.count {
                     let place = list.entries[(listed.first + index) as usize];
                     try_place::<F>(&mut best, tree, place, q);
