@@ -31,13 +31,8 @@ struct Last<T: Number> {
 impl<T: Number> Last<T> {
     /// Whether it is what a cloud and its normals after orientation would give again.
     fn is_of(&self, cloud: &PointCloud<T>, normals: &[[T; 3]]) -> bool {
-        let inputs = |of: &PointCloud<T>| {
-            (
-                of.points() == cloud.points(),
-                of.normals() == cloud.normals(),
-            )
-        };
-        inputs(&self.cloud) == (true, true)
+        self.cloud.points() == cloud.points()
+            && self.cloud.normals() == cloud.normals()
             && self.result.normals().is_ok_and(|found| found == normals)
     }
 }

@@ -165,7 +165,7 @@ def _call_on_cuda(
     inside: bool,
 ) -> None:
     # Kept until the call is done.
-    given = [tensor.detach().resolve_neg().contiguous() for tensor in inputs if tensor is not None]
+    given = [_dense(tensor) for tensor in inputs if tensor is not None]
     kinds = {torch.float32: "float32", torch.float64: "float64", torch.int32: "uint32"}
 
     def described(tensor: Tensor) -> tuple[int, list[int], str]:
@@ -201,5 +201,9 @@ def one_by_one(operator: Any) -> Any:
 
 def array(tensor: Tensor) -> np.ndarray:
     """The values in C order; a copy only where the tensor has another order."""
-    found: np.ndarray = tensor.detach().resolve_neg().contiguous().numpy()
+    found: np.ndarray = _dense(tensor).numpy()
     return found
+
+
+def _dense(tensor: Tensor) -> Tensor:
+    return tensor.detach().resolve_neg().contiguous()

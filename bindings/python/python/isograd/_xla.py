@@ -127,14 +127,11 @@ def call(
     def by_refusal(*arrays: jax.Array) -> tuple[jax.Array, ...]:
         return tuple(jax.pure_callback(refuse, results, *arrays, vmap_method="broadcast_all"))
 
-    if not _has_handlers():
+    platforms = _platforms()
+    if not platforms:
         return by_callback(*present)
-    handlers = {_PLATFORMS[name]: by_handler for name in _core.xla_targets()}
+    handlers = dict.fromkeys(platforms, by_handler)
     return tuple(jax.lax.platform_dependent(*present, **handlers, default=by_refusal))
-
-
-# Names of XLA's platforms in JAX.
-_PLATFORMS = {"cpu": "cpu", "CUDA": "cuda"}
 
 
 def refuse(*_arrays: ArrayLike) -> tuple[np.ndarray, ...]:
@@ -168,23 +165,24 @@ class _Callback:
 
 
 _lock = threading.Lock()
-_registered: bool | None = None
+_registered: tuple[str, ...] | None = None
 
 
-def _has_handlers() -> bool:
-    """Whether the handlers are registered with XLA, which happens on the first call."""
+def _platforms() -> tuple[str, ...]:
+    """JAX's names of the platforms whose handlers are registered with XLA, which happens on the first call."""
     global _registered
     if os.environ.get("ISOGRAD_JAX_CALLBACK", "0") not in ("", "0"):
-        return False
+        return ()
     with _lock:
         if _registered is None:
             _registered = _register()
         return _registered
 
 
-def _register() -> bool:
+def _register() -> tuple[str, ...]:
+    platforms = _core.xla_targets()
     try:
-        for platform, targets in _core.xla_targets().items():
+        for platform, targets in platforms.items():
             for name, capsule in targets.items():
                 jax.ffi.register_ffi_target(name, capsule, platform=platform)
     except Exception as error:  # any exception of another version of JAX
@@ -194,5 +192,6 @@ def _register() -> bool:
             RuntimeWarning,
             stacklevel=2,
         )
-        return False
-    return True
+        return ()
+    # XLA says CUDA where JAX says cuda.
+    return tuple(platform.lower() for platform in platforms)

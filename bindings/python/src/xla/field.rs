@@ -7,6 +7,8 @@ use super::Target;
 use super::buffers::Batch;
 use super::buffers::Call;
 use super::common::{Float, cloud, copy};
+#[cfg(feature = "cuda")]
+use super::run_each;
 use crate::backend::Failure;
 
 /// Inputs: points, optionally normals. Outputs: φ, alone or with what the pullback needs.
@@ -28,10 +30,7 @@ impl Target for Forward {
     #[cfg(feature = "cuda")]
     fn run_on_cuda(batch: Batch<'_>) -> Result<(), Failure> {
         on_device::check_backend(batch.settings)?;
-        match batch.is_double() {
-            true => batch.for_each(on_device::forward::<f64>),
-            false => batch.for_each(on_device::forward::<f32>),
-        }
+        run_each(batch, on_device::forward::<f64>, on_device::forward::<f32>)
     }
 }
 
@@ -59,10 +58,11 @@ impl Target for Pullback {
     #[cfg(feature = "cuda")]
     fn run_on_cuda(batch: Batch<'_>) -> Result<(), Failure> {
         on_device::check_backend(batch.settings)?;
-        match batch.is_double() {
-            true => batch.for_each(on_device::pullback::<f64>),
-            false => batch.for_each(on_device::pullback::<f32>),
-        }
+        run_each(
+            batch,
+            on_device::pullback::<f64>,
+            on_device::pullback::<f32>,
+        )
     }
 }
 

@@ -38,10 +38,7 @@ trait Target {
 
     /// The function of a batch, in the number type of its first input.
     fn run_batch(batch: Batch<'_>) -> Result<(), Failure> {
-        threads::install(|| match batch.is_double() {
-            true => batch.for_each(Self::run::<f64>),
-            false => batch.for_each(Self::run::<f32>),
-        })
+        run_each(batch, Self::run::<f64>, Self::run::<f32>)
     }
 
     /// [`Self::run_batch`] with arrays on a CUDA device: by copies in the host's memory, unless a target does better.
@@ -50,6 +47,16 @@ trait Target {
         cuda::check_backend(batch.settings)?;
         cuda::by_copies(batch, Self::run_batch)
     }
+}
+
+/// Runs the function of the number type of the points for each cloud of a batch, on the package's threads.
+fn run_each(
+    batch: Batch<'_>,
+    double: fn(Call<'_>) -> Result<(), Failure>,
+    single: fn(Call<'_>) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let is_double = batch.is_double();
+    threads::install(|| batch.for_each(if is_double { double } else { single }))
 }
 
 /// A target: its function for XLA and its function for Python.
@@ -145,7 +152,16 @@ pub fn call_target(
             .map(Writable::array)
             .collect::<PyResult<_>>()?,
     };
-    let result = py.detach(|| background::guard(|| (target.call)(batch)));
+    call(py, target.call, batch)
+}
+
+/// Calls a function with the interpreter released.
+fn call(
+    py: Python<'_>,
+    target: fn(Batch<'_>) -> Result<(), Failure>,
+    batch: Batch<'_>,
+) -> PyResult<()> {
+    let result = py.detach(|| background::guard(|| target(batch)));
     Ok(result.map_err(PyRuntimeError::new_err)??)
 }
 
@@ -167,37 +183,25 @@ pub fn call_target_on_cuda(
 ) -> PyResult<()> {
     background::check_process()?;
     let target = find(name)?;
-    let array = |(address, dims, kind): (u64, Vec<usize>, String)| {
-        let data = api::pointer(address, &dims, &kind, stream);
-        data.map(|data| (dims, data)).ok_or_else(wrong_type)
+    let pointer = |address, dims: &[usize], kind: &str| {
+        api::pointer(address, dims, kind, stream).ok_or_else(wrong_type)
     };
-    let inputs = inputs
-        .into_iter()
-        .map(array)
-        .collect::<PyResult<Vec<_>>>()?;
-    let outputs = outputs
-        .into_iter()
-        .map(array)
-        .collect::<PyResult<Vec<_>>>()?;
+    let inputs = inputs.into_iter().map(|(address, dims, kind)| {
+        let data = Data::OnDevice(pointer(address, &dims, &kind)?);
+        Ok(Array { dims, data })
+    });
+    let outputs = outputs.into_iter().map(|(address, dims, kind)| {
+        let data = DataMut::OnDevice(pointer(address, &dims, &kind)?);
+        Ok(Array { dims, data })
+    });
     let batch = Batch {
         settings,
         band,
         inside,
-        inputs: (inputs.into_iter())
-            .map(|(dims, data)| Array {
-                dims,
-                data: Data::OnDevice(data),
-            })
-            .collect(),
-        outputs: (outputs.into_iter())
-            .map(|(dims, data)| Array {
-                dims,
-                data: DataMut::OnDevice(data),
-            })
-            .collect(),
+        inputs: inputs.collect::<PyResult<_>>()?,
+        outputs: outputs.collect::<PyResult<_>>()?,
     };
-    let result = py.detach(|| background::guard(|| (target.call_on_cuda)(batch)));
-    Ok(result.map_err(PyRuntimeError::new_err)??)
+    call(py, target.call_on_cuda, batch)
 }
 
 /// A NumPy array as an input.

@@ -42,7 +42,7 @@ pub(super) fn try_place<F: Float + CubeElement>(
     }
 }
 
-/// What the units of a group share.
+/// Memory that the units of a group share.
 #[derive(CubeType)]
 pub(super) struct Group<F: Float> {
     list: List,
