@@ -109,6 +109,8 @@ def test_the_surface_may_be_finer_than_the_field():
     assert len(fine.mesh.faces) > 3 * len(coarse.mesh.faces)
     spacing = isograd.reconstruct(SPHERE, GRID, surface=GRID.spacing / 2, checks=False)
     assert bits(spacing.sdf) == bits(fine.sdf)
+    halves = [isograd.reconstruct(SPHERE, GRID, surface=cells, checks=False) for cells in ("0.5x", 2 * GRID.spacing)]
+    assert bits(halves[0].sdf) == bits(halves[1].sdf) != bits(coarse.sdf)
     exact = np.linalg.norm(GRID.centers(), axis=-1) - 1
     off = [np.abs(result.sdf - exact).mean() for result in (coarse, fine)]
     assert off[1] < off[0]

@@ -284,12 +284,12 @@ def _surface(value: object) -> float | str:
         found = float(text[:-1]) if is_factor else number(value, "surface")
     except (TypeError, ValueError):
         found = float("nan")
-    if is_factor and 1.0 <= found <= 64.0:
+    if is_factor and 1 / 64 <= found <= 64.0:
         return text
     if not is_factor and 0.0 < found < float("inf"):
         return found
     raise ValueError(
-        f'surface is {value!r}; give "grid", "auto", a cell size above 0, or a factor from "1x" to "64x"'
+        f'surface is {value!r}; give "grid", "auto", a cell size above 0, or a factor from 1/64 to 64, such as "3x"'
     )
 
 

@@ -31,7 +31,6 @@ pub struct Mesh<T> {
     pub(crate) vertices: Vec<[T; 3]>,
     pub(crate) faces: Vec<[u32; 3]>,
     pub(crate) edges: Vec<LatticeEdge>,
-    pub(crate) midpoints: Vec<[u32; 2]>,
 }
 
 /// Why a mesh was refused.
@@ -67,7 +66,6 @@ impl<T: Real> Mesh<T> {
         self.vertices.clear();
         self.faces.clear();
         self.edges.clear();
-        self.midpoints.clear();
     }
 
     /// A mesh of finite vertices and faces that name them, from 0.
@@ -96,7 +94,6 @@ impl<T: Real> Mesh<T> {
             vertices,
             faces,
             edges: Vec::new(),
-            midpoints: Vec::new(),
         })
     }
 
@@ -110,15 +107,9 @@ impl<T: Real> Mesh<T> {
         &self.faces
     }
 
-    /// The lattice edge of each vertex but [midpoints](Self::midpoints), where the mesh is an isosurface; else empty.
+    /// The lattice edge of each vertex, where the mesh is an isosurface; else empty.
     pub fn edges(&self) -> &[LatticeEdge] {
         &self.edges
-    }
-
-    /// The last vertices of an isosurface: for each the two others, on edges of one square of the lattice, halfway between
-    /// which it would lie if the surface were not curved there.
-    pub fn midpoints(&self) -> &[[u32; 2]] {
-        &self.midpoints
     }
 
     /// The three corners of a face.

@@ -198,7 +198,7 @@ fn emit_vertices<T: Real>(
             for axis in (0..3).filter(|&a| crossed[a] >> k & 1 == 1) {
                 let eta = crossing(values[p], values[p + strides[axis]], level);
                 if let Some((vertex, edge)) = places.next() {
-                    *vertex = position(grid, cell, [(axis, eta)]);
+                    *vertex = position(grid, cell, axis, eta);
                     *edge = LatticeEdge::new(p, axis);
                 }
             }
@@ -216,19 +216,13 @@ fn values_at_corners<T: Real>(chi: &Field<T>, [i, j, k]: [usize; 3]) -> [T; 8] {
     values
 }
 
-/// The point at a fraction of the way from the center of `cell` to the next along each axis `ahead`. Each step rounds
-/// monotonically, so the point lies between the rounded centers.
+/// The point at the fraction `eta` of the way from the center of `cell` to the next along `axis`. Each step rounds
+/// monotonically, so the point lies between the two rounded centers.
 #[inline(always)]
-pub(super) fn position<T: Real>(
-    grid: &Grid<T>,
-    cell: [usize; 3],
-    ahead: impl IntoIterator<Item = (usize, T)>,
-) -> [T; 3] {
+pub(super) fn position<T: Real>(grid: &Grid<T>, cell: [usize; 3], axis: usize, eta: T) -> [T; 3] {
     let mut point = grid.center_f64(cell);
-    for (axis, eta) in ahead {
-        let along = cell[axis] as f64 + 0.5 + eta.f64();
-        point[axis] = grid.lower()[axis].f64() + grid.spacing().f64() * along;
-    }
+    let along = cell[axis] as f64 + 0.5 + eta.f64();
+    point[axis] = grid.lower()[axis].f64() + grid.spacing().f64() * along;
     vector::of_f64(point)
 }
 

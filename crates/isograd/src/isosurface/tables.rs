@@ -28,8 +28,6 @@ pub(super) struct Table {
     counts: [u8; 256],
     loops: Vec<Loop>,
     triangles: Vec<[u8; 3]>,
-    /// The edges of each loop.
-    cycles: Vec<u8>,
 }
 
 /// A closed loop of crossed edges of a cube.
@@ -41,8 +39,6 @@ pub struct Loop {
     triangles: u8,
     /// Number of triangulations, one after the other.
     triangulations: u8,
-    /// Its first edge in the list of all.
-    cycle: u16,
 }
 
 /// The one table.
@@ -59,12 +55,6 @@ impl Loop {
     /// Its triangulations, that with the shortest diagonals first: triangles, each three edges of the cube.
     pub fn triangulations(&self) -> impl Iterator<Item = &'static [[u8; 3]]> {
         TABLE.triangulations(self)
-    }
-
-    /// Its edges of the cube.
-    #[inline(always)]
-    pub(super) fn cycle(&self) -> &'static [u8] {
-        &TABLE.cycles[self.cycle.into()..][..usize::from(self.triangles) + 2]
     }
 }
 
@@ -109,11 +99,7 @@ impl Table {
     /// The triangulation of a loop that encloses the most where its vertices lie at these fractions of their edges, which are
     /// needed if there is a choice.
     #[inline(always)]
-    pub(super) fn triangles<T: Real>(
-        &self,
-        of: &Loop,
-        fraction: Option<impl Fn(u8) -> T>,
-    ) -> &[[u8; 3]] {
+    fn triangles<T: Real>(&self, of: &Loop, fraction: Option<impl Fn(u8) -> T>) -> &[[u8; 3]] {
         let mut best = &self.triangles[of.first.into()..][..of.triangles.into()];
         if let Some(fraction) = fraction.filter(|_| of.triangulations > 1) {
             let mut vertices = [[0.0; 3]; 12];
@@ -137,7 +123,6 @@ impl Table {
             counts: [0; 256],
             loops: Vec::new(),
             triangles: Vec::new(),
-            cycles: Vec::new(),
         };
         for case in 0..=255u8 {
             for cycle in loops(case) {
@@ -146,9 +131,7 @@ impl Table {
                     first: table.triangles.len() as u16,
                     triangles: (cycle.len() - 2) as u8,
                     triangulations: all.len() as u8,
-                    cycle: table.cycles.len() as u16,
                 };
-                table.cycles.extend(&cycle);
                 table.counts[case as usize] += of.triangles;
                 table.loops.push(of);
                 table.triangles.extend(all.concat());
@@ -173,7 +156,7 @@ fn enclosed(triangles: &[[u8; 3]], vertices: &[[f64; 3]; 12]) -> f64 {
 
 /// The point at a fraction of an edge of a cube.
 #[inline(always)]
-pub(super) fn vertex(edge: u8, fraction: f64) -> [f64; 3] {
+fn vertex(edge: u8, fraction: f64) -> [f64; 3] {
     let (corner, axis) = start(edge);
     let mut point = corner.map(|c| c as f64);
     point[axis] = fraction;

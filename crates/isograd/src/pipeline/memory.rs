@@ -221,7 +221,6 @@ impl<T: Real> Reconstruction<T> {
             + self.sparse.as_ref().map_or(0, Sparse::bytes)
             + size_of_val(self.closest.as_slice())
             + size_of_val(self.mesh.edges())
-            + size_of_val(self.mesh.midpoints())
             + size_of_val(self.points.as_slice())
             + size_of_val(self.given.as_slice())
             + size_of_val(self.areas.as_slice())

@@ -462,16 +462,12 @@ fn march<T: Real>(
     use isosurface::{blocks, refine};
     match (refined, sparse) {
         (Some(refined), _) => {
-            let places = refine::OnSpline {
-                chi: indicator,
-                refined,
-                level,
-            };
-            blocks::forward(refined, level, &places, mesh)
+            let place = |edge| refine::on_edge(indicator, &refined.grid, level, edge);
+            blocks::forward(refined, level, place, mesh)
         }
         (None, Some(sparse)) => {
             let chi = &sparse.chi;
-            blocks::forward(chi, level, &blocks::Linear { chi, level }, mesh)
+            blocks::forward(chi, level, |edge| blocks::linear(chi, level, edge), mesh)
         }
         (None, None) => isosurface::forward(indicator, level, scratch, mesh),
     }

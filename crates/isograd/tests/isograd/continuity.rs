@@ -86,12 +86,13 @@ impl Line {
     }
 }
 
-/// On a finer surface, and on the grid with a local level.
-fn options() -> [Options; 2] {
+/// On a finer surface, on one that is marched on half cells, and on the grid with a local level.
+fn options() -> [Options; 3] {
     let sided = Options::default().orient(Method::Signs).checks(false);
-    let fine = sided.clone().surface(SurfaceResolution::Factor(1.5));
+    let [fine, halved] =
+        [1.5, 0.7].map(|factor| sided.clone().surface(SurfaceResolution::Factor(factor)));
     let local = sided.surface(SurfaceResolution::Grid).level(Level::Local);
-    [fine, local]
+    [fine, halved, local]
 }
 
 #[test]

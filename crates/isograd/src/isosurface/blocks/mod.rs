@@ -2,8 +2,6 @@
 //! and faces in the order of the blocks.
 
 mod open_ends;
-mod polygon;
-mod splits;
 
 use rayon::prelude::*;
 
@@ -12,7 +10,6 @@ use super::signs::ones;
 use super::tables::{self, TABLE};
 use super::{Error, Report};
 pub(crate) use open_ends::open_ends;
-use splits::Splits;
 
 use crate::Real;
 use crate::data::blocks::{BlockField, Blocks, EDGE, NODES};
@@ -39,8 +36,6 @@ struct Crossings {
     inside: usize,
     walls: [[bool; 2]; 3],
     is_finite: bool,
-    /// Whether cells of the block and the first ones of the next blocks are on both sides.
-    is_mixed: bool,
 }
 
 /// Signs at a block and the first cells of the next ones.
@@ -49,59 +44,15 @@ struct Corners {
     inside: Vec<Option<bool>>,
 }
 
-/// Where the vertices of a surface lie.
-pub(crate) trait Places<T>: Sync {
-    /// Whether segments may be split.
-    const SPLITS: bool = false;
-
-    /// Of the vertex on an edge, as a fraction of it, from 0 to 1.
-    fn on_edge(&self, edge: LatticeEdge) -> T;
-
-    /// Of the midpoint of a segment of the surface in a square of the lattice, from the ends of the segment, all from 0 to 1
-    /// along both sides of the square; `None` if the segment is not split.
-    fn in_square(&self, _square: Square, _ends: [[T; 2]; 2]) -> Option<[T; 2]> {
-        None
-    }
+/// Where a vertex lies on its edge, from 0 to 1: linearly between the values at the ends.
+#[inline(always)]
+pub(crate) fn linear<T: Real>(chi: &BlockField<T>, level: T, edge: LatticeEdge) -> T {
+    let [low, high] = Cells::from(chi).ends(edge);
+    crossing(low, high, level)
 }
 
-/// A face of a cube of the lattice.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Square {
-    /// Its low corner.
-    pub cell: [usize; 3],
-    /// The axis that it is perpendicular to.
-    pub axis: usize,
-}
-
-impl Square {
-    /// The axes along its sides, in their order.
-    pub fn sides(self) -> [usize; 2] {
-        sides(self.axis)
-    }
-}
-
-/// The two other axes.
-pub(crate) fn sides(axis: usize) -> [usize; 2] {
-    [usize::from(axis == 0), if axis == 2 { 1 } else { 2 }]
-}
-
-/// Vertices linearly between the values at the ends of their edges.
-pub(crate) struct Linear<'a, T> {
-    /// The indicator.
-    pub chi: &'a BlockField<T>,
-    /// The level of the surface.
-    pub level: T,
-}
-
-impl<T: Real> Places<T> for Linear<'_, T> {
-    #[inline(always)]
-    fn on_edge(&self, edge: LatticeEdge) -> T {
-        let [low, high] = Cells::from(self.chi).ends(edge);
-        crossing(low, high, self.level)
-    }
-}
-
-/// Writes the surface `χ = level` of a field in blocks into `mesh`, in the user's unit, the vertices at their `places`. A cube
+/// Writes the surface `χ = level` of a field in blocks into `mesh`, in the user's unit, each vertex at the fraction
+/// `place` of its edge. A cube
 /// without a value at each of its corners has no triangles. The same bits for any number of threads.
 ///
 /// # Errors
@@ -109,7 +60,7 @@ impl<T: Real> Places<T> for Linear<'_, T> {
 pub(crate) fn forward<T: Real>(
     chi: &BlockField<T>,
     level: T,
-    places: &impl Places<T>,
+    place: impl Fn(LatticeEdge) -> T + Sync,
     mesh: &mut Mesh<T>,
 ) -> Result<Report, Error> {
     mesh.clear();
@@ -152,15 +103,12 @@ pub(crate) fn forward<T: Real>(
     let edges = split(&mut mesh.edges, crossings.iter().map(|of| of.vertices));
     let work = edges.into_par_iter().enumerate();
     work.for_each(|(block, edges)| find_edges(chi, block, &crossings[block], edges));
-    let fractions = mesh.edges.par_iter().map(|&edge| places.on_edge(edge));
+    let fractions = mesh.edges.par_iter().map(|&edge| place(edge));
     let fractions: Vec<T> = fractions.collect();
     let on_edges = mesh.edges.par_iter().zip(&fractions);
     let vertex = |(edge, &fraction): (&LatticeEdge, &T)| {
-        position(
-            &chi.grid,
-            chi.grid.cell(edge.cell()),
-            [(edge.axis(), fraction)],
-        )
+        let cell = chi.grid.cell(edge.cell());
+        position(&chi.grid, cell, edge.axis(), fraction)
     };
     on_edges.map(vertex).collect_into_vec(&mut mesh.vertices);
     let vertices = Vertices {
@@ -168,18 +116,9 @@ pub(crate) fn forward<T: Real>(
         crossings: &crossings,
         fractions: &fractions,
     };
-    let splits = Splits::new(&vertices, level, places);
-    let vertices_and_midpoints = mesh.vertices.len() + splits.len();
-    if vertices_and_midpoints >= u32::MAX as usize {
-        mesh.clear();
-        return Err(Error::TooManyVertices {
-            vertices: vertices_and_midpoints,
-        });
-    }
-    splits.add_to(&chi.grid, &chi.blocks, mesh);
     let blocks = (0..chi.blocks.len()).into_par_iter();
     let blocks = blocks.filter(|&block| crossings[block].faces > 0);
-    let faces = blocks.flat_map_iter(|block| faces_of(&vertices, &splits, level, block));
+    let faces = blocks.flat_map_iter(|block| faces_of(&vertices, level, block));
     mesh.faces.par_extend(faces);
     Ok(Report {
         touches_wall: walls.as_flattened().contains(&true),
@@ -246,9 +185,14 @@ impl Crossings {
         };
         let corners = Corners::new(chi, level, block);
         of.count_inside(chi, block, &corners);
-        of.is_mixed = corners.inside.iter().flatten().any(|&inside| inside)
-            && corners.inside.iter().flatten().any(|&inside| !inside);
-        if !of.is_mixed {
+        let has = |side: bool| {
+            corners
+                .inside
+                .iter()
+                .flatten()
+                .any(|&inside| inside == side)
+        };
+        if !(has(true) && has(false)) {
             return of;
         }
         for cell in cells() {
@@ -339,15 +283,9 @@ impl<T: Real> Vertices<'_, T> {
 }
 
 /// The triangles of a block.
-fn faces_of<T: Real>(
-    vertices: &Vertices<T>,
-    splits: &Splits<T>,
-    level: T,
-    block: usize,
-) -> Vec<[u32; 3]> {
+fn faces_of<T: Real>(vertices: &Vertices<T>, level: T, block: usize) -> Vec<[u32; 3]> {
     let corners = Corners::new(vertices.chi, level, block);
     let mut faces = Vec::with_capacity(vertices.crossings[block].faces);
-    let splits = splits.near(&vertices.chi.blocks, block);
     for cell in cells() {
         let case = corners.case(cell).unwrap_or(0);
         let vertex = |edge: u8| {
@@ -355,16 +293,8 @@ fn faces_of<T: Real>(
             vertices.number(block, plus(cell, corner), axis)
         };
         let fraction = |edge: u8| vertices.fractions[vertex(edge) as usize];
-        for of in tables::loops_of(case) {
-            let polygon = splits.polygon(cell, of, &vertex, &fraction);
-            match polygon {
-                Some(polygon) => polygon.triangulate(T::epsilon().f64(), &mut faces),
-                None => {
-                    let triangles = TABLE.triangles(of, Some(&fraction));
-                    faces.extend(triangles.iter().map(|triangle| triangle.map(vertex)));
-                }
-            }
-        }
+        let add = |triangle: [u8; 3]| faces.push(triangle.map(vertex));
+        TABLE.for_each_triangle(case, || fraction, add);
     }
     faces
 }

@@ -3,7 +3,6 @@
 use crate::data::LatticeEdge;
 use crate::element::crossing::{bounded, crossing};
 use crate::element::stencil::{bspline, bspline_slope};
-use crate::isosurface::blocks::sides;
 use crate::{Field, Grid, Real};
 
 /// Most steps to the crossing. Newton's method takes two or three.
@@ -13,7 +12,7 @@ const STEPS: usize = 30;
 const SKEW: f64 = 16.0;
 
 /// Length of an edge, in cells of the indicator.
-pub(super) const LENGTH: f64 = 0.5;
+const LENGTH: f64 = 0.5;
 
 /// An edge between the centers of two cells half as large as those of the indicator.
 pub(super) struct Edge {
@@ -224,13 +223,14 @@ impl Place {
     }
 }
 
+/// The two other axes.
+fn sides(axis: usize) -> [usize; 2] {
+    [usize::from(axis == 0), if axis == 2 { 1 } else { 2 }]
+}
+
 /// Places in memory, along one axis, of the cells of the indicator from the one before that of cell `half` of the refined
 /// grid on.
 #[inline(always)]
-pub(super) fn places<T: Real, const N: usize>(
-    grid: &Grid<T>,
-    axis: usize,
-    half: usize,
-) -> [usize; N] {
+fn places<T: Real, const N: usize>(grid: &Grid<T>, axis: usize, half: usize) -> [usize; N] {
     std::array::from_fn(|n| super::cell_near(grid.shape()[axis], half, n) * grid.strides()[axis])
 }

@@ -8,30 +8,19 @@
 //! those of linear interpolation between the ends, and at least a 16th of them. So it comes to the end of its edge that changes
 //! sides, though the spline may have the iso-value there more than once.
 //!
-//! The segment between two vertices in a square of the lattice is split where its midpoint is off the surface by more than a
-//! hundredth of an edge. The midpoint moves within the square by `−F g/(g² + F²)`, nearly a step of Newton's method, with
-//! `F = χ − c` and `g = ∇χ` in the square; up to three hundredths by a share of that. See [`OnSpline`].
-//!
 //! Marching cubes on these cells follows parts half as thin. And how the surface lies on the lattice hardly shows: samples
 //! and vertices read the same smooth function. If vertices are placed by linear interpolation, a plate as thick as 1.4 cells
 //! of the indicator becomes thicker and thinner by 0.044 cells as it moves through one; with the spline, by 0.0002.
-//! And rims are hardly a cell wide: what inscribed triangles cut off one depends on where it lies. Of a ball of 1.5 edges of the
-//! lattice they cut off up to 24 %, with midpoints up to 9 %.
 //!
 //! # Pullback
 //! With `ȳ` the cotangent of a vertex, and `χ' = e·∇χ` at it: `χ̄_o −= (ȳ·e) B_o/χ'`, `c̄ += (ȳ·e)/χ'`: [`pullback`]. If its odds
 //! are bounded, the derivative is that of linear interpolation between the ends, one of them times the bound. As for
-//! [linear interpolation](super), a slope below a millionth of the range of `χ` counts as that much. The cotangent
-//! of a midpoint goes to both vertices, and by `F` and `g` to the cells round it.
+//! [linear interpolation](super), a slope below a millionth of the range of `χ` counts as that much.
 //!
 //! # Not differentiable
-//! - Which blocks have values is held constant; those without have no crossing.
-//! - Which triangulation a loop with midpoints has. The surface jumps by up to a hundredth of a cell where another one encloses
-//!   as much and is not the same surface, and where a segment becomes split beside one whose midpoint lies inwards.
+//! Which blocks have values is held constant; those without have no crossing.
 
 mod edge;
-mod midpoint;
-mod pull_midpoints;
 mod pullback;
 
 use std::sync::Arc;
@@ -39,8 +28,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::data::blocks::{BlockField, EDGE, Marks, NODES};
-use crate::{Field, Grid, GridError, Real};
-pub(crate) use midpoint::OnSpline;
+use crate::{Field, Grid, GridError, LatticeEdge, Real};
 pub(crate) use pullback::pullback;
 
 /// Cells of the indicator along each side of a block.
@@ -91,6 +79,13 @@ pub(crate) fn forward<T: Real>(
         interpolate(&halo, out);
     });
     Ok(refined)
+}
+
+/// Where a vertex lies on its edge, from 0 to 1. `fine` is the [refined grid](grid) of `chi`.
+pub(crate) fn on_edge<T: Real>(chi: &Field<T>, fine: &Grid<T>, level: T, edge: LatticeEdge) -> T {
+    let edge = edge::Edge::new(chi.grid(), fine, edge);
+    let crossing = edge.crossing(&edge.line(chi), level.f64());
+    T::of(crossing.fraction())
 }
 
 /// Blocks of the refined grid that may be crossed: cells of the indicator under them and round them are on both sides.

@@ -3,7 +3,6 @@
 use rayon::prelude::*;
 
 use super::edge::{Edge, Pull};
-use super::pull_midpoints::Midpoints;
 use crate::gather::Buckets;
 use crate::isosurface::pullback::{LevelCotangent, SMALLEST_DIFFERENCE, range};
 use crate::{Field, Grid, Mesh, Real};
@@ -22,19 +21,15 @@ pub(crate) fn pullback<T: Real>(
     chi_bar: &mut [T],
 ) -> LevelCotangent {
     let smallest = SMALLEST_DIFFERENCE * range(chi.values()).f64();
-    let midpoints = Midpoints::new(chi, level, refined, mesh, vertices_bar, smallest);
-    let on_edges = mesh.edges().len();
-    let mut bars = vertices_bar[..on_edges].to_vec();
-    midpoints.add_to_ends(mesh.midpoints(), &mut bars);
     let vertices = Vertices {
         chi,
         level: level.f64(),
         refined,
         mesh,
-        bars: &bars,
+        bars: vertices_bar,
         smallest,
     };
-    let pulls: Vec<Pull> = (0..on_edges)
+    let pulls: Vec<Pull> = (0..vertices_bar.len())
         .into_par_iter()
         .map(|vertex| vertices.pull(vertex))
         .collect();
@@ -42,9 +37,7 @@ pub(crate) fn pullback<T: Real>(
     let slabs = chi.grid().shape()[0].div_ceil(SLAB);
     let mut near = Buckets::default();
     near.fill(slabs, vertices_bar.len(), |vertex| {
-        let [low, high] = vertices
-            .planes(vertex, &midpoints)
-            .map(|plane| (plane / SLAB) as u32);
+        let [low, high] = vertices.planes(vertex).map(|plane| (plane / SLAB) as u32);
         low..=high
     });
     let work = chi_bar.par_chunks_mut(SLAB * plane).enumerate();
@@ -57,10 +50,6 @@ pub(crate) fn pullback<T: Real>(
         };
         for &vertex in near.of(slab) {
             let vertex = vertex as usize;
-            if let Some(midpoint) = vertex.checked_sub(on_edges) {
-                midpoints.for_each_cell(midpoint, &mut add);
-                continue;
-            }
             let edge = vertices.edge(vertex);
             for (fraction, pull) in pulls[vertex].parts.into_iter().filter(|part| part.1 != 0.0) {
                 let at = edge.at(fraction);
@@ -68,12 +57,9 @@ pub(crate) fn pullback<T: Real>(
             }
         }
     });
-    let of_level = |vertex: usize| match vertex.checked_sub(on_edges) {
-        Some(midpoint) => midpoints.of_level(midpoint),
-        None => {
-            let [(_, first), (_, second)] = pulls[vertex].parts;
-            (-first - second, pulls[vertex].is_guarded)
-        }
+    let of_level = |vertex: usize| {
+        let [(_, first), (_, second)] = pulls[vertex].parts;
+        (-first - second, pulls[vertex].is_guarded)
     };
     LevelCotangent::sum(chi.grid(), mesh, vertices_bar, of_level)
 }
@@ -90,13 +76,10 @@ struct Vertices<'a, T> {
 
 impl<T: Real> Vertices<'_, T> {
     /// The first and the last plane across x with a cell that has a weight at a vertex.
-    fn planes(&self, vertex: usize, midpoints: &Midpoints) -> [usize; 2] {
-        let half = match vertex.checked_sub(self.mesh.edges().len()) {
-            Some(midpoint) => midpoints.half(midpoint),
-            None => self.refined.cell(self.mesh.edges()[vertex].cell())[0],
-        };
+    fn planes(&self, vertex: usize) -> [usize; 2] {
+        let half = self.refined.cell(self.mesh.edges()[vertex].cell())[0];
         let last = self.chi.grid().shape()[0] - 1;
-        // One before that of the cell in which the edge or the square starts, and two after it.
+        // One before that of the cell in which the edge starts, and two after it.
         [(half / 2).saturating_sub(1), (half / 2 + 2).min(last)]
     }
 

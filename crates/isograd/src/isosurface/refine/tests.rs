@@ -1,6 +1,5 @@
 use super::*;
 use crate::Mesh;
-use crate::isosurface::blocks::Places;
 use crate::neighbors::tests::Random;
 use crate::testing::bspline;
 
@@ -40,31 +39,8 @@ fn spline(chi: &Field<f64>, place: [f64; 3]) -> f64 {
 fn surface(chi: &Field<f64>, level: f64) -> (Grid<f64>, Mesh<f64>) {
     let refined = forward(chi, level, None).expect("a grid");
     let mut mesh = Mesh::default();
-    let places = OnSpline {
-        chi,
-        refined: &refined,
-        level,
-    };
-    crate::isosurface::blocks::forward(&refined, level, &places, &mut mesh).expect("a surface");
-    (refined.grid, mesh)
-}
-
-/// The surface of `chi` without midpoints.
-fn surface_with_chords(chi: &Field<f64>, level: f64) -> (Grid<f64>, Mesh<f64>) {
-    struct OnEdges<'a>(OnSpline<'a, f64>);
-    impl Places<f64> for OnEdges<'_> {
-        fn on_edge(&self, edge: crate::LatticeEdge) -> f64 {
-            self.0.on_edge(edge)
-        }
-    }
-    let refined = forward(chi, level, None).expect("a grid");
-    let mut mesh = Mesh::default();
-    let places = OnEdges(OnSpline {
-        chi,
-        refined: &refined,
-        level,
-    });
-    crate::isosurface::blocks::forward(&refined, level, &places, &mut mesh).expect("a surface");
+    let place = |edge| on_edge(chi, &refined.grid, level, edge);
+    crate::isosurface::blocks::forward(&refined, level, place, &mut mesh).expect("a surface");
     (refined.grid, mesh)
 }
 
@@ -145,85 +121,6 @@ fn check_vertices(chi: &Field<f64>) -> (usize, usize) {
 }
 
 #[test]
-fn midpoints_are_in_their_squares_and_much_closer_to_the_surface_than_halfway() {
-    let (chi, level) = (setting(), 0.1);
-    let (fine, mesh) = surface(&chi, level);
-    let first = mesh.edges().len();
-    assert_eq!(mesh.vertices().len(), first + mesh.midpoints().len());
-    let off = |place: [f64; 3]| (spline(&chi, chi.grid().to_index(place)) - level).abs();
-    let [mut before, mut after] = [0.0; 2];
-    for (ends, midpoint) in mesh.midpoints().iter().zip(&mesh.vertices()[first..]) {
-        let ends = ends.map(|end| end as usize);
-        let index = fine.to_index(*midpoint);
-        let edges = ends.map(|end| mesh.edges()[end]);
-        let cells = edges.map(|edge| fine.cell(edge.cell()));
-        for axis in 0..3 {
-            let low = cells[0][axis].min(cells[1][axis]) as f64 + 0.5;
-            let is_flat =
-                cells[0][axis] == cells[1][axis] && edges.iter().all(|e| e.axis() != axis);
-            let high = if is_flat && (index[axis] - low).abs() < 1e-9 {
-                low
-            } else {
-                low + 1.0
-            };
-            assert!(
-                (low - 1e-9..=high + 1e-9).contains(&index[axis]),
-                "{index:?} {axis}"
-            );
-        }
-        let [a, b] = ends.map(|end| mesh.vertices()[end]);
-        before += off(std::array::from_fn(|axis| 0.5 * (a[axis] + b[axis])));
-        after += off(*midpoint);
-    }
-    // Noise: some are only moved in part, and some have come to the side of their square.
-    assert!(after < 0.4 * before, "{after} {before}");
-}
-
-#[test]
-fn areas_and_volumes_of_small_balls_are_those_of_balls_wherever_they_lie() {
-    let mut random = Random::new(5);
-    let grid = Grid::new([0.0; 3], 1.0, [8; 3]).expect("a grid");
-    let errors = |mesh: &Mesh<f64>, radius: f64| {
-        let of = crate::isosurface::measure::measure(mesh, &mut Default::default());
-        assert_eq!([of.boundary_edges, of.misaligned_edges], [0, 0]);
-        let area = 4.0 * std::f64::consts::PI * radius * radius;
-        [
-            (of.area / area - 1.0).abs(),
-            (of.volume / (area * radius / 3.0) - 1.0).abs(),
-        ]
-    };
-    // In cells of the refined lattice: the most by which area and volume are off.
-    for (radius, most) in [(1.5, [0.06, 0.11]), (3.0, [0.02, 0.04])] {
-        let radius = 0.5 * radius;
-        let mut found = [[0.0_f64; 2]; 2];
-        for _ in 0..40 {
-            let center = [0; 3].map(|_| 3.5 + random.uniform());
-            // The spline of a square is the square and a fourth.
-            let value = |n: usize| {
-                let from = crate::vector::sub(grid.center(grid.cell(n)), center);
-                crate::vector::dot(from, from) - 0.75
-            };
-            let chi =
-                Field::new(grid, (0..grid.cells()).map(value).collect()).expect("sizes match");
-            let level = radius * radius;
-            let [(_, split), (_, plain)] = [surface(&chi, level), surface_with_chords(&chi, level)];
-            for (found, mesh) in found.iter_mut().zip([split, plain]) {
-                for (found, error) in found.iter_mut().zip(errors(&mesh, radius)) {
-                    *found = found.max(error);
-                }
-            }
-        }
-        let [split, plain] = found;
-        for n in 0..2 {
-            assert!(
-                split[n] < most[n] && plain[n] > 2.5 * split[n],
-                "{split:?} {plain:?}"
-            );
-        }
-    }
-}
-
-#[test]
 fn pullback_is_the_derivative_by_every_cell_the_level_and_the_grid() {
     check_pullback(&setting());
     // Some vertices have bounded odds.
@@ -242,11 +139,9 @@ fn check_pullback(chi: &Field<f64>) {
     let mut chi_bar = vec![0.0; chi.grid().cells()];
     let found = pullback(chi, level, &fine, &mesh, &bars, &mut chi_bar);
     assert_eq!(found.guarded, 0);
-    assert!(mesh.midpoints().len() > 100);
     let loss = |chi: &Field<f64>, level: f64| -> f64 {
         let (_, moved) = surface(chi, level);
         assert_eq!(moved.edges(), mesh.edges());
-        assert_eq!(moved.midpoints(), mesh.midpoints());
         let parts = moved.vertices().iter().zip(&bars);
         parts.map(|(v, bar)| crate::vector::dot(*v, *bar)).sum()
     };
