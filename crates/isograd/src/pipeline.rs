@@ -4,6 +4,7 @@ mod checks;
 mod concrete;
 mod cotangent;
 mod extend;
+mod indicator;
 mod memory;
 mod open;
 #[cfg(test)]
@@ -14,6 +15,7 @@ mod pullback;
 mod query;
 mod restore;
 mod scaling;
+mod sdf;
 mod selection;
 #[cfg(test)]
 mod selection_tests;
