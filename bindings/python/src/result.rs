@@ -15,6 +15,7 @@ use crate::arrays::{self, Either, Number};
 use crate::backend::Failure;
 use crate::background;
 use crate::errors::{file, value};
+use crate::grid::Parts;
 use crate::plan::AttributeArray;
 use crate::threads::{self, Threads};
 
@@ -75,9 +76,12 @@ impl ReconstructionArrays {
         each!(&self.0, this => this.result.view().backend())
     }
 
-    /// Number of cells of the surface's grid along each axis.
-    fn surface_shape(&self) -> [usize; 3] {
-        each!(&self.0, this => this.result.view().surface_grid().shape())
+    /// Lower corner, spacing and shape of the surface's grid.
+    fn surface_grid(&self) -> Parts {
+        each!(&self.0, this => {
+            let grid = this.result.view().surface_grid();
+            (grid.lower().map(Real::f64), Real::f64(grid.spacing()), grid.shape())
+        })
     }
 
     /// The report as JSON.

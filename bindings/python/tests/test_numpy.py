@@ -116,6 +116,17 @@ def test_the_surface_may_be_finer_than_the_field():
     assert off[1] < off[0]
 
 
+def test_the_grid_of_the_surface_may_lie_beyond_that_of_the_field():
+    cloud = isograd.sample("sphere", 400, dtype=np.float64).points
+    result = isograd.reconstruct(cloud, resolution=101, padding=0.03)
+    grid = result.surface_grid
+    assert grid.shape == result.indicator.shape and grid.spacing == result.report["surface_spacing"]
+    assert all(a < b for a, b in zip(grid.lower, result.grid.lower))
+    away = np.linalg.norm(grid.centers(), axis=-1) - np.linalg.norm(cloud, axis=1).mean()
+    clear = np.abs(away) > grid.spacing
+    assert ((result.indicator < result.iso_value) == (away < 0))[clear].all()
+
+
 def test_a_sparse_solve_agrees_with_the_dense_one():
     dense, sparse = (
         isograd.reconstruct(SPHERE, GRID, surface="2x", solve=solve, checks=False) for solve in ("dense", "sparse")

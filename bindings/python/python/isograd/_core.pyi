@@ -94,8 +94,8 @@ class Result:
     def iso_value(self) -> float:
         """The iso-value of the surface."""
 
-    def surface_shape(self) -> list[int]:
-        """Number of cells of the surface's grid along each axis."""
+    def surface_grid(self) -> tuple[list[float], float, list[int]]:
+        """Lower corner, spacing and shape of the surface's grid."""
 
     def backend(self) -> str:
         """Name of the backend."""

@@ -98,8 +98,8 @@ class Reconstruction(Stored):
     @cached_property
     def surface_grid(self) -> Grid:
         """The grid that the surface was found on: that of :attr:`indicator`, unless the solve was sparse."""
-        nx, ny, nz = self._core.surface_shape()
-        return Grid(self.grid.lower, self.grid.spacing * self.grid.shape[0] / nx, (nx, ny, nz))
+        (x, y, z), spacing, (nx, ny, nz) = self._core.surface_grid()
+        return Grid((x, y, z), spacing, (nx, ny, nz))
 
     @cached_property
     def iso_value(self) -> float:

@@ -7,7 +7,9 @@
 //! number of dimensions, text encoding) is, before a slice is made.
 #![allow(unsafe_code)]
 
-use std::ffi::{CString, c_char, c_int, c_void};
+mod layout;
+
+use std::ffi::{CString, c_int, c_void};
 use std::mem::offset_of;
 use std::ptr;
 
@@ -21,141 +23,14 @@ use super::buffers::{Array, Batch, Data, DataMut};
 use super::cuda::Pointer;
 use crate::backend::Failure;
 use crate::background::guard;
-
-/// The oldest version with everything used here; a newer runtime takes it, too.
-const MAJOR: c_int = 0;
-const MINOR: c_int = 1;
-
-const EXTENSION_METADATA: c_int = 1;
-const STAGE_EXECUTE: c_int = 3;
-const BUFFER: c_int = 1;
-const SCALAR: c_int = 3;
-const STRING: c_int = 4;
-const U32: c_int = 8;
-const F32: c_int = 11;
-const F64: c_int = 12;
-const INVALID_ARGUMENT: c_int = 3;
-const INTERNAL: c_int = 13;
+pub use layout::CallFrame;
+use layout::*;
 
 /// Return value of a handler: null, or an error that belongs to XLA.
 pub type Status = *mut c_void;
 
 /// A function that XLA calls.
 pub type Handler = unsafe extern "C" fn(*mut CallFrame) -> Status;
-
-#[repr(C)]
-struct Extension {
-    struct_size: usize,
-    kind: c_int,
-    next: *mut Extension,
-}
-
-#[repr(C)]
-struct ApiVersion {
-    struct_size: usize,
-    extension: *mut Extension,
-    major: c_int,
-    minor: c_int,
-}
-
-#[repr(C)]
-struct Metadata {
-    struct_size: usize,
-    version: ApiVersion,
-    traits: u32,
-}
-
-#[repr(C)]
-struct MetadataExtension {
-    base: Extension,
-    metadata: *mut Metadata,
-}
-
-#[repr(C)]
-struct Buffer {
-    struct_size: usize,
-    extension: *mut Extension,
-    dtype: c_int,
-    data: *mut c_void,
-    rank: i64,
-    dims: *const i64,
-}
-
-#[repr(C)]
-struct ByteSpan {
-    start: *const c_char,
-    length: usize,
-}
-
-#[repr(C)]
-struct Scalar {
-    dtype: c_int,
-    value: *const c_void,
-}
-
-/// Arguments, or results.
-#[repr(C)]
-struct Buffers {
-    struct_size: usize,
-    extension: *mut Extension,
-    size: i64,
-    types: *const c_int,
-    values: *const *mut c_void,
-}
-
-#[repr(C)]
-struct Attributes {
-    struct_size: usize,
-    extension: *mut Extension,
-    size: i64,
-    types: *const c_int,
-    names: *const *const ByteSpan,
-    values: *const *const c_void,
-}
-
-/// Argument of a handler.
-#[repr(C)]
-pub struct CallFrame {
-    struct_size: usize,
-    extension: *mut Extension,
-    api: *const Api,
-    context: *mut c_void,
-    stage: c_int,
-    arguments: Buffers,
-    results: Buffers,
-    attributes: Attributes,
-}
-
-#[repr(C)]
-struct ErrorCreate {
-    struct_size: usize,
-    extension: *mut Extension,
-    message: *const c_char,
-    code: c_int,
-}
-
-/// Table of XLA's functions, up to the one that is called here.
-#[repr(C)]
-struct Api {
-    struct_size: usize,
-    extension: *mut Extension,
-    version: ApiVersion,
-    internal: *const c_void,
-    error_create: unsafe extern "C" fn(*mut ErrorCreate) -> Status,
-    #[cfg(feature = "cuda")]
-    others: [*const c_void; 3],
-    #[cfg(feature = "cuda")]
-    stream_get: unsafe extern "C" fn(*mut StreamGet) -> Status,
-}
-
-#[cfg(feature = "cuda")]
-#[repr(C)]
-struct StreamGet {
-    struct_size: usize,
-    extension: *mut Extension,
-    context: *mut c_void,
-    stream: *mut c_void,
-}
 
 /// Handles a call of XLA: a query for the version, or a call of the target. A panic becomes an error.
 ///

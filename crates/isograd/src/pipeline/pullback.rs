@@ -1,55 +1,24 @@
 //! Pullback of the pipeline: cotangents of its results → cotangents of its inputs.
 
-use std::sync::{Mutex, PoisonError};
+mod scratch;
+
+use std::sync::PoisonError;
 
 use rayon::prelude::*;
 
 use super::sparse::Bars;
 use super::{CloudCotangent, Cotangent, Pipeline, PullbackError, Reconstruction, Residuals};
+use crate::data::GridCotangent;
 use crate::data::blocks::BlockField;
 use crate::data::cells::CellsMut;
-use crate::data::{Field, GridCotangent};
-use crate::distance::{extend, lattice};
+use crate::distance::extend;
 use crate::isosurface::{Level, local_level};
-use crate::neighbors::RadiiCotangent;
 use crate::orient::Method;
 use crate::poisson::screened;
 use crate::splat::{SampleCotangent, SortedSamples};
 use crate::{Real, isosurface, neighbors, normals, orient, poisson, splat, vector};
-
-/// Scratch buffers of the pullback: a field, an index for each cell whose φ has a cotangent, and some numbers
-/// for each sample and each face.
-#[derive(Default)]
-pub struct PullbackScratch<T: Real> {
-    /// Cotangent of `χ`, then of the right-hand side.
-    field: Option<Field<T>>,
-    /// Cotangents of the vertices.
-    vertices: Vec<[T; 3]>,
-    pub(super) samples: SampleCotangent<T>,
-    /// Cotangents of the moved samples.
-    pub(super) moved: Vec<[T; 3]>,
-    distance: lattice::PullbackScratch<T>,
-    extension: extend::Cotangent<T>,
-    poisson: poisson::Scratch<T>,
-    screened: screened::Scratch<T>,
-    level: local_level::PullbackScratch<T>,
-    level_bars: local_level::Cotangent<T>,
-    splat: splat::PullbackScratch<T>,
-    areas: splat::area::PullbackScratch<T>,
-    normals: normals::Scratch<T>,
-    radii: RadiiCotangent,
-}
-
-/// The scratch buffers that stay with a reconstruction between calls of [`Reconstruction::pullback_into`]. A call while
-/// another one runs takes new ones.
-#[derive(Default)]
-pub(super) struct Workspace<T: Real>(Mutex<Option<Box<PullbackScratch<T>>>>);
-
-impl<T: Real> Clone for Workspace<T> {
-    fn clone(&self) -> Self {
-        Self::default()
-    }
-}
+pub use scratch::PullbackScratch;
+pub(super) use scratch::Workspace;
 
 impl<T: Pipeline> Reconstruction<T> {
     /// Cotangents of the samples and of the grid, from cotangents of any of the results: the transpose of the derivative
@@ -382,48 +351,9 @@ impl<T: Real> Reconstruction<T> {
     }
 }
 
-impl<T: Real> PullbackScratch<T> {
-    /// Starts the sums at the cotangents of the caller.
-    fn start(&mut self, cotangent: &Cotangent<'_, T>, points: usize, vertices: usize) {
-        let samples = &mut self.samples;
-        samples.points.clear();
-        samples.points.resize(points, [T::zero(); 3]);
-        fill(
-            &mut samples.normals,
-            cotangent.normals,
-            points,
-            [T::zero(); 3],
-        );
-        fill(&mut samples.areas, cotangent.areas, points, T::zero());
-        samples.grid = GridCotangent::default();
-        self.radii.clear();
-        fill(&mut self.vertices, None, vertices, [T::zero(); 3]);
-    }
-
-    /// A field on the grid of `chi` with the given values, or zeros, in the memory of the last one.
-    fn take_field(&mut self, chi: &Field<T>, given: Option<&[T]>) -> Field<T> {
-        let last = self.field.take().filter(|field| field.grid() == chi.grid());
-        let mut field = last.unwrap_or_else(|| Field::zeros(*chi.grid()));
-        match given {
-            Some(given) => field.values_mut().copy_from_slice(given),
-            None => field.values_mut().fill(T::zero()),
-        }
-        field
-    }
-}
-
 /// Adds `more` to `sums`, entry by entry.
 fn add<E: Copy>(sums: &mut [E], more: &[E], plus: impl Fn(E, E) -> E) {
     for (sum, &more) in sums.iter_mut().zip(more) {
         *sum = plus(*sum, more);
-    }
-}
-
-/// Overwrites `out` with the given values, or with `n` zeros.
-fn fill<E: Copy>(out: &mut Vec<E>, given: Option<&[E]>, n: usize, zero: E) {
-    out.clear();
-    match given {
-        Some(given) => out.extend_from_slice(given),
-        None => out.resize(n, zero),
     }
 }
