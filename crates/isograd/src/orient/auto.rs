@@ -102,10 +102,10 @@ impl Auto {
         graph.relax(&self.observed, &mut self.beliefs, &mut self.next);
     }
 
-    /// Input index and sign of every point.
-    pub(super) fn verdicts(&self) -> impl Iterator<Item = (usize, Verdict)> {
+    /// Input index and sign of every point, and the cosine between its axis and the one that the sign was found for.
+    pub(super) fn verdicts(&self) -> impl Iterator<Item = (usize, Verdict, f32)> {
         let order = self.sites.order().iter().enumerate();
-        order.map(|(p, &i)| (i as usize, self.signs.verdict(p)))
+        order.map(|(p, &i)| (i as usize, self.signs.verdict(p), self.graph.parallel[p]))
     }
 
     /// Collects the evidence of the fills and of the sheets.

@@ -49,6 +49,8 @@ pub struct Graph {
     pub ring: Vec<f32>,
     /// `(N,)` typical distance of the nearest samples from the tangent plane, in spacings.
     pub thickness: Vec<f32>,
+    /// `(N,)` cosine between the axis that was given and [`Self::axis`]; not negative.
+    pub parallel: Vec<f32>,
     pub(super) sheets: Sheets,
     /// Scratch for medians.
     pub(super) values: Vec<f32>,
@@ -133,10 +135,11 @@ impl Graph {
         let sheets = self.sheets.sheets();
         self.scatter
             .extend(sheets.iter().map(|sheet| sheet.scatter));
+        self.parallel.clear();
         for (axis, sheet) in self.axis.iter_mut().zip(sheets) {
-            if sheet.scatter > 0.0 {
-                *axis = sheet.axis;
-            }
+            let is_known = sheet.scatter > 0.0;
+            let given = std::mem::replace(axis, if is_known { sheet.axis } else { *axis });
+            self.parallel.push(vector::dot(given, *axis));
         }
         let points = self.offset.par_iter().zip(sheets);
         points

@@ -17,6 +17,7 @@
 //!   each other the *winding number* decides: with the correct signs it is ½ on the surface.
 //!   Where signs within a domain contradict the couplings, as along the border of a patch beside a hole, it is cut
 //!   into segments, and these are decided between in the same way.
+//!   Signs are those of the sheets; an axis far from that of its sheet, as beside an edge, gets the side of its neighbors.
 //!   Thin bodies and narrow gaps are locally the same; where that matters, both interpretations are solved, and
 //!   the winding number selects one. Time and memory are `O(N log N)`, regardless of outliers.
 //! - [`Method::Parity`]: the paper's method as printed (its §2.2), with its hyperparameters.
@@ -86,6 +87,7 @@ mod signs;
 mod sites;
 #[cfg(test)]
 mod tests;
+mod turned;
 mod visibility;
 mod winding;
 
@@ -215,7 +217,9 @@ pub fn forward<'a, T: Real>(
         take_axes(points, axes.normals, out)?;
     }
     match method {
-        Method::Auto => automatically(&axes, neighborhoods, None, &mut scratch.auto, out),
+        Method::Auto => {
+            automatically(points, &axes, neighborhoods, None, &mut scratch.auto, out);
+        }
         Method::Parity(options) => by_parity(neighborhoods, options, scratch, out)?,
         Method::Given => take_given(points, known.normals, out)?,
         Method::Signs => by_given_sides(points, known.normals, out)?,
@@ -320,6 +324,7 @@ fn by_parity<T: Real>(
 
 /// `views` are cosines between axes and lines of sight, in input order, where those are known.
 fn automatically<T: Real>(
+    points: &[[T; 3]],
     axes: &Axes<'_, T>,
     neighborhoods: &Neighborhoods<T>,
     views: Option<&[f32]>,
@@ -327,7 +332,8 @@ fn automatically<T: Real>(
     out: &mut Orientation<T>,
 ) {
     auto.run(axes, neighborhoods, views);
-    for (i, verdict) in auto.verdicts() {
+    let mut far = Vec::new();
+    for (i, verdict, cosine) in auto.verdicts() {
         match views
             .map(|views| views[i])
             .filter(|&view| evidence::is_clear(view))
@@ -336,9 +342,11 @@ fn automatically<T: Real>(
                 out.set_sign(i, view < 0.0, 1.0);
                 out.decided.given += 1;
             }
+            None if turned::is_far(cosine) => far.push((i, verdict)),
             None => take_verdict(i, verdict, out),
         }
     }
+    turned::take_sides_of_neighbors(&far, points, neighborhoods, out);
     out.method = MethodUsed::Auto;
 }
 
@@ -362,7 +370,7 @@ fn by_sensors<T: Real>(
 ) -> Result<(), Error> {
     let Scratch { auto, views, .. } = scratch;
     sensors::views(points, &out.normals, known, views)?;
-    automatically(axes, neighborhoods, Some(views), auto, out);
+    automatically(points, axes, neighborhoods, Some(views), auto, out);
     out.method = MethodUsed::Sensors;
     Ok(())
 }
@@ -377,7 +385,7 @@ fn by_previous<T: Real>(
 ) {
     let Scratch { auto, previous, .. } = scratch;
     if !previous.follow(points, neighborhoods, out) {
-        automatically(axes, neighborhoods, None, auto, out);
+        automatically(points, axes, neighborhoods, None, auto, out);
         previous.keep(out);
     }
 }

@@ -5,6 +5,7 @@
 //! Where an axis has jumped (at a sharp edge it may belong to one side now and to the other then) the
 //! neighbors decide.
 
+use super::turned::side_among_neighbors;
 use super::{MethodUsed, Orientation};
 use crate::element::turned;
 use crate::neighbors::Neighborhoods;
@@ -56,7 +57,8 @@ impl Previous {
         }
         for k in 0..self.turned.len() {
             let i = self.turned[k] as usize;
-            let side = self.side_among_neighbors(i, points, neighborhoods, &out.normals);
+            let has_sign = |j: usize| is_near(self.cosines[j]);
+            let side = side_among_neighbors(i, points, neighborhoods, &out.normals, has_sign);
             let side = side.unwrap_or(0.0);
             let flip = side < 0.0 || side == 0.0 && self.cosines[i] < 0.0;
             out.set_sign(i, flip, side.abs().min(1.0));
@@ -87,34 +89,6 @@ impl Previous {
         self.turned
             .extend(far.filter(|&(_, &c)| !is_near(c)).map(|(i, _)| i));
         turned::are_few(self.turned.len(), axes.len())
-    }
-
-    /// Evidence for the axis of point `i` from its neighbors that have not turned, from −1 to 1; `None` without such
-    /// neighbors.
-    fn side_among_neighbors<T: Real>(
-        &self,
-        i: usize,
-        points: &[[T; 3]],
-        neighborhoods: &Neighborhoods<T>,
-        normals: &[[T; 3]],
-    ) -> Option<f64> {
-        let axis = vector::to_f64(normals[i]);
-        let radius = neighborhoods.radius[i];
-        let blunt = turned::blunt(radius.f64());
-        let (mut sum, mut weight) = (0.0, 0.0);
-        let index = &neighborhoods.index;
-        index.for_each_within(points[i], radius, |j, distance_squared| {
-            if is_near(self.cosines[j]) {
-                let offset = vector::to_f64(vector::sub(points[j], points[i]));
-                let normal = vector::to_f64(normals[j]);
-                let near = turned::weight(distance_squared.f64(), blunt);
-                let [axis_along, normal_along] = [axis, normal].map(|v| vector::dot(v, offset));
-                let parallel = vector::dot(axis, normal);
-                sum += near * turned::carried(parallel, axis_along, normal_along, near);
-                weight += near;
-            }
-        });
-        (weight > 0.0).then(|| sum / weight)
     }
 }
 

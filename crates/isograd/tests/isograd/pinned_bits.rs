@@ -1,7 +1,7 @@
 //! Hashes of φ, mesh, normals and gradients of four clouds, recorded once: no change of structure may change a bit.
 //! Recorded again when the automatic radius became the median over all points instead of 1,024 of them, when the confidence
 //! of `auto` came from confirmed sheets and when it was calibrated, and for the plate when samples of thin parts were moved
-//! apart.
+//! apart and when axes that are far from those of their sheets got the sides of their neighbors.
 //!
 //! The clouds are made with the four operations and square roots alone. The stages also use functions of the C library,
 //! whose last bit is not the same everywhere: the test runs where a hash of those is the recorded one, and is skipped
@@ -276,18 +276,18 @@ const RECORDED: [[[u64; 5]; 2]; 5] = [
     ],
     [
         [
-            0xe86662e2ae001102,
-            0x9a95faa10312e10b,
-            0xbeebcc88cd2df7bb,
-            0x437d5ef059a27245,
-            0x19f486a934586b89,
+            0x93601a1fe8aa44ab,
+            0xb4c9ab8e7fc5653c,
+            0x70db27054b8e9fc0,
+            0x0fa333c0278bf3a0,
+            0x2e3d96b900cbbbd7,
         ],
         [
-            0x08bc0d58b4b48e9d,
-            0xbeae6a5ea2b535b6,
-            0xf551831fcce35a99,
-            0x1ae742c035d99306,
-            0x3b0224289646dcd9,
+            0x568bcc49efa54b05,
+            0x3ac734a87090e407,
+            0x3f3df5bca3b6540f,
+            0x74ead76706c62665,
+            0xbf9320e0cc6b8a91,
         ],
     ],
     [
