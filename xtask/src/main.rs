@@ -24,6 +24,7 @@ mod tally;
 mod test;
 mod workspace;
 
+use std::io::Write as _;
 use std::process::ExitCode;
 
 use process::Outcome;
@@ -85,7 +86,8 @@ fn main() -> ExitCode {
     let command = arguments.next().unwrap_or_default();
     let rest: Vec<String> = arguments.collect();
     if command == "--help" || command == "-h" || command == "help" {
-        println!("{HELP}");
+        // The reader may have seen enough: `| head`.
+        let _ = writeln!(std::io::stdout(), "{HELP}");
         return ExitCode::SUCCESS;
     }
     match run(&command, &rest) {

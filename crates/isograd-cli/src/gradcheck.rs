@@ -120,7 +120,7 @@ fn conclusion(check: &GradientCheck, args: &args::Gradcheck) -> String {
             "; larger steps differ: take smaller ones, a finer surface (--surface) or known normals (--orient signs)"
         }
         Verdict::Bad => {
-            "; what the row counts as changed has no derivative: try --orient signs, --radius or --resolution"
+            "; what the row counts as changed has no derivative: try --orient signs, --radius or --surface"
         }
     };
     format!(

@@ -19,7 +19,7 @@ pub struct Radii<'a, T> {
 /// The neighborhoods of `(N, 3)` points with radii that were found elsewhere.
 ///
 /// # Errors
-/// As [`forward`], and [`Error::TooFew`] where there are not as many points as radii.
+/// As [`forward`](super::forward), and [`Error::TooFew`] where there are not as many points as radii.
 pub fn with_radii<T: Real>(
     points: &[[T; 3]],
     radii: Radii<'_, T>,
