@@ -52,8 +52,7 @@ pub(crate) fn linear<T: Real>(chi: &BlockField<T>, level: T, edge: LatticeEdge) 
 }
 
 /// Writes the surface `χ = level` of a field in blocks into `mesh`, in the user's unit, each vertex at the fraction
-/// `place` of its edge. A cube
-/// without a value at each of its corners has no triangles. The same bits for any number of threads.
+/// `place` of its edge. A cube without a value at each of its corners has no triangles. The same bits for any number of threads.
 ///
 /// # Errors
 /// As [`forward`](super::forward).
@@ -185,14 +184,8 @@ impl Crossings {
         };
         let corners = Corners::new(chi, level, block);
         of.count_inside(chi, block, &corners);
-        let has = |side: bool| {
-            corners
-                .inside
-                .iter()
-                .flatten()
-                .any(|&inside| inside == side)
-        };
-        if !(has(true) && has(false)) {
+        let has = |side: bool| corners.inside.contains(&Some(side));
+        if !has(true) || !has(false) {
             return of;
         }
         for cell in cells() {
