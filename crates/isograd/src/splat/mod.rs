@@ -84,7 +84,7 @@ pub enum Error {
     },
     /// A sample is outside the grid or too close to a wall.
     #[error(
-        "point {index} is at {position:?} cells from the low corner of a grid of {shape:?} cells; every sample must be at least 2 cells inside: use more padding or larger bounds, or remove the point"
+        "point {index} is at {position:.2?} cells from the low corner of the surface's grid of {shape:?} cells; every sample must be at least 2 cells inside: use more padding or larger bounds, smaller cells of the surface, or remove the point"
     )]
     Outside {
         /// Index of the point, from 0.
