@@ -94,7 +94,7 @@ class Result:
     def iso_value(self) -> float:
         """The iso-value of the surface."""
 
-    def surface_grid(self) -> tuple[list[float], float, list[int]]:
+    def surface_grid(self) -> _Grid:
         """Lower corner, spacing and shape of the surface's grid."""
 
     def backend(self) -> str:

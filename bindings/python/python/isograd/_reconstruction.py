@@ -98,8 +98,7 @@ class Reconstruction(Stored):
     @cached_property
     def surface_grid(self) -> Grid:
         """The grid that the surface was found on: that of :attr:`indicator`, unless the solve was sparse."""
-        (x, y, z), spacing, (nx, ny, nz) = self._core.surface_grid()
-        return Grid((x, y, z), spacing, (nx, ny, nz))
+        return Grid(*self._core.surface_grid())
 
     @cached_property
     def iso_value(self) -> float:

@@ -173,7 +173,7 @@ pub(super) fn fraction<T: Real>(edge: u8, values: &[T; 8], level: T) -> T {
 
 /// The two faces of the cube that an edge lies on, as bits: `2·axis` of the low one and `2·axis + 1` of the high one.
 #[inline(always)]
-pub(super) fn faces_of(edge: u8) -> u8 {
+fn faces_of(edge: u8) -> u8 {
     let (corner, axis) = start(edge);
     let face = |a: usize| 1 << (2 * a + corner[a]);
     (0..3).filter(|&a| a != axis).map(face).sum()

@@ -137,8 +137,10 @@ impl Graph {
             .extend(sheets.iter().map(|sheet| sheet.scatter));
         self.parallel.clear();
         for (axis, sheet) in self.axis.iter_mut().zip(sheets) {
-            let is_known = sheet.scatter > 0.0;
-            let given = std::mem::replace(axis, if is_known { sheet.axis } else { *axis });
+            let given = *axis;
+            if sheet.scatter > 0.0 {
+                *axis = sheet.axis;
+            }
             self.parallel.push(vector::dot(given, *axis));
         }
         let points = self.offset.par_iter().zip(sheets);

@@ -342,7 +342,7 @@ fn automatically<T: Real>(
                 out.set_sign(i, view < 0.0, 1.0);
                 out.decided.given += 1;
             }
-            None if turned::is_far(cosine) => far.push((i, verdict)),
+            None if turned::is_far(cosine.into()) => far.push((i, verdict)),
             None => take_verdict(i, verdict, out),
         }
     }

@@ -5,7 +5,7 @@
 //! Where an axis has jumped (at a sharp edge it may belong to one side now and to the other then) the
 //! neighbors decide.
 
-use super::turned::side_among_neighbors;
+use super::turned::{is_far, side_among_neighbors};
 use super::{MethodUsed, Orientation};
 use crate::element::turned;
 use crate::neighbors::Neighborhoods;
@@ -50,16 +50,15 @@ impl Previous {
             return false;
         }
         for (i, cosine) in self.cosines.iter().enumerate() {
-            if is_near(*cosine) {
+            if !is_far(*cosine) {
                 let confidence = f64::from(self.confidence[i]).min(cosine.abs());
                 out.set_sign(i, *cosine < 0.0, confidence);
             }
         }
         for k in 0..self.turned.len() {
             let i = self.turned[k] as usize;
-            let has_sign = |j: usize| is_near(self.cosines[j]);
+            let has_sign = |j: usize| !is_far(self.cosines[j]);
             let side = side_among_neighbors(i, points, neighborhoods, &out.normals, has_sign);
-            let side = side.unwrap_or(0.0);
             let flip = side < 0.0 || side == 0.0 && self.cosines[i] < 0.0;
             out.set_sign(i, flip, side.abs().min(1.0));
             self.confidence[i] = out.confidence[i].f64() as f32;
@@ -87,12 +86,7 @@ impl Previous {
         let far = (0u32..).zip(&self.cosines);
         self.turned.clear();
         self.turned
-            .extend(far.filter(|&(_, &c)| !is_near(c)).map(|(i, _)| i));
+            .extend(far.filter(|&(_, &c)| is_far(c)).map(|(i, _)| i));
         turned::are_few(self.turned.len(), axes.len())
     }
-}
-
-/// Whether an axis has not turned far since the step before, by their cosine.
-fn is_near(cosine: f64) -> bool {
-    cosine.abs() >= f64::from(turned::FAR)
 }

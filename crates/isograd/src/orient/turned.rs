@@ -11,8 +11,8 @@ use crate::neighbors::Neighborhoods;
 use crate::{Real, vector};
 
 /// Whether an axis is far from the one that its sign was found for, by their cosine.
-pub(super) fn is_far(cosine: f32) -> bool {
-    cosine < turned::FAR
+pub(super) fn is_far(cosine: f64) -> bool {
+    !(cosine.abs() >= f64::from(turned::FAR))
 }
 
 /// Turns the axes `far` in input order, each with the verdict for another axis, to the sides that their neighbors have, which
@@ -30,19 +30,19 @@ pub(super) fn take_sides_of_neighbors<T: Real>(
     far.iter().for_each(|&(i, _)| has_sign[i] = false);
     for &(i, found) in far {
         let side = side_among_neighbors(i, points, neighborhoods, &out.normals, |j| has_sign[j]);
-        let verdict = match side {
-            Some(side) if side != 0.0 => Verdict {
+        let verdict = match side == 0.0 {
+            true => found,
+            false => Verdict {
                 flip: side < 0.0,
                 confidence: found.confidence.min(side.abs() as f32),
                 by: Decision::Neighbors,
             },
-            _ => found,
         };
         take_verdict(i, verdict, out);
     }
 }
 
-/// Evidence for the axis of point `i`, from −1 to 1, from the `normals` of its neighbors that have a sign; `None` without such
+/// Evidence for the axis of point `i`, from −1 to 1, from the `normals` of its neighbors that have a sign; 0 without such
 /// neighbors.
 pub(super) fn side_among_neighbors<T: Real>(
     i: usize,
@@ -50,7 +50,7 @@ pub(super) fn side_among_neighbors<T: Real>(
     neighborhoods: &Neighborhoods<T>,
     normals: &[[T; 3]],
     has_sign: impl Fn(usize) -> bool,
-) -> Option<f64> {
+) -> f64 {
     let axis = vector::to_f64(normals[i]);
     let radius = neighborhoods.radius[i];
     let blunt = turned::blunt(radius.f64());
@@ -67,7 +67,7 @@ pub(super) fn side_among_neighbors<T: Real>(
             weight += near;
         }
     });
-    (weight > 0.0).then(|| sum / weight)
+    if weight > 0.0 { sum / weight } else { 0.0 }
 }
 
 #[cfg(test)]
