@@ -62,6 +62,7 @@
 
 mod backend;
 pub mod clean;
+mod concrete;
 pub mod data;
 pub mod differential;
 pub mod distance;

@@ -5,7 +5,7 @@ use serde_json::Value;
 
 /// A sandbox with a cloud of a sphere of radius 0.5, and one of a smaller, dented one.
 fn sandbox() -> Sandbox {
-    Sandbox::with("sample sphere -n 2500 -o sphere.ply --precision f64 --seed 9")
+    Sandbox::with("sample sphere -n 1200 -o sphere.ply --precision f64 --seed 9")
 }
 
 fn number(value: &Value) -> f64 {
@@ -14,20 +14,20 @@ fn number(value: &Value) -> f64 {
         .unwrap_or_else(|| panic!("a number: {value}"))
 }
 
-const SPHERE: &str = "fit --shape sphere --param radius=0.4 -n 2000";
+const SPHERE: &str = "fit --shape sphere --param radius=0.4 -n 1000";
 
 #[test]
 fn the_radius_of_a_sphere_is_found_from_a_cloud_a_mesh_and_a_field() {
     let sandbox = sandbox();
-    sandbox.done("reconstruct sphere.ply --mesh mesh.ply --sdf sdf.vti --resolution 28 --padding 0.2 --precision f64 -q");
+    sandbox.done("reconstruct sphere.ply --mesh mesh.ply --sdf sdf.vti --resolution 22 --padding 0.2 --precision f64 -q");
     for (target, more) in [
         (
             "sphere.ply",
-            "--resolution 28 --pictures-at 0,2 --tolerance 0.01",
+            "--resolution 22 --pictures-at 0,2 --tolerance 0.01",
         ),
         (
             "mesh.ply",
-            "--resolution 28 --band 0.15 --pictures-at 0 --epochs 6",
+            "--resolution 22 --band 0.15 --pictures-at 0 --epochs 6",
         ),
         (
             "sdf.vti",
@@ -35,7 +35,7 @@ fn the_radius_of_a_sphere_is_found_from_a_cloud_a_mesh_and_a_field() {
         ),
         (
             "mesh.ply",
-            "--resolution 28 --target-kind cloud --random-start 0.2 --tolerance 0.01",
+            "--resolution 22 --target-kind cloud --random-start 0.2 --tolerance 0.01",
         ),
     ] {
         let run = sandbox.done(&format!("{SPHERE} --target {target} {more} -o out"));
@@ -101,16 +101,16 @@ fn the_folder_gets_its_files_and_the_history_its_fields() {
     assert_eq!(epochs[0]["parameters"][0], 0.4);
     assert!(number(&epochs[3]["loss"]) < number(&epochs[0]["loss"]));
     let cloud = sandbox.geometry("out/cloud.ply");
-    assert_eq!(cloud.points.len(), 2000);
+    assert_eq!(cloud.points.len(), 1000);
 }
 
 #[test]
 fn both_radii_of_a_torus_are_found_and_others_can_be_held() {
-    let sandbox = Sandbox::with("sample torus -n 3000 -o torus.ply --precision f64");
+    let sandbox = Sandbox::with("sample torus -n 2000 -o torus.ply --precision f64");
     let start = "--param major=0.9 --param minor=0.3";
     let fit = |more: &str| {
         sandbox.done(&format!(
-            "fit --shape torus --target torus.ply {start} -n 2500 --resolution 32 --tolerance 0.01 --pictures-at 0 -o out -q {more}"
+            "fit --shape torus --target torus.ply {start} -n 1500 --resolution 26 --tolerance 0.01 --pictures-at 0 -o out -q {more}"
         ));
         let fit = sandbox.json("out/fit.json");
         ["major", "minor"].map(|name| number(&fit["parameters"][name]))
@@ -154,14 +154,14 @@ fn a_run_that_is_resumed_ends_in_the_same_bits() {
     let sandbox = sandbox();
     for method in ["lbfgs", "adam --decay constant"] {
         let line = format!(
-            "fit --shape ellipsoid --target sphere.ply --random-start 0.2 --seed 3 -n 1500 --resample 2 --resolution 22 --tolerance 0 --pictures-at 0 -q --optimizer {method}"
+            "fit --shape ellipsoid --target sphere.ply --random-start 0.2 --seed 3 -n 600 --resample 2 --resolution 16 --tolerance 0 --pictures-at 0 -q --optimizer {method}"
         );
-        sandbox.done(&format!("{line} --epochs 7 -o whole --threads 1"));
+        sandbox.done(&format!("{line} --epochs 5 -o whole --threads 1"));
         sandbox.done(&format!(
             "{line} --epochs 3 -o parts --threads 2 --checkpoint a.json"
         ));
         sandbox.done(&format!(
-            "{line} --epochs 7 -o parts --threads 2 --resume a.json"
+            "{line} --epochs 5 -o parts --threads 2 --resume a.json"
         ));
         for file in "history.json cloud.ply sdf.vti mesh.ply loss.png".split(' ') {
             let [whole, parts] = ["whole", "parts"].map(|f| sandbox.read(&format!("{f}/{file}")));
@@ -223,7 +223,7 @@ fn what_can_not_be_fitted_is_refused_with_a_remedy() {
 fn a_run_that_is_interrupted_keeps_its_state_and_can_go_on() {
     use std::process::{Command, Stdio};
     let sandbox = sandbox();
-    let line = "fit --shape ellipsoid --target sphere.ply --param a=0.4 --param b=0.6 -n 1500 --resolution 22 --tolerance 0 --optimizer adam --rate 0.001 --decay constant --pictures-at 0";
+    let line = "fit --shape ellipsoid --target sphere.ply --param a=0.4 --param b=0.6 -n 600 --resolution 16 --tolerance 0 --optimizer adam --rate 0.001 --decay constant --pictures-at 0";
     let mut child = sandbox
         .command(&format!("{line} --epochs 100000 -o out"))
         .stdout(Stdio::piped())

@@ -9,7 +9,7 @@ use crate::shared_data;
 
 const CELLS: usize = 48;
 /// Of all samples, one in this many is used.
-const STRIDE: usize = 3;
+const STRIDE: usize = 8;
 
 /// Largest component of the cotangent of any point for `Σ φ²/2h²`, and how many places were guarded.
 fn largest<T: Pipeline>(points: &[[f64; 3]]) -> (f64, usize) {

@@ -47,21 +47,21 @@ fn on_grid() -> Options {
 fn cases() -> [Case; 4] {
     let torus = Case {
         shape: "torus",
-        samples: 4000,
-        cells: 40,
+        samples: 3000,
+        cells: 32,
         options: on_grid(),
     };
     let small = Case {
-        samples: 2000,
-        cells: 28,
+        samples: 1500,
+        cells: 22,
         ..torus.clone()
     };
     [
         torus,
         Case {
             shape: "fish",
-            samples: 3000,
-            cells: 48,
+            samples: 2000,
+            cells: 40,
             options: on_grid()
                 .smoothing(Smoothing::Cells(1.0))
                 .level(Level::Thin),
@@ -279,10 +279,10 @@ fn what_the_device_finds_and_holds_is_what_the_cpu_finds<R: Runtime, T: Scalar>(
     };
     let shape = isograd_shapes::by_name("torus").unwrap();
     let cloud = shape
-        .sample::<T>(4000, &Sampling::default(), 3)
+        .sample::<T>(2000, &Sampling::default(), 3)
         .unwrap()
         .cloud;
-    let grid = Grid::fit(&cloud, Resolution::Cells(40), real(0.1)).unwrap();
+    let grid = Grid::fit(&cloud, Resolution::Cells(24), real(0.1)).unwrap();
     let plan = pipeline::Reconstructor::new(device.clone(), grid, Default::default()).unwrap();
     let points = device.upload(cloud.points().as_flattened()).unwrap();
     let normals = device

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 use super::query::Hit;
 use super::query_pullback::{check, corners_of};
-use super::{Error, NO_TRIANGLE};
+use super::{Distance, Error, NO_TRIANGLE};
 use crate::{Mesh, Real};
 
 /// Values at the vertices of a mesh.
@@ -54,12 +54,19 @@ pub struct Cotangent<T> {
     pub values: Vec<T>,
 }
 
-impl<T: Real> VertexValues<'_, T> {
+impl<T: Distance> VertexValues<'_, T> {
     /// `(M, components)` values at the closest points of `hits`, row by row; zeros for a hit without a face.
     ///
     /// # Errors
     /// [`Error::Mismatch`] and [`Error::Face`].
     pub fn at(&self, hits: &[Hit<T>]) -> Result<Vec<T>, Error> {
+        T::values(self, hits)
+    }
+}
+
+impl<T: Real> VertexValues<'_, T> {
+    /// [`at`](Self::at).
+    pub(super) fn at_hits(&self, hits: &[Hit<T>]) -> Result<Vec<T>, Error> {
         let corners = self.corners(hits)?;
         let mut out = vec![T::zero(); hits.len() * self.components];
         if self.components == 0 {

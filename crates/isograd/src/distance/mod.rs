@@ -27,6 +27,7 @@
 //! is discrete.
 
 mod bvh;
+mod concrete;
 pub mod extend;
 pub mod interpolate;
 mod lanes;
@@ -42,6 +43,7 @@ mod winding;
 #[cfg(test)]
 mod tests;
 
+pub use concrete::Distance;
 pub use lattice::{Band, NO_TRIANGLE, Scratch, Sign};
 pub use query::{Hit, Query};
 pub(crate) use query::{cell_agrees, corners_agree, hits_within};

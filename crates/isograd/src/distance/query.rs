@@ -3,11 +3,11 @@
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::Error;
 use super::bvh::{Bvh, LANES, NOWHERE, NearestTriangles, Points, Stack, corners, morton_code};
 use super::lattice::NO_TRIANGLE;
 use super::pseudonormals::Pseudonormals;
 use super::triangle::{Closest, closest_point};
+use super::{Distance, Error};
 use crate::data::cells::Cells;
 use crate::vector::{dot, normalized, of_f64, scale, to_f64};
 use crate::{Field, Mesh, Real};
@@ -64,6 +64,20 @@ impl<T: Real> Query<T> {
         &self.mesh
     }
 
+    /// [`query`](Self::query).
+    pub(super) fn hits(&self, points: &[[T; 3]], signs: Option<&Field<T>>) -> Vec<Hit<T>> {
+        let surface = Surface {
+            mesh: &self.mesh,
+            bvh: &self.bvh,
+            pseudonormals: &self.pseudonormals,
+        };
+        surface.hits(points, f64::INFINITY, &|point| {
+            signs.and_then(|field| corners_agree(field.into(), T::zero(), point))
+        })
+    }
+}
+
+impl<T: Distance> Query<T> {
     /// Distance, gradient and closest point at `(N, 3)` points, in their order.
     ///
     /// `signs` is a field that is negative inside, such as the distance on the lattice: where its eight values
@@ -73,14 +87,7 @@ impl<T: Real> Query<T> {
     ///
     /// A point that is not finite, or whose squared distance overflows, gets NaN and no triangle.
     pub fn query(&self, points: &[[T; 3]], signs: Option<&Field<T>>) -> Vec<Hit<T>> {
-        let surface = Surface {
-            mesh: &self.mesh,
-            bvh: &self.bvh,
-            pseudonormals: &self.pseudonormals,
-        };
-        surface.hits(points, f64::INFINITY, |point| {
-            signs.and_then(|field| corners_agree(field.into(), T::zero(), point))
-        })
+        T::hits(self, points, signs)
     }
 }
 
@@ -93,7 +100,7 @@ pub(crate) fn hits_within<T: Real>(
     mesh: &Mesh<T>,
     points: &[[T; 3]],
     within: f64,
-    is_inside: impl Fn([f64; 3]) -> Option<bool> + Sync,
+    is_inside: &(dyn Fn([f64; 3]) -> Option<bool> + Sync),
 ) -> Result<Vec<Hit<T>>, Error> {
     if points.is_empty() {
         return Ok(Vec::new());
@@ -127,13 +134,13 @@ impl<T: Real> Hit<T> {
 pub(super) fn nearest_triangles<T: Real>(
     bvh: &Bvh,
     points: &[[T; 3]],
-    limit: impl Fn(usize) -> f64 + Sync,
+    limit: &(dyn Fn(usize) -> f64 + Sync),
 ) -> Vec<u32> {
     let is_near = |i: usize| {
         let limit = limit(i);
         limit == f64::INFINITY || bvh.has_box_within(to_f64(points[i]), limit)
     };
-    let order = morton_order(bvh, points, is_near);
+    let order = morton_order(bvh, points, &is_near);
     let arch = Arch::new();
     let mut sorted = vec![NOWHERE; order.len()];
     sorted
@@ -144,7 +151,7 @@ pub(super) fn nearest_triangles<T: Real>(
                 bvh,
                 points,
                 order,
-                limit: &limit,
+                limit,
                 found,
             });
         });
@@ -159,7 +166,7 @@ pub(super) fn nearest_triangles<T: Real>(
 pub(super) fn morton_order<T: Real>(
     bvh: &Bvh,
     points: &[[T; 3]],
-    is_wanted: impl Fn(usize) -> bool + Sync,
+    is_wanted: &(dyn Fn(usize) -> bool + Sync),
 ) -> Vec<(u64, u32)> {
     let mut order: Vec<(u64, u32)> = points
         .par_iter()
@@ -184,7 +191,7 @@ impl<T: Real> Surface<'_, T> {
         &self,
         points: &[[T; 3]],
         within: f64,
-        is_inside: impl Fn([f64; 3]) -> Option<bool> + Sync,
+        is_inside: &(dyn Fn([f64; 3]) -> Option<bool> + Sync),
     ) -> Vec<Hit<T>> {
         let is_inside = |point: &[T; 3]| is_inside(to_f64(*point));
         let sides: Vec<Option<bool>> = points.par_iter().map(is_inside).collect();
@@ -192,7 +199,7 @@ impl<T: Real> Surface<'_, T> {
             Some(false) => (MARGIN * within).powi(2),
             _ => f64::INFINITY,
         };
-        let nearest = nearest_triangles(self.bvh, points, limit);
+        let nearest = nearest_triangles(self.bvh, points, &limit);
         let all = points.par_iter().zip(nearest).enumerate();
         all.map(|(i, (&point, place))| {
             if place == NOWHERE && limit(i) < f64::INFINITY {
@@ -298,17 +305,17 @@ pub(super) fn packet<T: Real>(points: &[[T; 3]; LANES]) -> Points {
 }
 
 /// Finds the closest triangles of some packets of points.
-struct Packets<'a, T, L> {
+struct Packets<'a, T> {
     bvh: &'a Bvh,
     points: &'a [[T; 3]],
     /// Morton code and index of each point.
     order: &'a [(u64, u32)],
     /// Squared distance of a point beyond which nothing is looked for.
-    limit: &'a L,
+    limit: &'a (dyn Fn(usize) -> f64 + Sync),
     found: &'a mut [u32],
 }
 
-impl<T: Real, L: Fn(usize) -> f64> WithSimd for Packets<'_, T, L> {
+impl<T: Real> WithSimd for Packets<'_, T> {
     type Output = ();
 
     #[inline(always)]

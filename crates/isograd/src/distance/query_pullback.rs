@@ -6,13 +6,13 @@ use super::interpolate::{Bars, Cotangent, VertexValues};
 use super::query::{Hit, Query};
 use super::tangent::tangent;
 use super::triangle::closest_point;
-use super::{Error, NO_TRIANGLE};
+use super::{Distance, Error, NO_TRIANGLE};
 use crate::gather::{Buckets, add_to, bounded};
 use crate::parallel::CHUNK;
 use crate::vector::{add, dot, norm, scale, sub, to_f64};
 use crate::{Mesh, Real};
 
-impl<T: Real> Query<T> {
+impl<T: Distance> Query<T> {
     /// [`pull_hits`] of the result `hits` of [`Self::query`].
     ///
     /// # Errors
@@ -54,7 +54,7 @@ impl<T: Real> Query<T> {
 ///
 /// # Errors
 /// [`Error::Mismatch`] and [`Error::Face`]; nothing is then written.
-pub fn pull_hits<T: Real>(
+pub fn pull_hits<T: Distance>(
     mesh: &Mesh<T>,
     points: &[[T; 3]],
     hits: &[Hit<T>],
@@ -83,7 +83,7 @@ pub fn pull_hits<T: Real>(
     done
 }
 
-impl<T: Real> VertexValues<'_, T> {
+impl<T: Distance> VertexValues<'_, T> {
     /// Pulls cotangents of `hits`, the result of a query at `(M, 3)` points, and of the values [there](Self::at) back,
     /// adding to `out`, whose lists are first extended with zeros. Held constant and guarded is what [`pull_hits`] says;
     /// the number of guarded hits is returned. The bits are the same for any number of threads.
@@ -91,6 +91,19 @@ impl<T: Real> VertexValues<'_, T> {
     /// # Errors
     /// [`Error::Mismatch`] and [`Error::Face`]; nothing is then written.
     pub fn pullback(
+        &self,
+        points: &[[T; 3]],
+        hits: &[Hit<T>],
+        bars: Bars<'_, T>,
+        out: &mut Cotangent<T>,
+    ) -> Result<usize, Error> {
+        T::pull_hits(self, points, hits, bars, out)
+    }
+}
+
+impl<T: Real> VertexValues<'_, T> {
+    /// [`pullback`](Self::pullback).
+    pub(super) fn pull(
         &self,
         points: &[[T; 3]],
         hits: &[Hit<T>],

@@ -52,7 +52,7 @@ pub(crate) fn count<T: Real>(
 ) -> Result<Counts, Error> {
     let mut own = Bvh::default();
     let bvh = tree_of(mesh, built, &mut own)?;
-    let order = morton_order(bvh, samples.points, |_| true);
+    let order = morton_order(bvh, samples.points, &|_| true);
     let surface = Surface {
         mesh,
         bvh,
@@ -119,7 +119,7 @@ pub(crate) fn nearest_faces<T: Real>(
 ) -> Result<Vec<u32>, Error> {
     let mut own = Bvh::default();
     let bvh = tree_of(mesh, built, &mut own)?;
-    let mut faces = nearest_triangles(bvh, points, |_| f64::INFINITY);
+    let mut faces = nearest_triangles(bvh, points, &|_| f64::INFINITY);
     faces.par_iter_mut().for_each(|place| {
         *place = match *place {
             NOWHERE => NO_TRIANGLE,

@@ -2,11 +2,11 @@ use super::*;
 use crate::neighbors::tests::torus;
 
 fn cloud() -> PointCloud<f64> {
-    PointCloud::new(torus(20_000, 5).iter().map(|s| s.0).collect()).expect("finite")
+    PointCloud::new(torus(8000, 5).iter().map(|s| s.0).collect()).expect("finite")
 }
 
 fn grid() -> Grid<f64> {
-    Grid::new([-1.213, -1.206, -0.619], 2.4 / 48.0, [48, 48, 24]).expect("a grid")
+    Grid::new([-1.213, -1.206, -0.619], 2.4 / 32.0, [32, 32, 16]).expect("a grid")
 }
 
 #[test]

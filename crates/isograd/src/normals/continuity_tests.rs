@@ -69,16 +69,17 @@ impl Line {
             .enumerate()
             .max_by(|a, b| a.1.total_cmp(&b.1))
             .expect("steps");
-        let [mut low, mut high] = [k, k + 1].map(|k| k as f64 / steps as f64);
+        let place = |k: usize| (k as f64 / steps as f64, self.at(k as f64 / steps as f64));
+        let [mut low, mut high] = [k, k + 1].map(place);
         for _ in 0..40 {
-            let middle = 0.5 * (low + high);
-            let [a, b, c] = [low, middle, high].map(|s| self.at(s));
-            match self.change(&a, &b) > self.change(&b, &c) {
-                true => high = middle,
-                false => low = middle,
+            let middle = 0.5 * (low.0 + high.0);
+            let between = (middle, self.at(middle));
+            match self.change(&low.1, &between.1) > self.change(&between.1, &high.1) {
+                true => high = between,
+                false => low = between,
             }
         }
-        self.change(&self.at(low), &self.at(high))
+        self.change(&low.1, &high.1)
     }
 }
 
@@ -88,7 +89,7 @@ fn lines(radius: Radius) -> impl Iterator<Item = Line> {
         let mut random = Random::new(seed);
         let noise = [0.0, 0.0, 0.06][seed as usize % 3];
         let mut points: Vec<[f64; 3]> = Vec::new();
-        for (i, (p, _)) in torus(160, seed).into_iter().enumerate() {
+        for (i, (p, _)) in torus(120, seed).into_iter().enumerate() {
             if seed % 3 != 1 || p[0] < 0.4 || i % 9 == 0 {
                 points.push(p.map(|x| x + noise * (random.uniform() + random.uniform() - 1.0)));
             }

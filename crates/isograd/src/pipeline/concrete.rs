@@ -1,39 +1,21 @@
-//! The pipeline, compiled once for each number type, in this crate.
-//!
-//! A generic function is compiled in every program that calls it: without this, each test, bench and
-//! binding would spend minutes compiling the whole pipeline again.
+//! The pipeline, compiled once for each number type, in this crate: see [`concrete`](crate::concrete).
 
 use super::pullback::PullbackScratch;
 use super::{
     CloudCotangent, Cotangent, Error, Orienter, PullbackError, Reconstruction, Reconstructor,
     RestoreError, Saved, Stage,
 };
-use crate::data::PointCloud;
-use crate::{Real, poisson};
+use crate::concrete::concrete;
+use crate::data::{Attribute, PointCloud};
+use crate::distance::{self, Distance, Hit, extend};
+use crate::poisson;
 
-/// Declares [`Pipeline`], and implements it for both number types by the generic functions.
-macro_rules! pipeline {
-    ($($(#[$doc:meta])+ fn $name:ident($($arg:ident: $type:ty),+) -> $out:ty = $body:expr;)+) => {
-        /// A number type that [plans](Reconstructor) are compiled for: `f32` or `f64`.
-        pub trait Pipeline: Real {
-            $($(#[$doc])+ fn $name($($arg: $type),+) -> $out;)+
-        }
+concrete! {
+    /// A number type that [plans](Reconstructor) are compiled for: `f32` or `f64`.
+    pub trait Pipeline: Distance;
 
-        impl Pipeline for f32 {
-            $(fn $name($($arg: $type),+) -> $out { $body })+
-        }
-
-        impl Pipeline for f64 {
-            $(fn $name($($arg: $type),+) -> $out { $body })+
-        }
-    };
-}
-
-pipeline! {
-    #[doc(hidden)]
     fn poisson_plan(shape: [usize; 3]) -> poisson::Plan<Self> = poisson::Plan::new(shape);
 
-    #[doc(hidden)]
     fn run(
         plan: &mut Reconstructor<Self>,
         stage: Stage,
@@ -41,21 +23,38 @@ pipeline! {
         held: Option<&Reconstruction<Self>>
     ) -> Result<(), Error> = plan.run(stage, cloud, held);
 
-    #[doc(hidden)]
     fn orient(plan: &mut Orienter<Self>, cloud: &PointCloud<Self>) -> Result<(), Error> = plan.run(cloud);
 
-    #[doc(hidden)]
     fn rebuild(
         plan: &mut Reconstructor<Self>,
         cloud: &PointCloud<Self>,
         saved: &Saved<'_, Self>
     ) -> Result<(), RestoreError> = plan.rebuild(cloud, saved);
 
-    #[doc(hidden)]
     fn pull(
         reconstruction: &Reconstruction<Self>,
         cotangent: &Cotangent<'_, Self>,
         scratch: &mut PullbackScratch<Self>,
         out: &mut CloudCotangent<Self>
     ) -> Result<(), PullbackError> = reconstruction.pull(cotangent, scratch, out);
+
+    fn query(
+        reconstruction: &Reconstruction<Self>,
+        points: &[[Self; 3]],
+        within: f64
+    ) -> Result<Vec<Hit<Self>>, distance::Error> = reconstruction.hits(points, within);
+
+    fn extend(
+        reconstruction: &Reconstruction<Self>,
+        attribute: &Attribute<Self>,
+        region: extend::Region,
+        scratch: &mut extend::Scratch,
+        residual: &mut extend::Residual<Self>,
+        extension: &mut extend::Extension<Self>
+    ) -> Result<(), extend::Error> = reconstruction.extend_selected(attribute, region, scratch, residual, extension);
+
+    fn vertex_values(
+        reconstruction: &Reconstruction<Self>,
+        attribute: &Attribute<Self>
+    ) -> Result<Vec<Self>, extend::Error> = reconstruction.selected_at_vertices(attribute);
 }

@@ -2,12 +2,12 @@
 
 use std::borrow::Cow;
 
-use super::Reconstruction;
+use super::{Pipeline, Reconstruction};
 use crate::data::{Attribute, PointCloud};
 use crate::distance::extend::{Error, Extension, Region, Residual, Samples, Scratch, Surface};
 use crate::{Real, distance};
 
-impl<T: Real> Reconstruction<T> {
+impl<T: Pipeline> Reconstruction<T> {
     /// The attribute `name` of the cloud at the vertices of the surface, and at the closest surface point of every cell
     /// of a region: a number is the width of a [band](Region::Band), in the unit of the points. See
     /// [`distance::extend`](crate::distance::extend). Cells outside the band that φ was computed in are left out.
@@ -52,19 +52,7 @@ impl<T: Real> Reconstruction<T> {
         residual: &mut Residual<T>,
         extension: &mut Extension<T>,
     ) -> Result<(), Error> {
-        let used = match self.selection.is_all() {
-            true => None,
-            false => Some(self.selection.attribute(attribute)),
-        };
-        distance::extend::forward(
-            self.samples(),
-            used.as_ref().unwrap_or(attribute),
-            self.surface(),
-            region.into(),
-            scratch,
-            residual,
-            extension,
-        )
+        T::extend(self, attribute, region.into(), scratch, residual, extension)
     }
 
     /// An attribute of the reconstructed samples at the vertices of [`mesh`](Self::mesh): `(V, components)`, row by row.
@@ -73,11 +61,43 @@ impl<T: Real> Reconstruction<T> {
     /// # Errors
     /// As [`extend`](Self::extend).
     pub fn vertex_values(&self, attribute: &Attribute<T>) -> Result<Vec<T>, Error> {
-        let used = match self.selection.is_all() {
+        T::vertex_values(self, attribute)
+    }
+}
+
+impl<T: Real> Reconstruction<T> {
+    /// [`extend_into`](Self::extend_into).
+    pub(super) fn extend_selected(
+        &self,
+        attribute: &Attribute<T>,
+        region: Region,
+        scratch: &mut Scratch,
+        residual: &mut Residual<T>,
+        extension: &mut Extension<T>,
+    ) -> Result<(), Error> {
+        distance::extend::forward(
+            self.samples(),
+            &self.of_samples(attribute),
+            self.surface(),
+            region,
+            scratch,
+            residual,
+            extension,
+        )
+    }
+
+    /// [`vertex_values`](Self::vertex_values).
+    pub(super) fn selected_at_vertices(&self, attribute: &Attribute<T>) -> Result<Vec<T>, Error> {
+        let attribute = self.of_samples(attribute);
+        distance::extend::at_vertices(self.samples(), &attribute, self.mesh())
+    }
+
+    /// An attribute of the cloud at the reconstructed samples, without outliers.
+    fn of_samples<'a>(&self, attribute: &'a Attribute<T>) -> Cow<'a, Attribute<T>> {
+        match self.selection.is_all() {
             true => Cow::Borrowed(attribute),
             false => Cow::Owned(self.selection.attribute(attribute)),
-        };
-        distance::extend::at_vertices(self.samples(), &used, self.mesh())
+        }
     }
 
     /// Whether the least radius of an extension is the cell size of the surface, as that is larger than the common radius:

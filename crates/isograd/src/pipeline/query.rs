@@ -1,11 +1,11 @@
 //! Distance to the reconstructed surface at any points.
 
-use super::Reconstruction;
+use super::{Pipeline, Reconstruction};
 use crate::Real;
 use crate::data::cells::Cells;
 use crate::distance::{Error, Hit, cell_agrees, corners_agree, hits_within};
 
-impl<T: Real> Reconstruction<T> {
+impl<T: Pipeline> Reconstruction<T> {
     /// Distance, gradient and closest point of [`mesh`](Self::mesh) at `(M, 3)` points, on the grid or off it, in their
     /// order. Outside the surface, a point farther than `within`, in the unit of the points, gets that distance and
     /// [no face](Hit::beyond); a point that is not finite gets NaN and none.
@@ -17,12 +17,19 @@ impl<T: Real> Reconstruction<T> {
     /// # Errors
     /// [`Error::Range`].
     pub fn query(&self, points: &[[T; 3]], within: f64) -> Result<Vec<Hit<T>>, Error> {
+        T::query(self, points, within)
+    }
+}
+
+impl<T: Real> Reconstruction<T> {
+    /// [`query`](Self::query).
+    pub(super) fn hits(&self, points: &[[T; 3]], within: f64) -> Result<Vec<Hit<T>>, Error> {
         let mesh = self.mesh();
         match self.open {
-            Some(_) => hits_within(mesh, points, within, |point| {
+            Some(_) => hits_within(mesh, points, within, &|point| {
                 corners_agree((&self.sdf).into(), T::zero(), point)
             }),
-            None => hits_within(mesh, points, within, |point| self.is_inside(point)),
+            None => hits_within(mesh, points, within, &|point| self.is_inside(point)),
         }
     }
 

@@ -68,18 +68,18 @@ impl<T: Scalar> Scene<T> {
 
     /// Random samples of a torus.
     fn even() -> Self {
-        Self::new("torus", &torus_points(3000), meshes::torus(50, 20))
+        Self::new("torus", &torus_points(1200), meshes::torus(36, 14))
     }
 
     /// The same with holes, with an outlier, in few places, with areas of 0, and a box with flat sides.
     fn all() -> Vec<Self> {
-        let points = torus_points(4000);
+        let points = torus_points(1600);
         let outlier = [0.7, 0.0, 0.4];
         let hole = |p: &&[f64; 3]| distance(p, outlier) > 0.4 && p[0] > -0.5;
         let mut holed: Vec<_> = points.iter().filter(hole).copied().collect();
-        let holes = Self::new("holes", &holed, meshes::torus(50, 20));
+        let holes = Self::new("holes", &holed, meshes::torus(36, 14));
         holed.push(outlier);
-        let outlying = Self::new("an outlier in a hole", &holed, meshes::torus(50, 20));
+        let outlying = Self::new("an outlier in a hole", &holed, meshes::torus(36, 14));
         assert!(Real::f64(outlying.areas[holed.len() - 1]) == 0.0);
         let places = [
             [0.7, 0.0, 0.25],
@@ -92,7 +92,7 @@ impl<T: Scalar> Scene<T> {
         let mut none = Self::even();
         none.name = "areas of 0";
         none.areas.fill(T::of(0.0));
-        let square = Self::new("a flat square", &square(3000), plate());
+        let square = Self::new("a flat square", &square(1200), plate());
         vec![Self::even(), holes, outlying, few, none, square]
     }
 

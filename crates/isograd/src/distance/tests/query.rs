@@ -1,5 +1,5 @@
 use super::{Random, brute_force, soup, torus};
-use crate::distance::{Error, NO_TRIANGLE, Query};
+use crate::distance::{Distance, Error, NO_TRIANGLE, Query};
 use crate::vector::{add, cross, dot, norm, of_f64, scale, sub, to_f64};
 use crate::{Field, Grid, Mesh, Real};
 
@@ -10,7 +10,7 @@ fn points<T: Real>(n: usize, size: f64, seed: u64) -> Vec<[T; 3]> {
         .collect()
 }
 
-fn assert_exact<T: Real>(mesh: Mesh<T>, points: &[[T; 3]], tolerance: f64) {
+fn assert_exact<T: Distance>(mesh: Mesh<T>, points: &[[T; 3]], tolerance: f64) {
     let query = Query::new(mesh).expect("a mesh");
     let hits = query.query(points, None);
     assert_eq!(hits.len(), points.len());

@@ -1,5 +1,5 @@
 use super::{Random, soup, torus};
-use crate::distance::{Error, Hit, NO_TRIANGLE, Query};
+use crate::distance::{Distance, Error, Hit, NO_TRIANGLE, Query};
 use crate::testing::{assert_same_bits, inner};
 use crate::vector::{add, dot, of_f64, scale};
 use crate::{Mesh, Real};
@@ -11,7 +11,7 @@ struct Pulled<T> {
     guarded: usize,
 }
 
-fn pull<T: Real>(
+fn pull<T: Distance>(
     query: &Query<T>,
     points: &[[T; 3]],
     distance_bar: &[T],
@@ -127,7 +127,7 @@ fn moving_points_and_mesh_together_changes_only_the_closest_points() {
 
 #[test]
 fn ugly_meshes_and_points_give_finite_cotangents_and_misses_give_none() {
-    fn check<T: Real>() {
+    fn check<T: Distance>() {
         let mesh = soup::<T>(300, 5);
         let query = Query::new(mesh.clone()).expect("a mesh");
         let mut points = vectors::<T>(400, 1.5, 9);

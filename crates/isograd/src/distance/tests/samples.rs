@@ -1,12 +1,12 @@
 use super::{Random, soup, sphere, torus};
 use crate::distance::lattice::{Band, forward};
 use crate::distance::samples::{Counts, Samples, count, nearest_faces};
-use crate::distance::{Query, Scratch};
+use crate::distance::{Distance, Query, Scratch};
 use crate::vector::{dot, normalized, of_f64, scale, sub};
-use crate::{Field, Grid, Mesh, Real};
+use crate::{Field, Grid, Mesh};
 
 /// Counts from two full lists of hits.
-fn plain<T: Real>(mesh: &Mesh<T>, samples: Samples<'_, T>) -> Counts {
+fn plain<T: Distance>(mesh: &Mesh<T>, samples: Samples<'_, T>) -> Counts {
     let query = Query::new(mesh.clone()).expect("a mesh");
     let pairs = samples.points.iter().zip(samples.normals);
     let below: Vec<[T; 3]> = pairs
@@ -22,7 +22,7 @@ fn plain<T: Real>(mesh: &Mesh<T>, samples: Samples<'_, T>) -> Counts {
     counts
 }
 
-fn assert_counts<T: Real>(mesh: &Mesh<T>, number: usize, seed: u64) {
+fn assert_counts<T: Distance>(mesh: &Mesh<T>, number: usize, seed: u64) {
     let mut random = Random::new(seed);
     let mut points: Vec<[T; 3]> = (0..number).map(|_| of_f64(random.point())).collect();
     points[0] = [T::nan(); 3];
