@@ -156,11 +156,11 @@ fn march<T: Real>(
     match (refined, sparse) {
         (Some(refined), _) => {
             let place = |edge| refine::on_edge(indicator, &refined.grid, level, edge);
-            blocks::forward(refined, level, place, mesh)
+            blocks::forward(refined, level, &place, mesh)
         }
         (None, Some(sparse)) => {
             let chi = &sparse.chi;
-            blocks::forward(chi, level, |edge| blocks::linear(chi, level, edge), mesh)
+            blocks::forward(chi, level, &|edge| blocks::linear(chi, level, edge), mesh)
         }
         (None, None) => isosurface::forward(indicator, level, scratch, mesh),
     }

@@ -88,7 +88,7 @@ fn signs_carried_across_planes_rows_and_cavities_beyond_the_band_are_the_dense_o
         isosurface::blocks::forward(
             &blocks,
             0.0,
-            |edge| isosurface::blocks::linear(&blocks, 0.0, edge),
+            &|edge| isosurface::blocks::linear(&blocks, 0.0, edge),
             &mut mesh,
         )
         .expect("a surface");

@@ -59,7 +59,7 @@ pub(crate) fn linear<T: Real>(chi: &BlockField<T>, level: T, edge: LatticeEdge) 
 pub(crate) fn forward<T: Real>(
     chi: &BlockField<T>,
     level: T,
-    place: impl Fn(LatticeEdge) -> T + Sync,
+    place: &(dyn Fn(LatticeEdge) -> T + Sync),
     mesh: &mut Mesh<T>,
 ) -> Result<Report, Error> {
     mesh.clear();

@@ -40,7 +40,7 @@ fn surface(chi: &Field<f64>, level: f64) -> (Grid<f64>, Mesh<f64>) {
     let refined = forward(chi, level, None).expect("a grid");
     let mut mesh = Mesh::default();
     let place = |edge| on_edge(chi, &refined.grid, level, edge);
-    crate::isosurface::blocks::forward(&refined, level, place, &mut mesh).expect("a surface");
+    crate::isosurface::blocks::forward(&refined, level, &place, &mut mesh).expect("a surface");
     (refined.grid, mesh)
 }
 
