@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::{Error, Sparse, Statistical, check_length, checked, indices};
 use crate::Real;
 use crate::neighbors::CellIndex;
-use crate::parallel::sum_array;
+use crate::parallel::{self, sum_array};
 
 /// Indices of the samples whose mean distance to their nearest neighbors is at most the mean of all of these plus
 /// `ratio` standard deviations.
@@ -74,7 +74,7 @@ pub fn radius_outliers<T: Real>(points: &[[T; 3]], options: Sparse) -> Result<Ve
     let points = checked(points)?;
     let index = CellIndex::new(&points);
     let most = neighbors.saturating_add(1);
-    let has_enough = |&point: &[f64; 3]| index.count_within(point, radius, most) > neighbors;
-    let kept: Vec<bool> = points.par_iter().map(has_enough).collect();
+    let has_enough = |i: usize| index.count_within(points[i], radius, most) > neighbors;
+    let kept = parallel::map(points.len(), has_enough);
     Ok(indices(&kept))
 }

@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 
 use super::{Error, by_place, check_length, checked, indices, largest};
-use crate::Real;
 use crate::neighbors::CellIndex;
 use crate::vector::{add, norm_squared, scale, sub};
+use crate::{Real, parallel};
 
 /// Indices of samples no two of which are within `distance` of each other, such that each removed sample has one of them
 /// within it. At distance 0 equal points are duplicates, else this is [`poisson_disk`].
@@ -53,10 +53,8 @@ pub fn voxel<T: Real>(points: &[[T; 3]], size: f64) -> Result<Vec<u32>, Error> {
     if !(largest / size < MOST) {
         return Err(Error::Voxels { largest, size });
     }
-    let voxels: Vec<[i64; 3]> = points
-        .par_iter()
-        .map(|point| point.map(|x| (x / size).floor() as i64))
-        .collect();
+    let voxel = |i: usize| points[i].map(|x| (x / size).floor() as i64);
+    let voxels = parallel::map(points.len(), voxel);
     let voxel = |&i: &u32| voxels[i as usize];
     let compare = by_place(&points);
     let mut order: Vec<u32> = (0..points.len() as u32).collect();

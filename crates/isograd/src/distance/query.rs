@@ -10,7 +10,7 @@ use super::triangle::{Closest, closest_point};
 use super::{Distance, Error};
 use crate::data::cells::Cells;
 use crate::vector::{dot, normalized, of_f64, scale, to_f64};
-use crate::{Field, Mesh, Real};
+use crate::{Field, Mesh, Real, parallel};
 
 /// Packets of points per task: a fixed number, so that the result does not depend on the threads.
 pub(super) const PACKETS_PER_TASK: usize = 16;
@@ -193,8 +193,7 @@ impl<T: Real> Surface<'_, T> {
         within: f64,
         is_inside: &(dyn Fn([f64; 3]) -> Option<bool> + Sync),
     ) -> Vec<Hit<T>> {
-        let is_inside = |point: &[T; 3]| is_inside(to_f64(*point));
-        let sides: Vec<Option<bool>> = points.par_iter().map(is_inside).collect();
+        let sides = parallel::map(points.len(), |i| is_inside(to_f64(points[i])));
         let limit = |i: usize| match sides[i] {
             Some(false) => (MARGIN * within).powi(2),
             _ => f64::INFINITY,

@@ -8,7 +8,7 @@ use super::tangent::tangent;
 use super::triangle::closest_point;
 use super::{Distance, Error, NO_TRIANGLE};
 use crate::gather::{Buckets, add_to, bounded};
-use crate::parallel::CHUNK;
+use crate::parallel::{self, CHUNK};
 use crate::vector::{add, dot, norm, scale, sub, to_f64};
 use crate::{Mesh, Real};
 
@@ -122,7 +122,7 @@ impl<T: Real> VertexValues<'_, T> {
             let i = found[k] as usize;
             self.share(points[i], &hits[i], corners[k], bars.of(i, self.components))
         };
-        let shares: Vec<Share> = (0..found.len()).into_par_iter().map(share).collect();
+        let shares: Vec<Share> = parallel::map(found.len(), share);
         let guarded = shares.par_iter().filter(|share| share.guarded).count();
 
         let vertices = self.mesh.vertices().len();

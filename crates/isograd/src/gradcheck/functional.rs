@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::Parting;
 use crate::vector::{add, scale, sub};
-use crate::{Field, Grid, PointCloud};
+use crate::{Field, Grid, PointCloud, parallel};
 
 /// Width of the soft edge, in cells.
 const WIDTH: f64 = 6.0;
@@ -44,7 +44,7 @@ impl Functional {
         let volume = grid.spacing().powi(3);
         let weight = |cell: usize| volume * weight(center, size, grid.center_f64(grid.cell(cell)));
         Self {
-            weights: (0..grid.cells()).into_par_iter().map(weight).collect(),
+            weights: parallel::map(grid.cells(), weight),
             width: WIDTH * grid.spacing(),
         }
     }

@@ -103,15 +103,14 @@ pub(crate) fn forward_on<T: Real>(
         });
     }
     let grid = chi.grid();
-    let at = |&point: &[T; 3]| {
+    parallel::fill(&mut residual.at_samples, points.len(), |i| {
+        let point = points[i];
         if interpolation == Interpolation::Spline {
             return spline::at_sample(chi, point);
         }
         let (value, gradient) = Cube::new(grid, grid.to_index(point)).value_and_gradient_of(chi);
         AtSample { value, gradient }
-    };
-    let at_samples = points.par_iter().map(at);
-    at_samples.collect_into_vec(&mut residual.at_samples);
+    });
     let [sum, area] = parallel::sum_array(points.len(), |i| {
         let a = areas[i].f64();
         [a * residual.at_samples[i].value.f64(), a]

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use crate::data::Mesh;
 use crate::neighbors::CellIndex;
-use crate::{Real, vector};
+use crate::{Real, parallel, vector};
 
 /// Automatic distance, in sample spacings: beyond gaps of clouds whose density varies by a factor of ten.
 const SPACINGS: f64 = 4.0;
@@ -69,8 +69,9 @@ pub struct Trimmed<T> {
 /// The part of `mesh` whose corners are within `distance` of the points.
 pub fn forward<T: Real>(mesh: &Mesh<T>, points: &[[T; 3]], distance: f64) -> Trimmed<T> {
     let samples = SampleCells::new(points, distance);
-    let is_near = |p: &[T; 3]| samples.any_near(vector::to_f64(*p));
-    let is_near: Vec<bool> = mesh.vertices().par_iter().map(is_near).collect();
+    let vertices = mesh.vertices();
+    let is_near = |v: usize| samples.any_near(vector::to_f64(vertices[v]));
+    let is_near = parallel::map(vertices.len(), is_near);
     let stays = |face: &&[u32; 3]| face.iter().all(|&v| is_near[v as usize]);
     let mut faces: Vec<[u32; 3]> = mesh.faces().iter().filter(stays).copied().collect();
     let mut is_used = vec![false; is_near.len()];
@@ -128,8 +129,10 @@ struct SampleCells {
 
 impl SampleCells {
     fn new<T: Real>(points: &[[T; 3]], size: f64) -> Self {
-        let points = points.par_iter().map(|&p| vector::to_f64(p));
-        let mut cells: Vec<_> = points.map(|p| (cell(p, size), p)).collect();
+        let mut cells = parallel::map(points.len(), |i| {
+            let p = vector::to_f64(points[i]);
+            (cell(p, size), p)
+        });
         cells.par_sort_unstable_by_key(|(cell, _)| *cell);
         Self { cells, size }
     }

@@ -9,7 +9,7 @@ use super::cell_index::CellIndex;
 use super::cells::Search;
 use super::census::Census;
 use super::rule::{self, AUTO_NEIGHBORS, FEWEST_NEIGHBORS, FEWEST_POINTS, GROWTH_MARGIN};
-use crate::{Real, vector};
+use crate::{Real, parallel, vector};
 pub use given::{Radii, with_radii};
 
 /// Share of a neighborhood whose own radius must reach back to the sample, or the sample is isolated.
@@ -312,9 +312,10 @@ fn grow<T: Real, U: Copy + Default + Send + Sync>(
         }
     });
     find_positions(out);
-    let radius_at = |&position: &u32| sorted[position as usize].radius;
-    let positions = out.position.par_iter();
-    positions.map(radius_at).collect_into_vec(&mut out.radius);
+    let position = &out.position;
+    parallel::fill(&mut out.radius, position.len(), |i| {
+        sorted[position[i] as usize].radius
+    });
     out.spread_census(sorted);
 }
 
@@ -354,8 +355,7 @@ fn find_isolated<T: Real>(out: &mut Neighborhoods<T>) {
         let grown = radius[i] > common;
         grown && mutual_share(index, radius, i, position[i] as usize) < SMALLEST_MUTUAL_SHARE
     };
-    let samples = (0..radius.len()).into_par_iter();
-    samples.map(isolated).collect_into_vec(&mut out.isolated);
+    parallel::fill(&mut out.isolated, radius.len(), isolated);
 }
 
 /// Share of the neighbors of sample `i` that have `i` among theirs.

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::cell_index::compare_points;
 use super::radius::{Neighborhoods, Radius};
 use super::rule::{AUTO_MARGIN, FEWEST_NEIGHBORS, GROWTH_MARGIN};
-use crate::{Real, vector};
+use crate::{Real, parallel, vector};
 
 /// Cotangents of the radii, in one over the unit of the points where the result has no unit.
 #[derive(Clone, Debug, Default)]
@@ -114,7 +114,8 @@ fn middle_pairs<T: Real>(neighborhoods: &Neighborhoods<T>, bar: f64) -> Vec<(u32
     };
     let share = AUTO_MARGIN * bar / neighborhoods.common_radius.f64() / inside as f64;
     let point = |j: u32| index.point(neighborhoods.position()[j as usize] as usize);
-    let pair = |&position: &usize| {
+    parallel::map(middle.len(), |k| {
+        let position = middle[k];
         let (i, square) = (index.order()[position], reach[position]);
         let mut last = None;
         // Rounding of the root must not leave the sample out.
@@ -130,8 +131,7 @@ fn middle_pairs<T: Real>(neighborhoods: &Neighborhoods<T>, bar: f64) -> Vec<(u32
             }
         });
         (i, last.unwrap_or(i), share * weight(square))
-    };
-    middle.par_iter().map(pair).collect()
+    })
 }
 
 #[cfg(test)]

@@ -1,7 +1,5 @@
 //! The default method: evidence from fills at two scales, spread along the neighbor graph.
 
-use rayon::prelude::*;
-
 use super::Axes;
 use super::clusters::Clusters;
 use super::evidence::{self, of_view};
@@ -9,9 +7,9 @@ use super::fill::Fill;
 use super::graph::Graph;
 use super::signs::{Interpretation, Place, Signs, Verdict};
 use super::sites::Sites;
-use crate::Real;
 use crate::neighbors::Neighborhoods;
 use crate::vector;
+use crate::{Real, parallel};
 
 /// Scratch of the automatic method; all in the order of the sites.
 #[derive(Clone, Debug, Default)]
@@ -97,8 +95,7 @@ impl Auto {
         let (graph, collected) = (&self.graph, &self.evidence);
         let both = [Interpretation::Careful, Interpretation::Bold];
         let total = |p: usize| both.map(|of| collected.total(p, graph.side[p], of));
-        let all = (0..graph.near.len()).into_par_iter();
-        all.map(total).collect_into_vec(&mut self.observed);
+        parallel::fill(&mut self.observed, graph.near.len(), total);
         graph.relax(&self.observed, &mut self.beliefs, &mut self.next);
     }
 
@@ -144,9 +141,8 @@ impl Auto {
             }
         }
         self.graph.part_slabs(slabs);
-        let (graph, all) = (&self.graph, (0..n).into_par_iter());
-        all.map(|p| graph.sheet_evidence(p))
-            .collect_into_vec(sheets);
+        let graph = &self.graph;
+        parallel::fill(sheets, n, |p| graph.sheet_evidence(p));
     }
 }
 

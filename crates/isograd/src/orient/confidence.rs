@@ -9,9 +9,8 @@
 //! The constants below were fitted to the wrong signs on the clouds of docs/orientation.md, which lists their shares by
 //! confidence: an eighth below 0.1, less in each of the next classes, and 0.003 % from 0.9 on.
 
-use rayon::prelude::*;
-
 use super::graph::Graph;
+use crate::parallel;
 
 /// Belief that is worth half of a full one.
 const HALF: f32 = 0.2;
@@ -21,15 +20,14 @@ const POWER: f32 = 20.0;
 
 /// Writes the confidence in the `(N,)` signs, from 0 to 1, for the `(N,)` beliefs in signs of +1.
 pub(super) fn measure(graph: &Graph, sign: &[f32], belief: &[f32], confidence: &mut Vec<f32>) {
-    let all = || (0..sign.len()).into_par_iter();
-    let agreements: Vec<f32> = all().map(|p| agreement(graph, sign, p)).collect();
+    let agreements = parallel::map(sign.len(), |p| agreement(graph, sign, p));
     let of_sample = |p: usize| {
         let near = &graph.near[p];
         let sum: f32 = near.iter().map(|&q| agreements[q as usize]).sum();
         let least = agreements[p].min(sum / near.len() as f32);
         combined(sign[p] * belief[p], least)
     };
-    all().map(of_sample).collect_into_vec(confidence);
+    parallel::fill(confidence, sign.len(), of_sample);
 }
 
 /// Mean of the couplings of a sample that its sign and those of its neighbors satisfy, less those that they contradict,

@@ -16,7 +16,7 @@ use super::sheets::{self, Near, Sheets};
 use super::sites::Sites;
 use crate::neighbors::Neighborhoods;
 use crate::normals::Plane;
-use crate::parallel::CHUNK;
+use crate::parallel::{self, CHUNK};
 use crate::{Real, vector};
 
 /// Neighbors, axes and couplings, all in the order of the [`Sites`]; lengths are in sample spacings
@@ -84,11 +84,10 @@ impl Graph {
         sites: &Sites,
     ) {
         let order = sites.order();
-        let unit = |&i: &u32| {
-            let axis = vector::normalized(vector::to_f64(axes.normals[i as usize]));
+        parallel::fill(&mut self.axis, order.len(), |p| {
+            let axis = vector::normalized(vector::to_f64(axes.normals[order[p] as usize]));
             axis.unwrap_or([0.0; 3]).map(|a| a as f32)
-        };
-        order.par_iter().map(unit).collect_into_vec(&mut self.axis);
+        });
         let spacing = neighborhoods.spacing().f64();
         let scatter = |&i: &u32| {
             let i = i as usize;
@@ -143,49 +142,43 @@ impl Graph {
             }
             self.parallel.push(vector::dot(given, *axis));
         }
-        let points = self.offset.par_iter().zip(sheets);
-        points
-            .map(|(offset, &sheet)| sheets::interleaved(offset, sheet))
-            .collect_into_vec(&mut self.interleaved);
+        let offset = &self.offset;
+        parallel::fill(&mut self.interleaved, sheets.len(), |p| {
+            sheets::interleaved(&offset[p], sheets[p])
+        });
     }
 
     /// Reach and thickness of every point.
     fn measure(&mut self) {
         let (offset, axis) = (&self.offset, &self.axis);
-        let ring = offset
-            .par_iter()
-            .map(|offset| vector::norm(offset[RING - 1]));
-        ring.collect_into_vec(&mut self.ring);
-        let thickness = offset.par_iter().zip(axis).map(|(offset, &axis)| {
+        let n = offset.len();
+        parallel::fill(&mut self.ring, n, |p| vector::norm(offset[p][RING - 1]));
+        parallel::fill(&mut self.thickness, n, |p| {
             let mut height = [0.0; NEIGHBORS / 2];
-            for (height, &d) in height.iter_mut().zip(offset) {
-                *height = vector::dot(d, axis).abs();
+            for (height, &d) in height.iter_mut().zip(&offset[p]) {
+                *height = vector::dot(d, axis[p]).abs();
             }
             median(&mut height)
         });
-        thickness.collect_into_vec(&mut self.thickness);
-        let ring = &self.ring;
-        let reach = ring.par_iter().zip(&self.near).map(|(&own, near)| {
+        let (ring, near) = (&self.ring, &self.near);
+        parallel::fill(&mut self.reach, n, |p| {
             let mut around = [0.0; RING];
-            for (around, &q) in around.iter_mut().zip(near) {
+            for (around, &q) in around.iter_mut().zip(&near[p]) {
                 *around = ring[q as usize];
             }
-            coupling::reach(own, median(&mut around))
+            coupling::reach(ring[p], median(&mut around))
         });
-        reach.collect_into_vec(&mut self.reach);
     }
 
     fn couple(&mut self) {
         let mut coupling = std::mem::take(&mut self.coupling);
         let this = &*self;
-        let couplings = |(p, near): (usize, &[u32; NEIGHBORS])| {
-            std::array::from_fn(|slot| match near[slot] as usize {
+        parallel::fill(&mut coupling, this.near.len(), |p| {
+            std::array::from_fn(|slot| match this.near[p][slot] as usize {
                 q if q == p => 0.0,
                 q => this.tie(p, q, slot),
             })
-        };
-        let near = this.near.par_iter().enumerate();
-        near.map(couplings).collect_into_vec(&mut coupling);
+        });
         self.coupling = coupling;
     }
 
@@ -215,8 +208,7 @@ impl Graph {
     /// There are fewer slabs than points.
     pub fn part_slabs(&mut self, slab: &[f32]) {
         let (near, axis, side) = (&self.near, &self.axis, &self.side);
-        let all = self.coupling.par_iter_mut().enumerate();
-        all.for_each(|(p, coupling)| {
+        parallel::for_each(&mut self.coupling, |p, coupling| {
             for (coupling, &q) in coupling.iter_mut().zip(&near[p]) {
                 let q = q as usize;
                 let both = slab[p].min(slab[q]);
@@ -234,7 +226,7 @@ impl Graph {
 
     fn measure_areas(&mut self) {
         let (near, coupling, axis, reach) = (&self.near, &self.coupling, &self.axis, &self.reach);
-        let area = (0..near.len()).into_par_iter().map(|p| {
+        parallel::fill(&mut self.area, near.len(), |p| {
             let same = |&(slot, &q): &(usize, &u32)| {
                 let parallel = vector::dot(axis[p], axis[q as usize]);
                 coupling::on_same_sheet(coupling[p][slot], parallel)
@@ -242,7 +234,6 @@ impl Graph {
             let same = near[p].iter().enumerate().filter(same).count();
             coupling::area(reach[p], same as f32)
         });
-        area.collect_into_vec(&mut self.area);
         self.values.clone_from(&self.area);
         if !self.values.is_empty() {
             let median = median(&mut self.values);
@@ -284,8 +275,10 @@ impl Graph {
         next: &mut Vec<[f32; K]>,
     ) {
         assert_eq!(evidence.len(), self.coupling.len());
-        let samples = evidence.par_iter().zip(&self.coupling);
-        let weights: Vec<[f32; K]> = samples.map(|(own, ties)| weight(own, ties)).collect();
+        let mut weights = vec![[0.0; K]; evidence.len()];
+        parallel::for_each(&mut weights, |p, weights| {
+            *weights = weight(&evidence[p], &self.coupling[p]);
+        });
         belief.clear();
         belief.extend_from_slice(evidence);
         next.resize(belief.len(), [0.0; K]);

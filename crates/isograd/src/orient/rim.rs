@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::neighbors::{Candidates, LANES, Neighborhoods};
 use crate::simd::vectorized;
-use crate::{Real, vector};
+use crate::{Real, parallel, vector};
 
 /// A sample whose neighbors lie this far to one side, in radii, may be at a rim. Half a disc, which is
 /// what a sample on the edge of a sheet sees, has its weighted centroid at 0.32 radii.
@@ -47,8 +47,7 @@ pub(crate) fn rims<T: Real>(
         })
         .collect();
     let has_company = |i| rim_neighbors(i, points, &at_rim, neighborhoods) >= RIM_NEIGHBORS;
-    let samples = (0..points.len()).into_par_iter();
-    samples.map(|i| at_rim[i] && has_company(i)).collect()
+    parallel::map(points.len(), |i| at_rim[i] && has_company(i))
 }
 
 /// Distance from a point to the centroid of its neighbors weighted by `1/r`, itself left out, in radii.

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::coupling::{self, NEIGHBORS};
 use super::sheet::{self, Sheet};
-use crate::parallel::CHUNK;
+use crate::parallel::{self, CHUNK};
 use crate::{simd, vector};
 
 /// Neighbors that must have found the same sheet to confirm it.
@@ -77,9 +77,7 @@ impl Sheets {
 
     fn update(&mut self, next: impl Fn(&[Sheet], usize) -> Sheet + Sync) {
         let sheets = &self.sheets;
-        let all = (0..sheets.len()).into_par_iter();
-        all.map(|p| next(sheets, p))
-            .collect_into_vec(&mut self.next);
+        parallel::fill(&mut self.next, sheets.len(), |p| next(sheets, p));
         std::mem::swap(&mut self.sheets, &mut self.next);
     }
 }

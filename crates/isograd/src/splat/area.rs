@@ -25,8 +25,6 @@
 //! # Not differentiable
 //! The isolated samples are held constant.
 
-use rayon::prelude::*;
-
 use crate::element::plane;
 use crate::neighbors::{Candidates, LANES, Neighborhoods, RadiiCotangent};
 use crate::{Real, parallel, vector};
@@ -43,15 +41,10 @@ pub fn forward<T: Real>(neighborhoods: &Neighborhoods<T>, areas: &mut Vec<T>) {
         isolated,
         ..
     } = neighborhoods;
-    let samples = radius.par_iter().zip(crowd).zip(isolated);
-    let area = |((&radius, &crowd), &isolated): ((&T, &T), &bool)| {
-        if isolated {
-            T::zero()
-        } else {
-            plane::area(T::PI(), radius, crowd)
-        }
-    };
-    samples.map(area).collect_into_vec(areas);
+    parallel::fill(areas, radius.len(), |i| match isolated[i] {
+        true => T::zero(),
+        false => plane::area(T::PI(), radius[i], crowd[i]),
+    });
 }
 
 /// Mean of the positive areas, and their number.
@@ -92,14 +85,15 @@ pub fn pullback<T: Real>(
         let share = areas[i] / square;
         T::of(12.0) * T::FRAC_1_PI() * areas_bar[i] * share * share
     };
-    let samples = (0..areas.len()).into_par_iter();
-    samples.map(factor).collect_into_vec(factors);
-    let common = |&i: &u32| match neighborhoods.has_grown(i as usize) {
-        true => T::zero(),
-        false => factors[i as usize],
-    };
-    let order = neighborhoods.index.order().par_iter();
-    order.map(common).collect_into_vec(sorted_factors);
+    parallel::fill(factors, areas.len(), factor);
+    let order = neighborhoods.index.order();
+    parallel::fill(sorted_factors, order.len(), |position| {
+        let i = order[position] as usize;
+        match neighborhoods.has_grown(i) {
+            true => T::zero(),
+            false => factors[i],
+        }
+    });
     let (arch, radius) = (pulp::Arch::new(), neighborhoods.common_radius);
     let own = &*sorted_factors;
     let common =

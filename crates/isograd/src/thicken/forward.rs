@@ -1,11 +1,9 @@
 //! The map.
 
-use rayon::prelude::*;
-
 use super::pair::{add_pair, displacement};
 use super::{Inputs, Sums};
-use crate::Real;
 use crate::vector::{add, of_f64, scale, to_f64};
+use crate::{Real, parallel};
 
 /// Results of the stage.
 #[derive(Clone, Debug, Default)]
@@ -20,7 +18,7 @@ pub(crate) struct Thickened<T> {
 pub(crate) fn forward<T: Real>(inputs: Inputs<'_, T>, out: &mut Thickened<T>) {
     let Thickened { points, sums } = out;
     let old = inputs.samples.points;
-    let found = (0..old.len()).into_par_iter().map(|i| {
+    parallel::fill(sums, old.len(), |i| {
         let own = inputs.sample(i);
         let mut sums = Sums {
             own: own.area,
@@ -31,14 +29,12 @@ pub(crate) fn forward<T: Real>(inputs: Inputs<'_, T>, out: &mut Thickened<T>) {
         });
         sums
     });
-    found.collect_into_vec(sums);
-    let moves = sums.par_iter().enumerate().map(|(i, sums)| {
-        let away = displacement(sums, inputs.width, inputs.least);
+    parallel::fill(points, old.len(), |i| {
+        let away = displacement(&sums[i], inputs.width, inputs.least);
         if away == 0.0 {
             return old[i];
         }
         let normal = to_f64(inputs.samples.normals[i]);
         of_f64(add(to_f64(old[i]), scale(normal, away)))
     });
-    moves.collect_into_vec(points);
 }

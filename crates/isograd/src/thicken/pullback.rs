@@ -27,10 +27,10 @@ pub(crate) fn pullback<T: Real>(
 ) -> [f64; 2] {
     let Inputs { width, least, .. } = inputs;
     let bar_along = |i: usize| dot(to_f64(moved_bar[i]), to_f64(inputs.samples.normals[i]));
-    let samples = || (0..sums.len()).into_par_iter();
-    let of_sums = samples().map(|i| pull_sums(&sums[i], width, least, bar_along(i)));
+    let samples = (0..sums.len()).into_par_iter();
+    let of_sums = samples.map(|i| pull_sums(&sums[i], width, least, bar_along(i)));
     let (of_sums, of_least): (Vec<Sums>, Vec<f64>) = of_sums.unzip();
-    let shares: Vec<Share> = samples().map(|i| gather(inputs, &of_sums, i)).collect();
+    let shares = parallel::map(sums.len(), |i| gather(inputs, &of_sums, i));
     let work = out.points.par_iter_mut().zip(&mut out.normals);
     let work = work.zip(&mut out.areas).enumerate();
     work.for_each(|(i, ((point, normal), area))| {

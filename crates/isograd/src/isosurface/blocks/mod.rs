@@ -11,11 +11,11 @@ use super::tables::{self, TABLE};
 use super::{Error, Report};
 pub(crate) use open_ends::open_ends;
 
-use crate::Real;
 use crate::data::blocks::{BlockField, Blocks, EDGE, NODES};
 use crate::data::cells::Cells;
 use crate::data::{LatticeEdge, Mesh};
 use crate::element::crossing::crossing;
+use crate::{Real, parallel};
 
 /// Cells along each side of a block and the first ones of the next blocks.
 const SIDE: usize = EDGE + 1;
@@ -102,14 +102,12 @@ pub(crate) fn forward<T: Real>(
     let edges = split(&mut mesh.edges, crossings.iter().map(|of| of.vertices));
     let work = edges.into_par_iter().enumerate();
     work.for_each(|(block, edges)| find_edges(chi, block, &crossings[block], edges));
-    let fractions = mesh.edges.par_iter().map(|&edge| place(edge));
-    let fractions: Vec<T> = fractions.collect();
-    let on_edges = mesh.edges.par_iter().zip(&fractions);
-    let vertex = |(edge, &fraction): (&LatticeEdge, &T)| {
-        let cell = chi.grid.cell(edge.cell());
-        position(&chi.grid, cell, edge.axis(), fraction)
-    };
-    on_edges.map(vertex).collect_into_vec(&mut mesh.vertices);
+    let edges = &mesh.edges;
+    let fractions = parallel::map(edges.len(), |i| place(edges[i]));
+    parallel::fill(&mut mesh.vertices, edges.len(), |i| {
+        let cell = chi.grid.cell(edges[i].cell());
+        position(&chi.grid, cell, edges[i].axis(), fractions[i])
+    });
     let vertices = Vertices {
         chi,
         crossings: &crossings,

@@ -1,14 +1,12 @@
 //! The forward map: passes of weighted means over the samples near each cell, until they explain no more.
 
-use rayon::prelude::*;
-
 use super::layer::{Layer, NODES};
 use super::means::{CellMean, GridSamples, Reading};
 use super::{PASSES, Pass, Residual};
 use crate::data::cells::CellsMut;
 use crate::isosurface::iso_value;
 use crate::splat::SortedSamples;
-use crate::{Field, Real};
+use crate::{Field, Real, parallel};
 
 /// Scratch buffers reused between calls: a few numbers for each cell of the layer round the surface, and for
 /// each sample.
@@ -108,8 +106,8 @@ impl<T: Real> Scratch<T> {
         self.correction.clear();
         self.correction.resize(self.layer.len() * NODES, T::zero());
         let c = T::of(level.value);
-        let values = level.at_samples.par_iter().map(|at| at.value - c);
-        values.collect_into_vec(&mut self.remaining);
+        let values = &level.at_samples;
+        parallel::fill(&mut self.remaining, values.len(), |i| values[i].value - c);
     }
 
     /// One pass, after the pass `before`. Returns the share of the slope removed so far. If the gain is 0, nothing is
@@ -124,18 +122,13 @@ impl<T: Real> Scratch<T> {
     ) -> f64 {
         pass.flattened = flattened;
         // s = ω r
-        let offsets = self
-            .remaining
-            .par_iter()
-            .zip(trust)
-            .map(|(&r, &trust)| trust * r);
-        offsets.collect_into_vec(&mut pass.offsets);
+        let (remaining, readings) = (&self.remaining, &self.readings);
+        parallel::fill(&mut pass.offsets, trust.len(), |i| trust[i] * remaining[i]);
         if let Some(before) = before {
             // The slopes of χ after the pass before.
             let gain = T::of(before.gain);
-            let samples = before.slopes.par_iter().zip(&self.readings);
-            let slopes = samples.map(|(&slope, reading)| slope - gain * reading.slope);
-            slopes.collect_into_vec(&mut pass.slopes);
+            let slope = |i: usize| before.slopes[i] - gain * readings[i].slope;
+            parallel::fill(&mut pass.slopes, before.slopes.len(), slope);
         }
         near.average(&self.layer, &pass.offsets, &mut self.means);
         near.read(&self.layer, &self.means, &pass.offsets, &mut self.readings);
@@ -145,8 +138,8 @@ impl<T: Real> Scratch<T> {
         if gain != 0.0 {
             let gain = T::of(gain);
             near.accumulate(&self.means, gain, &mut self.correction);
-            let samples = self.remaining.par_iter_mut().zip(&self.readings);
-            samples.for_each(|(r, reading)| *r -= gain * reading.mean);
+            let readings = &self.readings;
+            parallel::for_each(&mut self.remaining, |i, r| *r -= gain * readings[i].mean);
         }
         flattened
     }

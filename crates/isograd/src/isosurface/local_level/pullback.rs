@@ -116,8 +116,7 @@ pub(crate) fn pullback_on<T: Real>(
             *bar += part;
         }
     });
-    let values = found.par_iter().map(|found| found.value);
-    values.collect_into_vec(&mut bars.values);
+    parallel::fill(&mut bars.values, found.len(), |i| found[i].value);
     near.add(found, out);
     let [sum] = parallel::sum_array(found.len(), |i| [found[i].value.f64()]);
     bars.level = -sum;

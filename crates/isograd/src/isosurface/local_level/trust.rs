@@ -76,16 +76,14 @@ impl<T: Real> GridSamples<'_, T> {
         bars: &mut Vec<[f64; 3]>,
     ) -> f64 {
         let (step, slopes) = (residual.step, &residual.passes[0].slopes);
-        let samples = 0..slopes.len();
-        let direct = samples.into_par_iter().map(|i| {
+        parallel::fill(bars, slopes.len(), |i| {
             let [trust_bar, shift_bar] = trust_bars(i);
             step.pullback(rising(slopes[i]), trust_bar, shift_bar)
         });
-        direct.collect_into_vec(bars);
         let [usual_bar, width_bar] =
             parallel::sum_array(slopes.len(), |i| [bars[i][1], bars[i][2]]);
         let share = step.usual_pullback(usual_bar, residual.total_area);
-        bars.par_iter_mut().enumerate().for_each(|(i, bars)| {
+        parallel::for_each(bars, |i, bars| {
             let (a, slope) = (self.area(i).f64(), rising(slopes[i]));
             bars[0] += share * a * slope;
             bars[1] = 0.5 * share * (slope * slope - step.usual * step.usual);

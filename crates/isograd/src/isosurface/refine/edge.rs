@@ -200,7 +200,7 @@ impl Edge {
 }
 
 /// Cotangents of the spline on an edge, from that of its vertex.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pull {
     /// One or two places, as fractions of the edge, and the cotangent at each; 0 for none.
     pub parts: [(f64, f64); 2],

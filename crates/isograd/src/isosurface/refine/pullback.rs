@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::edge::{Edge, Pull};
 use crate::gather::Buckets;
 use crate::isosurface::pullback::{LevelCotangent, SMALLEST_DIFFERENCE, range};
-use crate::{Field, Grid, Mesh, Real};
+use crate::{Field, Grid, Mesh, Real, parallel};
 
 /// Planes across x that one task owns.
 const SLAB: usize = 8;
@@ -29,10 +29,7 @@ pub(crate) fn pullback<T: Real>(
         bars: vertices_bar,
         smallest,
     };
-    let pulls: Vec<Pull> = (0..vertices_bar.len())
-        .into_par_iter()
-        .map(|vertex| vertices.pull(vertex))
-        .collect();
+    let pulls = parallel::map(vertices_bar.len(), |vertex| vertices.pull(vertex));
     let plane = chi.grid().strides()[0];
     let slabs = chi.grid().shape()[0].div_ceil(SLAB);
     let mut near = Buckets::default();
