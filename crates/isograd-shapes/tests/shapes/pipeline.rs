@@ -17,9 +17,9 @@ fn cloud(name: &str, n: usize) -> PointCloud<f64> {
 #[test]
 fn whole_pullback_is_the_transpose_of_the_derivative() {
     for (name, n, cells) in [
-        ("torus", 5000, 48),
-        ("fish", 8000, 96),
-        ("airliner", 8000, 96),
+        ("torus", 3000, 32),
+        ("fish", 4000, 64),
+        ("airliner", 6000, 64),
     ] {
         let cloud = cloud(name, n);
         let grid = Grid::fit(&cloud, Resolution::Cells(cells), 0.1).expect("a grid");
@@ -111,7 +111,7 @@ fn a_growing_sphere_follows_its_closed_forms_and_converges() {
         [0.5, 0.25, 0.05],
         [0.15, 0.35, 0.2],
     ];
-    let mean = [32, 64, 128].map(|cells| {
+    let mean = [32, 64, 96].map(|cells| {
         let mut sums = [0.0f64; 3];
         for shift in shifts {
             let errors = sphere_errors(cells, shift);
