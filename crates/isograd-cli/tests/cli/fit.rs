@@ -42,7 +42,7 @@ fn the_radius_of_a_sphere_is_found_from_a_cloud_a_mesh_and_a_field() {
         assert!(run.stderr.is_empty(), "no bar in a pipe: {run:?}");
         let fit = sandbox.json("out/fit.json");
         let radius = number(&fit["parameters"]["radius"]);
-        // 17 cells across: the error of the reconstruction, a few hundredths of a cell. Adam is not done yet.
+        // 14 cells across: the error of the reconstruction, a few hundredths of a cell. Adam is not done yet.
         let (off, error) = match more.contains("adam") {
             true => (0.015, 0.1),
             false => (0.005, 0.05),

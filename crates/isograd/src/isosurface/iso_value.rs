@@ -16,8 +16,6 @@
 //! # Not differentiable
 //! `∇χ` jumps where a sample crosses a plane through cell centers; the gradient on its side is used.
 
-use rayon::prelude::*;
-
 use super::{Interpolation, spline};
 use crate::data::cells::{Cells, CellsMut};
 use crate::splat::{SampleCotangent, Samples, SortedSamples};
@@ -168,7 +166,7 @@ pub(crate) fn pullback_on<T: Real>(
         vector::scale(residual.at_samples[i].gradient, slope)
     };
     // The mean does not depend on the unit of the areas.
-    out.areas.par_iter_mut().enumerate().for_each(|(i, area)| {
+    parallel::for_each(&mut out.areas, |i, area| {
         *area += T::of(share * (residual.at_samples[i].value.f64() - residual.value));
     });
     out.add(grid, samples, false, |i| (point_bar(i), T::zero()));

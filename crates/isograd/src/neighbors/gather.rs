@@ -51,13 +51,11 @@ impl<T: Real> Neighborhoods<T> {
             },
         );
         let sorted = &*sorted;
-        points_bar
-            .par_iter_mut()
-            .zip(self.position())
-            .for_each(|(bar, &position)| {
-                let [x, y, z, _] = sorted[position as usize];
-                *bar = vector::add(*bar, [x, y, z]);
-            });
+        let position = self.position();
+        parallel::for_each(points_bar, |i, bar| {
+            let [x, y, z, _] = sorted[position[i] as usize];
+            *bar = vector::add(*bar, [x, y, z]);
+        });
         let [sum] = parallel::sum_array(index.len(), |position| [sorted[position][3].f64()]);
         sum
     }

@@ -12,7 +12,7 @@ use super::disc;
 use super::regions::{self, Regions};
 use super::sight::{self, RAYS, STEPS};
 use super::visibility::Visibility;
-use crate::parallel::CHUNK;
+use crate::parallel::{self, CHUNK};
 use crate::{simd, vector};
 
 /// Free cells on each side of a body.
@@ -118,10 +118,9 @@ impl Fill {
         members: usize,
         sample: impl Fn(usize) -> ([f64; 3], [f32; 3], f64) + Sync,
     ) {
-        self.discs.resize(members, Disc::default());
-        self.discs.par_iter_mut().enumerate().for_each(|(m, disc)| {
+        parallel::fill(&mut self.discs, members, |m| {
             let (point, axis, reach) = sample(m);
-            *disc = Disc::new(lattice.place(point), axis, (reach / lattice.cell) as f32);
+            Disc::new(lattice.place(point), axis, (reach / lattice.cell) as f32)
         });
         self.draw(lattice);
         let (occupied, shape) = (&self.occupied, lattice.shape);

@@ -16,8 +16,7 @@ use super::sheets::{self, Near, Sheets};
 use super::sites::Sites;
 use crate::neighbors::Neighborhoods;
 use crate::normals::Plane;
-use crate::parallel::{self, CHUNK};
-use crate::{Real, vector};
+use crate::{Real, parallel, vector};
 
 /// Neighbors, axes and couplings, all in the order of the [`Sites`]; lengths are in sample spacings
 /// ([`Neighborhoods::spacing`]) of the whole cloud, so that single precision serves any unit.
@@ -284,15 +283,10 @@ impl Graph {
         next.resize(belief.len(), [0.0; K]);
         for _ in 0..ROUNDS {
             let before = &*belief;
-            next.par_chunks_mut(CHUNK)
-                .enumerate()
-                .for_each(|(chunk, next)| {
-                    for (k, next) in next.iter_mut().enumerate() {
-                        let p = chunk * CHUNK + k;
-                        let sum = spread(&evidence[p], &self.coupling[p], &self.near[p], before);
-                        *next = std::array::from_fn(|e| coupling::belief(sum[e], weights[p][e]));
-                    }
-                });
+            parallel::for_each(next, |p, next| {
+                let sum = spread(&evidence[p], &self.coupling[p], &self.near[p], before);
+                *next = std::array::from_fn(|e| coupling::belief(sum[e], weights[p][e]));
+            });
             std::mem::swap(belief, next);
         }
     }

@@ -21,7 +21,7 @@ fn run(seed: u64) -> Result<Outcome, String> {
 #[test]
 fn results_and_gradients_of_random_clouds_are_finite() {
     let (mut pulled, mut replaced) = (0, 0);
-    for seed in 0..300 {
+    for seed in 0..600 {
         let Ok(outcome) = run(seed) else { continue };
         let bad: Bad = outcome.bad.into_iter().filter(|bad| bad.1 > 0).collect();
         assert!(
@@ -39,8 +39,8 @@ fn results_and_gradients_of_random_clouds_are_finite() {
         replaced += usize::from(outcome.maxima > 0);
     }
     // The rest is refused: clouds too large or too small to be squared, on a line, or off their grid.
-    assert!(pulled > 150, "{pulled}");
-    assert!(replaced > 10, "{replaced}");
+    assert!(pulled > 300, "{pulled}");
+    assert!(replaced > 20, "{replaced}");
 }
 
 fn sphere(n: usize, center: [f64; 3], radius: f64) -> Vec<[f64; 3]> {
