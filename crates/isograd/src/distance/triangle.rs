@@ -115,8 +115,9 @@ impl Frame {
         let to_apex = sub(corners[(first + 2) % 3], origin);
         let base = norm(side);
         let u = normalized(side).unwrap_or([1.0, 0.0, 0.0]);
-        let foot = dot(u, to_apex);
-        let (v, height) = perpendicular(u, sub(to_apex, scale(u, foot)));
+        // Beyond an end of the base by rounding, where the apex is that end, an angle would be above 90°.
+        let foot = clamp(dot(u, to_apex), base);
+        let (v, height) = perpendicular(u, to_apex, foot);
         Self {
             origin,
             axes: [u, v, cross(u, v)],
@@ -352,14 +353,16 @@ fn min(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 
-/// Direction and length of `r` after what it has along `u` is taken off once more: the first time leaves a
-/// rounding error that a thin triangle would see. Where little remains, `r` was nothing but that error: then
-/// any direction across `u`, and no length.
-fn perpendicular(u: [f64; 3], r: [f64; 3]) -> ([f64; 3], f64) {
-    let across = sub(r, scale(u, dot(u, r)));
+/// Direction and length of what `side` has across the unit vector `u`, along which it has `along`. What `u` has of the
+/// difference is taken off once more: the first time leaves a rounding error that a thin triangle would see. Where little
+/// remains, the difference was nothing but rounding: then any direction across `u`, and no length.
+fn perpendicular(u: [f64; 3], side: [f64; 3], along: f64) -> ([f64; 3], f64) {
+    let rest = sub(side, scale(u, along));
+    let across = sub(rest, scale(u, dot(u, rest)));
     let length = norm(across);
+    let rounding = 4.0 * f64::EPSILON * norm(side);
     match normalized(across) {
-        Some(v) if length > 0.5 * norm(r) => {
+        Some(v) if length > 0.5 * norm(rest) && length > rounding => {
             let v = sub(v, scale(u, dot(u, v)));
             (scale(v, 1.0 / norm(v)), length)
         }

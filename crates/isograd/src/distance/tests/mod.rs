@@ -58,7 +58,7 @@ impl Random {
         match kind {
             4 => c = self.near(on_edge, 1e-4),
             5 => c = self.near(a, 1e-5),
-            6 => c = if self.below(2) == 0 { on_edge } else { a },
+            6 => c = [on_edge, a, b][self.below(3)],
             _ => (),
         }
         [a, b, c]

@@ -141,6 +141,32 @@ fn fast_distance_agrees_with_the_closest_point() {
 }
 
 #[test]
+fn triangle_of_two_points_is_the_segment_between_them() {
+    for seed in 0..SEEDS {
+        let mut random = Random::new(seed);
+        let [a, b] = [random.point(), random.point()];
+        let t = 0.5 + 0.5 * random.signed();
+        let between = add(a, scale(sub(b, a), t));
+        let mut corners = [a, b, [a, b, between][seed as usize % 3]];
+        corners.rotate_left(random.below(3));
+        let q = random.near(a, 30.0);
+        let expected = segment_distance(q, a, b);
+        let fast = distance_squared(&Frame::new(corners), q).sqrt();
+        let exact = closest_point(q, corners).distance;
+        // The search is exact to the square root of ε times the length of the segment.
+        let limit = 1e-7;
+        assert!(
+            (fast - expected).abs() < limit,
+            "seed {seed}: {fast} {expected}"
+        );
+        assert!(
+            (exact - expected).abs() < limit,
+            "seed {seed}: {exact} {expected}"
+        );
+    }
+}
+
+#[test]
 fn no_triangle_is_closer_than_its_corners_by_more_than_its_slack() {
     for seed in 0..SEEDS {
         let (corners, q) = triangle_and_point(seed);
