@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
-use isograd::distance::Sign;
 use isograd::distance::lattice::{Scratch, forward_of_mesh};
+use isograd::distance::{Distance, Sign};
 use isograd::{Field, Grid, Outliers, PointCloud, Real, check_distance_memory};
 use isograd_io::{Dtype, FIELD_EXTENSIONS, Geometry};
 
@@ -51,7 +51,7 @@ fn grid<T: Real>(args: &args::Sdf, geometry: &Geometry) -> Result<Grid<T>, Error
     grid.map_err(Error::input(&args.mesh))
 }
 
-fn solve<T: Real>(
+fn solve<T: Distance>(
     args: &args::Sdf,
     geometry: &Geometry,
     mut progress: Progress,

@@ -75,8 +75,7 @@ impl From<pipeline::Error> for Error {
         match error {
             pipeline::Error::Device(error) => Self::Device(error),
             pipeline::Error::Interrupted(stage) => Self::Interrupted(stage),
-            pipeline::Error::Neighbors(error) => Self::Host(error.into()),
-            pipeline::Error::Orient(error) => Self::Host(error.into()),
+            pipeline::Error::Samples(error) => Self::Host(error),
             pipeline::Error::Extension(error) => Self::Extension(error),
             error => Self::Pipeline(error),
         }

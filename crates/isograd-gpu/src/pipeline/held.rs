@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 
 use cubecl::prelude::*;
 use isograd::neighbors::{Neighborhoods, Radius};
-use isograd::orient::{self, Method, Orientation};
-use isograd::{PointCloud, Stage, normals};
+use isograd::orient::{Method, Orientation};
+use isograd::{Orienter, PointCloud, Stage, normals};
 
 use super::{Error, Reconstruction};
 use crate::device::{check_length, launch};
@@ -79,27 +79,17 @@ impl<T: Scalar> RadiiAndSigns<T> {
         method: &Method,
         begin: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<SearchResult<T>, Error> {
-        let (mut near, mut axes) = (Neighborhoods::default(), normals::Residual::default());
-        match method {
-            Method::Previous => return Err(Error::Orientation),
-            Method::Given => isograd::neighbors::forward(cloud.points(), radius, &mut near)?,
-            _ => normals::forward_with_neighborhoods(cloud.points(), radius, &mut near, &mut axes)?,
+        if *method == Method::Previous {
+            return Err(Error::Orientation);
         }
-        if begin().is_break() {
-            return Err(Error::Interrupted(Stage::Orient));
-        }
-        let mut found = Orientation::default();
-        orient::forward(
-            cloud.points(),
-            &axes,
-            &near,
-            cloud,
-            method,
-            &mut orient::Scratch::default(),
-            &mut found,
-        )?;
+        let mut plan = Orienter::new(radius, *method).with_checks(false);
+        plan.orient_observed(cloud, &mut |stage| match stage {
+            Stage::Orient => begin(),
+            _ => ControlFlow::Continue(()),
+        })?;
+        let (axes, found) = (plan.axes(), plan.orientation());
         Ok(SearchResult {
-            held: Self::of(device, &near, &axes, &found)?,
+            held: Self::of(device, plan.neighborhoods(), axes, found)?,
             axes: None,
             method: found.method.name(),
             guarded: axes.guarded(),
@@ -107,7 +97,7 @@ impl<T: Scalar> RadiiAndSigns<T> {
         })
     }
 
-    /// Radii and signs of the CPU's stages or of [`isograd::Orienter`].
+    /// Radii and signs of the CPU's stages or of an [`Orienter`].
     pub fn of<R: Runtime>(
         device: &Device<R>,
         near: &Neighborhoods<T>,

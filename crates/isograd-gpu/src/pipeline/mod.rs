@@ -41,12 +41,9 @@ pub enum Error {
     /// The device.
     #[error(transparent)]
     Device(#[from] crate::Error),
-    /// The neighbors.
+    /// Of the samples, as on the CPU.
     #[error(transparent)]
-    Neighbors(#[from] isograd::neighbors::Error),
-    /// The orientation.
-    #[error(transparent)]
-    Orient(#[from] isograd::orient::Error),
+    Samples(isograd::Error),
     /// A method of orientation that needs an earlier step.
     #[error("there is no step before here: take its sides by RadiiAndSigns::after")]
     Orientation,
@@ -83,6 +80,15 @@ pub enum Error {
     Extension(#[from] isograd::distance::extend::Error),
 }
 
+impl From<isograd::Error> for Error {
+    fn from(error: isograd::Error) -> Self {
+        match error {
+            isograd::Error::Interrupted(stage) => Self::Interrupted(stage),
+            error => Self::Samples(error),
+        }
+    }
+}
+
 impl From<distance::extend::Error> for Error {
     fn from(error: distance::extend::Error) -> Self {
         match error {
@@ -95,7 +101,7 @@ impl From<distance::extend::Error> for Error {
 impl From<neighbors::radius::Error> for Error {
     fn from(error: neighbors::radius::Error) -> Self {
         match error {
-            neighbors::radius::Error::Cloud(error) => error.into(),
+            neighbors::radius::Error::Cloud(error) => Self::Samples(error.into()),
             neighbors::radius::Error::Device(error) => error.into(),
         }
     }
@@ -104,7 +110,7 @@ impl From<neighbors::radius::Error> for Error {
 impl From<crate::orient::Error> for Error {
     fn from(error: crate::orient::Error) -> Self {
         match error {
-            crate::orient::Error::Cloud(error) => error.into(),
+            crate::orient::Error::Cloud(error) => Self::Samples(error.into()),
             crate::orient::Error::Device(error) => error.into(),
         }
     }

@@ -1,7 +1,8 @@
 //! Clouds that stages of points are tried on, and what the CPU finds in them.
 
 use isograd::neighbors::{self, RadiiCotangent, Radius};
-use isograd::{Real, normals};
+use isograd::orient::Method;
+use isograd::{Orienter, PointCloud, Real, normals};
 use isograd_gpu::neighbors::Neighborhoods;
 use isograd_gpu::{Buffer, Device, Scalar};
 use isograd_shapes::{Layout, Sampling};
@@ -23,14 +24,12 @@ impl<T: Scalar> Cloud<T> {
     }
 
     pub fn of(name: &'static str, points: Vec<[T; 3]>) -> Self {
-        let (mut near, mut axes) = Default::default();
-        normals::forward_with_neighborhoods(&points, Radius::Auto, &mut near, &mut axes)
-            .expect(name);
+        let plan = on_cpu(&points, Method::Signs).expect(name);
         Self {
             name,
+            near: plan.neighborhoods().clone(),
+            axes: plan.axes().clone(),
             points,
-            near,
-            axes,
         }
     }
 
@@ -64,6 +63,16 @@ impl<T: Scalar> Cloud<T> {
         println!("{name}, {number}: pullback within {fixed:.1e}, with radii {error:.1e}");
         assert!(fixed.max(error) <= tolerance, "{name}: {fixed:e} {error:e}");
     }
+}
+
+/// The neighborhoods of points on the CPU, and with [`Method::Signs`] their axes.
+pub fn on_cpu<T: Scalar>(points: &[[T; 3]], method: Method) -> Result<Orienter<T>, isograd::Error> {
+    let up = [T::zero(), T::zero(), T::one()];
+    let cloud =
+        PointCloud::new(points.to_vec()).and_then(|c| c.with_normals(vec![up; points.len()]));
+    let mut plan = Orienter::new(Radius::Auto, method).with_checks(false);
+    plan.orient(&cloud.unwrap())?;
+    Ok(plan)
 }
 
 /// Cotangents of points and of their radii, in the host's memory.

@@ -2,7 +2,7 @@
 
 use cubecl::prelude::Runtime;
 use isograd::isosurface::Level;
-use isograd::neighbors::{Neighborhoods, RadiiCotangent, Radius};
+use isograd::neighbors::{RadiiCotangent, Radius};
 use isograd::orient::{Method, ParityOptions};
 use isograd::poisson::{Smoothing, Walls};
 use isograd::{Grid, Options, PointCloud, Real, Reconstructor, Resolution, SurfaceResolution};
@@ -12,7 +12,7 @@ use isograd_gpu::splat::Weights;
 use isograd_gpu::{Device, Scalar, orient};
 use isograd_shapes::Sampling;
 
-use crate::clouds::{real, relative};
+use crate::clouds::{on_cpu, real, relative};
 use crate::devices::{Numbers, tests};
 
 tests! {
@@ -174,8 +174,8 @@ fn phi_and_its_gradient_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Dev
             [&bars.points, &bars.radii, axis_radii, &bars.grid]
                 .map(|bar| device.download(bar).unwrap())
         };
-        let mut near = Neighborhoods::default();
-        isograd::neighbors::forward(cloud.points(), Radius::Auto, &mut near).unwrap();
+        let samples = on_cpu(cloud.points(), Method::Given).unwrap();
+        let near = samples.neighborhoods();
         let widened = device.download(&held.radii).unwrap();
         let mut of_all = None;
         for given in cotangents() {
@@ -184,16 +184,16 @@ fn phi_and_its_gradient_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Dev
             let [x, y, z] = expected.grid.lower;
             let [fixed, of_radii, of_axis_radii, of_grid] = pull(&result, given);
             let mut of_points = fixed.as_chunks().0.to_vec();
-            let mut radii = RadiiCotangent::of(&near, &of_radii);
+            let mut radii = RadiiCotangent::of(near, &of_radii);
             let widened = [&widened[..], &near.radius];
             isograd::normals::radii_pullback(
-                &near,
+                near,
                 widened,
                 &of_axis_radii,
                 &mut of_points,
                 &mut radii,
             );
-            isograd::neighbors::pullback(&near, &radii, &mut of_points);
+            isograd::neighbors::pullback(near, &radii, &mut of_points);
             let errors = [
                 relative(of_points.as_flattened(), expected.points.as_flattened()),
                 match given == [false, false, false, false, true, true] {
@@ -329,7 +329,7 @@ fn what_the_device_finds_and_holds_is_what_the_cpu_finds<R: Runtime, T: Scalar>(
     let method = orient::Method::Parity(parity);
     assert!(matches!(
         RadiiAndSigns::find_on_device(device, &none, Radius::Auto, &method),
-        Err(Error::Neighbors(_))
+        Err(Error::Samples(isograd::Error::Neighbors(_)))
     ));
     let short = orient::Method::Signs(none.clone());
     assert!(matches!(

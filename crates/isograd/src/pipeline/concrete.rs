@@ -1,5 +1,7 @@
 //! The pipeline, compiled once for each number type, in this crate: see [`concrete`](crate::concrete).
 
+use std::ops::ControlFlow;
+
 use super::pullback::PullbackScratch;
 use super::{
     CloudCotangent, Cotangent, Error, Orienter, PullbackError, Reconstruction, Reconstructor,
@@ -23,7 +25,11 @@ concrete! {
         held: Option<&Reconstruction<Self>>
     ) -> Result<(), Error> = plan.run(stage, cloud, held);
 
-    fn orient(plan: &mut Orienter<Self>, cloud: &PointCloud<Self>) -> Result<(), Error> = plan.run(cloud);
+    fn orient(
+        plan: &mut Orienter<Self>,
+        cloud: &PointCloud<Self>,
+        observer: &mut dyn FnMut(Stage) -> ControlFlow<()>
+    ) -> Result<(), Error> = plan.run(cloud, observer);
 
     fn rebuild(
         plan: &mut Reconstructor<Self>,

@@ -1,5 +1,6 @@
 //! A plan for the normals alone.
 
+use std::ops::ControlFlow;
 use std::time::Instant;
 
 use super::memory::check_points;
@@ -57,12 +58,32 @@ impl<T: Pipeline> Orienter<T> {
     /// [`Error::Memory`], errors of the neighborhoods and of the orientation, or [`Error::NoPlane`]; the result of the previous call is
     /// then lost.
     pub fn orient(&mut self, cloud: &PointCloud<T>) -> Result<&Orientation<T>, Error> {
-        T::orient(self, cloud)?;
+        self.orient_observed(cloud, &mut |_| ControlFlow::Continue(()))
+    }
+
+    /// Like [`orient`](Self::orient), calling `observer` before each of the two stages; `Break` stops the work.
+    ///
+    /// # Errors
+    /// As [`orient`](Self::orient), and [`Error::Interrupted`] if the observer returns `Break`.
+    pub fn orient_observed(
+        &mut self,
+        cloud: &PointCloud<T>,
+        observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
+    ) -> Result<&Orientation<T>, Error> {
+        T::orient(self, cloud, observer)?;
         Ok(&self.orientation)
     }
 
-    /// [`Self::orient`], compiled where it is called: see [`concrete`](super::concrete).
-    pub(crate) fn run(&mut self, cloud: &PointCloud<T>) -> Result<(), Error> {
+    /// [`Self::orient_observed`], compiled where it is called: see [`concrete`](super::concrete).
+    pub(crate) fn run(
+        &mut self,
+        cloud: &PointCloud<T>,
+        observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
+    ) -> Result<(), Error> {
+        let mut begin = |stage| match observer(stage) {
+            ControlFlow::Break(()) => Err(Error::Interrupted(stage)),
+            ControlFlow::Continue(()) => Ok(()),
+        };
         let Self {
             residuals,
             orientation,
@@ -75,6 +96,7 @@ impl<T: Pipeline> Orienter<T> {
             ..Report::default()
         };
         check_points::<T>(cloud.len(), orientation.normals.capacity(), 0)?;
+        begin(Stage::Normals)?;
         let start = Instant::now();
         let is_given = self.method == Method::Given;
         find_axes(
@@ -87,6 +109,7 @@ impl<T: Pipeline> Orienter<T> {
             report,
         )?;
         let start = done(report, Stage::Normals, start);
+        begin(Stage::Orient)?;
         orient::forward(
             cloud.points(),
             &*axes,

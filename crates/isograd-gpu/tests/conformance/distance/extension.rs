@@ -6,12 +6,14 @@ mod degenerate;
 use cubecl::prelude::Runtime;
 use isograd::distance::Band;
 use isograd::distance::extend::{self as cpu, Region};
-use isograd::neighbors::{self, Neighborhoods, Radius};
+use isograd::neighbors::Neighborhoods;
+use isograd::orient::Method;
 use isograd::{Attribute, Field, Grid, Mesh, Real};
 use isograd_gpu::distance::{self, extend};
 use isograd_gpu::{Buffer, Device, Scalar};
 
 use super::{grid, meshes, upload};
+use crate::clouds::on_cpu;
 use crate::devices::{Numbers, tests, tolerance};
 use crate::samples::assert_near;
 
@@ -50,8 +52,8 @@ fn distance(a: &[f64; 3], b: [f64; 3]) -> f64 {
 impl<T: Scalar> Scene<T> {
     fn new(name: &'static str, points: &[[f64; 3]], mesh: Mesh<T>) -> Self {
         let points: Vec<[T; 3]> = points.iter().map(|p| p.map(T::of)).collect();
-        let mut near = Neighborhoods::default();
-        neighbors::forward(&points, Radius::Auto, &mut near).expect(name);
+        let plan = on_cpu(&points, Method::Given).expect(name);
+        let near = plan.neighborhoods().clone();
         let mut areas = Vec::new();
         isograd::splat::area::forward(&near, &mut areas);
         let (phi, closest) = measure(&mesh);

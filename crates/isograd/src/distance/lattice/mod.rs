@@ -26,6 +26,7 @@ use super::pseudonormals::Pseudonormals;
 use crate::data::cells::Cells;
 use crate::{Field, Grid, Mesh, Real};
 use block::{BLOCK, Block};
+pub(super) use of_mesh::fill as fill_from_mesh;
 pub use of_mesh::{Sign, forward_of_mesh};
 pub use pullback::{PullbackScratch, pullback};
 use sides::Sides;

@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use super::spread::{MARGIN, put};
 use super::{Band, Scratch, for_each_wave};
-use crate::distance::Error;
 use crate::distance::bvh::{LANES, Points};
 use crate::distance::winding::{INSIDE, Sources, Winding, is_closed};
+use crate::distance::{Distance, Error};
 use crate::vector::{norm, sub};
 use crate::{Field, Grid, Mesh, Real, simd};
 
@@ -58,7 +58,18 @@ impl Sign {
 /// assert!((phi.at([1, 2, 3]) + 0.05).abs() < 1e-12);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn forward_of_mesh<T: Real>(
+pub fn forward_of_mesh<T: Distance>(
+    mesh: &Mesh<T>,
+    band: Band,
+    scratch: &mut Scratch<T>,
+    phi: &mut Field<T>,
+    closest: &mut Vec<u32>,
+) -> Result<Sign, Error> {
+    T::of_mesh(mesh, band, scratch, phi, closest)
+}
+
+/// [`forward_of_mesh`], compiled where it is called: see [`concrete`](crate::distance::concrete).
+pub(in crate::distance) fn fill<T: Real>(
     mesh: &Mesh<T>,
     band: Band,
     scratch: &mut Scratch<T>,

@@ -1,10 +1,10 @@
 use super::{Random, brute_force, soup, sphere, torus};
 use crate::distance::lattice::{Band, PullbackScratch, Scratch, Sign, forward_of_mesh, pullback};
-use crate::distance::{Error, NO_TRIANGLE, Query};
+use crate::distance::{Distance, Error, NO_TRIANGLE, Query};
 use crate::vector::{add, cross, dot, norm, scale, sub, to_f64};
 use crate::{Field, Grid, Mesh, Real};
 
-fn solve<T: Real>(mesh: &Mesh<T>, grid: Grid<T>, band: Band) -> (Field<T>, Vec<u32>, Sign) {
+fn solve<T: Distance>(mesh: &Mesh<T>, grid: Grid<T>, band: Band) -> (Field<T>, Vec<u32>, Sign) {
     let mut phi = Field::zeros(grid);
     let mut closest = Vec::new();
     let scratch = &mut Scratch::default();
@@ -49,7 +49,7 @@ fn winding_number<T: Real>(mesh: &Mesh<T>, q: [f64; 3]) -> f64 {
 }
 
 /// Distance and sign of every `step`-th cell against all triangles. Returns the number of cells inside.
-fn assert_right<T: Real>(mesh: &Mesh<T>, grid: Grid<T>, expected: Sign, step: usize) -> usize {
+fn assert_right<T: Distance>(mesh: &Mesh<T>, grid: Grid<T>, expected: Sign, step: usize) -> usize {
     let (phi, closest, sign) = solve(mesh, grid, Band::Full);
     assert_eq!(sign, expected);
     let mut inside = 0;
