@@ -75,7 +75,7 @@ fn triangle(numbers: &mut Numbers) -> [[f64; 3]; 3] {
     match kind {
         4 => [a, b, near(on_edge, 1e-4)],
         5 => [a, b, near(a, 1e-5)],
-        6 => [a, b, on_edge],
+        6 => [a, b, [on_edge, a, b][numbers.bits() as usize % 3]],
         _ => [a, b, c],
     }
 }
