@@ -114,13 +114,17 @@ fn conclusion(check: &GradientCheck, args: &args::Gradcheck) -> String {
     let relevant = check.rows.iter().filter(|row| is_relevant(row));
     let is_within = |row: &&Row| off(row.large_ratio()) <= 0.02;
     let within = relevant.clone().filter(is_within).count();
+    let surface = match check.half_cells {
+        Some(size) => format!("a surface that is marched on half cells (--surface {size:.2e})"),
+        None => "a finer surface (--surface)".to_owned(),
+    };
     let advice = match verdict(check, tolerance) {
-        Verdict::Good => "",
-        Verdict::Check => {
-            "; larger steps differ: take smaller ones, a finer surface (--surface) or known normals (--orient signs)"
-        }
+        Verdict::Good => String::new(),
+        Verdict::Check => format!(
+            "; larger steps differ: take smaller ones, {surface} or known normals (--orient signs)"
+        ),
         Verdict::Bad => {
-            "; what the row counts as changed has no derivative: try --orient signs, --radius or --surface"
+            "; what the row counts as changed has no derivative: try --orient signs, --radius or --surface".to_owned()
         }
     };
     format!(

@@ -154,6 +154,9 @@ pub struct GradientCheck {
     pub rows: Vec<Row>,
     /// Places where a derivative was bounded: see [`crate::CloudCotangent::guarded`].
     pub guarded: usize,
+    /// A [size of the surface's cells](SurfaceResolution::Spacing) with which it would be marched on half cells, where
+    /// [`Level::Thin`](crate::isosurface::Level::Thin) is not: derivatives then vary less within a cell.
+    pub half_cells: Option<f64>,
 }
 
 /// Compares derivatives on `cloud`; see the [module](self). Its given normals, where they are used, are
@@ -189,5 +192,6 @@ pub fn gradcheck(
     Ok(GradientCheck {
         rows,
         guarded: check.guarded(),
+        half_cells: base.cells_to_be_halved(),
     })
 }

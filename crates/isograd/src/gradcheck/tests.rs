@@ -29,6 +29,29 @@ fn pullback_agrees_with_small_steps_and_nearly_with_large_ones() {
 }
 
 #[test]
+fn half_cells_are_named_until_the_surface_is_marched_on_them() {
+    let half_cells = |reconstruction: crate::Options| {
+        let options = Options {
+            reconstruction,
+            motions: Vec::new(),
+            ..Options::default()
+        };
+        let check = gradcheck(&cloud(), grid(), &options, &mut |_| ());
+        check.expect("a torus").half_cells
+    };
+    let thin = crate::Options::default();
+    let size = half_cells(thin.clone()).expect("whole cells");
+    assert_eq!(
+        half_cells(thin.clone().surface(SurfaceResolution::Spacing(size))),
+        None
+    );
+    assert_eq!(
+        half_cells(thin.level(crate::isosurface::Level::Local)),
+        None
+    );
+}
+
+#[test]
 fn a_wrong_pullback_would_be_seen() {
     let cloud = cloud();
     let options = Options {

@@ -13,6 +13,9 @@ use crate::{Grid, Real, SurfaceResolution};
 /// and take 1.7 to 2.4 times as long.
 const LEAST_CELL: f64 = 0.95;
 
+/// Cell size of the surface in sample spacings for half cells, with room for numbers of cells that are rounded up.
+const HALVED_CELL: f64 = 1.1;
+
 impl<T> Thickened<T> {
     /// The samples, at the points they were moved to.
     pub(super) fn samples<'a>(
@@ -41,6 +44,14 @@ impl<T: Real> Reconstruction<T> {
     /// Whether samples are dense enough for a surface on cells half as large as those of `grid`, of a dense solve.
     pub(super) fn would_be_refined(&self, grid: &Grid<T>) -> bool {
         self.keeps_thin_parts() && grid.spacing().f64() > LEAST_CELL * self.sample_spacing()
+    }
+
+    /// A size of the surface's cells with which it would be marched on half cells, in the unit of the points; `None` where it
+    /// is, or can't be.
+    pub(crate) fn cells_to_be_halved(&self) -> Option<f64> {
+        let is_whole = !self.residuals.is_refined && self.sparse.is_none();
+        let would_be = is_whole && self.options.level == Level::Thin;
+        would_be.then(|| HALVED_CELL * self.sample_spacing())
     }
 
     /// Whether thin parts are kept by more than the local level.
