@@ -3,9 +3,9 @@
 use std::ops::ControlFlow;
 
 use cubecl::prelude::*;
-use isograd::neighbors::{Neighborhoods, Radius};
-use isograd::orient::{Method, Orientation};
-use isograd::{Orienter, PointCloud, Stage, normals};
+use isograd::neighbors::Radius;
+use isograd::orient::Method;
+use isograd::{Orienter, PointCloud, Stage};
 
 use super::{Error, Reconstruction};
 use crate::device::{check_length, launch};
@@ -28,7 +28,7 @@ pub struct RadiiAndSigns<T> {
     pub spacing: T,
     /// `(N, 3)` roughly outward: a normal is turned to the side of its vector here.
     pub outward: Buffer<T>,
-    /// `(N,)` from 0 to 1, how sure that is: see [`Orientation::confidence`].
+    /// `(N,)` from 0 to 1, how sure that is: see [`Orientation::confidence`](isograd::orient::Orientation::confidence).
     pub confidence: Buffer<T>,
     /// Whether the sides are those of an earlier step, since which axes may have turned far: these then follow their
     /// neighbors.
@@ -87,23 +87,19 @@ impl<T: Scalar> RadiiAndSigns<T> {
             Stage::Orient => begin(),
             _ => ControlFlow::Continue(()),
         })?;
-        let (axes, found) = (plan.axes(), plan.orientation());
+        let found = plan.orientation();
         Ok(SearchResult {
-            held: Self::of(device, plan.neighborhoods(), axes, found)?,
+            held: Self::of(device, &plan)?,
             axes: None,
             method: found.method.name(),
-            guarded: axes.guarded(),
+            guarded: plan.axes().guarded(),
             flipped: found.flipped,
         })
     }
 
-    /// Radii and signs of the CPU's stages or of an [`Orienter`].
-    pub fn of<R: Runtime>(
-        device: &Device<R>,
-        near: &Neighborhoods<T>,
-        axes: &normals::Residual<T>,
-        found: &Orientation<T>,
-    ) -> Result<Self, crate::Error> {
+    /// Radii and signs of the last cloud of a plan on the CPU.
+    pub fn of<R: Runtime>(device: &Device<R>, plan: &Orienter<T>) -> Result<Self, crate::Error> {
+        let (near, axes, found) = (plan.neighborhoods(), plan.axes(), plan.orientation());
         // Empty where all normals were given.
         let radii = match axes.radius.is_empty() {
             true => &near.radius,
