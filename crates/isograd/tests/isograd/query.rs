@@ -72,6 +72,25 @@ fn at_cell_centers_it_is_phi() {
     }
 }
 
+/// Where values on half cells round a center differ, and those on whole cells agree.
+#[test]
+fn at_cell_centers_it_is_phi_where_only_half_cells_see_the_surface() {
+    for seed in 0..8 {
+        let options = Options::default().surface(SurfaceResolution::Factor(1.0));
+        let cloud = TORUS.uniform::<f64>(1500, seed);
+        let result = reconstruct(&cloud, options.orient(Method::Given).checks(false));
+        let hits = result.query(&centers(), f64::INFINITY).expect("a mesh");
+        for (i, (hit, &phi)) in hits.iter().zip(result.sdf().values()).enumerate() {
+            let error = (hit.distance - phi).abs();
+            assert!(
+                error < 1e-13,
+                "{seed}, cell {i}: {} for {phi}",
+                hit.distance
+            );
+        }
+    }
+}
+
 /// Up to a limit outside, and everywhere inside, hits are those without a limit.
 fn assert_limited<T: Pipeline>() {
     let mut random = Uniform::new(7);
