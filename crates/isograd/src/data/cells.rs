@@ -78,6 +78,13 @@ impl<'a, T: Real> Cells<'a, T> {
         }
     }
 
+    /// The values at the eight centers from `cell` on.
+    #[inline(always)]
+    pub(crate) fn corners(self, cell: [usize; 3]) -> impl Iterator<Item = Option<T>> {
+        (0..8)
+            .map(move |corner: usize| self.at(std::array::from_fn(|a| cell[a] + (corner >> a & 1))))
+    }
+
     /// Whether every cell has a value.
     pub(crate) fn is_whole(self) -> bool {
         matches!(self, Self::Dense(..))

@@ -275,14 +275,9 @@ pub(crate) fn corners_agree<T: Real>(field: Cells<'_, T>, c: T, point: [f64; 3])
 
 /// Whether the values at the eight centers from `cell` on are below the level `c`, where they are there and agree.
 pub(crate) fn cell_agrees<T: Real>(field: Cells<'_, T>, c: T, cell: [usize; 3]) -> Option<bool> {
-    let below = |corner: usize| {
-        let at = std::array::from_fn(|a| cell[a] + (corner >> a & 1));
-        field.at(at).map(|value| value < c)
-    };
-    let first = below(0)?;
-    (1..8)
-        .all(|corner| below(corner) == Some(first))
-        .then_some(first)
+    let mut below = field.corners(cell).map(|value| value.map(|x| x < c));
+    let first = below.next()??;
+    below.all(|side| side == Some(first)).then_some(first)
 }
 
 /// Infinity for NaN, since comparisons with NaN all fail and would admit it to absent boxes.

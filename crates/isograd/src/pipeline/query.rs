@@ -40,8 +40,8 @@ impl<T: Real> Reconstruction<T> {
         let near = self.marched();
         let cell = cell_of(near, point);
         // Where values on half cells differ, those on whole ones may agree on the wrong side.
-        let is_near = cell.is_some_and(|cell| has_value(near, cell));
-        if is_near || near.is_whole() || self.sparse.is_some() {
+        let is_near = |cell| near.corners(cell).any(|value| value.is_some());
+        if near.is_whole() || self.sparse.is_some() || cell.is_some_and(is_near) {
             return cell_agrees(near, level, cell?);
         }
         let all = Cells::from(&self.indicator);
@@ -62,12 +62,4 @@ fn cell_of<T: Real>(field: Cells<'_, T>, point: [f64; 3]) -> Option<[usize; 3]> 
         cell[a] = ((from_wall - 0.5).max(0.0) as usize).min(shape[a] - 2);
     }
     Some(cell)
-}
-
-/// Whether there is a value at any of the eight centers from `cell` on.
-fn has_value<T: Real>(field: Cells<'_, T>, cell: [usize; 3]) -> bool {
-    (0..8).any(|corner| {
-        let at = std::array::from_fn(|a| cell[a] + (corner >> a & 1));
-        field.at(at).is_some()
-    })
 }
