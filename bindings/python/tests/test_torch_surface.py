@@ -11,7 +11,7 @@ import isograd.torch as it  # noqa: E402
 FACES = ((1.0, 0.5, 0.5), (0.5, 1.0, 0.5), (0.5, 0.5, 1.0))
 GRID = isograd.Grid((-1.4, -1.4, -1.4), 0.14, (20, 20, 20))
 OPTIONS = isograd.Options(radius=0.5, orient="given")
-RNG = np.random.default_rng(17)
+RNG = np.random.default_rng(18)
 
 
 def ball(count=800, dtype=torch.float64):
@@ -66,7 +66,7 @@ def test_gradients_agree_with_differences(places):
         difference = ((sides[0] - sides[1]) / 2e-7).item()
         assert abs(difference) > 1e-3
         # Differences of a loss of order 1 over 1e-7 have 9 digits less than the loss.
-        assert abs((slope * way).sum().item() - difference) < 1e-5 * max(1, abs(difference)), k
+        assert abs((slope * way).sum().item() - difference) < 1e-6 * max(1, abs(difference)), k
 
 
 def test_bits_are_those_of_jax():

@@ -121,7 +121,7 @@ class Options:
             typical distance between samples.
         screening: strength of the pull of the indicator to one value at the samples; 1 to 4 are usual, 0 is off.
         level: value of the indicator at the surface; see :class:`Level`.
-        surface: cells that the surface is found on: ``"auto"`` for a little less than the distance between samples,
+        surface: cells that the surface is found on: ``"auto"`` for about the distance between samples,
             at most twice as fine as those of φ, or four times where these are at most 2²⁵ cells;
             ``"grid"`` for those of φ; a cell size in the unit of the points, or how many times as fine as φ's, such as
             ``"3x"``. φ stays on its own grid.

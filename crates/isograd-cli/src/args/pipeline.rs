@@ -74,7 +74,7 @@ pub struct MethodArgs {
     /// parts may be cut off) or mean (the mean at all samples)
     #[arg(long, value_name = "LEVEL", default_value = "thin")]
     pub level: Level,
-    /// Cells that the surface is found on: auto (a little less than the distance between samples; at most twice as fine
+    /// Cells that the surface is found on: auto (about the distance between samples; at most twice as fine
     /// as those of φ, or four times within 2²⁵ cells), grid (those of φ), a cell size in the
     /// cloud's unit, or how many times as fine as φ's, such as 3x; φ stays on its own grid
     #[arg(long, value_name = "auto|grid|H|Fx", default_value = "auto")]

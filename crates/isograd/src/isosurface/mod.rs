@@ -70,8 +70,8 @@ pub enum Level {
     /// Local value at the samples nearby, also on parts thinner than a cell, which are made about a cell thick: hardly any
     /// of them is missed. Where the surface has a grid of its own, samples of such parts are moved apart until these are
     /// thick enough, if samples have areas and are not less than about a sixth of a cell of the surface apart. Where its cells
-    /// are larger than 0.9 of the distance between samples, and the solve is dense, the surface is also that of quadratic
-    /// B-splines, marched on cells half as large: it hardly depends on how the body lies on the grid, and derivatives vary
+    /// are larger than 0.95 of the distance between samples, as automatic ones are, and the solve is dense, the surface is also that of
+    /// quadratic B-splines, marched on cells half as large: it hardly depends on how the body lies on the grid, and derivatives vary
     /// less within a cell.
     #[default]
     Thin,

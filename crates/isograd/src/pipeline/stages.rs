@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::surface::{CELLS_PER_SPACING, HALVED_PER_SPACING};
 use super::{Error, Reconstruction, Reconstructor, Residuals, Solve, check_memory};
 use crate::data::{Field, Grid, PointCloud};
 use crate::neighbors::{Neighborhoods, Radius};
@@ -168,7 +169,17 @@ impl<T: Real> Reconstructor<T> {
         };
         let spacing = self.result.sample_spacing();
         let margin = poisson::margin(points, sdf.grid());
-        (options.surface).grid_and_octaves(sdf.grid(), spacing, solve, margin)
+        let find = |per_spacing: f64| {
+            (options.surface).grid_and_octaves(sdf.grid(), spacing / per_spacing, solve, margin)
+        };
+        if self.result.keeps_thin_parts() {
+            let found = find(HALVED_PER_SPACING)?;
+            // A sparse solve has no half cells.
+            if found.1 == 0 {
+                return Ok(found);
+            }
+        }
+        find(CELLS_PER_SPACING)
     }
 
     /// Puts the indicator and the Poisson plan of a dense solve on the grid of the surface.

@@ -8,7 +8,13 @@ use crate::{Grid, GridError, Real};
 /// Most cells of the surface's grid per sample spacing with [`SurfaceResolution::Auto`]. Mean distance from the surface to the
 /// true mesh with 0.8, 1.2 and 1.6 of them, in cells of φ (128 on the longest side): an airliner 0.0060, 0.0046, 0.0045; a
 /// tray of plates 0.0041, 0.0049, 0.0068; a machined part 0.012, 0.020, 0.033. And with more than about 1.3 thin parts are torn.
-const CELLS_PER_SPACING: f64 = 1.2;
+pub(super) const CELLS_PER_SPACING: f64 = 1.2;
+
+/// Most of them where the surface is marched on cells half as large. With 1 and 0.9 of them instead of whole cells as above, for ten
+/// real shapes with 16,000 samples and 96 cells of φ: the derivative of the volume by a translation, which should be 0, is 0.38 and
+/// 0.43 times as large in the mean (with 1, 0.17 to 0.78), the true surface is 0.93 and 1.04 times as far away, a reconstruction from
+/// normals with known sides takes 1.65 and 1.37 times as long (with 1, 1.3 to 2.2), and its pullback with 1 of them 1.13 times.
+pub(super) const HALVED_PER_SPACING: f64 = 1.04;
 
 /// Automatic ratios of the cell sizes to an octave, evenly spaced: 1, 1.125, 1.25 and so on to 2.
 const RATIOS_PER_OCTAVE: i32 = 8;
@@ -46,10 +52,12 @@ const SLACK: f64 = 1.1;
 /// Time and memory grow with the number of these cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum SurfaceResolution {
-    /// Cells a little smaller than the distance between samples, 0.83 to 0.95 of it (from 0.64 on where they fill the box). Smaller
-    /// ones would tear thin parts, larger ones lose them. They are at most 64 times as coarse as those of φ, and lie beyond its
-    /// box where there would be fewer than 4 of them between samples and walls; and at most twice as fine, or four times where they are at most 2²⁵. The ratio of the cell sizes is a step function of
-    /// the points, and the pullback holds it constant: prefer [`Self::Spacing`] or [`Self::Factor`] for a time series.
+    /// Cells of 0.96 to 1.1 times the distance between samples, so that the surface is marched on half cells, for a dense solve with
+    /// [`Level::Thin`](crate::isosurface::Level::Thin); else of 0.83 to 0.95 of it. Smaller ones would tear thin parts, larger ones lose
+    /// them. Where cells fill the box they may be smaller by 0.77. They are at most 64 times as coarse as those of φ, and lie beyond
+    /// its box where there would be fewer than 4 of them between samples and walls; and at most twice as fine, or four times where
+    /// they are at most 2²⁵. The ratio of the cell sizes is a step function of the points, and the pullback holds it constant: prefer
+    /// [`Self::Spacing`] or [`Self::Factor`] for a time series.
     #[default]
     Auto,
     /// The grid of φ itself.
@@ -70,21 +78,21 @@ impl SurfaceResolution {
         }
     }
 
-    /// The grid of the surface for samples that are `sample_spacing` apart, with the lower corner of `grid` or whole cells off
-    /// it, and the number of octaves of the sparse solve, 0 for a dense one. A sparse one may have cells smaller by a tenth. All samples are at least
-    /// `margin` cells of `grid` off its walls.
+    /// The grid of the surface, with the lower corner of `grid` or whole cells off it, and the number of octaves of the sparse solve,
+    /// 0 for a dense one. Automatic cells are at least of `cell_size`; those of a sparse solve may be smaller by a tenth. All samples
+    /// are at least `margin` cells of `grid` off its walls.
     ///
     /// # Errors
     /// [`Error::Surface`] for cells more than 64 times as fine or as coarse, [`Error::Grid`] for too many or too small cells.
     pub(super) fn grid_and_octaves<T: Real>(
         self,
         grid: &Grid<T>,
-        sample_spacing: f64,
+        cell_size: f64,
         solve: Solve,
         margin: f64,
     ) -> Result<(Grid<T>, usize), Error> {
         let refine = Refine { grid, margin };
-        let fine = self.grid(refine, sample_spacing, solve)?;
+        let fine = self.grid(refine, cell_size, solve)?;
         if solve == Solve::Dense || solve == Solve::Auto && fine.cells() <= MAX_DENSE_CELLS {
             return Ok((dense(fine)?, 0));
         }
@@ -108,15 +116,14 @@ impl SurfaceResolution {
     fn grid<T: Real>(
         self,
         refine: Refine<'_, T>,
-        sample_spacing: f64,
+        cell_size: f64,
         solve: Solve,
     ) -> Result<Grid<T>, Error> {
         let spacing = refine.grid.spacing().f64();
         let factor = match self {
             Self::Grid => 1.0,
             Self::Auto => {
-                let wanted = CELLS_PER_SPACING * spacing / sample_spacing;
-                return Ok(refine.automatically(wanted, solve));
+                return Ok(refine.automatically(spacing / cell_size, solve));
             }
             Self::Spacing(length) => spacing / length,
             Self::Factor(factor) => factor,

@@ -8,9 +8,9 @@ use crate::splat::Samples;
 use crate::thicken::{self, Inputs, Thickened};
 use crate::{Grid, Real, SurfaceResolution};
 
-/// Least cell size of the surface in sample spacings for which it is refined. Smaller cells, such as automatic ones that are not
-/// limited by the grid of φ, show all that the samples do: on cells half as large, four real shapes lie 5 to 17 % nearer to the truth,
-/// and take 1.7 to 2.4 times as long.
+/// Least cell size of the surface in sample spacings for which it is refined: a little below that of automatic cells. Smaller ones
+/// show all that the samples do: on cells half as large, four real shapes lie 5 to 17 % nearer to the truth, and take 1.7 to 2.4 times
+/// as long.
 const LEAST_CELL: f64 = 0.95;
 
 /// Cell size of the surface in sample spacings for half cells, with room for numbers of cells that are rounded up.

@@ -23,6 +23,9 @@ const SIDE: usize = EDGE + 1;
 /// Cells along each side of a block with one more all round.
 const WIDE: usize = EDGE + 2;
 
+/// Bits of the cells of the block in a row of [`Corners`].
+const OWN_CELLS: u16 = (1 << EDGE) - 1;
+
 /// Crossed edges and triangles of a block.
 #[derive(Clone, Copy, Debug, Default)]
 struct Crossings {
@@ -40,8 +43,9 @@ struct Crossings {
 
 /// Signs at a block and the first cells of the next ones.
 struct Corners {
-    /// `(SIDE, SIDE, SIDE)`; `None` where there is no value.
-    inside: Vec<Option<bool>>,
+    /// Rows along z, `(SIDE, SIDE)`, a bit for each cell: whether it has a value, and whether that is inside.
+    has_value: [u16; SIDE * SIDE],
+    inside: [u16; SIDE * SIDE],
 }
 
 /// Where a vertex lies on its edge, from 0 to 1: linearly between the values at the ends.
@@ -66,11 +70,7 @@ pub(crate) fn forward<T: Real>(
     if !level.is_finite() {
         return Err(Error::Level { level: level.f64() });
     }
-    let blocks = 0..chi.blocks.len();
-    let mut crossings: Vec<Crossings> = blocks
-        .into_par_iter()
-        .map(|block| Crossings::new(chi, level, block))
-        .collect();
+    let mut crossings = parallel::map(chi.blocks.len(), |block| Crossings::new(chi, level, block));
     if let Some(block) = crossings.iter().position(|of| !of.is_finite) {
         return Err(Error::NotFinite {
             cell: chi.blocks.corner(block),
@@ -108,15 +108,11 @@ pub(crate) fn forward<T: Real>(
         let cell = chi.grid.cell(edges[i].cell());
         position(&chi.grid, cell, edges[i].axis(), fractions[i])
     });
-    let vertices = Vertices {
-        chi,
-        crossings: &crossings,
-        fractions: &fractions,
-    };
-    let blocks = (0..chi.blocks.len()).into_par_iter();
-    let blocks = blocks.filter(|&block| crossings[block].faces > 0);
-    let faces = blocks.flat_map_iter(|block| faces_of(&vertices, level, block));
-    mesh.faces.par_extend(faces);
+    mesh.faces.resize(faces, [0; 3]);
+    let faces = split(&mut mesh.faces, crossings.iter().map(|of| of.faces));
+    let work = faces.into_par_iter().enumerate();
+    let work = work.filter(|(_, faces)| !faces.is_empty());
+    work.for_each(|(block, faces)| fill_faces((chi, level), &crossings, &fractions, block, faces));
     Ok(Report {
         touches_wall: walls.as_flattened().contains(&true),
         walls,
@@ -128,34 +124,73 @@ impl Corners {
     fn new<T: Real>(chi: &BlockField<T>, level: T, block: usize) -> Self {
         let (blocks, corner) = (&chi.blocks, chi.blocks.corner(block));
         let next = with_next(blocks, block);
-        let sign = |at: usize| {
-            let cell = [at / SIDE / SIDE, at / SIDE % SIDE, at % SIDE];
-            let [x, y, z] = cell.map(|c| c / EDGE);
-            let block = next[4 * x + 2 * y + z]?;
-            let is_inside = (0..3).all(|a| corner[a] + cell[a] < blocks.cells()[a]);
-            let node = Blocks::node(cell);
-            is_inside.then(|| chi.values[block * NODES + node] < level)
+        let room: [usize; 3] = std::array::from_fn(|a| (blocks.cells()[a] - corner[a]).min(SIDE));
+        let mut of = Self {
+            has_value: [0; SIDE * SIDE],
+            inside: [0; SIDE * SIDE],
         };
-        Self {
-            inside: (0..SIDE * SIDE * SIDE).map(sign).collect(),
+        for i in 0..room[0] {
+            for j in 0..room[1] {
+                let row = i * SIDE + j;
+                for (first, length) in
+                    [(0, room[2].min(EDGE)), (EDGE, room[2].saturating_sub(EDGE))]
+                {
+                    let owner = 4 * (i / EDGE) + 2 * (j / EDGE) + first / EDGE;
+                    let Some(owner) = next[owner] else { continue };
+                    let node = owner * NODES + Blocks::node([i, j, first]);
+                    for (k, &value) in chi.values[node..node + length].iter().enumerate() {
+                        of.has_value[row] |= 1 << (first + k);
+                        of.inside[row] |= u16::from(value < level) << (first + k);
+                    }
+                }
+            }
         }
+        of
     }
 
-    #[inline(always)]
-    fn at(&self, [i, j, k]: [usize; 3]) -> Option<bool> {
-        self.inside[(i * SIDE + j) * SIDE + k]
+    /// Whether any cell has a value on this side.
+    fn has(&self, inside: bool) -> bool {
+        let mut rows = self.has_value.iter().zip(&self.inside);
+        rows.any(|(all, ins)| if inside { *ins != 0 } else { all & !ins != 0 })
     }
 
-    /// Sign pattern of a cube; `None` without a value at a corner.
+    /// Of a row of the block: for each axis, which of the edges from its cells are crossed.
     #[inline(always)]
-    fn case(&self, [i, j, k]: [usize; 3]) -> Option<u8> {
-        let mut case = 0;
-        for c in 0..8 {
-            let inside = self.at([i + (c >> 2), j + (c >> 1 & 1), k + (c & 1)])?;
-            case |= u8::from(inside) << c;
-        }
-        Some(case)
+    fn crossed(&self, i: usize, j: usize) -> [u16; 3] {
+        let row = i * SIDE + j;
+        let between = |next: usize, shift: u32| {
+            let both = self.has_value[row] & (self.has_value[next] >> shift);
+            (self.inside[row] ^ (self.inside[next] >> shift)) & both & OWN_CELLS
+        };
+        [between(row + SIDE, 0), between(row + 1, 0), between(row, 1)]
     }
+
+    /// Which cubes from the cells of a row have values at all corners, on both sides.
+    #[inline(always)]
+    fn cut(&self, i: usize, j: usize) -> u16 {
+        let rows = [0, 1, SIDE, SIDE + 1].map(|n| i * SIDE + j + n);
+        let fold = |bits: &[u16; SIDE * SIDE], by: fn(u16, u16) -> u16| {
+            let [a, b, c, d] = rows.map(|row| bits[row]);
+            let all = by(by(a, b), by(c, d));
+            by(all, all >> 1)
+        };
+        let with_values = fold(&self.has_value, |a, b| a & b);
+        let any = fold(&self.inside, |a, b| a | b);
+        with_values & any & !fold(&self.inside, |a, b| a & b) & OWN_CELLS
+    }
+
+    /// Sign pattern of a cube.
+    #[inline(always)]
+    fn case(&self, [i, j, k]: [usize; 3]) -> u8 {
+        let row = i * SIDE + j;
+        let pair = |n: usize| (self.inside[row + n] >> k & 3) as u8;
+        pair(0) | pair(1) << 2 | pair(SIDE) << 4 | pair(SIDE + 1) << 6
+    }
+}
+
+/// The rows of a block along z.
+fn rows() -> impl Iterator<Item = (usize, usize)> {
+    (0..EDGE * EDGE).map(|row| (row / EDGE, row % EDGE))
 }
 
 /// A block and those after it, block `4·dx + 2·dy + dz` that which is so many further along each axis.
@@ -168,11 +203,6 @@ fn with_next(blocks: &Blocks, block: usize) -> [Option<usize>; 8] {
     })
 }
 
-/// The cells of a block.
-fn cells() -> impl Iterator<Item = [usize; 3]> {
-    (0..NODES).map(Blocks::cell_of)
-}
-
 impl Crossings {
     fn new<T: Real>(chi: &BlockField<T>, level: T, block: usize) -> Self {
         let own = &chi.values[block * NODES..(block + 1) * NODES];
@@ -182,23 +212,15 @@ impl Crossings {
         };
         let corners = Corners::new(chi, level, block);
         of.count_inside(chi, block, &corners);
-        let has = |side: bool| corners.inside.contains(&Some(side));
-        if !has(true) || !has(false) {
+        if !corners.has(true) || !corners.has(false) {
             return of;
         }
-        for cell in cells() {
-            let Some(inside) = corners.at(cell) else {
-                continue;
-            };
-            for axis in 0..3 {
-                let mut next = cell;
-                next[axis] += 1;
-                if corners.at(next).is_some_and(|other| other != inside) {
-                    of.crossed[axis][cell[0]] |= 1 << (EDGE * cell[1] + cell[2]);
-                }
+        for (i, j) in rows() {
+            for (words, row) in of.crossed.iter_mut().zip(corners.crossed(i, j)) {
+                words[i] |= u64::from(row) << (EDGE * j);
             }
-            if let Some(case) = corners.case(cell) {
-                of.faces += TABLE.count(case);
+            for k in ones(u64::from(corners.cut(i, j))) {
+                of.faces += TABLE.count(corners.case([i, j, k as usize]));
             }
         }
         let words = of.crossed.as_flattened().iter();
@@ -211,12 +233,14 @@ impl Crossings {
 
     fn count_inside<T: Real>(&mut self, chi: &BlockField<T>, block: usize, corners: &Corners) {
         let (corner, shape) = (chi.blocks.corner(block), chi.blocks.cells());
-        for cell in cells().filter(|&cell| corners.at(cell) == Some(true)) {
-            self.inside += 1;
-            for a in 0..3 {
-                let at = corner[a] + cell[a];
-                self.walls[a][0] |= at == 0;
-                self.walls[a][1] |= at == shape[a] - 1;
+        for (i, j) in rows() {
+            for k in ones(u64::from(corners.inside[i * SIDE + j] & OWN_CELLS)) {
+                self.inside += 1;
+                for (a, cell) in [i, j, k as usize].into_iter().enumerate() {
+                    let at = corner[a] + cell;
+                    self.walls[a][0] |= at == 0;
+                    self.walls[a][1] |= at == shape[a] - 1;
+                }
             }
         }
     }
@@ -254,40 +278,41 @@ fn plus(a: [usize; 3], b: [usize; 3]) -> [usize; 3] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
-/// The vertices on the edges of the lattice.
-struct Vertices<'a, T> {
-    chi: &'a BlockField<T>,
-    crossings: &'a [Crossings],
-    /// Where each lies on its edge.
-    fractions: &'a [T],
-}
-
-impl<T: Real> Vertices<'_, T> {
-    /// Number of the vertex on the edge along an axis from a cell that is counted from the corner of a block.
-    #[inline(always)]
-    fn number(&self, block: usize, cell: [usize; 3], axis: usize) -> u32 {
-        let place = self.chi.blocks.corner(block).map(|c| c / EDGE);
-        let owner = self.chi.blocks.at(plus(place, cell.map(|c| c / EDGE)));
-        let local = cell.map(|c| c % EDGE);
-        owner.map_or(0, |owner| self.crossings[owner].vertex(axis, local))
+/// Writes the triangles of a block, with the fraction of its edge at which each vertex lies.
+fn fill_faces<T: Real>(
+    (chi, level): (&BlockField<T>, T),
+    crossings: &[Crossings],
+    fractions: &[T],
+    block: usize,
+    faces: &mut [[u32; 3]],
+) {
+    let corners = Corners::new(chi, level, block);
+    let next = with_next(&chi.blocks, block);
+    let mut places = faces.iter_mut();
+    for (i, j) in rows() {
+        for k in ones(u64::from(corners.cut(i, j))) {
+            let cell = [i, j, k as usize];
+            let vertex = |edge: u8| {
+                let (corner, axis) = tables::start(edge);
+                let start = plus(cell, corner);
+                let [x, y, z] = start.map(|c| c / EDGE);
+                let owner = next[4 * x + 2 * y + z];
+                owner.map_or(0, |owner| {
+                    crossings[owner].vertex(axis, start.map(|c| c % EDGE))
+                })
+            };
+            let fraction = |edge: u8| fractions[vertex(edge) as usize];
+            TABLE.for_each_triangle(
+                corners.case(cell),
+                || fraction,
+                |triangle| {
+                    if let Some(place) = places.next() {
+                        *place = triangle.map(vertex);
+                    }
+                },
+            );
+        }
     }
-}
-
-/// The triangles of a block.
-fn faces_of<T: Real>(vertices: &Vertices<T>, level: T, block: usize) -> Vec<[u32; 3]> {
-    let corners = Corners::new(vertices.chi, level, block);
-    let mut faces = Vec::with_capacity(vertices.crossings[block].faces);
-    for cell in cells() {
-        let case = corners.case(cell).unwrap_or(0);
-        let vertex = |edge: u8| {
-            let (corner, axis) = tables::start(edge);
-            vertices.number(block, plus(cell, corner), axis)
-        };
-        let fraction = |edge: u8| vertices.fractions[vertex(edge) as usize];
-        let add = |triangle: [u8; 3]| faces.push(triangle.map(vertex));
-        TABLE.for_each_triangle(case, || fraction, add);
-    }
-    faces
 }
 
 fn one_sided<T: Real>(chi: &BlockField<T>, level: T, nothing_inside: bool) -> Error {

@@ -74,8 +74,11 @@ fn lengths_suit_a_fourier_transform_where_the_box_allows() {
 #[test]
 fn automatic_cells_follow_the_samples_as_far_as_is_affordable() {
     let cells = |shape, sample_spacing: f64, solve| {
-        let (auto, spacing) = (SurfaceResolution::Auto, 0.05 * sample_spacing);
-        let found = auto.grid_and_octaves(&grid(shape), spacing, solve, 20.0);
+        let (auto, size) = (
+            SurfaceResolution::Auto,
+            0.05 * sample_spacing / CELLS_PER_SPACING,
+        );
+        let found = auto.grid_and_octaves(&grid(shape), size, solve, 20.0);
         found.expect("fits").0.shape()
     };
     let cube = [40; 3];
