@@ -7,7 +7,7 @@ fn the_pullback_of_a_torus_agrees_with_small_steps() {
     let sandbox = Sandbox::with("sample torus -n 6000 -o torus.ply");
     // Of 48 cells, a plane through centers passes through a sample.
     let run = sandbox
-        .run("gradcheck torus.ply --resolution 50 --tolerance 1e-5 --report check.json --seed 2");
+        .run("gradcheck torus.ply --resolution 50 --tolerance 1e-6 --report check.json --seed 2");
     run.says(0, &[]);
     let table = run.stdout;
     let last = table.lines().last().unwrap_or_default();

@@ -14,8 +14,9 @@ use crate::vector::{dot, norm, sub};
 use crate::{CloudCotangent, Cotangent, Error, Mesh, PointCloud, Reconstruction, Reconstructor};
 
 /// Small steps that are tried, in cells: the first one over which nothing changes that has no derivative is
-/// taken, or else the last one.
-const SMALL_STEPS: [f64; 3] = [1e-6, 1e-7, 1e-8];
+/// taken, or else the last one. In 5 of 8 directions of noise at all samples of a torus, steps of 1e-6 pass kinks of the surface on half
+/// cells that are not counted, and differ from the pullback by up to 6e-7 of [`Row::scale`]; these, by less than 5e-10.
+const SMALL_STEPS: [f64; 2] = [1e-7, 1e-8];
 
 /// How far the closest point to a cell goes in a small step, in cells, where the cell crosses the medial axis.
 /// No vertex goes so far: those that do go a thousand times as far as the samples.
