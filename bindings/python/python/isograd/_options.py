@@ -47,8 +47,8 @@ class Level(str, Enum):
     """Value of the indicator at the surface.
 
     Attributes:
-        THIN: the value at the samples nearby. Parts thinner than a cell are made about a cell thick, and the surface is
-            marched on half cells where samples are dense.
+        THIN: the value at the samples nearby. Parts thinner than a cell are made about a cell thick, and automatic cells
+            of the surface are halved where the solve is dense.
         LOCAL: like ``THIN``, without both: thin parts may be cut off.
         MEAN: the mean at all samples, as in the paper.
     """

@@ -70,8 +70,8 @@ pub struct MethodArgs {
     #[arg(long, value_name = "ALPHA", default_value = "0", value_parser = not_negative)]
     pub screening: f64,
     /// Value of the indicator at the surface: thin (that at the samples nearby; parts thinner than a cell are made about a
-    /// cell thick, and the surface is marched on half cells where samples are dense), local (like thin, without both: thin
-    /// parts may be cut off) or mean (the mean at all samples)
+    /// cell thick, and automatic cells of the surface are halved where the solve is dense), local (like thin, without both:
+    /// thin parts may be cut off) or mean (the mean at all samples)
     #[arg(long, value_name = "LEVEL", default_value = "thin")]
     pub level: Level,
     /// Cells that the surface is found on: auto (about the distance between samples; at most twice as fine
