@@ -43,6 +43,8 @@ struct Crossings {
 
 /// Signs at a block and the first cells of the next ones.
 struct Corners {
+    /// See [`with_next`].
+    owners: [Option<usize>; 8],
     /// Rows along z, `(SIDE, SIDE)`, a bit for each cell: whether it has a value, and whether that is inside.
     has_value: [u16; SIDE * SIDE],
     inside: [u16; SIDE * SIDE],
@@ -123,9 +125,9 @@ pub(crate) fn forward<T: Real>(
 impl Corners {
     fn new<T: Real>(chi: &BlockField<T>, level: T, block: usize) -> Self {
         let (blocks, corner) = (&chi.blocks, chi.blocks.corner(block));
-        let next = with_next(blocks, block);
         let room: [usize; 3] = std::array::from_fn(|a| (blocks.cells()[a] - corner[a]).min(SIDE));
         let mut of = Self {
+            owners: with_next(blocks, block),
             has_value: [0; SIDE * SIDE],
             inside: [0; SIDE * SIDE],
         };
@@ -135,9 +137,11 @@ impl Corners {
                 for (first, length) in
                     [(0, room[2].min(EDGE)), (EDGE, room[2].saturating_sub(EDGE))]
                 {
-                    let owner = 4 * (i / EDGE) + 2 * (j / EDGE) + first / EDGE;
-                    let Some(owner) = next[owner] else { continue };
-                    let node = owner * NODES + Blocks::node([i, j, first]);
+                    let cell = [i, j, first];
+                    let Some(owner) = of.owner(cell) else {
+                        continue;
+                    };
+                    let node = owner * NODES + Blocks::node(cell);
                     for (k, &value) in chi.values[node..node + length].iter().enumerate() {
                         of.has_value[row] |= 1 << (first + k);
                         of.inside[row] |= u16::from(value < level) << (first + k);
@@ -148,10 +152,18 @@ impl Corners {
         of
     }
 
-    /// Whether any cell has a value on this side.
-    fn has(&self, inside: bool) -> bool {
-        let mut rows = self.has_value.iter().zip(&self.inside);
-        rows.any(|(all, ins)| if inside { *ins != 0 } else { all & !ins != 0 })
+    /// The block that a cell, counted from the corner of this one, belongs to.
+    #[inline(always)]
+    fn owner(&self, cell: [usize; 3]) -> Option<usize> {
+        let [x, y, z] = cell.map(|c| c / EDGE);
+        self.owners[4 * x + 2 * y + z]
+    }
+
+    /// Whether there are values on both sides.
+    fn is_mixed(&self) -> bool {
+        let outside = |(all, inside): (&u16, &u16)| all & !inside != 0;
+        self.inside.iter().any(|&inside| inside != 0)
+            && self.has_value.iter().zip(&self.inside).any(outside)
     }
 
     /// Of a row of the block: for each axis, which of the edges from its cells are crossed.
@@ -193,6 +205,12 @@ fn rows() -> impl Iterator<Item = (usize, usize)> {
     (0..EDGE * EDGE).map(|row| (row / EDGE, row % EDGE))
 }
 
+/// The cells of a block whose bits are set in its rows.
+#[inline(always)]
+fn cells(row: impl Fn(usize, usize) -> u16) -> impl Iterator<Item = [usize; 3]> {
+    rows().flat_map(move |(i, j)| ones(u64::from(row(i, j))).map(move |k| [i, j, k as usize]))
+}
+
 /// A block and those after it, block `4·dx + 2·dy + dz` that which is so many further along each axis.
 fn with_next(blocks: &Blocks, block: usize) -> [Option<usize>; 8] {
     let place = blocks.corner(block).map(|c| c / EDGE);
@@ -212,16 +230,16 @@ impl Crossings {
         };
         let corners = Corners::new(chi, level, block);
         of.count_inside(chi, block, &corners);
-        if !corners.has(true) || !corners.has(false) {
+        if !corners.is_mixed() {
             return of;
         }
         for (i, j) in rows() {
             for (words, row) in of.crossed.iter_mut().zip(corners.crossed(i, j)) {
                 words[i] |= u64::from(row) << (EDGE * j);
             }
-            for k in ones(u64::from(corners.cut(i, j))) {
-                of.faces += TABLE.count(corners.case([i, j, k as usize]));
-            }
+        }
+        for cell in cells(|i, j| corners.cut(i, j)) {
+            of.faces += TABLE.count(corners.case(cell));
         }
         let words = of.crossed.as_flattened().iter();
         for (word, before) in words.zip(of.before.as_flattened_mut()) {
@@ -233,14 +251,11 @@ impl Crossings {
 
     fn count_inside<T: Real>(&mut self, chi: &BlockField<T>, block: usize, corners: &Corners) {
         let (corner, shape) = (chi.blocks.corner(block), chi.blocks.cells());
-        for (i, j) in rows() {
-            for k in ones(u64::from(corners.inside[i * SIDE + j] & OWN_CELLS)) {
-                self.inside += 1;
-                for (a, cell) in [i, j, k as usize].into_iter().enumerate() {
-                    let at = corner[a] + cell;
-                    self.walls[a][0] |= at == 0;
-                    self.walls[a][1] |= at == shape[a] - 1;
-                }
+        for cell in cells(|i, j| corners.inside[i * SIDE + j] & OWN_CELLS) {
+            self.inside += 1;
+            for (a, at) in plus(corner, cell).into_iter().enumerate() {
+                self.walls[a][0] |= at == 0;
+                self.walls[a][1] |= at == shape[a] - 1;
             }
         }
     }
@@ -287,31 +302,22 @@ fn fill_faces<T: Real>(
     faces: &mut [[u32; 3]],
 ) {
     let corners = Corners::new(chi, level, block);
-    let next = with_next(&chi.blocks, block);
     let mut places = faces.iter_mut();
-    for (i, j) in rows() {
-        for k in ones(u64::from(corners.cut(i, j))) {
-            let cell = [i, j, k as usize];
-            let vertex = |edge: u8| {
-                let (corner, axis) = tables::start(edge);
-                let start = plus(cell, corner);
-                let [x, y, z] = start.map(|c| c / EDGE);
-                let owner = next[4 * x + 2 * y + z];
-                owner.map_or(0, |owner| {
-                    crossings[owner].vertex(axis, start.map(|c| c % EDGE))
-                })
-            };
-            let fraction = |edge: u8| fractions[vertex(edge) as usize];
-            TABLE.for_each_triangle(
-                corners.case(cell),
-                || fraction,
-                |triangle| {
-                    if let Some(place) = places.next() {
-                        *place = triangle.map(vertex);
-                    }
-                },
-            );
-        }
+    for cell in cells(|i, j| corners.cut(i, j)) {
+        let vertex = |edge: u8| {
+            let (corner, axis) = tables::start(edge);
+            let start = plus(cell, corner);
+            corners.owner(start).map_or(0, |owner| {
+                crossings[owner].vertex(axis, start.map(|c| c % EDGE))
+            })
+        };
+        let fraction = |edge: u8| fractions[vertex(edge) as usize];
+        let add = |triangle: [u8; 3]| {
+            if let Some(place) = places.next() {
+                *place = triangle.map(vertex);
+            }
+        };
+        TABLE.for_each_triangle(corners.case(cell), || fraction, add);
     }
 }
 
