@@ -1,8 +1,10 @@
 //! Parallel loops whose result does not depend on the number of threads.
 //!
-//! Work is cut into chunks of a fixed length, and what the chunks return is combined in their order.
+//! Work is cut where the number of threads has no say, and what the parts return is combined in their order. All loops of
+//! the crate are here, and all of them end in [`run`]: what rayon adds to a loop is compiled once, and not for each closure.
 
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
@@ -12,12 +14,110 @@ pub(crate) const CHUNK: usize = 2048;
 /// Pieces of a loop over few items.
 const PIECES: usize = 64;
 
+/// Calls `f` with each of `0..n`.
+fn run(n: usize, f: &(dyn Fn(usize) + Sync)) {
+    (0..n).into_par_iter().for_each(f);
+}
+
+/// `f` of every part and its number, in order. Parts are often chunks of slices that are walked together, as in
+/// `map_each(out.chunks_mut(n).zip(points.chunks(n)), |k, (out, points)| …)`.
+pub(crate) fn map_each<P: Send, R: Send>(
+    parts: impl IntoIterator<Item = P>,
+    f: impl Fn(usize, P) -> R + Sync,
+) -> Vec<R> {
+    let slot = |part| Mutex::new((Some(part), None));
+    let slots: Vec<_> = parts.into_iter().map(slot).collect();
+    run(slots.len(), &|k| {
+        let part = unpoisoned(slots[k].lock()).0.take();
+        let result = part.map(|part| f(k, part));
+        unpoisoned(slots[k].lock()).1 = result;
+    });
+    let results = slots.into_iter();
+    results
+        .filter_map(|slot| unpoisoned(slot.into_inner()).1)
+        .collect()
+}
+
+/// Calls `f` with every part and its number: [`map_each`] without results.
+pub(crate) fn each<P: Send>(parts: impl IntoIterator<Item = P>, f: impl Fn(usize, P) + Sync) {
+    map_each(parts, f);
+}
+
+/// [`map_each`] with a scratch, which `new` makes once for each thread. It holds whatever the part before left in it.
+pub(crate) fn map_each_with<S: Send, P: Send, R: Send>(
+    new: impl Fn() -> S + Sync,
+    parts: impl IntoIterator<Item = P>,
+    f: impl Fn(&mut S, usize, P) -> R + Sync,
+) -> Vec<R> {
+    let spare = Mutex::new(Vec::new());
+    map_each(parts, |k, part| {
+        let kept = unpoisoned(spare.lock()).pop();
+        let mut scratch = kept.unwrap_or_else(&new);
+        let result = f(&mut scratch, k, part);
+        unpoisoned(spare.lock()).push(scratch);
+        result
+    })
+}
+
+/// No closure of a caller runs while one of the locks is held, so none can be poisoned.
+fn unpoisoned<G>(lock: Result<G, PoisonError<G>>) -> G {
+    lock.unwrap_or_else(PoisonError::into_inner)
+}
+
+/// `f(0), …, f(n − 1)`.
+pub(crate) fn map<T: Clone + Default + Send>(n: usize, f: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let mut out = Vec::new();
+    fill(&mut out, n, f);
+    out
+}
+
+/// [`map`] with a scratch, as [`map_each_with`] has it.
+pub(crate) fn map_with<S: Send, T: Clone + Default + Send>(
+    new: impl Fn() -> S + Sync,
+    n: usize,
+    f: impl Fn(&mut S, usize) -> T + Sync,
+) -> Vec<T> {
+    let mut out = vec![T::default(); n];
+    let size = piece(n);
+    map_each_with(new, out.chunks_mut(size), |scratch, k, out| {
+        for (i, out) in out.iter_mut().enumerate() {
+            *out = f(scratch, k * size + i);
+        }
+    });
+    out
+}
+
+/// Makes `out` hold `f(0), …, f(n − 1)`, in the memory that it has.
+pub(crate) fn fill<T: Clone + Default + Send>(
+    out: &mut Vec<T>,
+    n: usize,
+    f: impl Fn(usize) -> T + Sync,
+) {
+    out.resize(n, T::default());
+    for_each(out, |i, item| *item = f(i));
+}
+
+/// Calls `f` with the index of each item, and the item.
+pub(crate) fn for_each<T: Send>(items: &mut [T], f: impl Fn(usize, &mut T) + Sync) {
+    let size = piece(items.len());
+    in_pieces(items, size, &|k, piece| {
+        for (i, item) in piece.iter_mut().enumerate() {
+            f(k * size + i, item);
+        }
+    });
+}
+
+/// [`each`] of the chunks of a slice, compiled once for each `T`.
+fn in_pieces<T: Send>(items: &mut [T], size: usize, f: &(dyn Fn(usize, &mut [T]) + Sync)) {
+    each(items.chunks_mut(size), f);
+}
+
 /// `Σ_i f(i)` for `i` in `0..n`, several sums at once, in one fixed order.
 pub(crate) fn sum_array<const M: usize>(
     n: usize,
     f: impl Fn(usize) -> [f64; M] + Sync,
 ) -> [f64; M] {
-    let partial = of_chunks(n, &|items| {
+    let partial = of_ranges(n, CHUNK, &|items| {
         let mut total = [0.0; M];
         for i in items {
             let term = f(i);
@@ -36,43 +136,65 @@ pub(crate) fn sum_array<const M: usize>(
     total
 }
 
-/// `f(0), …, f(n − 1)`.
-pub(crate) fn map<T: Clone + Default + Send>(n: usize, f: impl Fn(usize) -> T + Sync) -> Vec<T> {
-    let mut out = Vec::new();
-    fill(&mut out, n, f);
-    out
-}
-
-/// Makes `out` hold `f(0), …, f(n − 1)`, in the memory that it has.
-pub(crate) fn fill<T: Clone + Default + Send>(
-    out: &mut Vec<T>,
+/// `join` of `none` and all `f(i)`, in any order of brackets: `join` must be associative to the last bit.
+pub(crate) fn reduce<R: Clone + Send + Sync>(
     n: usize,
-    f: impl Fn(usize) -> T + Sync,
-) {
-    out.resize(n, T::default());
-    for_each(out, |i, item| *item = f(i));
+    none: R,
+    f: impl Fn(usize) -> R + Sync,
+    join: impl Fn(R, R) -> R + Sync,
+) -> R {
+    let of = |items: Range<usize>| items.fold(none.clone(), |all, i| join(all, f(i)));
+    of_ranges(n, piece(n), &of)
+        .into_iter()
+        .fold(none.clone(), &join)
 }
 
-/// Calls `f` with the index of each item, and the item.
-pub(crate) fn for_each<T: Send>(items: &mut [T], f: impl Fn(usize, &mut T) + Sync) {
-    in_pieces(items, &|first, piece| {
-        for (k, item) in piece.iter_mut().enumerate() {
-            f(first + k, item);
-        }
+/// How many of `0..n` are so.
+pub(crate) fn count(n: usize, is_so: impl Fn(usize) -> bool + Sync) -> usize {
+    let of = |items: Range<usize>| items.filter(|&i| is_so(i)).count();
+    of_ranges(n, piece(n), &of).into_iter().sum()
+}
+
+/// The first of `0..n` that is so.
+pub(crate) fn first(n: usize, is_so: impl Fn(usize) -> bool + Sync) -> Option<usize> {
+    let of = |mut items: Range<usize>| items.find(|&i| is_so(i));
+    of_ranges(n, piece(n), &of).into_iter().flatten().next()
+}
+
+/// The `f(i)` that are there, in order.
+pub(crate) fn filter_map<R: Send>(n: usize, f: impl Fn(usize) -> Option<R> + Sync) -> Vec<R> {
+    let of = |items: Range<usize>| items.filter_map(&f).collect::<Vec<R>>();
+    of_ranges(n, piece(n), &of).into_iter().flatten().collect()
+}
+
+/// `f` of each range of `size` of `0..n`, compiled once for each `R`.
+fn of_ranges<R: Send>(n: usize, size: usize, f: &(dyn Fn(Range<usize>) -> R + Sync)) -> Vec<R> {
+    let ranges = (0..n.div_ceil(size)).map(|k| k * size..n.min((k + 1) * size));
+    map_each(ranges, |_, range| f(range))
+}
+
+/// Items in a piece of a loop over `n`: few may each take long.
+fn piece(n: usize) -> usize {
+    n.div_ceil(PIECES).clamp(1, CHUNK)
+}
+
+/// Both results, found side by side.
+pub(crate) fn join<A: Send, B: Send>(
+    a: impl FnOnce() -> A + Send,
+    b: impl FnOnce() -> B + Send,
+) -> (A, B) {
+    let (mut of_a, mut of_b) = (None, None);
+    let (mut a, mut b) = (Some(a), Some(b));
+    both(&mut || of_a = a.take().map(|a| a()), &mut || {
+        of_b = b.take().map(|b| b())
     });
+    match (of_a, of_b) {
+        (Some(a), Some(b)) => (a, b),
+        _ => unreachable!("rayon calls both"),
+    }
 }
 
-/// Calls `f` with pieces of a slice, and the index of the first item of each. Compiled once for each `T`, as
-/// [`of_chunks`] is.
-fn in_pieces<T: Send>(items: &mut [T], f: &(dyn Fn(usize, &mut [T]) + Sync)) {
-    // Few items may each take long.
-    let size = items.len().div_ceil(PIECES).clamp(1, CHUNK);
-    let pieces = items.par_chunks_mut(size).enumerate();
-    pieces.for_each(|(k, piece)| f(k * size, piece));
-}
-
-/// `f` of each chunk of `0..n`. The closure is `dyn` so that what rayon adds is compiled once for each `R`.
-fn of_chunks<R: Send>(n: usize, f: &(dyn Fn(Range<usize>) -> R + Sync)) -> Vec<R> {
-    let chunk = |k: usize| f(k * CHUNK..n.min((k + 1) * CHUNK));
-    (0..n.div_ceil(CHUNK)).into_par_iter().map(chunk).collect()
+/// Compiled once, as [`run`] is.
+fn both(a: &mut (dyn FnMut() + Send), b: &mut (dyn FnMut() + Send)) {
+    rayon::join(a, b);
 }
