@@ -1,14 +1,13 @@
 //! Points and neighborhoods to axes.
 
 use pulp::Arch;
-use rayon::prelude::*;
 
 use super::{Plane, Residual, widen};
 use crate::element::{eigen::eigen, plane};
 use crate::neighbors::{
     self, Candidates, Found, LANES, Lanes, Neighborhoods, Radius, rule, sum_lanes,
 };
-use crate::parallel::CHUNK;
+use crate::parallel::{self, CHUNK};
 use crate::{Real, simd, vector};
 
 /// `ε/R_i`: see the table on the module's page.
@@ -141,11 +140,11 @@ fn find_all_planes<T: Real>(neighborhoods: &Neighborhoods<T>, arch: Arch, out: &
     out.normals.resize(n, [T::zero(); 3]);
     out.planes.resize(n, Plane::default());
     let sorted = &out.sorted;
-    let normals = out.normals.par_chunks_mut(CHUNK);
-    let planes = out.planes.par_chunks_mut(CHUNK);
-    let positions = neighborhoods.position().par_chunks(CHUNK);
+    let normals = out.normals.chunks_mut(CHUNK);
+    let planes = out.planes.chunks_mut(CHUNK);
+    let positions = neighborhoods.position().chunks(CHUNK);
     let chunks = normals.zip(planes).zip(positions);
-    chunks.for_each(|((normals, planes), positions)| {
+    parallel::each(chunks, |_, ((normals, planes), positions)| {
         simd::vectorized!(arch, find_planes(sorted, positions, normals, planes));
     });
 }

@@ -3,14 +3,12 @@
 //! All lengths are in units of the radius, so that nothing overflows or vanishes whatever the unit of the
 //! cloud: `d̂ = d/R`, `ŵ = wR`, `ĝ = R² g/(RW)`. The result is divided by `R` once.
 
-use rayon::prelude::*;
-
 use super::forward::{EPSILON, SMALLEST_GAP};
 use super::{Plane, Residual, widen_pullback};
 use crate::element::plane;
 use crate::neighbors::{Candidates, LANES, Neighborhoods, RadiiCotangent, rule};
 use crate::vector::{add, dot, norm, scale};
-use crate::{Real, vector};
+use crate::{Real, parallel, vector};
 
 /// Values that each candidate carries: `ĝ/Ŵ`, `n` and `m̂`.
 const VALUES: usize = 9;
@@ -45,8 +43,7 @@ pub fn pullback<T: Real>(
         sorted,
     } = scratch;
     let slope = |i: usize| slope(&residual.planes[i], residual.radius[i], normals_bar[i]);
-    let samples = (0..normals_bar.len()).into_par_iter();
-    samples.map(slope).collect_into_vec(slopes);
+    parallel::fill(slopes, normals_bar.len(), slope);
     sort_values(neighborhoods, residual, slopes, values);
     let (arch, radius) = (pulp::Arch::new(), neighborhoods.common_radius);
     let steepness = T::of(rule::steepness(neighborhoods.rule));
@@ -126,7 +123,7 @@ fn sort_values<T: Real>(
     let order = neighborhoods.index.order();
     let common = neighborhoods.common_radius;
     let inverse = T::one() / common;
-    values.par_iter_mut().enumerate().for_each(|(m, out)| {
+    parallel::for_each(values, |m, out| {
         let (what, axis) = (m / 3, m % 3);
         out.clear();
         out.extend(order.iter().map(|&i| {

@@ -12,13 +12,12 @@
 //! normals in noisy point cloud data" (2004); here neither noise nor curvature need be known.
 
 use pulp::Arch;
-use rayon::prelude::*;
 
 use super::forward::{Moments, find_planes, moments};
 use super::{Plane, Residual};
 use crate::element::plane;
 use crate::neighbors::{Candidates, Census, Found as Sum, Neighborhoods, Radius, Search};
-use crate::{Real, simd, vector};
+use crate::{Real, parallel, simd, vector};
 
 /// Radii that are tried one after the other, in `R_i`.
 pub const STEPS: [f64; 3] = [1.55, 2.2, 3.1];
@@ -88,18 +87,18 @@ fn positions<T: Real>(
     neighborhoods: &Neighborhoods<T>,
     is_wanted: impl Fn(usize) -> bool + Sync,
 ) -> Vec<u32> {
-    let order = neighborhoods.index.order().par_iter();
-    let positions = (0u32..order.len() as u32).into_par_iter().zip(order);
-    let wanted = positions.filter(|&(_, &i)| is_wanted(i as usize));
-    wanted.map(|(position, _)| position).collect()
+    let order = neighborhoods.index.order();
+    parallel::filter_map(order.len(), |position| {
+        is_wanted(order[position] as usize).then_some(position as u32)
+    })
 }
 
 fn in_tasks<T: Real>(
     positions: &[u32],
     run: impl Fn(&[u32]) -> Vec<Found<T>> + Send + Sync,
 ) -> Vec<Found<T>> {
-    let tasks = positions.par_chunks(TASK);
-    tasks.flat_map_iter(run).collect()
+    let found = parallel::map_each(positions.chunks(TASK), |_, task| run(task));
+    found.into_iter().flatten().collect()
 }
 
 /// How far a neighborhood is widened.

@@ -10,8 +10,6 @@
 //! since `Σ_k λ̄_k λ_k = 0` for a function of quotients of them. Nothing depends on the unit of length, so
 //! `R_i R̄_i = −Σ_j ⟨d̄_j, d_j⟩`.
 
-use rayon::prelude::*;
-
 use super::forward::{EPSILON, SMALLEST_GAP};
 use super::widen::{
     Found, GAIN, RIM, ROUGH, STEPS, TASK, Widening, find, lateral, parts_of_share, roughness,
@@ -20,7 +18,7 @@ use super::widen::{
 use crate::element::plane;
 use crate::neighbors::{Candidates, Neighborhoods, RadiiCotangent, rule};
 use crate::vector::{add, dot, norm, scale, sub, to_f64};
-use crate::{Real, vector};
+use crate::{Real, parallel, vector};
 
 /// Pulls `(N,)` cotangents `R_i R̄_i` of the radii that axes were found with back to the radii of the neighborhoods, in
 /// `radii_bar`, and through how far each radius is `widened` beyond its `own`, both `(N,)`, to the `(N, 3)` `points_bar`. Adds
@@ -53,8 +51,8 @@ pub(super) fn pullback<T: Real>(
 ) {
     // Rounds of a fixed number of tasks, so that the lists stay short.
     for round in bars.chunks(64 * TASK) {
-        let tasks = round.par_chunks(TASK);
-        let tasks: Vec<Contributions> = tasks.map(|task| pull_task(neighborhoods, task)).collect();
+        let tasks =
+            parallel::map_each(round.chunks(TASK), |_, task| pull_task(neighborhoods, task));
         for (j, bar) in tasks.iter().flat_map(|task| &task.points) {
             let sum = &mut points_bar[*j as usize];
             *sum = vector::add(*sum, vector::of_f64(*bar));

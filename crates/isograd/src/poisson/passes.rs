@@ -1,12 +1,11 @@
 //! The three passes over memory: planes forward, lines across the planes, planes backward.
 
 use isograd_fourier::num_complex::Complex;
-use rayon::prelude::*;
 
 use super::axis::{Axis, Gain};
 use super::scratch::{Lines, Scratch, first};
 use super::{Plan, Symbols};
-use crate::{Real, simd};
+use crate::{Real, parallel, simd};
 
 /// Complex lines handled together where a line's places are far apart in memory: neighboring lines
 /// share cache lines.
@@ -19,8 +18,7 @@ impl<T: Real> Plan<T> {
     /// Cosine transforms along z, then y, plane by plane.
     pub(super) fn forward_planes(&self, field: &mut [T], scratch: &Scratch<T>) {
         let [_, y, z] = &self.axes;
-        let planes = field.par_chunks_mut(y.n * z.n).enumerate();
-        planes.for_each(|(i, plane)| {
+        parallel::each(field.chunks_mut(y.n * z.n), |i, plane| {
             scratch.with_lines(|buffers| {
                 simd::vectorized!(self.arch, {
                     if self.closed {
@@ -36,8 +34,7 @@ impl<T: Real> Plan<T> {
     /// The inverse of [`Self::forward_planes`], times `4 n_y n_z`.
     pub(super) fn inverse_planes(&self, field: &mut [T], scratch: &Scratch<T>) {
         let [_, y, z] = &self.axes;
-        let planes = field.par_chunks_mut(y.n * z.n).enumerate();
-        planes.for_each(|(i, plane)| {
+        parallel::each(field.chunks_mut(y.n * z.n), |i, plane| {
             scratch.with_lines(|buffers| {
                 simd::vectorized!(self.arch, {
                     inverse_columns(y, &mut rows_of(plane, z.n), buffers);
@@ -61,7 +58,7 @@ impl<T: Real> Plan<T> {
                 task.push(part);
             }
         }
-        tasks.par_iter_mut().enumerate().for_each(|(task, rows)| {
+        parallel::each(&mut tasks, |task, rows| {
             scratch.with_lines(|buffers| {
                 simd::vectorized!(
                     self.arch,

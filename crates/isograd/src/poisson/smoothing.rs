@@ -1,11 +1,10 @@
 //! Width of the smoothing of the indicator, and its pullback.
 
 use pulp::Arch;
-use rayon::prelude::*;
 
 use super::Plan;
 use crate::data::blocks::{BlockField, Blocks, NODES};
-use crate::{Real, simd};
+use crate::{Real, parallel, simd};
 
 /// Cells of smoothing for each cell of distance between samples. Errors of the vertices of a torus, in cells, mean
 /// and maximum, with the local iso-value:
@@ -56,13 +55,13 @@ impl Smoothing {
 /// differences along the axes. The same bits for any number of threads.
 pub fn pullback<T: Real>(plan: &Plan<T>, smoothing: f64, chi: &[T], chi_bar: &[T]) -> f64 {
     let [_, ny, nz] = plan.shape;
-    let plane = |(i, plane): (usize, &[T])| {
+    let plane = |i: usize, plane: &[T]| -> f64 {
         let rows = plane.chunks_exact(nz).enumerate();
         rows.map(|(j, row)| laplacian_dot(plan, chi_bar, (i * ny + j) * nz, row))
             .sum()
     };
-    let planes = chi.par_chunks_exact(ny * nz).enumerate();
-    smoothing * planes.map(plane).collect::<Vec<f64>>().iter().sum::<f64>()
+    let planes = parallel::map_each(chi.chunks_exact(ny * nz), plane);
+    smoothing * planes.iter().sum::<f64>()
 }
 
 /// Like [`pullback`], for fields in blocks. An absent neighbor counts as equal.
@@ -84,7 +83,7 @@ pub(crate) fn pullback_in_blocks<T: Real>(
         }
         (sum * bar).f64()
     };
-    let of_block = |(block, bars): (usize, &[T])| {
+    let of_block = |block: usize, bars: &[T]| -> f64 {
         let corner = chi_bar.blocks.corner(block);
         let bars = bars
             .iter()
@@ -96,13 +95,8 @@ pub(crate) fn pullback_in_blocks<T: Real>(
         });
         terms.sum()
     };
-    let blocks = chi_bar.values.par_chunks_exact(NODES).enumerate();
-    smoothing
-        * blocks
-            .map(of_block)
-            .collect::<Vec<f64>>()
-            .iter()
-            .sum::<f64>()
+    let blocks = parallel::map_each(chi_bar.values.chunks_exact(NODES), of_block);
+    smoothing * blocks.iter().sum::<f64>()
 }
 
 /// `Σ_k part_k (Lv)_k` over cells along z from place `start` in memory on.

@@ -1,8 +1,6 @@
 //! Conditions at the walls of the grid.
 
-use rayon::prelude::*;
-
-use crate::{Grid, Real};
+use crate::{Grid, Real, parallel};
 
 /// Cells of φ from the wall within which a sample reaches it. Samples keep 2 cells off the walls, and a fitted grid keeps
 /// [`Grid::MARGIN_CELLS`] cells off the samples.
@@ -41,10 +39,10 @@ pub(crate) fn reaches_wall(margin: f64) -> bool {
 /// How far the nearest of the points is off the walls, in cells.
 pub(crate) fn margin<T: Real>(points: &[[T; 3]], grid: &Grid<T>) -> f64 {
     let shape = grid.shape();
-    let of = |&point: &[T; 3]| {
-        let x = grid.to_index(point);
+    let of = |i: usize| {
+        let x = grid.to_index(points[i]);
         let along = |a: usize| x[a].f64().min(shape[a] as f64 - x[a].f64());
         (0..3).map(along).fold(f64::INFINITY, f64::min)
     };
-    points.par_iter().map(of).reduce(|| f64::INFINITY, f64::min)
+    parallel::reduce(points.len(), f64::INFINITY, of, f64::min)
 }

@@ -34,9 +34,8 @@ mod stencil;
 mod tests;
 
 use pulp::Arch;
-use rayon::prelude::*;
 
-use crate::{Field, Grid, Real, simd, vector};
+use crate::{Field, Grid, Real, parallel, simd, vector};
 pub(crate) use blocks::{blocks_near, forward_in_blocks};
 pub use order::Scratch;
 pub(crate) use order::central_cell;
@@ -142,22 +141,20 @@ pub fn forward<T: Real>(
     scratch.sort(samples.points, &grid, &mut residual.order)?;
     let [nx, ny, nz] = grid.shape();
     let (arch, scratch, residual) = (Arch::new(), &*scratch, &*residual);
-    b.values_mut()
-        .par_chunks_mut(SLAB * ny * nz)
-        .enumerate()
-        .for_each(|(task, slab)| {
-            slab.fill(T::zero());
-            let from = task * SLAB;
-            let to = from + slab.len() / (ny * nz);
-            // Samples up to two planes away reach into the slab.
-            let near = scratch.planes(from.saturating_sub(REACH), nx.min(to + REACH), ny);
-            let near = &residual.order[near];
-            simd::vectorized!(arch, {
-                for &i in near {
-                    samples.add(i as usize, &grid, weights, from, slab);
-                }
-            });
+    let slabs = b.values_mut().chunks_mut(SLAB * ny * nz);
+    parallel::each(slabs, |task, slab| {
+        slab.fill(T::zero());
+        let from = task * SLAB;
+        let to = from + slab.len() / (ny * nz);
+        // Samples up to two planes away reach into the slab.
+        let near = scratch.planes(from.saturating_sub(REACH), nx.min(to + REACH), ny);
+        let near = &residual.order[near];
+        simd::vectorized!(arch, {
+            for &i in near {
+                samples.add(i as usize, &grid, weights, from, slab);
+            }
         });
+    });
     Ok(())
 }
 
@@ -171,8 +168,8 @@ impl<T: Real> Samples<'_, T> {
                 areas: self.areas.len(),
             });
         }
-        let bad = |i: &usize| !vector::is_finite(self.normals[*i]) || !self.areas[*i].is_finite();
-        match (0..points).into_par_iter().find_first(bad) {
+        let bad = |i: usize| !vector::is_finite(self.normals[i]) || !self.areas[i].is_finite();
+        match parallel::first(points, bad) {
             Some(index) => Err(Error::NotFinite { index }),
             None => Ok(()),
         }

@@ -2,10 +2,8 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use super::{Error, Residual, stencil::REACH};
-use crate::parallel::CHUNK;
+use crate::parallel::{self, CHUNK};
 use crate::{Grid, Real};
 
 /// Scratch buffers reused between calls.
@@ -63,22 +61,17 @@ impl Scratch {
         self.rows.clear();
         self.rows.resize(points.len(), 0);
         let ny = grid.shape()[1];
-        let first_bad = self
-            .rows
-            .par_chunks_mut(CHUNK)
-            .zip(points.par_chunks(CHUNK))
-            .enumerate()
-            .filter_map(|(chunk, (rows, points))| {
-                for (i, (row, &point)) in rows.iter_mut().zip(points).enumerate() {
-                    match central_cell(grid.shape(), grid.to_index(point)) {
-                        Some([x, y, _]) => *row = (x * ny + y) as u32,
-                        None => return Some(chunk * CHUNK + i),
-                    }
+        let chunks = self.rows.chunks_mut(CHUNK).zip(points.chunks(CHUNK));
+        let first_bad = parallel::map_each(chunks, |chunk, (rows, points)| {
+            for (i, (row, &point)) in rows.iter_mut().zip(points).enumerate() {
+                match central_cell(grid.shape(), grid.to_index(point)) {
+                    Some([x, y, _]) => *row = (x * ny + y) as u32,
+                    None => return Some(chunk * CHUNK + i),
                 }
-                None
-            })
-            .min();
-        match first_bad {
+            }
+            None
+        });
+        match first_bad.into_iter().flatten().next() {
             Some(index) => Err(Error::Outside {
                 index,
                 position: grid.to_index(points[index]).map(|x| x.f64()),

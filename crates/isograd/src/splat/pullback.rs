@@ -1,13 +1,13 @@
 //! Cotangents of the right-hand side to cotangents of points, normals, areas and grid: one gather a sample.
 
 use pulp::Arch;
-use rayon::prelude::*;
 
 use super::stencil::{self, Gathered, REACH, WIDTH};
 use super::{Residual, Samples, central_cell};
 use crate::data::GridCotangent;
 use crate::data::cells::Cells;
-use crate::{Field, Grid, Real, parallel, simd, vector};
+use crate::parallel::{self, CHUNK};
+use crate::{Field, Grid, Real, simd, vector};
 
 /// Samples in one task.
 const TASK: usize = 512;
@@ -37,11 +37,14 @@ impl<T: Real> SampleCotangent<T> {
     ) {
         let (h, points) = (grid.spacing(), samples.points);
         let unit = if in_cells { h } else { T::one() };
-        let bars = self.points.par_iter_mut().zip(&mut self.areas).enumerate();
-        bars.for_each(|(i, (point_bar, area_bar))| {
-            let (point, area) = bar(i);
-            *point_bar = vector::add(*point_bar, point);
-            *area_bar += area / unit / unit;
+        let chunks = self.points.chunks_mut(CHUNK);
+        let chunks = chunks.zip(self.areas.chunks_mut(CHUNK));
+        parallel::each(chunks, |chunk, (points, areas)| {
+            for (i, (point_bar, area_bar)) in points.iter_mut().zip(areas).enumerate() {
+                let (point, area) = bar(chunk * CHUNK + i);
+                *point_bar = vector::add(*point_bar, point);
+                *area_bar += area / unit / unit;
+            }
         });
         let [x, y, z, spacing] = parallel::sum_array(points.len(), |i| {
             let (point, area) = bar(i);
@@ -90,16 +93,17 @@ pub(crate) fn pullback_on<T: Real>(
     scratch
         .sorted
         .resize(residual.order.len(), Gathered::default());
-    let tasks = scratch.sorted.par_chunks_mut(TASK);
-    tasks
-        .zip(residual.order.par_chunks(TASK))
-        .for_each(|(gathered, order)| {
+    let tasks = scratch.sorted.chunks_mut(TASK);
+    parallel::each(
+        tasks.zip(residual.order.chunks(TASK)),
+        |_, (gathered, order)| {
             simd::vectorized!(arch, {
                 for (gathered, &i) in gathered.iter_mut().zip(order) {
                     *gathered = samples.gather(i as usize, residual, b_bar);
                 }
             });
-        });
+        },
+    );
     let h = grid.spacing();
     let Samples {
         points,

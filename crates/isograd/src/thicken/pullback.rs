@@ -1,7 +1,5 @@
 //! The pullback.
 
-use rayon::prelude::*;
-
 use super::pair::{displacement, pull_pair, pull_sums};
 use super::{Inputs, Sums};
 use crate::splat::SampleCotangent;
@@ -27,18 +25,21 @@ pub(crate) fn pullback<T: Real>(
 ) -> [f64; 2] {
     let Inputs { width, least, .. } = inputs;
     let bar_along = |i: usize| dot(to_f64(moved_bar[i]), to_f64(inputs.samples.normals[i]));
-    let samples = (0..sums.len()).into_par_iter();
-    let of_sums = samples.map(|i| pull_sums(&sums[i], width, least, bar_along(i)));
-    let (of_sums, of_least): (Vec<Sums>, Vec<f64>) = of_sums.unzip();
+    let of_sums = parallel::map(sums.len(), |i| {
+        pull_sums(&sums[i], width, least, bar_along(i))
+    });
+    let (of_sums, of_least): (Vec<Sums>, Vec<f64>) = of_sums.into_iter().unzip();
     let shares = parallel::map(sums.len(), |i| gather(inputs, &of_sums, i));
-    let work = out.points.par_iter_mut().zip(&mut out.normals);
-    let work = work.zip(&mut out.areas).enumerate();
-    work.for_each(|(i, ((point, normal), area))| {
-        let (share, bar) = (&shares[i], to_f64(moved_bar[i]));
-        let away = displacement(&sums[i], width, least);
-        *point = of_f64(add(to_f64(*point), add(bar, share.point)));
-        *normal = of_f64(add(to_f64(*normal), add(scale(bar, away), share.normal)));
-        *area = T::of(area.f64() + share.area);
+    let bar = |i: usize| to_f64(moved_bar[i]);
+    parallel::for_each(&mut out.points, |i, point| {
+        *point = of_f64(add(to_f64(*point), add(bar(i), shares[i].point)));
+    });
+    parallel::for_each(&mut out.normals, |i, normal| {
+        let moved = scale(bar(i), displacement(&sums[i], width, least));
+        *normal = of_f64(add(to_f64(*normal), add(moved, shares[i].normal)));
+    });
+    parallel::for_each(&mut out.areas, |i, area| {
+        *area = T::of(area.f64() + shares[i].area);
     });
     let [by_length, least_bar] = parallel::sum_array(sums.len(), |i| {
         let moved = displacement(&sums[i], width, least) * bar_along(i);

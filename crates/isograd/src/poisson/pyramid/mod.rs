@@ -34,11 +34,9 @@ mod transfer;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use super::{Error, Plan, Scratch, Symbol};
-use crate::Real;
 use crate::data::blocks::{BRICK, Blocks, Brick, EDGE, Marks, NODES};
+use crate::{Real, parallel};
 
 /// Cells round a brick of which the samples have an effect in it.
 const HALO: usize = 12;
@@ -233,7 +231,7 @@ impl Symbols {
             };
             a.amplitude * b.amplitude * c.amplitude * share
         };
-        let mut gains: Vec<f64> = (0..FULL * FULL * FULL).into_par_iter().map(gain).collect();
+        let mut gains = parallel::map(FULL * FULL * FULL, gain);
         let cut = cut();
         for _ in 0..3 {
             gains = cut_last_axis(&gains, &cut);
@@ -257,10 +255,10 @@ fn cut() -> Vec<f64> {
 
 /// Multiplies the lines along the last axis by a matrix, and makes it the first axis.
 fn cut_last_axis(gains: &[f64], matrix: &[f64]) -> Vec<f64> {
-    let rows = matrix.par_chunks_exact(FULL).flat_map_iter(|row| {
-        gains
-            .chunks_exact(FULL)
-            .map(move |line| line.iter().zip(row).map(|(a, b)| a * b).sum::<f64>())
-    });
-    rows.collect()
+    let lines = gains.len() / FULL;
+    parallel::map(matrix.len() / FULL * lines, |place| {
+        let row = &matrix[place / lines * FULL..][..FULL];
+        let line = &gains[place % lines * FULL..][..FULL];
+        line.iter().zip(row).map(|(a, b)| a * b).sum()
+    })
 }

@@ -1,9 +1,7 @@
 //! Transfer between cells and cells twice as large: quintic B-splines, and their transpose.
 
-use rayon::prelude::*;
-
-use crate::Real;
 use crate::data::blocks::{Blocks, EDGE, NODES};
+use crate::{Real, parallel};
 
 /// Large cells on either side of a pair of small ones to which their values contribute.
 pub(super) const REACH: isize = 3;
@@ -51,8 +49,8 @@ pub(super) fn prolong<T: Real>(
         let weights = std::array::from_fn(|m| T::of(weight(n as isize, large(m))));
         (first, weights)
     });
-    let work = out.par_chunks_exact_mut(NODES).enumerate();
-    work.for_each_init(Rooms::default, |rooms, (block, out)| {
+    let blocks = out.chunks_exact_mut(NODES);
+    parallel::map_each_with(Rooms::default, blocks, |rooms, block, out| {
         let origin = small.corner(block).map(|c| (c / 2) as isize - REACH);
         if rooms.read((large, coefficients), origin, ABOVE, closed) {
             rooms.contract(ABOVE, &rows);
@@ -74,8 +72,8 @@ pub(super) fn restrict<T: Real>(
     const TAPS: usize = 4 * REACH as usize;
     let weights: [T; TAPS] = std::array::from_fn(|m| T::of(weight(m as isize - 2 * REACH + 1, 0)));
     let rows: [(usize, [T; TAPS]); EDGE] = std::array::from_fn(|n| (2 * n, weights));
-    let work = out.par_chunks_exact_mut(NODES).enumerate();
-    work.for_each_init(Rooms::default, |rooms, (block, out)| {
+    let blocks = out.chunks_exact_mut(NODES);
+    parallel::map_each_with(Rooms::default, blocks, |rooms, block, out| {
         let origin = large
             .corner(block)
             .map(|c| (2 * c) as isize - 2 * REACH + 1);

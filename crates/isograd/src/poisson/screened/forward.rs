@@ -1,7 +1,5 @@
 //! Conjugate gradients over the samples.
 
-use rayon::prelude::*;
-
 use super::{Equation, Error, MOST_ITERATIONS};
 use crate::trilinear::{self, Cube};
 use crate::{Real, parallel, poisson};
@@ -36,14 +34,10 @@ pub fn forward<T: Real>(
         return Ok(0);
     }
     let Scratch { roots, rest, .. } = &mut *scratch;
-    let at = |(i, &root): (usize, &T)| root * equation.at_sample(chi, i);
-    let values = roots.par_iter().enumerate().map(at);
-    values.collect_into_vec(rest);
+    parallel::fill(rest, roots.len(), |i| roots[i] * equation.at_sample(chi, i));
     let iterations = scratch.solve(equation)?;
     scratch.spread_solution(equation)?;
-    let alpha = T::of(equation.screening);
-    let cells = chi.par_iter_mut().zip(&scratch.field);
-    cells.for_each(|(chi, &change)| *chi -= alpha * change);
+    add(chi, &scratch.field, -equation.screening);
     Ok(iterations)
 }
 
@@ -60,9 +54,8 @@ impl<T: Real> Equation<'_, T> {
 
 impl<T: Real> Scratch<T> {
     pub(super) fn start(&mut self, equation: &Equation<'_, T>) {
-        let samples = (0..equation.samples.samples.points.len()).into_par_iter();
-        let root = |i| equation.area_of(i).sqrt();
-        samples.map(root).collect_into_vec(&mut self.roots);
+        let samples = equation.samples.samples.points.len();
+        parallel::fill(&mut self.roots, samples, |i| equation.area_of(i).sqrt());
         self.field.resize(equation.grid.cells(), T::zero());
     }
 
@@ -78,9 +71,8 @@ impl<T: Real> Scratch<T> {
 
     /// Fills `rest` with numbers of the samples.
     pub(super) fn set_right_hand_side(&mut self, value: impl Fn(usize, T) -> T + Sync) {
-        let roots = self.roots.par_iter().enumerate();
-        let values = roots.map(|(i, &root)| value(i, root));
-        values.collect_into_vec(&mut self.rest);
+        let roots = &self.roots;
+        parallel::fill(&mut self.rest, roots.len(), |i| value(i, roots[i]));
     }
 
     /// `field = A⁺ Sᵀ u` for the solution `u`.
@@ -120,19 +112,16 @@ impl<T: Real> Scratch<T> {
                 return Ok(iteration);
             }
             green(equation, roots, direction, field, poisson)?;
-            let samples = roots.par_iter().zip(&*direction).enumerate();
-            let row = |(i, (&root, &u)): (usize, (&T, &T))| {
-                u + alpha * root * equation.at_sample(field, i)
-            };
-            samples.map(row).collect_into_vec(image);
+            parallel::fill(image, roots.len(), |i| {
+                direction[i] + alpha * roots[i] * equation.at_sample(field, i)
+            });
             project(image, roots);
             let step = now / dot(direction, image);
             add(solution, direction, step);
             add(rest, image, -step);
             let before = std::mem::replace(&mut now, dot(rest, rest));
             let share = T::of(now / before);
-            let along = direction.par_iter_mut().zip(&*rest);
-            along.for_each(|(p, &r)| *p = r + share * *p);
+            parallel::for_each(direction, |i, p| *p = rest[i] + share * *p);
         }
         Err(Error::NotConverged {
             iterations: MOST_ITERATIONS,
@@ -155,7 +144,7 @@ fn green<T: Real>(
         samples,
         ..
     } = *equation;
-    field.par_iter_mut().for_each(|value| *value = T::zero());
+    parallel::for_each(field, |_, value| *value = T::zero());
     trilinear::spread(grid, samples, |i| roots[i] * u[i], field);
     Ok(plan.solve(field, 0.0, scratch)?)
 }
@@ -168,8 +157,7 @@ fn dot<T: Real>(a: &[T], b: &[T]) -> f64 {
 /// `a += s b`.
 fn add<T: Real>(a: &mut [T], b: &[T], s: f64) {
     let s = T::of(s);
-    let pairs = a.par_iter_mut().zip(b);
-    pairs.for_each(|(a, &b)| *a += s * b);
+    parallel::for_each(a, |i, a| *a += s * b[i]);
 }
 
 /// Subtracts the projection on `d = √â`.
