@@ -1,8 +1,6 @@
 //! Scatters turned into gathers: each output adds up its own terms, in one fixed order.
 
-use rayon::prelude::*;
-
-use crate::parallel::CHUNK;
+use crate::parallel::{self, CHUNK};
 use crate::{Mesh, Real, vector};
 
 /// Items by key, those of one key in ascending order: a stable counting sort.
@@ -97,17 +95,15 @@ pub(crate) fn add_to<T: Real>(
     out: &mut [[T; 3]],
     term: impl Fn(usize) -> [f64; 3] + Sync,
 ) -> usize {
-    out.par_chunks_mut(CHUNK)
-        .enumerate()
-        .map(|(chunk, out)| {
-            let mut guarded = 0;
-            for (k, out) in out.iter_mut().enumerate() {
-                let sum = term(chunk * CHUNK + k);
-                *out = vector::add(*out, sum.map(|x| bounded(x, &mut guarded)));
-            }
-            guarded
-        })
-        .sum()
+    let guarded = parallel::map_each(out.chunks_mut(CHUNK), |chunk, out| {
+        let mut guarded = 0;
+        for (k, out) in out.iter_mut().enumerate() {
+            let sum = term(chunk * CHUNK + k);
+            *out = vector::add(*out, sum.map(|x| bounded(x, &mut guarded)));
+        }
+        guarded
+    });
+    guarded.into_iter().sum()
 }
 
 #[cfg(test)]

@@ -8,6 +8,8 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
+use crate::Real;
+
 /// Items in one chunk of a loop over points or vertices.
 pub(crate) const CHUNK: usize = 2048;
 
@@ -147,6 +149,16 @@ pub(crate) fn reduce<R: Clone + Send + Sync>(
     of_ranges(n, piece(n), &of)
         .into_iter()
         .fold(none.clone(), &join)
+}
+
+/// The least and the greatest of some numbers, but for NaN; infinity and minus infinity if there are none.
+pub(crate) fn range<T: Real>(values: &[T]) -> [T; 2] {
+    let wider = |[low, high]: [T; 2], [l, h]: [T; 2]| [low.min(l), high.max(h)];
+    let none = [T::infinity(), T::neg_infinity()];
+    let of = |_, chunk: &[T]| chunk.iter().fold(none, |ends, &v| wider(ends, [v, v]));
+    map_each(values.chunks(CHUNK), of)
+        .into_iter()
+        .fold(none, wider)
 }
 
 /// How many of `0..n` are so.

@@ -4,13 +4,11 @@ mod json;
 mod verdict;
 mod warning;
 
-use rayon::prelude::*;
-
 use crate::differential::{Eikonal, EikonalOptions, eikonal};
 use crate::isosurface::Level;
 use crate::isosurface::measure::Measures;
 use crate::orient::doubt::{Doubt, Region};
-use crate::{Field, Real};
+use crate::{Field, Real, parallel};
 
 pub use json::JsonReport;
 pub(crate) use verdict::TOLERATED_SHARE;
@@ -156,13 +154,7 @@ impl Report {
     }
 
     pub(crate) fn measure_field<T: Real>(&mut self, sdf: &Field<T>) {
-        let ends = sdf.values().par_iter().fold(
-            || (T::infinity(), T::neg_infinity()),
-            |(low, high), &v| (low.min(v), high.max(v)),
-        );
-        let none = || (T::infinity(), T::neg_infinity());
-        let (low, high) = ends.reduce(none, |a, b| (a.0.min(b.0), a.1.max(b.1)));
-        (self.sdf_min, self.sdf_max) = (low.f64(), high.f64());
+        [self.sdf_min, self.sdf_max] = parallel::range(sdf.values()).map(T::f64);
         self.eikonal = eikonal(sdf, &EikonalOptions::default());
     }
 }

@@ -4,13 +4,11 @@
 //! (its even reflection): the value is that of the nearest point between the cell centers, and the
 //! gradient has no component across the wall. The gradient jumps at the planes through cell centers.
 
-use rayon::prelude::*;
-
 use crate::data::blocks::{Blocks, Overlap};
 use crate::data::cells::{Cells, CellsMut};
 use crate::element::linear::lerp;
 use crate::splat::SortedSamples;
-use crate::{Field, Grid, Real};
+use crate::{Field, Grid, Real, parallel};
 
 /// Planes across x that one task of [`spread`] owns.
 const SLAB: usize = 8;
@@ -155,8 +153,7 @@ pub(crate) fn spread<T: Real>(
     out: &mut [T],
 ) {
     let (plane, points) = (grid.strides()[0], sorted.samples.points);
-    let slabs = out.par_chunks_mut(SLAB * plane).enumerate();
-    slabs.for_each(|(task, slab)| {
+    parallel::each(out.chunks_mut(SLAB * plane), |task, slab| {
         let first = task * SLAB * plane;
         let planes = task * SLAB..task * SLAB + slab.len() / plane;
         // The eight cells reach one plane beyond that of the sample's own cell.

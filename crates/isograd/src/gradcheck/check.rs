@@ -1,6 +1,6 @@
 //! One motion: its differences, and the pullback beside them.
 
-use rayon::prelude::*;
+use rayon::slice::ParallelSliceMut;
 
 use super::functional::{Functional, parting};
 use super::{CheckError, Difference, Motion, Options, Row};
@@ -11,7 +11,9 @@ use crate::isosurface::Level;
 use crate::neighbors::Radius;
 use crate::splat::Weights;
 use crate::vector::{dot, norm, sub};
-use crate::{CloudCotangent, Cotangent, Error, Mesh, PointCloud, Reconstruction, Reconstructor};
+use crate::{
+    CloudCotangent, Cotangent, Error, Mesh, PointCloud, Reconstruction, Reconstructor, parallel,
+};
 
 /// Small steps that are tried, in cells: the first one over which nothing changes that has no derivative is
 /// taken, or else the last one. In 5 of 8 directions of noise at all samples of a torus, steps of 1e-6 pass kinks of the surface on half
@@ -174,14 +176,14 @@ impl<'a> Check<'a> {
             let corners = mesh.faces()[closest[cell] as usize].map(|v| mesh.vertices()[v as usize]);
             closest_point(grid.center(grid.cell(cell)), corners).point
         };
-        let jumps = |&cell: &usize| {
+        parallel::filter_map(grid.cells(), |cell| {
             let (a, b) = (plus.1[cell], minus.1[cell]);
-            a != b
+            let jumps = a != b
                 && a != NO_TRIANGLE
                 && b != NO_TRIANGLE
-                && norm(sub(closest(plus, cell), closest(minus, cell))) > JUMP * grid.spacing()
-        };
-        (0..grid.cells()).into_par_iter().filter(jumps).collect()
+                && norm(sub(closest(plus, cell), closest(minus, cell))) > JUMP * grid.spacing();
+            jumps.then_some(cell)
+        })
     }
 }
 

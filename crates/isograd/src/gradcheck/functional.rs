@@ -1,7 +1,5 @@
 //! The functional of φ whose derivatives are compared.
 
-use rayon::prelude::*;
-
 use super::Parting;
 use crate::vector::{add, scale, sub};
 use crate::{Field, Grid, PointCloud, parallel};
@@ -51,16 +49,16 @@ impl Functional {
 
     /// The part of every cell.
     pub(super) fn parts(&self, phi: &Field<f64>) -> Vec<f64> {
-        let cells = phi.values().par_iter().zip(&self.weights);
-        cells.map(|(&phi, u)| u * fall(phi / self.width)).collect()
+        let (phi, u) = (phi.values(), &self.weights);
+        parallel::map(phi.len(), |cell| u[cell] * fall(phi[cell] / self.width))
     }
 
     /// `∂L/∂φ` at every cell.
     pub(super) fn cotangent(&self, phi: &Field<f64>) -> Vec<f64> {
-        let cells = phi.values().par_iter().zip(&self.weights);
-        cells
-            .map(|(&phi, u)| u * slope(phi / self.width) / self.width)
-            .collect()
+        let (phi, u) = (phi.values(), &self.weights);
+        parallel::map(phi.len(), |cell| {
+            u[cell] * slope(phi[cell] / self.width) / self.width
+        })
     }
 }
 

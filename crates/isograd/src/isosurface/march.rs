@@ -1,7 +1,6 @@
 //! The forward map: signs, counts, then vertices and faces into their final places.
 
 use pulp::Arch;
-use rayon::prelude::*;
 
 use super::signs::{Signs, ones};
 use super::tables::{self, TABLE};
@@ -9,7 +8,7 @@ use super::{Error, Report};
 use crate::data::cells::Cells;
 use crate::data::{Field, Grid, LatticeEdge, Mesh};
 use crate::element::crossing::crossing;
-use crate::{Real, vector};
+use crate::{Real, parallel, vector};
 
 /// Scratch buffers reused between calls: about a fifth of a byte per cell.
 #[derive(Debug, Default)]
@@ -70,11 +69,8 @@ impl Scratch {
         let signs = &self.signs;
         self.before.resize(planes * signs.plane(), 0);
         self.planes.resize(planes, Plane::default());
-        let work = self
-            .planes
-            .par_iter_mut()
-            .zip(self.before.par_chunks_exact_mut(signs.plane()));
-        work.enumerate().for_each(|(i, (plane, before))| {
+        let before = self.before.chunks_exact_mut(signs.plane());
+        parallel::each(self.planes.iter_mut().zip(before), |i, (plane, before)| {
             plane.vertices = signs.count_vertices(i, before);
             plane.faces = signs.count_faces(i);
         });
@@ -90,18 +86,17 @@ impl Scratch {
         let vertices = split(&mut mesh.vertices, self.planes.iter().map(|p| p.vertices));
         let edges = split(&mut mesh.edges, self.planes.iter().map(|p| p.vertices));
         let faces = split(&mut mesh.faces, self.planes.iter().map(|p| p.faces));
-        let work = vertices.into_par_iter().zip(edges).zip(faces);
-        work.enumerate()
-            .for_each(|(i, ((vertices, edges), faces))| {
-                crate::simd::dispatch(
-                    Arch::new(),
-                    #[inline(always)]
-                    || {
-                        emit_vertices(&self.signs, chi, level, i, vertices, edges);
-                        self.emit_faces(chi, level, i, faces);
-                    },
-                );
-            });
+        let planes = vertices.into_iter().zip(edges).zip(faces);
+        parallel::each(planes, |i, ((vertices, edges), faces)| {
+            crate::simd::dispatch(
+                Arch::new(),
+                #[inline(always)]
+                || {
+                    emit_vertices(&self.signs, chi, level, i, vertices, edges);
+                    self.emit_faces(chi, level, i, faces);
+                },
+            );
+        });
     }
 
     #[inline(always)]

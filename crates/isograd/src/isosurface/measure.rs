@@ -2,11 +2,9 @@
 
 pub(crate) mod pieces;
 
-use rayon::prelude::*;
-
 use crate::data::Mesh;
 use crate::parallel::{CHUNK, sum_array};
-use crate::{Real, vector};
+use crate::{Real, parallel, vector};
 
 /// Area, volume and topology of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -203,10 +201,10 @@ impl Scratch {
             begin = self.start[last];
             rest = after;
         }
-        let counts = pieces
-            .into_par_iter()
-            .map(|(start, uses)| count_piece(start, uses));
-        counts.reduce(EdgeCounts::default, EdgeCounts::add)
+        let counts = parallel::map_each(pieces, |_, (start, uses)| count_piece(start, uses));
+        counts
+            .into_iter()
+            .fold(EdgeCounts::default(), EdgeCounts::add)
     }
 }
 

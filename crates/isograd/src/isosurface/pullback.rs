@@ -1,7 +1,5 @@
 //! Cotangents of the vertices to cotangents of the indicator, the level and the grid.
 
-use rayon::prelude::*;
-
 use crate::data::cells::{Cells, CellsMut};
 use crate::data::{Field, Grid, GridCotangent, LatticeEdge, Mesh};
 use crate::element::crossing::{bounded, crossing};
@@ -57,8 +55,9 @@ pub(crate) fn pullback_on<T: Real>(
     match chi_bar {
         CellsMut::Dense(grid, chi_bar) => {
             let plane = grid.strides()[0];
-            let slabs = chi_bar.par_chunks_mut(SLAB * plane).enumerate();
-            slabs.for_each(|(task, slab)| vertices.add(task * SLAB * plane, plane, slab));
+            parallel::each(chi_bar.chunks_mut(SLAB * plane), |task, slab| {
+                vertices.add(task * SLAB * plane, plane, slab);
+            });
         }
         CellsMut::Blocks(chi_bar) => {
             chi_bar.add_at_ends(mesh.edges(), |vertex| vertices.parts(vertex));
@@ -101,12 +100,7 @@ impl LevelCotangent {
 
 /// Greatest value less least value.
 pub(super) fn range<T: Real>(values: &[T]) -> T {
-    let none = || [T::infinity(), T::neg_infinity()];
-    let wider = |[low, high]: [T; 2], [l, h]: [T; 2]| [low.min(l), high.max(h)];
-    let [low, high] = values
-        .par_iter()
-        .fold(none, |ends, &v| wider(ends, [v, v]))
-        .reduce(none, wider);
+    let [low, high] = parallel::range(values);
     high - low
 }
 

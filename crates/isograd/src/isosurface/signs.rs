@@ -2,10 +2,9 @@
 //! case of each cube, the number of each vertex.
 
 use pulp::Arch;
-use rayon::prelude::*;
 
 use super::tables::TABLE;
-use crate::Real;
+use crate::{Real, parallel};
 
 /// Cells in one word.
 const WORD: usize = 64;
@@ -44,7 +43,7 @@ impl Signs {
         let words = nz.div_ceil(WORD);
         self.words = words;
         self.bits.resize(nx * ny * words, 0);
-        let plane = |(bits, values): (&mut [u64], &[T])| {
+        let plane = |_, (bits, values): (&mut [u64], &[T])| {
             crate::simd::dispatch(
                 Arch::new(),
                 #[inline(always)]
@@ -56,11 +55,9 @@ impl Signs {
                 },
             )
         };
-        let planes = self.bits.par_chunks_exact_mut(ny * words);
-        planes
-            .zip(values.par_chunks_exact(ny * nz))
-            .map(plane)
-            .reduce(|| true, |a, b| a & b)
+        let planes = self.bits.chunks_exact_mut(ny * words);
+        let finite = parallel::map_each(planes.zip(values.chunks_exact(ny * nz)), plane);
+        !finite.contains(&false)
     }
 
     /// Place of word `w` of row `(i, j)`.

@@ -1,13 +1,11 @@
 //! The quadratic B-spline of an indicator: `χ(x) = Σ_o B_o(x) χ_o`, with the `B` that the splat spreads samples by. Unlike
 //! linear interpolation it has a continuous derivative, so that a surface changes little as samples move through cells.
 
-use rayon::prelude::*;
-
 use super::iso_value::AtSample;
 use super::local_level::Stencil;
 use crate::data::cells::Cells;
 use crate::splat::SortedSamples;
-use crate::{Grid, Real};
+use crate::{Grid, Real, parallel};
 
 /// Planes across x that one task of [`spread`] owns.
 const SLAB: usize = 8;
@@ -44,8 +42,7 @@ pub(super) fn spread<T: Real>(
 ) {
     let (strides, points) = (grid.strides(), sorted.samples.points);
     let plane = strides[0];
-    let slabs = out.par_chunks_mut(SLAB * plane).enumerate();
-    slabs.for_each(|(task, slab)| {
+    parallel::each(out.chunks_mut(SLAB * plane), |task, slab| {
         let planes = task * SLAB..task * SLAB + slab.len() / plane;
         let near = planes.start.saturating_sub(1)..planes.end + 1;
         for &i in sorted.order.in_planes(points, grid, near) {

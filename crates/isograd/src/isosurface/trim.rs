@@ -13,7 +13,7 @@
 //! # Not differentiable
 //! Which faces stay.
 
-use rayon::prelude::*;
+use rayon::slice::ParallelSliceMut;
 
 use crate::data::Mesh;
 use crate::neighbors::CellIndex;
@@ -107,10 +107,9 @@ pub fn forward<T: Real>(mesh: &Mesh<T>, points: &[[T; 3]], distance: f64) -> Tri
 /// meshes about 2¹⁶ vertices are looked at.
 pub(crate) fn far_share<T: Real>(mesh: &Mesh<T>, index: &CellIndex<T>, distance: T) -> f64 {
     let step = (mesh.vertices().len() >> 16).max(1);
-    let vertices = mesh.vertices().par_iter().step_by(step);
-    let is_far = |p: &&[T; 3]| !index.any_within(**p, distance);
-    let far = vertices.clone().filter(is_far).count();
-    far as f64 / vertices.len().max(1) as f64
+    let looked_at = mesh.vertices().len().div_ceil(step);
+    let is_far = |n: usize| !index.any_within(mesh.vertices()[n * step], distance);
+    parallel::count(looked_at, is_far) as f64 / looked_at.max(1) as f64
 }
 
 /// Adds the cotangents of the vertices that stay to those of the whole mesh.

@@ -1,7 +1,5 @@
 //! Measurements of a reconstruction, and warnings that follow from them. None of them changes a result.
 
-use rayon::prelude::*;
-
 use crate::data::Mesh;
 use crate::distance::samples::{self, Counts, Samples};
 use crate::isosurface::measure::pieces::Pieces;
@@ -12,7 +10,7 @@ use crate::orient::Orientation;
 use crate::orient::doubt::{self, Doubt, Region};
 use crate::orient::rim;
 use crate::report::{Report, TOLERATED_SHARE, Warning};
-use crate::{Field, Real, distance, vector};
+use crate::{Field, Real, distance, parallel, vector};
 
 /// Samples further apart than this many cells of the surface leave holes between the supports of their splats.
 const SPARSE_CELLS: f64 = 1.25;
@@ -143,14 +141,14 @@ impl Report {
 
 /// Counts by φ between its cells.
 fn interpolated<T: Real>(samples: Samples<'_, T>, sdf: &Field<T>) -> Counts {
-    let count = |(&x, &n): (&[T; 3], &[T; 3])| {
+    let count = |i: usize| {
+        let (x, n) = (samples.points[i], samples.normals[i]);
         let below = vector::sub(x, vector::scale(n, samples.depth));
         let gradient = sdf.interpolate_with_gradient(below).1;
         let distance = sdf.interpolate(x);
         samples.judged(n, distance.abs(), gradient)
     };
-    let pairs = samples.points.par_iter().zip(samples.normals);
-    pairs.map(count).reduce(Counts::default, Counts::add)
+    parallel::reduce(samples.points.len(), Counts::default(), count, Counts::add)
 }
 
 /// `count` of `all` as a share, from 0 to 1.

@@ -1,10 +1,8 @@
 //! Input and output of the pullback of the pipeline.
 
-use rayon::prelude::*;
-
 use crate::data::{Attribute, GridCotangent};
 use crate::distance::extend;
-use crate::parallel::CHUNK;
+use crate::parallel::{self, CHUNK};
 use crate::{Real, poisson, vector};
 
 /// Cotangents of the results of a reconstruction: derivatives of a scalar (a loss) with respect to each result.
@@ -177,7 +175,8 @@ fn check<E: Sync>(
     }
     // A chunk at a time, whose loop has no branch: all numbers are finite as a rule.
     let spoilt = |chunk: &[E]| chunk.iter().fold(false, |spoilt, x| spoilt | !finite(x));
-    let Some(chunk) = bar.par_chunks(CHUNK).position_first(spoilt) else {
+    let chunks = parallel::map_each(bar.chunks(CHUNK), |_, chunk| spoilt(chunk));
+    let Some(chunk) = chunks.into_iter().position(|spoilt| spoilt) else {
         return Ok(());
     };
     let start = chunk * CHUNK;

@@ -4,8 +4,6 @@ mod scratch;
 
 use std::sync::PoisonError;
 
-use rayon::prelude::*;
-
 use super::sparse::Bars;
 use super::{CloudCotangent, Cotangent, Pipeline, PullbackError, Reconstruction, Residuals};
 use crate::data::GridCotangent;
@@ -16,7 +14,7 @@ use crate::isosurface::{Level, local_level};
 use crate::orient::Method;
 use crate::poisson::screened;
 use crate::splat::{SampleCotangent, SortedSamples};
-use crate::{Real, isosurface, neighbors, normals, orient, poisson, splat, vector};
+use crate::{Real, isosurface, neighbors, normals, orient, parallel, poisson, splat, vector};
 pub use scratch::PullbackScratch;
 pub(super) use scratch::Workspace;
 
@@ -294,7 +292,7 @@ impl<T: Real> Reconstruction<T> {
             return;
         }
         let share = T::of(0.5 * by_logarithm / (mean * count as f64));
-        samples.areas.par_iter_mut().for_each(|area| *area += share);
+        parallel::for_each(&mut samples.areas, |_, area| *area += share);
         samples.grid.spacing -= by_logarithm / self.surface_grid().spacing().f64();
     }
 

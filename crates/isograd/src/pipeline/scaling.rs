@@ -1,11 +1,10 @@
 //! The pullback of cotangents of any size. It is linear, so powers of two may be taken out of the cotangents and put back
 //! into the gradients, which changes no bit unless a number leaves the range of its type.
 
-use rayon::prelude::*;
-
 use super::pullback::PullbackScratch;
 use super::{CloudCotangent, Cotangent, ExtensionCotangent, PullbackError, Reconstruction};
 use crate::Real;
+use crate::parallel::{self, CHUNK};
 
 /// Share of the exponents of the number type, on either side of 0, at which cotangents are pulled back as they are. Half of
 /// the rest is for the factors of the stages, half for what is small beside the largest cotangent.
@@ -162,7 +161,7 @@ impl<T: Real> CloudCotangent<T> {
     /// Whether every number is below the largest of its type, which stands for what is larger.
     fn is_representable(&self) -> bool {
         let is = |x: &T| x.abs() < T::max_value();
-        let vectors = |v: &[[T; 3]]| v.as_flattened().par_iter().all(is);
+        let vectors = |v: &[[T; 3]]| parallel::first(v.len(), |i| !v[i].iter().all(is)).is_none();
         let grid = self.grid.lower.iter().chain([&self.grid.spacing]);
         vectors(&self.points)
             && vectors(&self.normals)
@@ -177,9 +176,14 @@ impl<T: Real> CloudCotangent<T> {
             *x = product;
             usize::from(replaced)
         };
-        let vectors =
-            |v: &mut [[T; 3]]| v.as_flattened_mut().par_iter_mut().map(one).sum::<usize>();
-        let [points, normals] = [&mut self.points, &mut self.normals].map(|v| vectors(v));
+        let vectors = |v: &mut Vec<[T; 3]>| -> usize {
+            let chunk =
+                |_, v: &mut [[T; 3]]| v.as_flattened_mut().iter_mut().map(one).sum::<usize>();
+            parallel::map_each(v.chunks_mut(CHUNK), chunk)
+                .into_iter()
+                .sum()
+        };
+        let [points, normals] = [&mut self.points, &mut self.normals].map(vectors);
         let attributes: usize = self.attributes.iter_mut().flatten().map(one).sum();
         let grid = self.grid.lower.iter_mut().chain([&mut self.grid.spacing]);
         points + normals + attributes + grid.map(one).sum::<usize>()
@@ -189,8 +193,10 @@ impl<T: Real> CloudCotangent<T> {
 /// Exponent of 2 of the largest of some numbers; minus infinity where all are 0.
 fn exponent<T: Real>(numbers: &[T]) -> f64 {
     let larger = |a: T, b: T| if b > a { b } else { a };
-    let magnitudes = numbers.par_iter().map(|x| x.abs());
-    magnitudes.reduce(T::zero, larger).f64().log2()
+    let magnitude = |i: usize| numbers[i].abs();
+    parallel::reduce(numbers.len(), T::zero(), magnitude, larger)
+        .f64()
+        .log2()
 }
 
 /// `x · 2^exponent`, or the nearest number of the type, 0 for NaN; and whether it is not the product.

@@ -3,8 +3,6 @@
 
 mod open_ends;
 
-use rayon::prelude::*;
-
 use super::march::{position, split};
 use super::signs::ones;
 use super::tables::{self, TABLE};
@@ -102,8 +100,9 @@ pub(crate) fn forward<T: Real>(
     }
     mesh.edges.resize(vertices, LatticeEdge::new(0, 0));
     let edges = split(&mut mesh.edges, crossings.iter().map(|of| of.vertices));
-    let work = edges.into_par_iter().enumerate();
-    work.for_each(|(block, edges)| find_edges(chi, block, &crossings[block], edges));
+    parallel::each(edges, |block, edges| {
+        find_edges(chi, block, &crossings[block], edges);
+    });
     let edges = &mesh.edges;
     let fractions = parallel::map(edges.len(), |i| place(edges[i]));
     parallel::fill(&mut mesh.vertices, edges.len(), |i| {
@@ -112,9 +111,11 @@ pub(crate) fn forward<T: Real>(
     });
     mesh.faces.resize(faces, [0; 3]);
     let faces = split(&mut mesh.faces, crossings.iter().map(|of| of.faces));
-    let work = faces.into_par_iter().enumerate();
-    let work = work.filter(|(_, faces)| !faces.is_empty());
-    work.for_each(|(block, faces)| fill_faces((chi, level), &crossings, &fractions, block, faces));
+    parallel::each(faces, |block, faces| {
+        if !faces.is_empty() {
+            fill_faces((chi, level), &crossings, &fractions, block, faces);
+        }
+    });
     Ok(Report {
         touches_wall: walls.as_flattened().contains(&true),
         walls,

@@ -1,10 +1,8 @@
 //! Where a surface leaves the blocks of its field.
 
-use rayon::prelude::*;
-
 use super::WIDE;
-use crate::Real;
 use crate::data::blocks::{BlockField, EDGE};
+use crate::{Real, parallel};
 
 /// Absent blocks into which the surface `χ = level` continues.
 pub(crate) fn open_ends<T: Real>(chi: &BlockField<T>, level: T) -> Vec<[usize; 3]> {
@@ -33,8 +31,7 @@ pub(crate) fn open_ends<T: Real>(chi: &BlockField<T>, level: T) -> Vec<[usize; 3
         }
         found
     };
-    let found = (0..blocks.len()).into_par_iter().flat_map_iter(of_block);
-    found.collect()
+    parallel::map(blocks.len(), of_block).concat()
 }
 
 /// Whether cells that touch the neighboring block in the direction `step − 1` are on both sides.

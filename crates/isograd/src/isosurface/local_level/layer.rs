@@ -1,12 +1,10 @@
 //! The layer of cells near the samples, in blocks of 8³: memory in proportion to the surface, not to the grid.
 
-use rayon::prelude::*;
-
 use super::stencil::Stencil;
 pub(super) use crate::data::blocks::{EDGE, NODES, Overlap};
 use crate::data::cells::{Cells, CellsMut};
 use crate::splat::SortedSamples;
-use crate::{Grid, Real};
+use crate::{Grid, Real, parallel};
 
 /// Table entry of a block that no sample is near.
 const NONE: u32 = u32::MAX;
@@ -131,8 +129,8 @@ impl Layer {
             CellsMut::Dense(grid, field) => (*grid, &mut **field),
             CellsMut::Blocks(field) => {
                 let blocks = &field.blocks;
-                let work = field.values.par_chunks_exact_mut(NODES).enumerate();
-                return work.for_each(|(block, cells)| {
+                let work = field.values.chunks_exact_mut(NODES);
+                return parallel::each(work, |block, cells| {
                     let [x, y, z] = blocks.corner(block).map(|c| c / EDGE);
                     let entry = self.table[(x * self.shape[1] + y) * self.shape[2] + z];
                     if entry != NONE {
@@ -144,8 +142,7 @@ impl Layer {
         };
         let shape = grid.shape();
         let [_, ny, nz] = shape;
-        let layers = field.par_chunks_mut(EDGE * ny * nz).enumerate();
-        layers.for_each(|(layer, cells)| {
+        parallel::each(field.chunks_mut(EDGE * ny * nz), |layer, cells| {
             let first = |layer: usize| {
                 let place = layer * self.shape[1] * self.shape[2];
                 self.places.partition_point(|&p| (p as usize) < place)

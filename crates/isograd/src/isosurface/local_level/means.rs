@@ -1,7 +1,6 @@
 //! Means of the offsets at the cells, and their values and slopes back at the samples.
 
 use pulp::Arch;
-use rayon::prelude::*;
 
 use super::Pass;
 use super::gain::Sums;
@@ -73,8 +72,7 @@ impl<'a, T: Real> GridSamples<'a, T> {
     /// Writes `D` and `e` at the cells of the layer for the `(N,)` offsets `s`.
     pub(super) fn average(&self, layer: &Layer, offsets: &[T], means: &mut Vec<CellMean<T>>) {
         means.resize(layer.len() * NODES, CellMean::default());
-        let work = means.par_chunks_exact_mut(NODES).enumerate();
-        work.for_each(|(block, means)| {
+        parallel::each(means.chunks_exact_mut(NODES), |block, means| {
             simd::dispatch(
                 self.arch,
                 #[inline(always)]
@@ -110,8 +108,8 @@ impl<'a, T: Real> GridSamples<'a, T> {
 
     /// Adds `λ e` to `sum`, cell by cell of the layer.
     pub(super) fn accumulate(&self, means: &[CellMean<T>], gain: T, sum: &mut [T]) {
-        let blocks = sum.par_chunks_mut(NODES).zip(means.par_chunks(NODES));
-        blocks.for_each(|(sum, means)| {
+        let blocks = sum.chunks_mut(NODES).zip(means.chunks(NODES));
+        parallel::each(blocks, |_, (sum, means)| {
             simd::dispatch(
                 self.arch,
                 #[inline(always)]
@@ -127,8 +125,7 @@ impl<'a, T: Real> GridSamples<'a, T> {
     /// Runs `f(i, item)` for the item of every sample, compiled for the processor's instruction set.
     #[inline(always)]
     pub(super) fn for_each<E: Send>(&self, items: &mut [E], f: impl Fn(usize, &mut E) + Sync) {
-        let chunks = items.par_chunks_mut(parallel::CHUNK).enumerate();
-        chunks.for_each(|(chunk, items)| {
+        parallel::each(items.chunks_mut(parallel::CHUNK), |chunk, items| {
             simd::dispatch(
                 self.arch,
                 #[inline(always)]

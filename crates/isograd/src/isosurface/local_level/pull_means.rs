@@ -1,13 +1,11 @@
 //! The pullback of the means: from the readings at the samples to the cells, and from the cells to the samples.
 
-use rayon::prelude::*;
-
 use super::Pass;
 use super::layer::{Layer, NODES, Overlap};
 use super::means::{CellMean, GridSamples, Reading, means_of};
 use super::pullback::{PassScratch, SampleBars};
 use super::stencil::{Corners, Stencil};
-use crate::{Real, simd, vector};
+use crate::{Real, parallel, simd, vector};
 
 /// Cotangents at a cell.
 #[derive(Clone, Copy, Debug, Default)]
@@ -69,8 +67,7 @@ impl<T: Real> GridSamples<'_, T> {
             ..
         } = state;
         mean_bars.resize(means.len(), CellBars::default());
-        let work = mean_bars.par_chunks_exact_mut(NODES).enumerate();
-        work.for_each(|(block, bars)| {
+        parallel::each(mean_bars.chunks_exact_mut(NODES), |block, bars| {
             let cells = block * NODES..(block + 1) * NODES;
             let (means, total) = (&means[cells.clone()], &total[cells]);
             simd::dispatch(
@@ -143,8 +140,7 @@ impl<T: Real> GridSamples<'_, T> {
 
     /// Writes `Σ_i ū_i n_i·∇B_o` at the cells of the layer, for the slopes `u` before the first pass.
     pub(super) fn spread_slopes(&self, layer: &Layer, bars: &[SampleBars<T>], cells: &mut [T]) {
-        let work = cells.par_chunks_exact_mut(NODES).enumerate();
-        work.for_each(|(block, cells)| {
+        parallel::each(cells.chunks_exact_mut(NODES), |block, cells| {
             simd::dispatch(
                 self.arch,
                 #[inline(always)]

@@ -1,7 +1,5 @@
 //! The pullback: the passes in reverse, then trust and slopes.
 
-use rayon::prelude::*;
-
 use super::gain::Sums;
 use super::layer::{EDGE, Layer, NODES};
 use super::means::{CellMean, GridSamples, Reading};
@@ -134,8 +132,7 @@ impl<T: Real> PullbackScratch<T> {
         self.total.resize(layer.len() * NODES, T::zero());
         self.corrections.clear();
         self.corrections.resize(self.total.len(), T::zero());
-        let work = self.total.par_chunks_exact_mut(NODES).enumerate();
-        work.for_each(|(block, total)| {
+        parallel::each(self.total.chunks_exact_mut(NODES), |block, total| {
             layer.copy_block(block, chi_bar, total);
             for total in total {
                 *total = -*total;
@@ -185,12 +182,12 @@ impl<T: Real> PullbackScratch<T> {
     /// `λ̄`, without the part through the share of the slope.
     fn gain_bar(&self) -> f64 {
         let (means, readings) = (&self.pass.means, &self.pass.readings);
-        let blocks = means.par_chunks(NODES).zip(self.total.par_chunks(NODES));
-        let of_blocks = blocks.map(|(means, total)| {
+        let blocks = means.chunks(NODES).zip(self.total.chunks(NODES));
+        let of_blocks = parallel::map_each(blocks, |_, (means, total)| {
             let products = means.iter().zip(total);
             products.map(|(n, t)| n.mean.f64() * t.f64()).sum::<f64>()
         });
-        let of_cells: f64 = of_blocks.collect::<Vec<f64>>().iter().sum();
+        let of_cells: f64 = of_blocks.iter().sum();
         let [of_samples] = parallel::sum_array(readings.len(), |i| {
             let (bars, reading) = (self.samples[i], readings[i]);
             [(bars.value * reading.mean + bars.slope * reading.slope).f64()]
@@ -203,15 +200,18 @@ impl<T: Real> PullbackScratch<T> {
         let (gain, readings) = (T::of(pass.gain), &self.pass.readings);
         let [rise, slope, agreement, offset, prediction] = bars.to_array().map(T::of);
         let two = T::of(2.0);
-        let work = self.samples.par_iter_mut().zip(&mut self.pass.reading_bars);
-        work.enumerate().for_each(|(i, (bars, reading_bar))| {
-            let (w, p) = (readings[i].slope, readings[i].prediction);
+        let samples = &self.samples;
+        parallel::for_each(&mut self.pass.reading_bars, |i, reading_bar| {
             let (a, s, u) = (near.area(i), pass.offsets[i], pass.slopes[i]);
             *reading_bar = Reading {
-                mean: -gain * bars.value,
-                slope: a * rise * u - gain * bars.slope,
-                prediction: a * (agreement * s + two * prediction * p),
+                mean: -gain * samples[i].value,
+                slope: a * rise * u - gain * samples[i].slope,
+                prediction: a * (agreement * s + two * prediction * readings[i].prediction),
             };
+        });
+        parallel::for_each(&mut self.samples, |i, bars| {
+            let (w, p) = (readings[i].slope, readings[i].prediction);
+            let (a, s, u) = (near.area(i), pass.offsets[i], pass.slopes[i]);
             bars.slope += a * (rise * w + two * slope * u);
             bars.area += rise * w * u
                 + slope * u * u
@@ -229,8 +229,9 @@ impl<T: Real> PullbackScratch<T> {
         let samples = &self.samples;
         let trust_bars = |i: usize| [samples[i].trust.f64(), samples[i].value.f64()];
         let smoothing_bar = near.pull_trust(residual, trust_bars, &mut self.trust);
-        let samples = self.samples.par_iter_mut().zip(&self.trust);
-        samples.for_each(|(bars, &[slope, area, _])| {
+        let trust = &self.trust;
+        parallel::for_each(&mut self.samples, |i, bars| {
+            let [slope, area, _] = trust[i];
             bars.slope += T::of(slope);
             bars.area += T::of(area);
         });
@@ -271,23 +272,24 @@ impl<T: Real> PullbackScratch<T> {
         grid: &Grid<T>,
         f: impl Fn(usize, &[T]) -> f64 + Sync,
     ) -> f64 {
-        let of_block = |(block, corrections): (usize, &[T])| {
+        let of_block = |block: usize, corrections: &[T]| -> f64 {
             let rows = self.pass.layer.rows(block, grid.shape());
             let rows = rows.zip(corrections.chunks_exact(EDGE));
             let rows = rows.filter_map(|(row, corrections)| Some((row?, corrections)));
             rows.map(|((start, count), corrections)| f(start, &corrections[..count]))
                 .sum()
         };
-        let blocks = self.corrections.par_chunks_exact(NODES).enumerate();
-        blocks.map(of_block).collect::<Vec<f64>>().iter().sum()
+        let blocks = parallel::map_each(self.corrections.chunks_exact(NODES), of_block);
+        blocks.iter().sum()
     }
 }
 
 impl<T: Real> GridSamples<'_, T> {
     /// Adds cotangents in index coordinates and cells² to `out`, in the user's units.
     fn add(&self, samples: &[SampleBars<T>], out: &mut SampleCotangent<T>) {
-        let normals = out.normals.par_iter_mut().zip(samples);
-        normals.for_each(|(bar, bars)| *bar = vector::add(*bar, bars.normal));
+        parallel::for_each(&mut out.normals, |i, bar| {
+            *bar = vector::add(*bar, samples[i].normal);
+        });
         let per_cell = T::one() / self.grid.spacing();
         out.add(self.grid, self.samples, self.in_cells, |i| {
             (vector::scale(samples[i].place, per_cell), samples[i].area)

@@ -1,7 +1,5 @@
 //! Trust and shift of each sample, from the thickness of the body there.
 
-use rayon::prelude::*;
-
 use super::Residual;
 use super::forward::Options;
 use super::means::GridSamples;
@@ -38,12 +36,11 @@ impl<T: Real> GridSamples<'_, T> {
         });
         let step = Step::new(squares, area, options);
         (residual.area, residual.step, residual.total_area) = (options.area, step, area);
-        let trust = remaining.par_iter_mut().zip(slopes).map(|(r, slope)| {
-            let slope = rising(*slope);
-            *r += T::of(step.shift(slope));
-            T::of(step.trust(slope))
+        let slope = |i: usize| rising(slopes[i]);
+        parallel::for_each(remaining, |i, r| *r += T::of(step.shift(slope(i))));
+        parallel::fill(&mut residual.trust, slopes.len(), |i| {
+            T::of(step.trust(slope(i)))
         });
-        trust.collect_into_vec(&mut residual.trust);
     }
 
     /// Derivatives at sample `i` of the B-spline of `chi`, plus a correction on the 3³ cells from a corner on.

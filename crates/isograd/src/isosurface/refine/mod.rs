@@ -25,10 +25,8 @@ mod pullback;
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use crate::data::blocks::{BlockField, EDGE, Marks, NODES};
-use crate::{Field, Grid, GridError, LatticeEdge, Real};
+use crate::{Field, Grid, GridError, LatticeEdge, Real, parallel};
 pub(crate) use pullback::pullback;
 
 /// Cells of the indicator along each side of a block.
@@ -70,8 +68,7 @@ pub(crate) fn forward<T: Real>(
         blocks: blocks.clone(),
         values,
     };
-    let work = refined.values.par_chunks_exact_mut(NODES).enumerate();
-    work.for_each(|(block, out)| {
+    parallel::each(refined.values.chunks_exact_mut(NODES), |block, out| {
         let mut halo = [T::zero(); WIDE * WIDE * WIDE];
         for_each_cell(chi.grid(), blocks.corner(block), |place, cell| {
             halo[place] = chi.values()[cell];
@@ -94,19 +91,19 @@ fn crossed<T: Real>(chi: &Field<T>, level: T) -> Vec<[usize; 3]> {
     let [bx, by, bz] = [nx, ny, nz].map(|n| n.div_ceil(OWN));
     // Bit 0: a cell is outside; bit 1: a cell is inside.
     let mut sides = vec![0u8; bx * by * bz];
-    let slabs = sides.par_chunks_mut(by * bz);
-    slabs
-        .zip(chi.values().par_chunks(OWN * ny * nz))
-        .for_each(|(sides, values)| {
-            for (row, values) in values.chunks_exact(nz).enumerate() {
-                let first = row % ny / OWN * bz;
-                for (k, &value) in values.iter().enumerate() {
-                    sides[first + k / OWN] |= 1 << u8::from(value < level);
-                }
+    let slabs = sides.chunks_mut(by * bz);
+    let slabs = slabs.zip(chi.values().chunks(OWN * ny * nz));
+    parallel::each(slabs, |_, (sides, values)| {
+        for (row, values) in values.chunks_exact(nz).enumerate() {
+            let first = row % ny / OWN * bz;
+            for (k, &value) in values.iter().enumerate() {
+                sides[first + k / OWN] |= 1 << u8::from(value < level);
             }
-        });
+        }
+    });
     let near = |b: usize, n: usize| b.saturating_sub(1)..(b + 2).min(n);
-    let is_crossed = |&[x, y, z]: &[usize; 3]| {
+    let crossed = |n: usize| {
+        let [x, y, z] = [n / (by * bz), n / bz % by, n % bz];
         let mut both = 0;
         for i in near(x, bx) {
             for j in near(y, by) {
@@ -115,11 +112,9 @@ fn crossed<T: Real>(chi: &Field<T>, level: T) -> Vec<[usize; 3]> {
                 }
             }
         }
-        both == 3
+        (both == 3).then_some([x, y, z])
     };
-    let places = (0..sides.len()).into_par_iter();
-    let places = places.map(|n| [n / (by * bz), n / bz % by, n % bz]);
-    places.filter(is_crossed).collect()
+    parallel::filter_map(sides.len(), crossed)
 }
 
 /// The cells of the indicator of a block's halo, by place there and place in memory, reflected at the walls.

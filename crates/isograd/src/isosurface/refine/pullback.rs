@@ -1,7 +1,5 @@
 //! Cotangents of the vertices to cotangents of the indicator, the level and the grid.
 
-use rayon::prelude::*;
-
 use super::edge::{Edge, Pull};
 use crate::gather::Buckets;
 use crate::isosurface::pullback::{LevelCotangent, SMALLEST_DIFFERENCE, range};
@@ -37,8 +35,7 @@ pub(crate) fn pullback<T: Real>(
         let [low, high] = vertices.planes(vertex).map(|plane| (plane / SLAB) as u32);
         low..=high
     });
-    let work = chi_bar.par_chunks_mut(SLAB * plane).enumerate();
-    work.for_each(|(slab, out)| {
+    parallel::each(chi_bar.chunks_mut(SLAB * plane), |slab, out| {
         let first = slab * SLAB * plane;
         let mut add = |cell: usize, part: f64| {
             if let Some(value) = cell.checked_sub(first).and_then(|at| out.get_mut(at)) {
