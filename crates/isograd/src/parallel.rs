@@ -99,6 +99,11 @@ pub(crate) fn fill<T: Clone + Default + Send>(
     for_each(out, |i, item| *item = f(i));
 }
 
+/// [`fill`] for large items, which are written once and need no default. Compiled once for each `T`.
+pub(crate) fn fill_large<T: Send>(out: &mut Vec<T>, n: usize, f: &(dyn Fn(usize) -> T + Sync)) {
+    (0..n).into_par_iter().map(f).collect_into_vec(out);
+}
+
 /// Calls `f` with the index of each item, and the item.
 pub(crate) fn for_each<T: Send>(items: &mut [T], f: impl Fn(usize, &mut T) + Sync) {
     let size = piece(items.len());

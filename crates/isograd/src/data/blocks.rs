@@ -2,11 +2,9 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use super::grid::Grid;
-use crate::Real;
 use crate::gather::Buckets;
+use crate::{Real, parallel};
 
 /// Cells along each side of a block.
 pub(crate) const EDGE: usize = 8;
@@ -254,14 +252,13 @@ impl Blocks {
             values = rest;
             (brick, own)
         });
-        let work: Vec<(&Brick, &mut [T])> = work.collect();
-        work.into_par_iter().for_each(|(brick, own)| f(brick, own));
+        parallel::each(work, |_, (brick, own)| f(brick, own));
     }
 
     /// Copies the values into a field of the whole grid in C order.
     pub(crate) fn write_dense<T: Real>(&self, values: &[T], field: &mut [T]) {
         let [_, ny, nz] = self.cells;
-        field.par_chunks_mut(nz).enumerate().for_each(|(row, out)| {
+        parallel::each(field.chunks_mut(nz), |row, out| {
             for (k, out) in out.chunks_mut(EDGE).enumerate() {
                 let count = out.len();
                 match self.place([row / ny, row % ny, k * EDGE]) {
@@ -275,8 +272,7 @@ impl Blocks {
     /// Copies from a field of the whole grid; nodes beyond it become 0.
     pub(crate) fn read_dense<T: Real>(&self, field: &[T], values: &mut [T]) {
         let [nx, ny, nz] = self.cells;
-        let work = values.par_chunks_exact_mut(NODES).enumerate();
-        work.for_each(|(block, values)| {
+        parallel::each(values.chunks_exact_mut(NODES), |block, values| {
             let [x, y, z] = self.corner(block);
             for (row, out) in values.chunks_exact_mut(EDGE).enumerate() {
                 let (i, j) = (x + row / EDGE, y + row % EDGE);
@@ -313,8 +309,9 @@ impl Blocks {
                 grid.filter_map(|place| self.at(place).map(|block| block as u32))
             })
         });
-        let work = values.par_chunks_exact_mut(NODES).enumerate();
-        work.for_each(|(block, values)| f(block, values, buckets.of(block)));
+        parallel::each(values.chunks_exact_mut(NODES), |block, values| {
+            f(block, values, buckets.of(block));
+        });
     }
 }
 

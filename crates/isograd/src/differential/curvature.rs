@@ -1,12 +1,11 @@
 //! Mean curvature at every cell.
 
 use pulp::Arch;
-use rayon::prelude::*;
 
 use super::mean_curvature as element;
 use super::rows::{self, Order, Rows, Stencil};
-use crate::Real;
 use crate::data::Field;
+use crate::{Real, parallel};
 
 /// How curvature is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,19 +47,17 @@ pub fn mean_curvature<T: Real>(
     let [_, ny, nz] = rows.shape;
     let per_length = phi.grid().spacing().recip();
     out.resize(phi.values().len(), T::zero());
-    out.par_chunks_exact_mut(ny * nz)
-        .enumerate()
-        .for_each(|(i, plane)| {
-            let mut buffers = Buffers::new(nz);
-            crate::simd::vectorized!(Arch::new(), {
-                for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
-                    buffers.fill(&rows, [i, j]);
-                    for k in 0..nz {
-                        out[k] = per_length * curvature(buffers.gradient(k), buffers.hessian(k));
-                    }
+    parallel::each(out.chunks_exact_mut(ny * nz), |i, plane| {
+        let mut buffers = Buffers::new(nz);
+        crate::simd::vectorized!(Arch::new(), {
+            for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
+                buffers.fill(&rows, [i, j]);
+                for k in 0..nz {
+                    out[k] = per_length * curvature(buffers.gradient(k), buffers.hessian(k));
                 }
-            });
+            }
         });
+    });
 }
 
 /// `div(g/|g|)` from the gradient and the Hessian `[xx, yy, zz, xy, xz, yz]`, within ±2 (a sphere of radius
@@ -143,26 +140,24 @@ pub(super) fn smooth<T: Real>(phi: &Field<T>, passes: usize, scratch: &mut Scrat
 fn sweep<T: Real>(values: &[T], out: &mut [T], shape: [usize; 3], axis: usize) {
     let quarter = T::of(0.25);
     let [_, ny, nz] = shape;
-    out.par_chunks_exact_mut(ny * nz)
-        .enumerate()
-        .for_each(|(i, plane)| {
-            crate::simd::vectorized!(Arch::new(), {
-                for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
-                    let row = |i: usize, j: usize| &values[(i * ny + j) * nz..][..nz];
-                    let own = row(i, j);
-                    if axis == 2 {
-                        rows::along(Order::Second, own, quarter, out);
-                    } else {
-                        let at = [i, j][axis];
-                        let stencil = Stencil::new(Order::Second, shape[axis], at);
-                        let beside = |p: usize| if axis == 0 { row(p, j) } else { row(i, p) };
-                        let weight = stencil.weight.map(|w: T| w * quarter);
-                        rows::combine(own, stencil.at.map(beside), weight, out);
-                    }
-                    for k in 0..nz {
-                        out[k] += own[k];
-                    }
+    parallel::each(out.chunks_exact_mut(ny * nz), |i, plane| {
+        crate::simd::vectorized!(Arch::new(), {
+            for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
+                let row = |i: usize, j: usize| &values[(i * ny + j) * nz..][..nz];
+                let own = row(i, j);
+                if axis == 2 {
+                    rows::along(Order::Second, own, quarter, out);
+                } else {
+                    let at = [i, j][axis];
+                    let stencil = Stencil::new(Order::Second, shape[axis], at);
+                    let beside = |p: usize| if axis == 0 { row(p, j) } else { row(i, p) };
+                    let weight = stencil.weight.map(|w: T| w * quarter);
+                    rows::combine(own, stencil.at.map(beside), weight, out);
                 }
-            });
+                for k in 0..nz {
+                    out[k] += own[k];
+                }
+            }
         });
+    });
 }

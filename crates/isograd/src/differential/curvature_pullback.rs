@@ -1,7 +1,6 @@
 //! The pullback of the mean curvature.
 
 use pulp::Arch;
-use rayon::prelude::*;
 
 use super::columns::{Column, Strided, add_across, add_along, same};
 use super::curvature::{Buffers, smooth};
@@ -10,7 +9,7 @@ use super::pullback::{PullbackScratch, add_finite, check_cells};
 use super::rows::{self, Order, Rows};
 use super::{Error, Options};
 use crate::data::Field;
-use crate::{Real, vector};
+use crate::{Real, parallel, vector};
 
 /// Adds the cotangent of `φ` for that of its [`mean_curvature`](super::mean_curvature) with the same options:
 /// `bar` and `phi_bar` are `(cells,)`, in memory order. Smoothing and the one-sided differences at the walls are
@@ -51,12 +50,9 @@ pub fn mean_curvature_pullback<T: Real>(
         std::mem::swap(rest, &mut smoothing.other);
     }
     let row = shape[2];
-    let out_of_range: usize = phi_bar
-        .par_chunks_exact_mut(row)
-        .zip(rest.par_chunks_exact(row))
-        .map(|(out, rest)| add_finite(rest, per_length, out))
-        .sum();
-    Ok(guarded + out_of_range)
+    let rows = phi_bar.chunks_exact_mut(row).zip(rest.chunks_exact(row));
+    let out_of_range = parallel::map_each(rows, |_, (out, rest)| add_finite(rest, per_length, out));
+    Ok(guarded + out_of_range.into_iter().sum::<usize>())
 }
 
 /// Cotangents of the gradient and of the Hessian `[xx, yy, zz, xy, xz, yz]` for that of
@@ -189,66 +185,63 @@ fn within_planes<T: Real>(
         // Every place is written below.
         out.resize(bar.len(), T::zero());
     }
-    once.par_chunks_exact_mut(ny * nz)
-        .zip(twice.par_chunks_exact_mut(ny * nz))
-        .zip(rest.par_chunks_exact_mut(ny * nz))
-        .zip(bar.par_chunks_exact(ny * nz))
-        .enumerate()
-        .map_init(
-            || Plane::new(rows.shape),
-            |plane, (i, (((once, twice), rest), bar))| {
-                let mut guarded = 0;
-                crate::simd::vectorized!(Arch::new(), {
-                    for j in 0..ny {
-                        let own = j * nz..(j + 1) * nz;
-                        let bar = &bar[own.clone()];
-                        guarded += plane.fill_row(rows, [i, j], per_length, bar);
-                        let (once, twice) = (&mut once[own.clone()], &mut twice[own.clone()]);
-                        plane.spread_row(j, [once, twice, &mut rest[own]]);
-                    }
-                    for j in 0..ny {
-                        let own = j * nz..(j + 1) * nz;
-                        plane.add_row(ny, j, &mut once[own.clone()], &mut rest[own]);
-                    }
-                });
-                guarded
-            },
-        )
-        .sum()
+    let planes = once
+        .chunks_exact_mut(ny * nz)
+        .zip(twice.chunks_exact_mut(ny * nz))
+        .zip(rest.chunks_exact_mut(ny * nz))
+        .zip(bar.chunks_exact(ny * nz));
+    let guarded = parallel::map_each_with(
+        || Plane::new(rows.shape),
+        planes,
+        |plane, i, (((once, twice), rest), bar)| {
+            let mut guarded = 0;
+            crate::simd::vectorized!(Arch::new(), {
+                for j in 0..ny {
+                    let own = j * nz..(j + 1) * nz;
+                    let bar = &bar[own.clone()];
+                    guarded += plane.fill_row(rows, [i, j], per_length, bar);
+                    let (once, twice) = (&mut once[own.clone()], &mut twice[own.clone()]);
+                    plane.spread_row(j, [once, twice, &mut rest[own]]);
+                }
+                for j in 0..ny {
+                    let own = j * nz..(j + 1) * nz;
+                    plane.add_row(ny, j, &mut once[own.clone()], &mut rest[own]);
+                }
+            });
+            guarded
+        },
+    );
+    guarded.into_iter().sum()
 }
 
 /// Adds the transposed differences along x to the rest.
 fn across_planes<T: Real>([nx, ny, nz]: [usize; 3], once: &[T], twice: &[T], rest: &mut [T]) {
     let plane = ny * nz;
-    rest.par_chunks_exact_mut(plane)
-        .enumerate()
-        .for_each(|(i, rest)| {
-            crate::simd::vectorized!(Arch::new(), {
-                for (order, from) in [(Order::First, once), (Order::Second, twice)] {
-                    let column = Column::new(order, nx, i);
-                    let rows = Strided {
-                        values: from,
-                        start: 0,
-                        stride: plane,
-                    };
-                    add_across(&column, T::one(), rows, same, rest);
-                }
-            });
+    parallel::each(rest.chunks_exact_mut(plane), |i, rest| {
+        crate::simd::vectorized!(Arch::new(), {
+            for (order, from) in [(Order::First, once), (Order::Second, twice)] {
+                let column = Column::new(order, nx, i);
+                let rows = Strided {
+                    values: from,
+                    start: 0,
+                    stride: plane,
+                };
+                add_across(&column, T::one(), rows, same, rest);
+            }
         });
+    });
 }
 
 /// The transpose of one pass of smoothing along one axis.
 fn sweep_back<T: Real>(values: &[T], out: &mut [T], shape: [usize; 3], axis: usize) {
     let [_, ny, nz] = shape;
-    out.par_chunks_exact_mut(ny * nz)
-        .enumerate()
-        .for_each(|(i, plane)| {
-            crate::simd::vectorized!(Arch::new(), {
-                for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
-                    sweep_row(values, shape, axis, [i, j], out);
-                }
-            });
+    parallel::each(out.chunks_exact_mut(ny * nz), |i, plane| {
+        crate::simd::vectorized!(Arch::new(), {
+            for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
+                sweep_row(values, shape, axis, [i, j], out);
+            }
         });
+    });
 }
 
 #[inline(always)]

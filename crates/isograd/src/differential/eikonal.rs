@@ -1,11 +1,10 @@
 //! How close `|∇φ|` is to 1, its value for a distance.
 
 use pulp::Arch;
-use rayon::prelude::*;
 
 use super::rows::{self, Rows};
-use crate::Real;
 use crate::data::Field;
+use crate::{Real, parallel};
 
 /// Equal bins from `lower` to `upper`. What lies beyond an end is counted in the bin at that end.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -164,7 +163,7 @@ impl Moments {
 
 /// Of all cells and of those near the surface. Planes are added up in their order.
 fn moments<T: Real>(phi: &Field<T>, near: f64, bins: &Bins) -> [Moments; 2] {
-    let planes = (0..phi.grid().shape()[0]).into_par_iter().map(|i| {
+    let planes = parallel::map_each(0..phi.grid().shape()[0], |_, i| {
         let mut groups = [Moments::new(bins), Moments::new(bins)];
         for_each_in_plane(phi, i, near, |m, is_near| {
             groups[0].count(m.f64(), bins);
@@ -175,12 +174,15 @@ fn moments<T: Real>(phi: &Field<T>, near: f64, bins: &Bins) -> [Moments; 2] {
         groups
     });
     let mut total = [Moments::new(bins), Moments::new(bins)];
-    for plane in planes.collect::<Vec<_>>() {
+    for plane in planes {
         total[0].add(&plane[0]);
         total[1].add(&plane[1]);
     }
     total
 }
+
+/// Planes whose digits are counted together.
+const SLAB: usize = 8;
 
 /// Bits of a key that one pass looks at.
 const DIGIT: u32 = 11;
@@ -239,26 +241,28 @@ fn count_digits<T: Real>(
     targets: &[[Target; 2]; 2],
     shift: u32,
 ) -> Vec<u64> {
-    let none = || vec![0u64; 4 << DIGIT];
-    let plane = |mut counts: Vec<u64>, i: usize| {
-        for_each_in_plane(phi, i, near, |m, is_near| {
-            let key = (m.f64() as f32).to_bits();
-            let digit = (key >> shift) as usize & ((1 << DIGIT) - 1);
-            for (group, targets) in targets.iter().enumerate().take(1 + usize::from(is_near)) {
-                for (t, target) in targets.iter().enumerate() {
-                    let place = (2 * group + t) << DIGIT | digit;
-                    counts[place] += u64::from(target.matches(key, shift));
+    let planes = phi.grid().shape()[0];
+    let slabs = parallel::map_each((0..planes).step_by(SLAB), |_, first| {
+        let mut counts = vec![0u64; 4 << DIGIT];
+        for i in first..planes.min(first + SLAB) {
+            for_each_in_plane(phi, i, near, |m, is_near| {
+                let key = (m.f64() as f32).to_bits();
+                let digit = (key >> shift) as usize & ((1 << DIGIT) - 1);
+                for (group, targets) in targets.iter().enumerate().take(1 + usize::from(is_near)) {
+                    for (t, target) in targets.iter().enumerate() {
+                        let place = (2 * group + t) << DIGIT | digit;
+                        counts[place] += u64::from(target.matches(key, shift));
+                    }
                 }
-            }
-        });
+            });
+        }
         counts
-    };
-    // Whole numbers: the order in which threads add them up does not matter.
-    let planes = (0..phi.grid().shape()[0]).into_par_iter().fold(none, plane);
-    planes.reduce(none, |mut a, b| {
-        a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
-        a
-    })
+    });
+    let mut total = vec![0; 4 << DIGIT];
+    for counts in slabs {
+        total.iter_mut().zip(counts).for_each(|(a, b)| *a += b);
+    }
+    total
 }
 
 #[cfg(test)]

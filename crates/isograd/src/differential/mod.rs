@@ -69,10 +69,9 @@ pub use pullback::{PullbackScratch, gradient_pullback, unit_normals_pullback};
 pub use sample::{Error, Local};
 
 use pulp::Arch;
-use rayon::prelude::*;
 
 use crate::data::{Field, Grid};
-use crate::{Real, vector};
+use crate::{Real, parallel, vector};
 use rows::Rows;
 
 /// `∇φ` at every cell, per unit length, in memory order. Overwrites `out`, reusing its memory.
@@ -99,19 +98,17 @@ fn for_each_gradient<T: Real>(
     let rows = Rows::of(phi);
     let [_, ny, nz] = rows.shape;
     out.resize(phi.values().len(), [T::zero(); 3]);
-    out.par_chunks_exact_mut(ny * nz)
-        .enumerate()
-        .for_each(|(i, plane)| {
-            let mut g = rows::buffers::<T, 3>(nz);
-            crate::simd::vectorized!(Arch::new(), {
-                for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
-                    rows.gradient([i, j], &mut g);
-                    for k in 0..nz {
-                        out[k] = map([g[0][k], g[1][k], g[2][k]]);
-                    }
+    parallel::each(out.chunks_exact_mut(ny * nz), |i, plane| {
+        let mut g = rows::buffers::<T, 3>(nz);
+        crate::simd::vectorized!(Arch::new(), {
+            for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
+                rows.gradient([i, j], &mut g);
+                for k in 0..nz {
+                    out[k] = map([g[0][k], g[1][k], g[2][k]]);
                 }
-            });
+            }
         });
+    });
 }
 
 /// Gradient and mean curvature at every cell, to be interpolated at any point, such as in each time step of a flow

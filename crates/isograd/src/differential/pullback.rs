@@ -1,7 +1,6 @@
 //! The pullbacks of gradient and unit normal.
 
 use pulp::Arch;
-use rayon::prelude::*;
 
 use super::columns::{Column, Strided, add_across, add_along, component};
 use super::rows::{self, Order, Rows};
@@ -9,7 +8,7 @@ use super::sample_pullback::PointBars;
 use super::{Error, Scratch};
 use crate::data::{Field, Grid};
 use crate::gather::Buckets;
-use crate::{Real, vector};
+use crate::{Real, parallel, vector};
 
 /// Scratch buffers of the pullbacks reused between calls: up to nine values per cell.
 #[derive(Debug, Default)]
@@ -64,25 +63,23 @@ pub fn unit_normals_pullback<T: Real>(
     let [_, ny, nz] = rows.shape;
     let gradient_bar = &mut scratch.gradient;
     gradient_bar.resize(bar.len(), [T::zero(); 3]);
-    let guarded: usize = gradient_bar
-        .par_chunks_exact_mut(ny * nz)
-        .zip(bar.par_chunks_exact(ny * nz))
-        .enumerate()
-        .map(|(i, (out, bar))| {
-            let mut g = rows::buffers::<T, 3>(nz);
-            let mut guarded = 0;
-            for j in 0..ny {
-                rows.gradient([i, j], &mut g);
-                for k in 0..nz {
-                    let at = j * nz + k;
-                    let own = unit_pullback([g[0][k], g[1][k], g[2][k]], bar[at]);
-                    guarded += usize::from(own.is_none());
-                    out[at] = own.unwrap_or([T::zero(); 3]);
-                }
+    let planes = gradient_bar.chunks_exact_mut(ny * nz);
+    let planes = planes.zip(bar.chunks_exact(ny * nz));
+    let guarded = parallel::map_each(planes, |i, (out, bar)| {
+        let mut g = rows::buffers::<T, 3>(nz);
+        let mut guarded = 0;
+        for j in 0..ny {
+            rows.gradient([i, j], &mut g);
+            for k in 0..nz {
+                let at = j * nz + k;
+                let own = unit_pullback([g[0][k], g[1][k], g[2][k]], bar[at]);
+                guarded += usize::from(own.is_none());
+                out[at] = own.unwrap_or([T::zero(); 3]);
             }
-            guarded
-        })
-        .sum();
+        }
+        guarded
+    });
+    let guarded: usize = guarded.into_iter().sum();
     Ok(guarded + add_gradient(phi.grid(), gradient_bar, phi_bar))
 }
 
@@ -102,24 +99,18 @@ pub(super) fn unit_pullback<T: Real>(g: [T; 3], bar: [T; 3]) -> Option<[T; 3]> {
 /// Adds `Σ_a D_aᵀ ḡ_a`. Returns how many numbers were out of range, and left out.
 pub(super) fn add_gradient<T: Real>(grid: &Grid<T>, bar: &[[T; 3]], phi_bar: &mut [T]) -> usize {
     let [_, ny, nz] = grid.shape();
-    phi_bar
-        .par_chunks_exact_mut(ny * nz)
-        .enumerate()
-        .map_init(
-            || vec![T::zero(); nz],
-            |sum, (i, plane)| {
-                let mut guarded = 0;
-                crate::simd::vectorized!(Arch::new(), {
-                    for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
-                        sum.fill(T::zero());
-                        add_row(grid, bar, [i, j], sum);
-                        guarded += add_finite(sum, grid.spacing().recip(), out);
-                    }
-                });
-                guarded
-            },
-        )
-        .sum()
+    let guarded = parallel::map_each(phi_bar.chunks_exact_mut(ny * nz), |i, plane| {
+        let (mut sum, mut guarded) = (vec![T::zero(); nz], 0);
+        crate::simd::vectorized!(Arch::new(), {
+            for (j, out) in plane.chunks_exact_mut(nz).enumerate() {
+                sum.fill(T::zero());
+                add_row(grid, bar, [i, j], &mut sum);
+                guarded += add_finite(&sum, grid.spacing().recip(), out);
+            }
+        });
+        guarded
+    });
+    guarded.into_iter().sum()
 }
 
 /// `h Σ_a D_aᵀ ḡ_a` on one row.

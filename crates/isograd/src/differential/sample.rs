@@ -1,10 +1,8 @@
 //! The quantities at arbitrary points.
 
-use rayon::prelude::*;
-
 use super::{Differential, unit};
 use crate::data::Grid;
-use crate::{Real, vector};
+use crate::{Real, parallel, vector};
 
 /// Differential quantities of `φ` at a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -72,10 +70,9 @@ impl<T: Real> Differential<T> {
     pub fn at_points(&self, points: &[[T; 3]], out: &mut Vec<Local<T>>) -> Result<(), Error> {
         out.clear();
         check_points(&self.grid, points)?;
-        points
-            .par_iter()
-            .map(|&p| self.at(p).unwrap_or_default())
-            .collect_into_vec(out);
+        parallel::fill(out, points.len(), |i| {
+            self.at(points[i]).unwrap_or_default()
+        });
         Ok(())
     }
 }

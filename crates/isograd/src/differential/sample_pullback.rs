@@ -1,14 +1,12 @@
 //! The pullback of the quantities at arbitrary points.
 
-use rayon::prelude::*;
-
 use super::pullback::{PullbackScratch, add_gradient, check, check_cells, unit_pullback};
 use super::sample::{Local, Place, check_points};
 use super::{Differential, Error, mean_curvature_pullback};
-use crate::Real;
 use crate::data::Field;
 use crate::gather::{add_to, bounded};
 use crate::vector::{add, dot, scale, to_f64};
+use crate::{Real, parallel};
 
 /// Cotangents of the interpolated gradient and curvature at a point.
 #[derive(Clone, Copy, Debug)]
@@ -50,13 +48,11 @@ impl<T: Real> Differential<T> {
         if phi.grid() != &self.grid {
             return Err(Error::Grid);
         }
-        let pulled = points
-            .par_iter()
-            .zip(bar)
-            .map(|(&p, bar)| self.pull(p, bar));
-        pulled.collect_into_vec(&mut scratch.at_points);
+        parallel::fill_large(&mut scratch.at_points, points.len(), &|i| {
+            self.pull(points[i], &bar[i])
+        });
         let at_points = &scratch.at_points;
-        let mut guarded = at_points.par_iter().filter(|at| at.guarded).count();
+        let mut guarded = parallel::count(at_points.len(), |i| at_points[i].guarded);
         points_bar.resize(points.len(), [T::zero(); 3]);
         guarded += add_to(points_bar, |i| self.slope(points[i], at_points[i].bar));
         guarded += self.spread(points, scratch);
@@ -113,11 +109,10 @@ impl<T: Real> Differential<T> {
         let (at_points, between) = (&*at_points, &*between);
         gradient.resize(self.grid.cells(), [T::zero(); 3]);
         curvature.resize(self.grid.cells(), T::zero());
-        gradient
-            .par_chunks_exact_mut(ny * nz)
-            .zip(curvature.par_chunks_exact_mut(ny * nz))
-            .enumerate()
-            .map_init(Vec::new, |sums, (i, (gradient, curvature))| {
+        let gradients = gradient.chunks_exact_mut(ny * nz);
+        let planes = gradients.zip(curvature.chunks_exact_mut(ny * nz));
+        let guarded =
+            parallel::map_each_with(Vec::new, planes, |sums, i, (gradient, curvature)| {
                 sums.clear();
                 sums.resize(ny * nz, [0.0; 4]);
                 for (side, base) in [(1, i.checked_sub(1)), (0, Some(i))] {
@@ -132,8 +127,8 @@ impl<T: Real> Differential<T> {
                     (gradient[k], curvature[k]) = ([x, y, z], c);
                 }
                 guarded
-            })
-            .sum()
+            });
+        guarded.into_iter().sum()
     }
 }
 

@@ -14,12 +14,10 @@
 //! Where the closest point passes to another face; a direction in which a face is much thinner than the distance is
 //! left out, as in [`pull_hits`](super::pull_hits).
 
-use rayon::prelude::*;
-
 use super::query::Hit;
 use super::query_pullback::{check, corners_of};
 use super::{Distance, Error, NO_TRIANGLE};
-use crate::{Mesh, Real};
+use crate::{Mesh, Real, parallel};
 
 /// Values at the vertices of a mesh.
 #[derive(Clone, Copy, Debug)]
@@ -69,16 +67,11 @@ impl<T: Real> VertexValues<'_, T> {
     pub(super) fn at_hits(&self, hits: &[Hit<T>]) -> Result<Vec<T>, Error> {
         let corners = self.corners(hits)?;
         let mut out = vec![T::zero(); hits.len() * self.components];
-        if self.components == 0 {
-            return Ok(out);
-        }
-        let rows = out.par_chunks_exact_mut(self.components).zip(hits);
-        rows.zip(&corners).for_each(|((row, hit), corners)| {
-            if hit.triangle == NO_TRIANGLE {
-                return;
-            }
-            for (c, value) in row.iter_mut().enumerate() {
-                let corner = |k: usize| hit.barycentric[k].f64() * self.value(corners[k], c);
+        parallel::for_each(&mut out, |place, value| {
+            let (i, c) = (place / self.components, place % self.components);
+            if hits[i].triangle != NO_TRIANGLE {
+                let beta = hits[i].barycentric;
+                let corner = |k: usize| beta[k].f64() * self.value(corners[i][k], c);
                 *value = T::of(corner(0) + corner(1) + corner(2));
             }
         });

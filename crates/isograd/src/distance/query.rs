@@ -1,7 +1,7 @@
 //! Distance at any point.
 
 use pulp::{Arch, Simd, WithSimd};
-use rayon::prelude::*;
+use rayon::slice::ParallelSliceMut;
 
 use super::bvh::{Bvh, LANES, NOWHERE, NearestTriangles, Points, Stack, corners, morton_code};
 use super::lattice::NO_TRIANGLE;
@@ -143,18 +143,17 @@ pub(super) fn nearest_triangles<T: Real>(
     let order = morton_order(bvh, points, &is_near);
     let arch = Arch::new();
     let mut sorted = vec![NOWHERE; order.len()];
-    sorted
-        .par_chunks_mut(PACKETS_PER_TASK * LANES)
-        .zip(order.par_chunks(PACKETS_PER_TASK * LANES))
-        .for_each(|(found, order)| {
-            arch.dispatch(Packets {
-                bvh,
-                points,
-                order,
-                limit,
-                found,
-            });
+    let tasks = sorted.chunks_mut(PACKETS_PER_TASK * LANES);
+    let tasks = tasks.zip(order.chunks(PACKETS_PER_TASK * LANES));
+    parallel::each(tasks, |_, (found, order)| {
+        arch.dispatch(Packets {
+            bvh,
+            points,
+            order,
+            limit,
+            found,
         });
+    });
     let mut nearest = vec![NOWHERE; points.len()];
     for (&(_, index), place) in order.iter().zip(sorted) {
         nearest[index as usize] = place;
@@ -168,12 +167,10 @@ pub(super) fn morton_order<T: Real>(
     points: &[[T; 3]],
     is_wanted: &(dyn Fn(usize) -> bool + Sync),
 ) -> Vec<(u64, u32)> {
-    let mut order: Vec<(u64, u32)> = points
-        .par_iter()
-        .enumerate()
-        .filter(|&(index, _)| is_wanted(index))
-        .map(|(index, &p)| (morton_code(bvh.to_morton(to_f64(p))), index as u32))
-        .collect();
+    let mut order = parallel::filter_map(points.len(), |i| {
+        let code = || morton_code(bvh.to_morton(to_f64(points[i])));
+        is_wanted(i).then(|| (code(), i as u32))
+    });
     order.par_sort_unstable();
     order
 }
@@ -199,18 +196,18 @@ impl<T: Real> Surface<'_, T> {
             _ => f64::INFINITY,
         };
         let nearest = nearest_triangles(self.bvh, points, &limit);
-        let all = points.par_iter().zip(nearest).enumerate();
-        all.map(|(i, (&point, place))| {
-            if place == NOWHERE && limit(i) < f64::INFINITY {
-                return Hit::beyond(point, within);
+        let mut hits = Vec::new();
+        parallel::fill_large(&mut hits, points.len(), &|i| {
+            if nearest[i] == NOWHERE && limit(i) < f64::INFINITY {
+                return Hit::beyond(points[i], within);
             }
-            let hit = self.hit(point, place, sides[i]);
+            let hit = self.hit(points[i], nearest[i], sides[i]);
             match hit.distance.f64() > within {
-                true => Hit::beyond(point, within),
+                true => Hit::beyond(points[i], within),
                 false => hit,
             }
-        })
-        .collect()
+        });
+        hits
     }
 
     /// Result of a query whose closest triangle is at `place` of the tree.

@@ -1,7 +1,5 @@
 //! The pullback of a query: cotangents of distances, closest points and values there → points, vertices and their values.
 
-use rayon::prelude::*;
-
 use super::interpolate::{Bars, Cotangent, VertexValues};
 use super::query::{Hit, Query};
 use super::tangent::tangent;
@@ -123,7 +121,7 @@ impl<T: Real> VertexValues<'_, T> {
             self.share(points[i], &hits[i], corners[k], bars.of(i, self.components))
         };
         let shares: Vec<Share> = parallel::map(found.len(), share);
-        let guarded = shares.par_iter().filter(|share| share.guarded).count();
+        let guarded = parallel::count(shares.len(), |k| shares[k].guarded);
 
         let vertices = self.mesh.vertices().len();
         let mut hits_of = Buckets::default();
@@ -143,17 +141,15 @@ impl<T: Real> VertexValues<'_, T> {
         let Some(values) = bars.values else {
             return Ok(guarded + bounded);
         };
-        let rows = out.values.par_chunks_exact_mut(self.components.max(1));
-        rows.enumerate().for_each(|(vertex, sums)| {
-            for (c, sum) in sums.iter_mut().enumerate() {
-                let mut total = sum.f64();
-                hits_of.for_each_corner(&corners, vertex, |k, corner| {
-                    let i = found[k] as usize;
-                    let bar = values[i * self.components + c].f64();
-                    total += hits[i].barycentric[corner].f64() * bar;
-                });
-                *sum = T::of(total);
-            }
+        parallel::for_each(&mut out.values, |place, sum| {
+            let (vertex, c) = (place / self.components, place % self.components);
+            let mut total = sum.f64();
+            hits_of.for_each_corner(&corners, vertex, |k, corner| {
+                let i = found[k] as usize;
+                let bar = values[i * self.components + c].f64();
+                total += hits[i].barycentric[corner].f64() * bar;
+            });
+            *sum = T::of(total);
         });
         Ok(guarded + bounded)
     }
@@ -239,8 +235,7 @@ fn add_to_some<T: Real>(
     places: &[u32],
     term: impl Fn(usize) -> [f64; 3] + Sync,
 ) -> usize {
-    let chunks = out.par_chunks_mut(CHUNK).enumerate();
-    let add_to_chunk = |(chunk, out): (usize, &mut [[T; 3]])| {
+    let add_to_chunk = |chunk: usize, out: &mut [[T; 3]]| {
         let (start, mut guarded) = (chunk * CHUNK, 0);
         let first = places.partition_point(|&i| (i as usize) < start);
         for (k, &i) in places.iter().enumerate().skip(first) {
@@ -251,7 +246,8 @@ fn add_to_some<T: Real>(
         }
         guarded
     };
-    chunks.map(add_to_chunk).sum()
+    let guarded = parallel::map_each(out.chunks_mut(CHUNK), add_to_chunk);
+    guarded.into_iter().sum()
 }
 
 /// The vertices of the face of each hit; one past the last for a hit without a triangle.

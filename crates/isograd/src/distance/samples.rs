@@ -1,7 +1,6 @@
 //! Samples beside a surface: those that it misses, and those on thin parts.
 
 use pulp::{Arch, Simd, WithSimd};
-use rayon::prelude::*;
 
 use super::bvh::{Bvh, LANES, NOWHERE, NearestTriangles, Stack};
 use super::lattice::NO_TRIANGLE;
@@ -11,7 +10,7 @@ use super::query::{
 };
 use super::{Error, Scratch};
 use crate::vector::{dot, norm, scale, sub, to_f64};
-use crate::{Mesh, Real};
+use crate::{Mesh, Real, parallel};
 
 /// Share by which a bound of a distance exceeds it, so that rounding changes nothing.
 const MARGIN: f64 = 1.001;
@@ -59,14 +58,15 @@ pub(crate) fn count<T: Real>(
         pseudonormals: &Pseudonormals::new(mesh),
     };
     let arch = Arch::new();
-    let tasks = order.par_chunks(PACKETS_PER_TASK * LANES).map(|order| {
+    let tasks = order.chunks(PACKETS_PER_TASK * LANES);
+    let counts = parallel::map_each(tasks, |_, order| {
         arch.dispatch(Task {
             surface: &surface,
             samples,
             order,
         })
     });
-    Ok(tasks.reduce(Counts::default, Counts::add))
+    Ok(counts.into_iter().fold(Counts::default(), Counts::add))
 }
 
 impl<T: Real> Samples<'_, T> {
@@ -120,7 +120,7 @@ pub(crate) fn nearest_faces<T: Real>(
     let mut own = Bvh::default();
     let bvh = tree_of(mesh, built, &mut own)?;
     let mut faces = nearest_triangles(bvh, points, &|_| f64::INFINITY);
-    faces.par_iter_mut().for_each(|place| {
+    parallel::for_each(&mut faces, |_, place| {
         *place = match *place {
             NOWHERE => NO_TRIANGLE,
             place => bvh.face(place),

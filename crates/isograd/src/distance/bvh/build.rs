@@ -1,12 +1,12 @@
 //! Construction of the tree.
 
-use rayon::prelude::*;
+use rayon::slice::ParallelSliceMut;
 
 use super::node::{EMPTY_BOX, Node, including, joined};
 use super::{Bvh, LEAF, WIDTH};
 use crate::distance::Error;
 use crate::distance::triangle::Frame;
-use crate::parallel::CHUNK;
+use crate::parallel;
 use crate::vector::{add, scale, sub, to_f64};
 use crate::{Mesh, Real};
 
@@ -36,24 +36,21 @@ impl Bvh {
         };
         self.sort(mesh);
         let order = &self.keys;
-        order
-            .par_iter()
-            .map(|&(_, face)| Frame::new(corners(mesh, face)))
-            .collect_into_vec(&mut self.frames);
+        parallel::fill_large(&mut self.frames, order.len(), &|i| {
+            Frame::new(corners(mesh, order[i].1))
+        });
         self.build_levels(mesh);
         Ok(())
     }
 
     fn sort<T: Real>(&mut self, mesh: &Mesh<T>) {
         let mut keys = std::mem::take(&mut self.keys);
-        (0..mesh.faces().len() as u32)
-            .into_par_iter()
-            .map(|face| {
-                let [a, b, c] = corners(mesh, face);
-                let centroid = scale(add(add(a, b), c), 1.0 / 3.0);
-                (morton_code(self.to_morton(centroid)), face)
-            })
-            .collect_into_vec(&mut keys);
+        parallel::fill(&mut keys, mesh.faces().len(), |face| {
+            let face = face as u32;
+            let [a, b, c] = corners(mesh, face);
+            let centroid = scale(add(add(a, b), c), 1.0 / 3.0);
+            (morton_code(self.to_morton(centroid)), face)
+        });
         // The keys differ in the face, so an unstable sort has one result.
         keys.par_sort_unstable();
         self.keys = keys;
@@ -101,19 +98,16 @@ fn fill_level(
     children: usize,
     child: impl Fn(usize) -> [[f64; 3]; 2] + Sync,
 ) {
-    (0..children.div_ceil(WIDTH))
-        .into_par_iter()
-        .map(|node| {
-            Node::new(|slot| {
-                let index = node * WIDTH + slot;
-                if index < children {
-                    child(index)
-                } else {
-                    EMPTY_BOX
-                }
-            })
+    parallel::fill_large(level, children.div_ceil(WIDTH), &|node| {
+        Node::new(|slot| {
+            let index = node * WIDTH + slot;
+            if index < children {
+                child(index)
+            } else {
+                EMPTY_BOX
+            }
         })
-        .collect_into_vec(level);
+    });
 }
 
 /// The corners of a face in double precision.
@@ -123,15 +117,11 @@ pub(in crate::distance) fn corners<T: Real>(mesh: &Mesh<T>, face: u32) -> [[f64;
 }
 
 fn bounds<T: Real>(mesh: &Mesh<T>) -> ([f64; 3], [f64; 3]) {
-    let faces = (0..mesh.faces().len() as u32).into_par_iter();
-    let [low, high] = faces
-        .with_min_len(CHUNK)
-        .fold(
-            || EMPTY_BOX,
-            |bounds, face| corners(mesh, face).into_iter().fold(bounds, including),
-        )
-        .reduce(|| EMPTY_BOX, joined);
-    (low, high)
+    let of_face = |face: usize| {
+        let corners = corners(mesh, face as u32).into_iter();
+        corners.fold(EMPTY_BOX, including)
+    };
+    parallel::reduce(mesh.faces().len(), EMPTY_BOX, of_face, joined).into()
 }
 
 /// Cells of the Morton curve along an axis: 21 bits each.

@@ -1,7 +1,5 @@
 //! The loops over vertices and cells.
 
-use rayon::prelude::*;
-
 use super::fit::{self, Fit, Neighbor};
 use super::rule::{ENOUGH, MARGIN, MOST, REACH, SMALLEST_AREA};
 use super::{Error, Extension, NO_TRIANGLE, Region, Residual, Samples, Surface};
@@ -98,13 +96,13 @@ pub(super) fn check_samples<T: Real>(
             components,
         });
     }
-    if let Some(k) = values.par_iter().position_first(|v| !v.is_finite()) {
+    if let Some(k) = parallel::first(values.len(), |k| !values[k].is_finite()) {
         return Err(Error::NotFinite {
             sample: k / components,
         });
     }
-    let bad = |area: &T| !(*area >= T::zero()) || !area.is_finite();
-    match areas.par_iter().position_first(bad) {
+    let bad = |i: usize| !(areas[i] >= T::zero()) || !areas[i].is_finite();
+    match parallel::first(count, bad) {
         Some(sample) => Err(Error::Area {
             sample,
             area: areas[sample].f64(),
@@ -114,10 +112,10 @@ pub(super) fn check_samples<T: Real>(
 }
 
 pub(super) fn check_faces<T: Real>(surface: Surface<'_, T>, cells: &[u32]) -> Result<(), Error> {
-    let face = |&cell: &u32| surface.closest[cell as usize];
-    let missing = |face: &u32| *face as usize >= surface.mesh.faces().len();
-    match cells.par_iter().map(face).find_first(missing) {
-        Some(face) => Err(Error::Face { face }),
+    let face = |i: usize| surface.closest[cells[i] as usize];
+    let missing = |i: usize| face(i) as usize >= surface.mesh.faces().len();
+    match parallel::first(cells.len(), missing) {
+        Some(i) => Err(Error::Face { face: face(i) }),
         None => Ok(()),
     }
 }
@@ -132,10 +130,9 @@ fn find_band<T: Real>(
     let (phi, closest) = (surface.phi.values(), surface.closest);
     let inside = |&i: &usize| least <= phi[i] && phi[i] <= most && closest[i] != NO_TRIANGLE;
     let chunk = |k: usize| k * CELLS..phi.len().min((k + 1) * CELLS);
-    let chunks = (0..phi.len().div_ceil(CELLS)).into_par_iter();
-    chunks
-        .map(|k| chunk(k).filter(inside).count())
-        .collect_into_vec(counts);
+    parallel::fill(counts, phi.len().div_ceil(CELLS), |k| {
+        chunk(k).filter(inside).count()
+    });
     // Every place is written below.
     cells.resize(counts.iter().sum(), 0);
     let mut rest = &mut cells[..];
@@ -145,7 +142,7 @@ fn find_band<T: Real>(
         parts.push(part);
         rest = after;
     }
-    parts.into_par_iter().enumerate().for_each(|(k, part)| {
+    parallel::each(parts, |k, part| {
         for (place, cell) in part.iter_mut().zip(chunk(k).filter(inside)) {
             *place = cell as u32;
         }
@@ -177,24 +174,21 @@ fn extend_to_vertices<T: Real>(
     let smallest_area = residual.smallest_area;
     residual.fits.resize(mesh.vertices().len(), Fit::default());
     values.resize(mesh.vertices().len() * components, T::zero());
-    let outputs = residual
-        .fits
-        .par_chunks_mut(CHUNK)
-        .zip(values.par_chunks_mut(CHUNK * components));
-    mesh.vertices()
-        .par_chunks(CHUNK)
-        .zip(outputs)
-        .for_each_init(
-            Workspace::default,
-            |workspace, (vertices, (fits, values))| {
-                let values = values.chunks_exact_mut(components);
-                for ((&vertex, fit), value) in vertices.iter().zip(fits).zip(values) {
-                    let radius = gather(samples, smallest_area, vertex, workspace);
-                    *fit = fit::fit(radius, &mut workspace.neighbors);
-                    evaluate(&workspace.neighbors, attribute, value);
-                }
-            },
-        );
+    let fits = residual.fits.chunks_mut(CHUNK);
+    let outputs = fits.zip(values.chunks_mut(CHUNK * components));
+    let chunks = mesh.vertices().chunks(CHUNK).zip(outputs);
+    parallel::map_each_with(
+        Workspace::default,
+        chunks,
+        |workspace, _, (vertices, (fits, values))| {
+            let values = values.chunks_exact_mut(components);
+            for ((&vertex, fit), value) in vertices.iter().zip(fits).zip(values) {
+                let radius = gather(samples, smallest_area, vertex, workspace);
+                *fit = fit::fit(radius, &mut workspace.neighbors);
+                evaluate(&workspace.neighbors, attribute, value);
+            }
+        },
+    );
 }
 
 /// Collects the samples round a vertex with their weights `w_j`, and returns the radius.
@@ -296,22 +290,17 @@ fn extend_to_cells<T: Real>(
     let (components, grid) = (*components, surface.phi.grid());
     barycentric.resize(cells.len(), [T::zero(); 3]);
     values.resize(cells.len() * components, T::zero());
-    let outputs = barycentric
-        .par_chunks_mut(CHUNK)
-        .zip(values.par_chunks_mut(CHUNK * components));
-    cells
-        .par_chunks(CHUNK)
-        .zip(outputs)
-        .for_each(|(cells, (barycentric, values))| {
-            let outputs = barycentric
-                .iter_mut()
-                .zip(values.chunks_exact_mut(components));
-            for (&cell, (weights, value)) in cells.iter().zip(outputs) {
-                let face = surface.closest[cell as usize] as usize;
-                *weights = closest_weights(grid, cell as usize, surface.mesh, face);
-                blend(vertices, surface.mesh.faces()[face], *weights, value);
-            }
-        });
+    let barycentric = barycentric.chunks_mut(CHUNK);
+    let outputs = barycentric.zip(values.chunks_mut(CHUNK * components));
+    let chunks = cells.chunks(CHUNK).zip(outputs);
+    parallel::each(chunks, |_, (cells, (barycentric, values))| {
+        let values = values.chunks_exact_mut(components);
+        for ((&cell, weights), value) in cells.iter().zip(barycentric).zip(values) {
+            let face = surface.closest[cell as usize] as usize;
+            *weights = closest_weights(grid, cell as usize, surface.mesh, face);
+            blend(vertices, surface.mesh.faces()[face], *weights, value);
+        }
+    });
 }
 
 /// Barycentric coordinates of the point of a face that is closest to a cell's center.

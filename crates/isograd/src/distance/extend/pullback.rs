@@ -1,7 +1,5 @@
 //! The loops of the pullback: cells → faces → vertices → samples, each a gather in a fixed order.
 
-use rayon::prelude::*;
-
 use super::forward::{check_faces, check_samples};
 use super::shares::{Shares, Workspace, add_to_samples};
 use super::{Error, Extension, Residual, Samples, Surface};
@@ -10,7 +8,7 @@ use crate::data::{Attribute, GridCotangent};
 use crate::distance::tangent::tangent;
 use crate::distance::triangle::closest_point;
 use crate::gather::{Buckets, bounded};
-use crate::parallel::CHUNK;
+use crate::parallel::{self, CHUNK};
 use crate::vector::{add, dot, to_f64};
 
 /// Inputs and outputs of [`forward`](super::forward), and cotangents of its outputs.
@@ -141,8 +139,9 @@ fn check<T: Real>(inputs: &Inputs<'_, T>) -> Result<(), Error> {
             expected,
         });
     }
-    let outside = |cell: &&u32| **cell as usize >= cells;
-    if let Some(&cell) = band.par_iter().find_first(outside) {
+    let outside = |i: usize| band[i] as usize >= cells;
+    if let Some(i) = parallel::first(band.len(), outside) {
+        let cell = band[i];
         return Err(Error::Cell { cell, cells });
     }
     check_faces(surface, band)
@@ -194,22 +193,18 @@ fn from_cells<T: Real>(inputs: &Inputs<'_, T>, out: &mut Cotangent<T>) {
     cells_of.fill(faces, cells.len(), |b| [closest[cells[b] as usize]]);
     corners.resize(faces, [[0.0; 3]; 3]);
     let cells_of = &*cells_of;
-    let chunks: Vec<FaceBars> = corners
-        .par_chunks_mut(CHUNK)
-        .enumerate()
-        .map(|(chunk, corners)| {
-            let mut sum = FaceBars::default();
-            for (k, corners) in corners.iter_mut().enumerate() {
-                let face = chunk * CHUNK + k;
-                let got = face_bars(inputs, values_bar, face, cells_of.of(face));
-                *corners = got.corners;
-                sum.lower = add(sum.lower, got.lower);
-                sum.spacing += got.spacing;
-                sum.guarded += got.guarded;
-            }
-            sum
-        })
-        .collect();
+    let chunks = parallel::map_each(corners.chunks_mut(CHUNK), |chunk, corners| {
+        let mut sum = FaceBars::default();
+        for (k, corners) in corners.iter_mut().enumerate() {
+            let face = chunk * CHUNK + k;
+            let got = face_bars(inputs, values_bar, face, cells_of.of(face));
+            *corners = got.corners;
+            sum.lower = add(sum.lower, got.lower);
+            sum.spacing += got.spacing;
+            sum.guarded += got.guarded;
+        }
+        sum
+    });
     let (mut lower, mut spacing) = ([0.0; 3], 0.0);
     for chunk in chunks {
         lower = add(lower, chunk.lower);
@@ -307,28 +302,23 @@ fn from_vertices<T: Real>(inputs: &Inputs<'_, T>, out: &mut Cotangent<T>) {
     };
     out.vertices.resize(mesh.vertices().len(), [T::zero(); 3]);
     shares.resize_with(mesh.vertices().len().div_ceil(CHUNK), Shares::default);
-    let chunks = out
-        .vertices
-        .par_chunks_mut(CHUNK)
-        .zip(shares.par_iter_mut())
-        .enumerate();
-    out.guarded += chunks
-        .map_init(
-            Workspace::default,
-            |work, (chunk, (vertices_bar, shares))| {
-                let mut guarded = 0;
-                shares.begin(work);
-                for (k, vertex_bar) in vertices_bar.iter_mut().enumerate() {
-                    let vertex = chunk * CHUNK + k;
-                    inputs.start_bar(vertex, &mut work.bar);
-                    let through_surface = through_cells(inputs, &cells, vertex, &mut work.bar);
-                    let through_fit = shares.add_fit(inputs, vertex, work, &mut guarded);
-                    *vertex_bar =
-                        add(through_surface, through_fit).map(|x| bounded(x, &mut guarded));
-                }
-                shares.finish();
-                guarded
-            },
-        )
-        .sum::<usize>();
+    let chunks = out.vertices.chunks_mut(CHUNK).zip(shares);
+    let guarded = parallel::map_each_with(
+        Workspace::default,
+        chunks,
+        |work, chunk, (vertices_bar, shares)| {
+            let mut guarded = 0;
+            shares.begin(work);
+            for (k, vertex_bar) in vertices_bar.iter_mut().enumerate() {
+                let vertex = chunk * CHUNK + k;
+                inputs.start_bar(vertex, &mut work.bar);
+                let through_surface = through_cells(inputs, &cells, vertex, &mut work.bar);
+                let through_fit = shares.add_fit(inputs, vertex, work, &mut guarded);
+                *vertex_bar = add(through_surface, through_fit).map(|x| bounded(x, &mut guarded));
+            }
+            shares.finish();
+            guarded
+        },
+    );
+    out.guarded += guarded.into_iter().sum::<usize>();
 }

@@ -5,15 +5,13 @@
 
 use std::collections::HashMap;
 
-use rayon::prelude::*;
-
 use super::fit::Neighbor;
 use super::fit_pullback::{Adjoint, Share};
 use super::forward::collect;
 use super::pullback::Inputs;
 use crate::Real;
 use crate::gather::bounded;
-use crate::parallel::CHUNK;
+use crate::parallel::{self, CHUNK};
 use crate::vector::{dot, norm_squared, scale, sub};
 
 /// Scratch buffers of one thread.
@@ -138,29 +136,24 @@ pub(super) fn add_to_samples<T: Real>(
     areas: &mut [T],
 ) -> usize {
     let stride = FIXED + components;
-    let outputs = points
-        .par_chunks_mut(CHUNK)
-        .zip(areas.par_chunks_mut(CHUNK))
-        .zip(attribute.par_chunks_mut(CHUNK * components));
-    let chunks = outputs.enumerate();
-    chunks
-        .map_init(Vec::new, |sums, (chunk, ((points, areas), attribute))| {
-            sums.clear();
-            sums.resize(points.len() * stride, 0.0);
-            add_chunks(shares, chunk * CHUNK, stride, sums);
-            let mut guarded = 0;
-            let mut finite = |x: f64| bounded(x, &mut guarded);
-            let values = attribute.chunks_exact_mut(components);
-            for (k, (sums, values)) in sums.chunks_exact(stride).zip(values).enumerate() {
-                points[k] = [sums[0], sums[1], sums[2]].map(&mut finite);
-                areas[k] = finite(sums[3]);
-                for (value, &sum) in values.iter_mut().zip(&sums[FIXED..]) {
-                    *value = finite(sum);
-                }
+    let outputs = points.chunks_mut(CHUNK).zip(areas.chunks_mut(CHUNK));
+    let outputs = outputs.zip(attribute.chunks_mut(CHUNK * components));
+    let guarded = parallel::map_each(outputs, |chunk, ((points, areas), attribute)| {
+        let mut sums = vec![0.0; points.len() * stride];
+        add_chunks(shares, chunk * CHUNK, stride, &mut sums);
+        let mut guarded = 0;
+        let mut finite = |x: f64| bounded(x, &mut guarded);
+        let values = attribute.chunks_exact_mut(components);
+        for (k, (sums, values)) in sums.chunks_exact(stride).zip(values).enumerate() {
+            points[k] = [sums[0], sums[1], sums[2]].map(&mut finite);
+            areas[k] = finite(sums[3]);
+            for (value, &sum) in values.iter_mut().zip(&sums[FIXED..]) {
+                *value = finite(sum);
             }
-            guarded
-        })
-        .sum()
+        }
+        guarded
+    });
+    guarded.into_iter().sum()
 }
 
 /// Adds up the shares of the samples from `first` on.

@@ -18,13 +18,12 @@ mod task;
 mod workspace;
 
 use pulp::Arch;
-use rayon::prelude::*;
 
 use super::Error;
 use super::bvh::Bvh;
 use super::pseudonormals::Pseudonormals;
 use crate::data::cells::Cells;
-use crate::{Field, Grid, Mesh, Real};
+use crate::{Field, Grid, Mesh, Real, parallel};
 use block::{BLOCK, Block};
 pub(super) use of_mesh::fill as fill_from_mesh;
 pub use of_mesh::{Sign, forward_of_mesh};
@@ -236,26 +235,24 @@ fn solve_wave<T: Real>(
         magnitude: magnitude(grid).max(bvh.magnitude()),
         arch: Arch::new(),
     };
-    let results = scratch.distance.par_chunks_mut(CELLS);
-    results
-        .zip(scratch.closest.par_chunks_mut(CELLS))
-        .enumerate()
-        .for_each(|(index, (distance, closest))| {
-            let (layer, rest) = (
-                index / (across[0] * across[1]),
-                index % (across[0] * across[1]),
-            );
-            let start = [
-                planes.start + layer * BLOCK,
-                rest / across[1] * BLOCK,
-                rest % across[1] * BLOCK,
-            ];
-            let block = Block::new(start, BLOCK, [planes.end, shape[1], shape[2]]);
-            let mut output = Output { distance, closest };
-            scratch
-                .workspaces
-                .with(|workspace| task.solve(&block, workspace, &mut output));
-        });
+    let results = scratch.distance.chunks_mut(CELLS);
+    let results = results.zip(scratch.closest.chunks_mut(CELLS));
+    parallel::each(results, |index, (distance, closest)| {
+        let (layer, rest) = (
+            index / (across[0] * across[1]),
+            index % (across[0] * across[1]),
+        );
+        let start = [
+            planes.start + layer * BLOCK,
+            rest / across[1] * BLOCK,
+            rest % across[1] * BLOCK,
+        ];
+        let block = Block::new(start, BLOCK, [planes.end, shape[1], shape[2]]);
+        let mut output = Output { distance, closest };
+        scratch
+            .workspaces
+            .with(|workspace| task.solve(&block, workspace, &mut output));
+    });
 }
 
 /// The largest absolute coordinate of a grid.
@@ -276,8 +273,8 @@ impl<T: Real> Wave<'_, T> {
         let scratch = self.scratch;
         let [_, ny, nz] = self.grid.shape();
         let across = [ny.div_ceil(BLOCK), nz.div_ceil(BLOCK)];
-        let rows = phi.par_chunks_mut(nz).zip(closest.par_chunks_mut(nz));
-        rows.enumerate().for_each(|(row, (phi, closest))| {
+        let rows = phi.chunks_mut(nz).zip(closest.chunks_mut(nz));
+        parallel::each(rows, |row, (phi, closest)| {
             let (i, j) = (row / ny, row % ny);
             let first_block = (i / BLOCK * across[0] + j / BLOCK) * across[1];
             let runs = phi.chunks_mut(BLOCK).zip(closest.chunks_mut(BLOCK));

@@ -4,7 +4,6 @@
 //! then one point decides for all cells of a block, or of a part of it, between which the surface cannot pass.
 
 use pulp::Arch;
-use rayon::prelude::*;
 
 use super::spread::{MARGIN, put};
 use super::{Band, Scratch, for_each_wave};
@@ -12,7 +11,7 @@ use crate::distance::bvh::{LANES, Points};
 use crate::distance::winding::{INSIDE, Sources, Winding, is_closed};
 use crate::distance::{Distance, Error};
 use crate::vector::{norm, sub};
-use crate::{Field, Grid, Mesh, Real, simd};
+use crate::{Field, Grid, Mesh, Real, parallel, simd};
 
 /// How the sides of a mesh are found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,7 +112,7 @@ fn blocks(shape: [usize; 3]) -> [usize; 3] {
 fn write_signs<T: Real>(grid: &Grid<T>, masks: &[Mask], phi: &mut [T]) {
     let [_, ny, nz] = grid.shape();
     let [_, across, along] = blocks(grid.shape());
-    phi.par_chunks_mut(nz).enumerate().for_each(|(row, phi)| {
+    parallel::each(phi.chunks_mut(nz), |row, phi| {
         let (i, j) = (row / ny, row % ny);
         let first = (i / BLOCK * across + j / BLOCK) * along;
         for (mask, phi) in masks[first..].iter().zip(phi.chunks_mut(BLOCK)) {
@@ -190,8 +189,7 @@ impl<T: Real> Sides<'_, T> {
             self.solve(block, BLOCK, workspace, &mut mask);
             mask
         };
-        let all = (0..nx * ny * nz).into_par_iter();
-        all.map_init(Workspace::default, solve).collect()
+        parallel::map_with(Workspace::default, nx * ny * nz, solve)
     }
 
     fn solve(&self, region: Region, side: usize, workspace: &mut Workspace, mask: &mut Mask) {

@@ -3,14 +3,12 @@
 //! The cells are sorted by their closest face, and each face gathers from its cells; then each vertex adds up
 //! its faces, in their order.
 
-use rayon::prelude::*;
-
 use super::NO_TRIANGLE;
 use crate::data::GridCotangent;
 use crate::distance::triangle::Frame;
 use crate::gather::Buckets;
 use crate::vector::{add, normalized, scale, to_f64};
-use crate::{Field, Mesh, Real, vector};
+use crate::{Field, Mesh, Real, parallel, vector};
 
 /// Faces in one task.
 const TASK: usize = 512;
@@ -42,17 +40,14 @@ pub fn pullback<T: Real>(
     });
     corners.resize(faces.len(), [[T::zero(); 3]; 3]);
     let cells = &*cells;
-    let tasks = corners.par_chunks_mut(TASK).enumerate();
-    let parts: Vec<GridCotangent<f64>> = tasks
-        .map(|(task, corners)| {
-            let mut grid_bar = GridCotangent::default();
-            for (face, corners) in (task * TASK..).zip(corners) {
-                let bars = pull_face(mesh, face, phi, phi_bar, cells.of(face), &mut grid_bar);
-                *corners = bars.map(vector::of_f64);
-            }
-            grid_bar
-        })
-        .collect();
+    let parts = parallel::map_each(corners.chunks_mut(TASK), |task, corners| {
+        let mut grid_bar = GridCotangent::default();
+        for (face, corners) in (task * TASK..).zip(corners) {
+            let bars = pull_face(mesh, face, phi, phi_bar, cells.of(face), &mut grid_bar);
+            *corners = bars.map(vector::of_f64);
+        }
+        grid_bar
+    });
     for (face, corners) in faces.iter().zip(&*corners) {
         for (&vertex, &bar) in face.iter().zip(corners) {
             let sum = &mut vertices_bar[vertex as usize];

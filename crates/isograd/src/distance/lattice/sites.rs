@@ -1,11 +1,9 @@
 //! Vertices of a mesh in the order of the tree, with the triangles round each, for culling.
 
-use rayon::prelude::*;
-
 use super::facet::Facet;
 use crate::distance::bvh::{Bvh, LEAF};
 use crate::vector::to_f64;
-use crate::{Mesh, Real};
+use crate::{Mesh, Real, parallel};
 
 /// A triangle whose slack (see `Frame`) is above this many squared cells is culled by itself; the others by
 /// their corners, of which there are fewer than triangles, and which are quicker to test.
@@ -63,12 +61,12 @@ impl Sites {
             f64::NEG_INFINITY
         };
         let mut facets = std::mem::take(&mut self.facets);
-        let places = 0..bvh.len() as u32;
-        rayon::join(
+        parallel::join(
             || {
-                let facet = |place| Facet::new(bvh.frame(place), bvh.face(place), 1.0 / spacing);
-                let facets_of_all = places.clone().into_par_iter().map(facet);
-                facets_of_all.collect_into_vec(&mut facets);
+                parallel::fill_large(&mut facets, bvh.len(), &|place| {
+                    let place = place as u32;
+                    Facet::new(bvh.frame(place), bvh.face(place), 1.0 / spacing)
+                });
             },
             || {
                 self.measure(bvh, limit);

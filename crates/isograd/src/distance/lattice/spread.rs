@@ -1,9 +1,7 @@
 //! Signs of distances: of each cell by itself, or carried on from cell to cell where the surface cannot pass between them.
 
-use rayon::prelude::*;
-
 use super::NO_TRIANGLE;
-use crate::Real;
+use crate::{Real, parallel};
 
 /// Share by which the distances of two cells must exceed that between their centers, so that rounding changes nothing.
 pub(super) const MARGIN: f64 = 1.001;
@@ -46,15 +44,12 @@ pub(super) fn along<T: Real>(
 
 /// Gives rows beyond the band, which must be wider than the distance between neighbors, the signs of the rows beside them.
 pub(super) fn fill<T: Real>([_, ny, nz]: [usize; 3], phi: &mut [T], closest: &[u32]) {
-    let planes = phi
-        .par_chunks_mut(ny * nz)
-        .zip(closest.par_chunks(ny * nz))
-        .map(|(phi, closest)| fill_plane(nz, phi, closest));
-    let known: Vec<bool> = planes.collect();
+    let planes = phi.chunks_mut(ny * nz).zip(closest.chunks(ny * nz));
+    let known = parallel::map_each(planes, |_, (phi, closest)| fill_plane(nz, phi, closest));
     carry(&known, |from, to| {
         let sign = phi[from * ny * nz] < T::zero();
         let plane = &mut phi[to * ny * nz..(to + 1) * ny * nz];
-        plane.par_iter_mut().for_each(|phi| put(sign, phi));
+        parallel::for_each(plane, |_, phi| put(sign, phi));
     });
 }
 

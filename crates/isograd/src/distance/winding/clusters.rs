@@ -2,10 +2,9 @@
 
 use std::f64::consts::PI;
 
-use rayon::prelude::*;
-
 use super::super::bvh::{LANES, LEAF, Points, WIDTH};
 use super::area_vector;
+use crate::parallel;
 use crate::vector::{add, norm, scale, sub};
 
 /// Expansion of the winding number of some triangles about their center, over the moments of their area vectors.
@@ -39,10 +38,10 @@ impl Clusters {
             let parts: Vec<Cluster> = places.map(|p| of_triangle(corners(p as u32))).collect();
             joined(&parts)
         };
-        let leaves = (0..triangles.div_ceil(LEAF)).into_par_iter();
-        let mut levels: Vec<Vec<Cluster>> = vec![leaves.map(leaf).collect()];
+        let mut levels = vec![parallel::map(triangles.div_ceil(LEAF), leaf)];
         while let Some(below) = levels.last().filter(|below| below.len() > 1) {
-            let above = below.par_chunks(WIDTH).map(joined).collect();
+            let parts = |above: usize| &below[above * WIDTH..below.len().min((above + 1) * WIDTH)];
+            let above = parallel::map(below.len().div_ceil(WIDTH), |above| joined(parts(above)));
             levels.push(above);
         }
         Self { levels }

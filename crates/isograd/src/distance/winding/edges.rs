@@ -2,9 +2,9 @@
 
 use std::cmp::Ordering;
 
-use rayon::prelude::*;
+use rayon::slice::ParallelSliceMut;
 
-use crate::{Mesh, Real};
+use crate::{Mesh, Real, parallel};
 
 /// Whether faces run through each edge as often in one direction as in the other. Vertices at one place count as one.
 pub(in crate::distance) fn is_closed<T: Real>(mesh: &Mesh<T>) -> bool {
@@ -17,14 +17,12 @@ pub(in crate::distance) fn is_closed<T: Real>(mesh: &Mesh<T>) -> bool {
 
 /// Whether each edge is balanced, if `name` gives the name of a vertex.
 fn is_balanced<T: Real>(mesh: &Mesh<T>, name: impl Fn(u32) -> u32 + Sync) -> bool {
-    let faces = mesh.faces().par_iter();
-    let mut uses: Vec<(u32, u32, bool)> = faces
-        .flat_map_iter(|face| {
-            let [a, b, c] = face.map(&name);
-            [[a, b], [b, c], [c, a]].map(|[p, q]| (p.min(q), p.max(q), p < q))
-        })
-        .filter(|&(low, high, _)| low != high)
-        .collect();
+    let faces = mesh.faces();
+    let mut uses = parallel::filter_map(3 * faces.len(), |side| {
+        let (face, k) = (faces[side / 3], side % 3);
+        let [p, q] = [face[k], face[(k + 1) % 3]].map(&name);
+        (p != q).then_some((p.min(q), p.max(q), p < q))
+    });
     uses.par_sort_unstable();
     uses.chunk_by(|p, q| (p.0, p.1) == (q.0, q.1)).all(|edge| {
         let forward = edge.partition_point(|&(_, _, forward)| !forward);
