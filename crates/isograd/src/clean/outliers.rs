@@ -1,7 +1,5 @@
 //! Samples that are far from all others.
 
-use rayon::prelude::*;
-
 use super::{Error, Sparse, Statistical, check_length, checked, indices};
 use crate::Real;
 use crate::neighbors::CellIndex;
@@ -41,15 +39,14 @@ pub fn statistical_outliers<T: Real>(
     // In an order that does not depend on that of the input, and nor do the sums.
     let mut order = Vec::new();
     index.positions_by_place(&mut order);
-    let mean = |found: &mut Vec<(u32, f64)>, &position: &u32| {
-        let point = index.point(position as usize);
+    let means = parallel::map_with(Vec::new, order.len(), |found, k| {
+        let point = index.point(order[k] as usize);
         // The sample itself, or one at the same place, comes first.
         index.nearest(point, neighbors.saturating_add(1), found);
         let others = found.get(1..).unwrap_or_default();
         let sum: f64 = others.iter().map(|&(_, squared)| squared.sqrt()).sum();
         sum / others.len().max(1) as f64
-    };
-    let means: Vec<f64> = order.par_iter().map_init(Vec::new, mean).collect();
+    });
     let count = means.len() as f64;
     let [sum] = sum_array(means.len(), |i| [means[i]]);
     let average = sum / count.max(1.0);

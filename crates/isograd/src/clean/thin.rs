@@ -1,6 +1,6 @@
 //! Fewer samples where there are many.
 
-use rayon::prelude::*;
+use rayon::slice::ParallelSliceMut;
 
 use super::{Error, by_place, check_length, checked, indices, largest};
 use crate::neighbors::CellIndex;

@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 use std::ops::Range;
 
-use crate::Real;
+use crate::{Real, parallel};
 
 /// Most points in one cell.
 pub(super) const CELL: usize = 16;
@@ -342,11 +342,11 @@ fn sort_into_cells<T: Real>(entries: &mut [Entry<T>], nodes: &mut [Node<T>], lev
     entries.select_nth_unstable_by(middle, |a, b| {
         compare_points(key(a), key(b)).then(a.index.cmp(&b.index))
     });
-    let parallel = entries.len() > TASK;
+    let is_large = entries.len() > TASK;
     let (left, right) = entries.split_at_mut(middle);
     let (left_nodes, right_nodes) = below.split_at_mut((1 << levels) - 1);
-    if parallel {
-        rayon::join(
+    if is_large {
+        parallel::join(
             || sort_into_cells(left, left_nodes, levels - 1),
             || sort_into_cells(right, right_nodes, levels - 1),
         );

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::candidates::Candidates;
 use super::cell_index::{CellIndex, Place, TASK};
-use crate::{Real, simd};
+use crate::{Real, parallel, simd};
 
 /// What is looked for: points within a radius, with values that they carry, arrays in sorted order.
 #[derive(Clone, Copy, Debug)]
@@ -143,7 +143,7 @@ impl<T: Real, F> Walk<'_, T, F> {
         if at.end - at.start > TASK {
             let near = &buffers.near[near];
             let alone = |child, out| self.enter(child, 0..near.len(), out, &mut Buffers::new(near));
-            rayon::join(|| alone(left, left_out), || alone(right, right_out));
+            parallel::join(|| alone(left, left_out), || alone(right, right_out));
         } else {
             self.enter(left, near.clone(), left_out, buffers);
             self.enter(right, near, right_out, buffers);

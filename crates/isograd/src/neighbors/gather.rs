@@ -5,8 +5,6 @@
 //! `c` is one of `k`, rounding included; so one walk over the points within that radius gathers both. The
 //! few centers with a wider radius hand out what they have in a fixed order.
 
-use rayon::prelude::*;
-
 use super::candidates::Candidates;
 use super::radius::Neighborhoods;
 use super::radius_pullback::RadiiCotangent;
@@ -75,10 +73,9 @@ impl<T: Real> Neighborhoods<T> {
         let wide: Vec<usize> = wide.collect();
         // Rounds of a fixed number of centers, so that the lists stay short.
         for round in wide.chunks(4 * CHUNK) {
-            let lists: Vec<Contributions<T>> = round
-                .par_chunks(CHUNK / 8)
-                .map(|centers| self.contributions(radius, centers, offset_bar))
-                .collect();
+            let lists = parallel::map_each(round.chunks(CHUNK / 8), |_, centers| {
+                self.contributions(radius, centers, offset_bar)
+            });
             for (j, bar) in lists.iter().flat_map(|list| &list.points) {
                 let sum = &mut points_bar[*j as usize];
                 *sum = vector::add(*sum, *bar);

@@ -2,8 +2,6 @@
 
 mod given;
 
-use rayon::prelude::*;
-
 use super::candidates::Candidates;
 use super::cell_index::CellIndex;
 use super::cells::Search;
@@ -154,14 +152,10 @@ impl<T: Real> Neighborhoods<T> {
 
     /// Writes counts and crowds in input order.
     fn spread_census<U: Sync>(&mut self, sorted: &[Found<T, U>]) {
-        let at = |&position: &u32| {
-            let census = &sorted[position as usize].census;
-            (census.count, census.crowd)
-        };
-        let positions = self.position.par_iter();
-        positions
-            .map(at)
-            .unzip_into_vecs(&mut self.count, &mut self.crowd);
+        let position = &self.position;
+        let census = |i: usize| &sorted[position[i] as usize].census;
+        parallel::fill(&mut self.count, position.len(), |i| census(i).count);
+        parallel::fill(&mut self.crowd, position.len(), |i| census(i).crowd);
     }
 
     /// Input index → sorted position in [`Self::index`].

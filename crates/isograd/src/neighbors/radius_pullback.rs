@@ -3,8 +3,6 @@
 //! Normals and areas depend on the radius through quotients `d/R` alone, but for powers of `R` as factors. So a pullback that
 //! has the `d̄_j` also has `R R̄ = p y ȳ − Σ ⟨d̄_j, d_j⟩`, for a `y` in units of length to the power `p`.
 
-use rayon::prelude::*;
-
 use super::cell_index::compare_points;
 use super::radius::{Neighborhoods, Radius};
 use super::rule::{AUTO_MARGIN, FEWEST_NEIGHBORS, GROWTH_MARGIN};
@@ -79,13 +77,13 @@ fn grown_pairs<T: Real>(
     grown: &[(u32, f64)],
 ) -> Vec<(u32, u32, f64)> {
     let Neighborhoods { index, radius, .. } = neighborhoods;
-    let pair = |nearest: &mut Vec<(u32, T)>, &(i, bar): &(u32, f64)| {
+    parallel::map_with(Vec::new, grown.len(), |nearest, k| {
+        let (i, bar) = grown[k];
         let position = neighborhoods.position()[i as usize] as usize;
         index.nearest(index.point(position), FEWEST_NEIGHBORS, nearest);
         let j = nearest.last().map_or(i, |&(j, _)| j);
         (i, j, GROWTH_MARGIN * bar / radius[i as usize].f64())
-    };
-    grown.par_iter().map_init(Vec::new, pair).collect()
+    })
 }
 
 /// The points whose distances the automatic radius is the mean of, each with its 24th sample and the cotangent of the
@@ -95,11 +93,11 @@ fn middle_pairs<T: Real>(neighborhoods: &Neighborhoods<T>, bar: f64) -> Vec<(u32
     let Some([least, largest]) = neighborhoods.middle else {
         return Vec::new();
     };
-    let is_middle = |&position: &usize| least <= reach[position] && reach[position] <= largest;
-    let positions = (0..reach.len()).into_par_iter();
-    let middle: Vec<usize> = positions.filter(is_middle).collect();
+    let middle = parallel::filter_map(reach.len(), |position| {
+        (least <= reach[position] && reach[position] <= largest).then_some(position)
+    });
     // Two samples may each be the other's 24th: of equal distances at either end a part may be in the middle half.
-    let count = |is: &(dyn Fn(T) -> bool + Sync)| reach.par_iter().filter(|&&r| is(r)).count();
+    let count = |is: &(dyn Fn(T) -> bool + Sync)| parallel::count(reach.len(), |k| is(reach[k]));
     let [at_least, at_largest] = [least, largest].map(|end| count(&|r| r == end));
     let below = count(&|r| T::zero() < r && r < least);
     let above = count(&|r| r > largest);

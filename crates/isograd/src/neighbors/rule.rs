@@ -1,6 +1,6 @@
 //! Rules for the choice of radii, shared with neighbor searches on other devices.
 
-use rayon::prelude::*;
+use rayon::slice::ParallelSliceMut;
 
 use super::radius::{Error, Radius};
 use crate::{Real, vector};

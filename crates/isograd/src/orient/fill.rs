@@ -6,13 +6,11 @@
 //! in which they see out of the grid. A body with a hole in its sampling, which a flood fill alone would classify as
 //! air, still has a darker and a brighter side.
 
-use rayon::prelude::*;
-
 use super::disc;
 use super::regions::{self, Regions};
 use super::sight::{self, RAYS, STEPS};
 use super::visibility::Visibility;
-use crate::parallel::{self, CHUNK};
+use crate::parallel;
 use crate::{simd, vector};
 
 /// Free cells on each side of a body.
@@ -125,7 +123,7 @@ impl Fill {
         self.draw(lattice);
         let (occupied, shape) = (&self.occupied, lattice.shape);
         let (regions, visibility) = (&mut self.regions, &mut self.visibility);
-        rayon::join(
+        parallel::join(
             || regions.find(occupied, shape),
             || visibility.compute(occupied, shape),
         );
@@ -150,9 +148,9 @@ impl Fill {
         self.occupied.clear();
         self.occupied.resize(lattice.size(), 0);
         let (discs, by_slab) = (&self.discs, &self.by_slab);
-        let slabs = self.occupied.par_chunks_mut(SLAB * ny * nz);
+        let slabs = self.occupied.chunks_mut(SLAB * ny * nz);
         let arch = pulp::Arch::new();
-        slabs.enumerate().for_each(|(slab, cells)| {
+        parallel::each(slabs, |slab, cells| {
             let nearby = slab.saturating_sub(1)..(slab + 2).min(by_slab.len());
             simd::vectorized!(arch, {
                 for nearby in &by_slab[nearby.clone()] {
@@ -166,14 +164,12 @@ impl Fill {
 
     /// Air or matter, for each region.
     fn classify_regions(&mut self, lattice: &Lattice) {
-        let mut walls = std::mem::take(&mut self.walls);
-        walls.clear();
-        let this = &*self;
-        walls.par_extend(this.discs.par_iter().filter_map(|disc| {
-            let front = this.first_free(lattice, disc.center, disc.axis)?;
-            let back = this.first_free(lattice, disc.center, disc.axis.map(|a| -a))?;
+        let mut walls = parallel::filter_map(self.discs.len(), |m| {
+            let disc = &self.discs[m];
+            let front = self.first_free(lattice, disc.center, disc.axis)?;
+            let back = self.first_free(lattice, disc.center, disc.axis.map(|a| -a))?;
             (front.region != back.region).then_some((front.region, back.region))
-        }));
+        });
         regions::sides(self.regions.len, &mut walls, &mut self.sides);
         self.walls = walls;
     }
@@ -181,13 +177,8 @@ impl Fill {
     /// The evidence of each disc: light on one side less light on the other, over a cone of directions.
     fn compare_sides(&mut self, lattice: &Lattice) {
         let mut all = std::mem::take(&mut self.evidence);
-        all.resize(self.discs.len(), SideEvidence::default());
-        let this = &*self;
-        let chunks = all.par_chunks_mut(CHUNK).zip(this.discs.par_chunks(CHUNK));
-        chunks.for_each(|(all, discs)| {
-            for (evidence, disc) in all.iter_mut().zip(discs) {
-                *evidence = this.compare(lattice, disc);
-            }
+        parallel::fill(&mut all, self.discs.len(), |m| {
+            self.compare(lattice, &self.discs[m])
         });
         self.evidence = all;
     }

@@ -7,8 +7,6 @@
 //! # Not differentiable
 //! Nothing here has a derivative: it decides about signs.
 
-use rayon::prelude::*;
-
 use super::Axes;
 pub use super::coupling::NEIGHBORS;
 use super::coupling::{self, RING, ROUNDS};
@@ -88,8 +86,8 @@ impl Graph {
             axis.unwrap_or([0.0; 3]).map(|a| a as f32)
         });
         let spacing = neighborhoods.spacing().f64();
-        let scatter = |&i: &u32| {
-            let i = i as usize;
+        let scatter = |site: usize| {
+            let i = order[site] as usize;
             let is_wide = axes
                 .radius
                 .get(i)
@@ -99,10 +97,8 @@ impl Graph {
                 _ => (0.0, 0.0),
             }
         };
-        order
-            .par_iter()
-            .map(scatter)
-            .unzip_into_vecs(&mut self.spread, &mut self.side);
+        let scatters = parallel::map(order.len(), scatter);
+        (self.spread, self.side) = scatters.into_iter().unzip();
     }
 
     fn find_neighbors<T: Real>(&mut self, neighborhoods: &Neighborhoods<T>, sites: &Sites) {
@@ -110,16 +106,17 @@ impl Graph {
         let radius = neighborhoods.common_radius;
         index.nearest_of_all(radius, sites.positions(), &mut self.near);
         let unit = 1.0 / neighborhoods.spacing().f64();
-        let offsets = |(site, near): (usize, &mut [u32; NEIGHBORS])| {
+        let near = &self.near;
+        parallel::fill(&mut self.offset, near.len(), |site| {
             let point = index.point(sites.position(site));
-            near.each_mut().map(|near| {
-                let d = vector::sub(index.point(*near as usize), point);
-                *near = sites.of(index.order()[*near as usize]);
+            near[site].map(|near| {
+                let d = vector::sub(index.point(near as usize), point);
                 d.map(|x| (x.f64() * unit) as f32)
             })
-        };
-        let near = self.near.par_iter_mut().enumerate();
-        near.map(offsets).collect_into_vec(&mut self.offset);
+        });
+        parallel::for_each(&mut self.near, |_, near| {
+            *near = near.map(|near| sites.of(index.order()[near as usize]));
+        });
     }
 
     /// Takes the axis of its own sheet for each point whose neighbors lie on several.

@@ -1,10 +1,8 @@
 //! Orientation by parity along the normal, as the paper prints it (its §2.2).
 
-use rayon::prelude::*;
-
 use super::Error;
 use crate::neighbors::Neighborhoods;
-use crate::{Real, vector};
+use crate::{Real, parallel, vector};
 
 /// Most probes across the box of the cloud. Only clouds whose points come in all but equal pairs, so
 /// that `r_d` is nothing beside the spacing, would need more.
@@ -88,15 +86,12 @@ pub(super) fn detection_radius<T: Real>(
     options: &ParityOptions,
 ) -> f64 {
     let index = &neighborhoods.index;
-    let largest = (0..index.len())
-        .into_par_iter()
-        .map_init(Vec::new, |nearest, position| {
-            index.nearest(index.point(position), 2, nearest);
-            // The point itself or an equal one is first, so the second is the nearest other.
-            nearest.get(1).map_or(T::zero(), |&(_, d2)| d2).f64()
-        })
-        .reduce(|| 0.0, f64::max);
-    options.detection_radius(largest.sqrt())
+    let squares = parallel::map_with(Vec::new, index.len(), |nearest, position| {
+        index.nearest(index.point(position), 2, nearest);
+        // The point itself or an equal one is first, so the second is the nearest other.
+        nearest.get(1).map_or(T::zero(), |&(_, d2)| d2).f64()
+    });
+    options.detection_radius(squares.into_iter().fold(0.0, f64::max).sqrt())
 }
 
 /// The outcome for one axis.
@@ -131,16 +126,15 @@ pub(super) fn forward<T: Real>(
         low,
         high,
     };
-    verdicts.clear();
-    verdicts.resize(axes.len(), Verdict::default());
-    let each = verdicts.par_iter_mut().enumerate();
-    each.for_each_init(Vec::new, |nearest, (position, verdict)| {
+    *verdicts = parallel::map_with(Vec::new, axes.len(), |nearest, position| {
         let point = vector::to_f64(index.point(position));
         let axis = vector::to_f64(axes[index.order()[position] as usize]);
         let along = ray.look(point, axis, neighborhoods, nearest);
         let against = ray.look(point, axis.map(|a| -a), neighborhoods, nearest);
-        verdict.flip = flip(along, against, options.tolerance);
-        verdict.closed = along.crossings % 2 != against.crossings % 2;
+        Verdict {
+            flip: flip(along, against, options.tolerance),
+            closed: along.crossings % 2 != against.crossings % 2,
+        }
     });
     Ok(radius)
 }

@@ -1,18 +1,17 @@
 //! Cotangents of the outward normals to cotangents of the axes, or of the given normals.
 
-use rayon::prelude::*;
-
 use super::Orientation;
+use crate::parallel::{self, CHUNK};
 use crate::vector::{dot, norm, normalized, scale, sub, to_f64};
 use crate::{Real, vector};
 
 /// Turns cotangents of `normals` into those of the `axes` that they are, up to sign: `s_i n̄_i`, in place.
 pub fn axes_pullback<T: Real>(normals: &[[T; 3]], axes: &[[T; 3]], bars: &mut [[T; 3]]) {
-    let flipped = |(n, axis): (&[T; 3], &[T; 3])| vector::dot(*n, *axis) < T::zero();
-    bars.par_iter_mut()
-        .zip(normals.par_iter().zip(axes))
-        .filter(|(_, pair)| flipped(*pair))
-        .for_each(|(bar, _)| *bar = bar.map(|x| -x));
+    parallel::for_each(bars, |i, bar| {
+        if vector::dot(normals[i], axes[i]) < T::zero() {
+            *bar = bar.map(|x| -x);
+        }
+    });
 }
 
 /// The axes with the signs that `held` has: what [`axes_pullback`] is the pullback of.
@@ -48,5 +47,9 @@ pub fn given_pullback<T: Real>(given: &[[T; 3]], bars: &mut [[T; 3]]) -> usize {
         *bar = exact.map(|x| T::of(x.clamp(-most, most)));
         exact.iter().filter(|x| x.abs() > most).count()
     };
-    bars.par_iter_mut().zip(given).map(pull).sum()
+    let chunks = bars.chunks_mut(CHUNK).zip(given.chunks(CHUNK));
+    let replaced = parallel::map_each(chunks, |_, (bars, given)| {
+        bars.iter_mut().zip(given).map(pull).sum::<usize>()
+    });
+    replaced.into_iter().sum()
 }

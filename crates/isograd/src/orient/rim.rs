@@ -1,7 +1,6 @@
 //! Samples along the boundary of an open surface.
 
 use pulp::Arch;
-use rayon::prelude::*;
 
 use crate::neighbors::{Candidates, LANES, Neighborhoods};
 use crate::simd::vectorized;
@@ -37,15 +36,11 @@ pub(crate) fn rims<T: Real>(
         let offset = vectorized!(arch, offset(center, radius, candidates));
         offset > T::of(RIM_OFFSET)
     });
-    let at_rim: Vec<bool> = neighborhoods
-        .position()
-        .par_iter()
-        .enumerate()
-        .map_init(Vec::new, |directions, (i, &position)| {
-            one_sided[position as usize]
-                && borders_a_gap(i, points, normals, neighborhoods, directions)
-        })
-        .collect();
+    let position = neighborhoods.position();
+    let at_rim = parallel::map_with(Vec::new, position.len(), |directions, i| {
+        one_sided[position[i] as usize]
+            && borders_a_gap(i, points, normals, neighborhoods, directions)
+    });
     let has_company = |i| rim_neighbors(i, points, &at_rim, neighborhoods) >= RIM_NEIGHBORS;
     parallel::map(points.len(), |i| at_rim[i] && has_company(i))
 }

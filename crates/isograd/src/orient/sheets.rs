@@ -4,8 +4,6 @@
 //! too few, or too many, for [`sheet::find`] to separate them. Such a sample takes the plane of the sheet that most of
 //! its neighbors agree on. In noise, planes are found by chance: no neighbor finds the same one.
 
-use rayon::prelude::*;
-
 use super::coupling::{self, NEIGHBORS};
 use super::sheet::{self, Sheet};
 use crate::parallel::{self, CHUNK};
@@ -48,9 +46,9 @@ impl Sheets {
     pub(super) fn find(&mut self, near: Near<'_>, axes: &[[f32; 3]]) {
         let arch = pulp::Arch::new();
         self.sheets.resize(axes.len(), Sheet::default());
-        let chunks = self.sheets.par_chunks_mut(CHUNK);
-        let neighbors = near.offset.par_chunks(CHUNK).zip(axes.par_chunks(CHUNK));
-        chunks.zip(neighbors).for_each(|(sheets, (offset, axes))| {
+        let chunks = self.sheets.chunks_mut(CHUNK);
+        let chunks = chunks.zip(near.offset.chunks(CHUNK).zip(axes.chunks(CHUNK)));
+        parallel::each(chunks, |_, (sheets, (offset, axes))| {
             simd::vectorized!(arch, {
                 for ((sheet, offset), &axis) in sheets.iter_mut().zip(offset).zip(axes) {
                     *sheet = sheet::find(offset, axis).unwrap_or_default();

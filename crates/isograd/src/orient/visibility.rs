@@ -1,6 +1,7 @@
 //! Number of directions in which each free cell sees out of the grid.
 
 use super::sight;
+use crate::parallel;
 
 /// Directions of one sweep: the neighbors of a cell that come before it in C order.
 const DIRECTIONS: u32 = 13;
@@ -28,7 +29,7 @@ impl Visibility {
     /// leaves the grid without meeting an occupied cell.
     pub(super) fn compute(&mut self, occupied: &[u8], shape: [usize; 3]) {
         let [forward, backward] = &mut self.sweeps;
-        rayon::join(
+        parallel::join(
             || forward.run(occupied, shape, false),
             || backward.run(occupied, shape, true),
         );

@@ -10,11 +10,9 @@
 //! S. Lin et al., "Surface reconstruction from point clouds without normals by parametrizing the Gauss
 //! formula" (2022), for the ½.
 
-use rayon::prelude::*;
-
 use super::graph::Graph;
 use super::signs::{Domains, Place};
-use crate::{simd, vector};
+use crate::{parallel, simd, vector};
 use tree::{Dipole, Tree};
 
 mod tree;
@@ -30,20 +28,16 @@ fn numbers(graph: &Graph, place: &impl Place, domains: &Domains<'_>, probes: &[u
         let normal = vector::scale(graph.axis[p], domains.sign[p]);
         Dipole::new(place.in_spacings(p), normal, graph.area[p])
     };
-    let of_domain = |members: Vec<u32>| {
-        let dipoles: Vec<Dipole> = members.iter().map(dipole).collect();
-        Tree::new(dipoles)
-    };
-    let members = domains.members().into_par_iter();
-    let trees: Vec<Tree> = members.map(of_domain).collect();
+    let trees = parallel::map_each(domains.members(), |_, members| {
+        Tree::new(members.iter().map(dipole).collect())
+    });
     let arch = pulp::Arch::new();
-    let at_probe = |&probe: &u32| -> Vec<f64> {
-        let at = place.in_spacings(probe as usize);
+    let at_probe = |k: usize| -> Vec<f64> {
+        let at = place.in_spacings(probes[k] as usize);
         let winding = |tree: &Tree| simd::vectorized!(arch, tree.winding_number(at));
         trees.iter().map(winding).collect()
     };
-    let rows: Vec<Vec<f64>> = probes.par_iter().map(at_probe).collect();
-    rows.concat()
+    parallel::map(probes.len(), at_probe).concat()
 }
 
 /// Cost of signs: the sum over all samples of the squared distance of the winding number from ½, which is
@@ -73,9 +67,9 @@ impl Misfit {
             }
         }
         let mut gram = vec![0.0; count * count];
-        let rows = gram.par_chunks_mut((ROWS * count).max(1)).enumerate();
+        let rows = gram.chunks_mut((ROWS * count).max(1));
         let arch = pulp::Arch::new();
-        rows.for_each(|(chunk, rows)| {
+        parallel::each(rows, |chunk, rows| {
             simd::vectorized!(arch, {
                 for (weight, winding) in weighted() {
                     for (a, row) in (chunk * ROWS..).zip(rows.chunks_exact_mut(count)) {

@@ -6,8 +6,6 @@
 //! the winding number decide between them as between domains: first large segments, then smaller ones. Signs change
 //! only if that is clearly better by the sum of all three.
 
-use rayon::prelude::*;
-
 use super::super::regions::root;
 use super::{DomainSigns, Graph, Place, STRONG, Ties, number};
 use crate::parallel::{self, CHUNK};
@@ -95,7 +93,7 @@ impl DomainSigns {
     /// level.
     fn by_level(&self, graph: &Graph) -> Vec<[Vec<(u32, u32)>; LEVELS]> {
         let n = self.sign.len();
-        let of_samples = |first: usize| {
+        let of_samples = |_, first: usize| {
             let mut couplings = [(); LEVELS].map(|()| Vec::new());
             for p in first..n.min(first + CHUNK) {
                 for (q, agreement) in self.agreements(graph, p) {
@@ -107,8 +105,7 @@ impl DomainSigns {
             }
             couplings
         };
-        let firsts = (0..n).into_par_iter().step_by(CHUNK);
-        firsts.map(of_samples).collect()
+        parallel::map_each((0..n).step_by(CHUNK), of_samples)
     }
 
     /// Turns the segments whose sign in `outcome` is −1, relative to the evidence, if these are at least so many samples

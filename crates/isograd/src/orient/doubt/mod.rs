@@ -23,13 +23,12 @@ mod region;
 #[cfg(test)]
 mod tests;
 
-use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
 use super::rim::rims;
 use super::{DOUBTFUL, Orientation};
-use crate::Real;
 use crate::neighbors::Neighborhoods;
+use crate::{Real, parallel};
 use patch::{Cloud, Patch};
 pub use region::{Region, regions};
 
@@ -38,6 +37,9 @@ const SPARSE: f64 = 2.0;
 
 /// Samples that scatter by this share of their spacing are noisy.
 const NOISY: f64 = 0.3;
+
+/// Doubtful points that are looked at in one task.
+const TASK: usize = 64;
 
 /// Of so many samples round a noisy one, more than half must be noisy too.
 const ASKED: usize = 8;
@@ -175,10 +177,12 @@ pub(crate) fn reasons_beside<T: Real>(
         },
         neighborhoods,
     };
-    let mut found: Vec<(u32, Reason)> = doubtful
-        .par_iter()
-        .map_init(Patch::default, |patch, &i| (i, look.at(i as usize, patch)))
-        .collect();
+    let chunks = doubtful.chunks(TASK);
+    let found = parallel::map_each_with(Patch::default, chunks, |patch, _, chunk| {
+        let looks = chunk.iter().map(|&i| (i, look.at(i as usize, patch)));
+        looks.collect::<Vec<(u32, Reason)>>()
+    });
+    let mut found = found.concat();
     look.spread(&mut found);
     found
 }

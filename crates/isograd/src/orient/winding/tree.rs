@@ -6,7 +6,7 @@
 
 use std::f32::consts::PI;
 
-use crate::vector;
+use crate::{parallel, vector};
 
 /// A sample nearer than this share of the spacing counts as if it were so far: it lies on the same sheet, and
 /// only its noise would speak.
@@ -82,7 +82,7 @@ impl Tree {
         }
         tree.push(dipoles);
         let (low, high) = halves(dipoles);
-        let (low, high) = rayon::join(|| Self::of(low, many), || Self::of(high, many));
+        let (low, high) = parallel::join(|| Self::of(low, many), || Self::of(high, many));
         tree.append(low);
         tree.append(high);
         tree.clusters[0].next = tree.clusters.len() as u32;
