@@ -27,17 +27,32 @@ pub(crate) fn map_each<P: Send, R: Send>(
     parts: impl IntoIterator<Item = P>,
     f: impl Fn(usize, P) -> R + Sync,
 ) -> Vec<R> {
-    let slot = |part| Mutex::new((Some(part), None));
-    let slots: Vec<_> = parts.into_iter().map(slot).collect();
+    let parts = parts.into_iter();
+    let mut slots = Vec::with_capacity(parts.size_hint().0);
+    for part in parts {
+        slots.push(Mutex::new((Some(part), None)));
+    }
+    of_slots(slots, &f)
+}
+
+/// A part, until it is taken, and its result.
+type Slot<P, R> = Mutex<(Option<P>, Option<R>)>;
+
+/// Compiled once for each `P` and `R`.
+fn of_slots<P: Send, R: Send>(
+    slots: Vec<Slot<P, R>>,
+    f: &(dyn Fn(usize, P) -> R + Sync),
+) -> Vec<R> {
     run(slots.len(), &|k| {
         let part = unpoisoned(slots[k].lock()).0.take();
         let result = part.map(|part| f(k, part));
         unpoisoned(slots[k].lock()).1 = result;
     });
-    let results = slots.into_iter();
+    let mut results = Vec::with_capacity(slots.len());
+    for slot in slots {
+        results.extend(unpoisoned(slot.into_inner()).1);
+    }
     results
-        .filter_map(|slot| unpoisoned(slot.into_inner()).1)
-        .collect()
 }
 
 /// Calls `f` with every part and its number: [`map_each`] without results.
