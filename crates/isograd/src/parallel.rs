@@ -196,7 +196,16 @@ pub(crate) fn first(n: usize, is_so: impl Fn(usize) -> bool + Sync) -> Option<us
 /// The `f(i)` that are there, in order.
 pub(crate) fn filter_map<R: Send>(n: usize, f: impl Fn(usize) -> Option<R> + Sync) -> Vec<R> {
     let of = |items: Range<usize>| items.filter_map(&f).collect::<Vec<R>>();
-    of_ranges(n, piece(n), &of).into_iter().flatten().collect()
+    joined(of_ranges(n, piece(n), &of))
+}
+
+/// The items of all lists, in order.
+pub(crate) fn joined<T>(lists: Vec<Vec<T>>) -> Vec<T> {
+    let mut all = Vec::with_capacity(lists.iter().map(Vec::len).sum());
+    for list in lists {
+        all.extend(list);
+    }
+    all
 }
 
 /// `f` of each range of `size` of `0..n`, compiled once for each `R`.

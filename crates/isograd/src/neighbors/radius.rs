@@ -7,7 +7,8 @@ use super::cell_index::CellIndex;
 use super::cells::Search;
 use super::census::Census;
 use super::rule::{self, AUTO_NEIGHBORS, FEWEST_NEIGHBORS, FEWEST_POINTS, GROWTH_MARGIN};
-use crate::{Real, parallel, vector};
+use crate::parallel::{self, CHUNK};
+use crate::{Real, vector};
 pub use given::{Radii, with_radii};
 
 /// Share of a neighborhood whose own radius must reach back to the sample, or the sample is isolated.
@@ -152,10 +153,17 @@ impl<T: Real> Neighborhoods<T> {
 
     /// Writes counts and crowds in input order.
     fn spread_census<U: Sync>(&mut self, sorted: &[Found<T, U>]) {
-        let position = &self.position;
-        let census = |i: usize| &sorted[position[i] as usize].census;
-        parallel::fill(&mut self.count, position.len(), |i| census(i).count);
-        parallel::fill(&mut self.crowd, position.len(), |i| census(i).crowd);
+        self.count.resize(sorted.len(), 0);
+        self.crowd.resize(sorted.len(), T::zero());
+        let chunks = self.count.chunks_mut(CHUNK);
+        let chunks = chunks.zip(self.crowd.chunks_mut(CHUNK));
+        let chunks = chunks.zip(self.position.chunks(CHUNK));
+        parallel::each(chunks, |_, ((counts, crowds), positions)| {
+            for ((count, crowd), &position) in counts.iter_mut().zip(crowds).zip(positions) {
+                let census = &sorted[position as usize].census;
+                (*count, *crowd) = (census.count, census.crowd);
+            }
+        });
     }
 
     /// Input index → sorted position in [`Self::index`].

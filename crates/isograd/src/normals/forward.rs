@@ -192,10 +192,11 @@ fn planes_of(moments: &Moments<[f64; LANES]>) -> Planes {
         vectors: [[[0.0; LANES]; 3]; 3],
     };
     for l in 0..LANES {
-        let m: [f64; 9] = std::array::from_fn(
-            #[inline(always)]
-            |k| moments[k + 1][l] / moments[0][l],
-        );
+        // Plain loops: closures of `array::from_fn` are inlined in some callers only.
+        let mut m = [0.0; 9];
+        for (m, moment) in m.iter_mut().zip(&moments[1..]) {
+            *m = moment[l] / moments[0][l];
+        }
         let covariance = [
             m[3] - m[0] * m[0],
             m[4] - m[0] * m[1],
@@ -222,9 +223,10 @@ impl Planes {
     /// Normal and plane of one lane.
     #[inline(always)]
     fn lane<T: Real>(&self, l: usize) -> ([T; 3], Plane<T>) {
-        let of = |v: &[[f64; LANES]; 3]| vector::of_f64([v[0][l], v[1][l], v[2][l]]);
-        let [first, second, third] = self.values.map(|value| value[l]);
-        let [normal, v2, v3] = self.vectors.each_ref().map(of);
+        let of = |v: &[[f64; LANES]; 3]| [T::of(v[0][l]), T::of(v[1][l]), T::of(v[2][l])];
+        let [first, second, third] = [self.values[0][l], self.values[1][l], self.values[2][l]];
+        let [v1, v2, v3] = &self.vectors;
+        let (normal, v2, v3) = (of(v1), of(v2), of(v3));
         let sign = sign(normal);
         let plane = Plane {
             centroid: of(&self.centroid),

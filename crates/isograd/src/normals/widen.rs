@@ -97,8 +97,9 @@ fn in_tasks<T: Real>(
     positions: &[u32],
     run: impl Fn(&[u32]) -> Vec<Found<T>> + Send + Sync,
 ) -> Vec<Found<T>> {
-    let found = parallel::map_each(positions.chunks(TASK), |_, task| run(task));
-    found.into_iter().flatten().collect()
+    parallel::joined(parallel::map_each(positions.chunks(TASK), |_, task| {
+        run(task)
+    }))
 }
 
 /// How far a neighborhood is widened.

@@ -102,7 +102,6 @@ pub struct Fill {
     occupied: Vec<u8>,
     regions: Regions,
     visibility: Visibility,
-    walls: Vec<(u32, u32)>,
     sides: Vec<i8>,
     evidence: Vec<SideEvidence>,
 }
@@ -171,7 +170,6 @@ impl Fill {
             (front.region != back.region).then_some((front.region, back.region))
         });
         regions::sides(self.regions.len, &mut walls, &mut self.sides);
-        self.walls = walls;
     }
 
     /// The evidence of each disc: light on one side less light on the other, over a cone of directions.
@@ -285,11 +283,13 @@ impl Disc {
         let [ax, ay, az] = self.axis;
         let d = |a: usize, i: usize| i as f32 + 0.5 - self.center[a];
         let (dx, dy) = (d(0, x), d(1, y));
-        std::array::from_fn(|k| {
+        let mut covered = [0; LONGEST];
+        for (k, covered) in covered.iter_mut().enumerate() {
             let dz = d(2, first + k);
             let square = dx * dx + dy * dy + dz * dz;
             let height = dx * ax + dy * ay + dz * az;
-            u8::from(disc::covers(square, height, self.half, self.radius))
-        })
+            *covered = u8::from(disc::covers(square, height, self.half, self.radius));
+        }
+        covered
     }
 }

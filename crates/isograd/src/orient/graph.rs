@@ -107,7 +107,7 @@ impl Graph {
         index.nearest_of_all(radius, sites.positions(), &mut self.near);
         let unit = 1.0 / neighborhoods.spacing().f64();
         let near = &self.near;
-        parallel::fill(&mut self.offset, near.len(), |site| {
+        parallel::fill_large(&mut self.offset, near.len(), &|site| {
             let point = index.point(sites.position(site));
             near[site].map(|near| {
                 let d = vector::sub(index.point(near as usize), point);

@@ -8,8 +8,9 @@ use super::layer::{Layer, NODES, Overlap};
 use super::stencil::Stencil;
 use crate::element::plate::least_area;
 use crate::isosurface::Interpolation;
+use crate::parallel::{self, CHUNK};
 use crate::splat::Samples;
-use crate::{Grid, Real, parallel, simd, vector};
+use crate::{Grid, Real, simd, vector};
 
 /// Weighted mean of the offsets at a cell.
 #[derive(Clone, Copy, Debug, Default)]
@@ -108,8 +109,8 @@ impl<'a, T: Real> GridSamples<'a, T> {
 
     /// Adds `λ e` to `sum`, cell by cell of the layer.
     pub(super) fn accumulate(&self, means: &[CellMean<T>], gain: T, sum: &mut [T]) {
-        let blocks = sum.chunks_mut(NODES).zip(means.chunks(NODES));
-        parallel::each(blocks, |_, (sum, means)| {
+        let chunks = sum.chunks_mut(CHUNK).zip(means.chunks(CHUNK));
+        parallel::each(chunks, |_, (sum, means)| {
             simd::dispatch(
                 self.arch,
                 #[inline(always)]
@@ -125,13 +126,13 @@ impl<'a, T: Real> GridSamples<'a, T> {
     /// Runs `f(i, item)` for the item of every sample, compiled for the processor's instruction set.
     #[inline(always)]
     pub(super) fn for_each<E: Send>(&self, items: &mut [E], f: impl Fn(usize, &mut E) + Sync) {
-        parallel::each(items.chunks_mut(parallel::CHUNK), |chunk, items| {
+        parallel::each(items.chunks_mut(CHUNK), |chunk, items| {
             simd::dispatch(
                 self.arch,
                 #[inline(always)]
                 || {
                     for (n, item) in items.iter_mut().enumerate() {
-                        f(chunk * parallel::CHUNK + n, item);
+                        f(chunk * CHUNK + n, item);
                     }
                 },
             );
