@@ -66,14 +66,38 @@ pub(crate) fn map_each_with<S: Send, P: Send, R: Send>(
     parts: impl IntoIterator<Item = P>,
     f: impl Fn(&mut S, usize, P) -> R + Sync,
 ) -> Vec<R> {
-    let spare = Mutex::new(Vec::new());
+    let pool = Pool::default();
     map_each(parts, |k, part| {
-        let kept = unpoisoned(spare.lock()).pop();
-        let mut scratch = kept.unwrap_or_else(&new);
-        let result = f(&mut scratch, k, part);
-        unpoisoned(spare.lock()).push(scratch);
-        result
+        pool.with(&new, |scratch| f(scratch, k, part))
     })
+}
+
+/// Idle scratches, whose contents have no influence on results.
+#[derive(Debug)]
+pub(crate) struct Pool<S>(Mutex<Vec<S>>);
+
+impl<S> Pool<S> {
+    /// Runs `work` with a scratch of the pool, or with a new one where all are in use.
+    pub(crate) fn with<R>(&self, new: impl FnOnce() -> S, work: impl FnOnce(&mut S) -> R) -> R {
+        let idle = unpoisoned(self.0.lock()).pop();
+        let mut scratch = idle.unwrap_or_else(new);
+        let result = work(&mut scratch);
+        unpoisoned(self.0.lock()).push(scratch);
+        result
+    }
+}
+
+impl<S> Default for Pool<S> {
+    fn default() -> Self {
+        Self(Mutex::default())
+    }
+}
+
+impl<S> Clone for Pool<S> {
+    /// An empty pool.
+    fn clone(&self) -> Self {
+        Self::default()
+    }
 }
 
 /// No closure of a caller runs while one of the locks is held, so none can be poisoned.
@@ -194,18 +218,12 @@ pub(crate) fn first(n: usize, is_so: impl Fn(usize) -> bool + Sync) -> Option<us
 }
 
 /// The `f(i)` that are there, in order.
-pub(crate) fn filter_map<R: Send>(n: usize, f: impl Fn(usize) -> Option<R> + Sync) -> Vec<R> {
+pub(crate) fn filter_map<R: Clone + Send>(
+    n: usize,
+    f: impl Fn(usize) -> Option<R> + Sync,
+) -> Vec<R> {
     let of = |items: Range<usize>| items.filter_map(&f).collect::<Vec<R>>();
-    joined(of_ranges(n, piece(n), &of))
-}
-
-/// The items of all lists, in order.
-pub(crate) fn joined<T>(lists: Vec<Vec<T>>) -> Vec<T> {
-    let mut all = Vec::with_capacity(lists.iter().map(Vec::len).sum());
-    for list in lists {
-        all.extend(list);
-    }
-    all
+    of_ranges(n, piece(n), &of).concat()
 }
 
 /// `f` of each range of `size` of `0..n`, compiled once for each `R`.

@@ -70,7 +70,7 @@ impl<T: Real> Differential<T> {
     pub fn at_points(&self, points: &[[T; 3]], out: &mut Vec<Local<T>>) -> Result<(), Error> {
         out.clear();
         check_points(&self.grid, points)?;
-        parallel::fill(out, points.len(), |i| {
+        parallel::fill_large(out, points.len(), &|i| {
             self.at(points[i]).unwrap_or_default()
         });
         Ok(())

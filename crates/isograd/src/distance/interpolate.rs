@@ -17,7 +17,8 @@
 use super::query::Hit;
 use super::query_pullback::{check, corners_of};
 use super::{Distance, Error, NO_TRIANGLE};
-use crate::{Mesh, Real, parallel};
+use crate::parallel::{self, CHUNK};
+use crate::{Mesh, Real};
 
 /// Values at the vertices of a mesh.
 #[derive(Clone, Copy, Debug)]
@@ -67,12 +68,21 @@ impl<T: Real> VertexValues<'_, T> {
     pub(super) fn at_hits(&self, hits: &[Hit<T>]) -> Result<Vec<T>, Error> {
         let corners = self.corners(hits)?;
         let mut out = vec![T::zero(); hits.len() * self.components];
-        parallel::for_each(&mut out, |place, value| {
-            let (i, c) = (place / self.components, place % self.components);
-            if hits[i].triangle != NO_TRIANGLE {
-                let beta = hits[i].barycentric;
-                let corner = |k: usize| beta[k].f64() * self.value(corners[i][k], c);
-                *value = T::of(corner(0) + corner(1) + corner(2));
+        if self.components == 0 {
+            return Ok(out);
+        }
+        let of_hits = hits.chunks(CHUNK).zip(corners.chunks(CHUNK));
+        let chunks = out.chunks_mut(CHUNK * self.components).zip(of_hits);
+        parallel::each(chunks, |_, (rows, (hits, corners))| {
+            let rows = rows.chunks_exact_mut(self.components).zip(hits);
+            for ((row, hit), corners) in rows.zip(corners) {
+                if hit.triangle == NO_TRIANGLE {
+                    continue;
+                }
+                for (c, value) in row.iter_mut().enumerate() {
+                    let corner = |k: usize| hit.barycentric[k].f64() * self.value(corners[k], c);
+                    *value = T::of(corner(0) + corner(1) + corner(2));
+                }
             }
         });
         Ok(out)

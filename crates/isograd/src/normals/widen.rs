@@ -97,9 +97,7 @@ fn in_tasks<T: Real>(
     positions: &[u32],
     run: impl Fn(&[u32]) -> Vec<Found<T>> + Send + Sync,
 ) -> Vec<Found<T>> {
-    parallel::joined(parallel::map_each(positions.chunks(TASK), |_, task| {
-        run(task)
-    }))
+    parallel::map_each(positions.chunks(TASK), |_, task| run(task)).concat()
 }
 
 /// How far a neighborhood is widened.

@@ -14,7 +14,8 @@ use super::sheets::{self, Near, Sheets};
 use super::sites::Sites;
 use crate::neighbors::Neighborhoods;
 use crate::normals::Plane;
-use crate::{Real, parallel, vector};
+use crate::parallel::{self, CHUNK};
+use crate::{Real, vector};
 
 /// Neighbors, axes and couplings, all in the order of the [`Sites`]; lengths are in sample spacings
 /// ([`Neighborhoods::spacing`]) of the whole cloud, so that single precision serves any unit.
@@ -97,8 +98,15 @@ impl Graph {
                 _ => (0.0, 0.0),
             }
         };
-        let scatters = parallel::map(order.len(), scatter);
-        (self.spread, self.side) = scatters.into_iter().unzip();
+        self.spread.resize(order.len(), 0.0);
+        self.side.resize(order.len(), 0.0);
+        let chunks = self.spread.chunks_mut(CHUNK);
+        let chunks = chunks.zip(self.side.chunks_mut(CHUNK));
+        parallel::each(chunks, |chunk, (spread, side)| {
+            for (i, (spread, side)) in spread.iter_mut().zip(side).enumerate() {
+                (*spread, *side) = scatter(chunk * CHUNK + i);
+            }
+        });
     }
 
     fn find_neighbors<T: Real>(&mut self, neighborhoods: &Neighborhoods<T>, sites: &Sites) {

@@ -7,11 +7,17 @@ use crate::{Real, vector};
 
 /// Turns cotangents of `normals` into those of the `axes` that they are, up to sign: `s_i n̄_i`, in place.
 pub fn axes_pullback<T: Real>(normals: &[[T; 3]], axes: &[[T; 3]], bars: &mut [[T; 3]]) {
-    parallel::for_each(bars, |i, bar| {
-        if vector::dot(normals[i], axes[i]) < T::zero() {
-            *bar = bar.map(|x| -x);
-        }
-    });
+    let chunks = normals.chunks(CHUNK).zip(axes.chunks(CHUNK));
+    parallel::each(
+        bars.chunks_mut(CHUNK).zip(chunks),
+        |_, (bars, (normals, axes))| {
+            for (bar, (&normal, &axis)) in bars.iter_mut().zip(normals.iter().zip(axes)) {
+                if vector::dot(normal, axis) < T::zero() {
+                    *bar = bar.map(|x| -x);
+                }
+            }
+        },
+    );
 }
 
 /// The axes with the signs that `held` has: what [`axes_pullback`] is the pullback of.

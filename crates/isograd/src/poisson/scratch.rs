@@ -1,17 +1,16 @@
 //! Scratch buffers of a solve.
 
-use std::sync::{Mutex, PoisonError};
-
 use isograd_fourier::num_complex::Complex;
 
 use crate::Real;
+use crate::parallel::Pool;
 
 /// Scratch buffers reused between calls: a few lines of the grid for each thread.
 #[derive(Default)]
 pub struct Scratch<T> {
     /// `G` at every frequency, per axis.
     pub(super) gaussian: [Vec<T>; 3],
-    idle: Mutex<Vec<Lines<T>>>,
+    lines: Pool<Lines<T>>,
 }
 
 /// The buffers of one thread.
@@ -28,10 +27,7 @@ pub(super) struct Lines<T> {
 impl<T: Real> Scratch<T> {
     /// Runs `f` with buffers that no other thread uses meanwhile.
     pub(super) fn with_lines(&self, f: impl FnOnce(&mut Lines<T>)) {
-        let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut lines = idle().pop().unwrap_or_default();
-        f(&mut lines);
-        idle().push(lines);
+        self.lines.with(Lines::default, f);
     }
 }
 

@@ -23,7 +23,8 @@ use super::Error;
 use super::bvh::Bvh;
 use super::pseudonormals::Pseudonormals;
 use crate::data::cells::Cells;
-use crate::{Field, Grid, Mesh, Real, parallel};
+use crate::parallel::{self, Pool};
+use crate::{Field, Grid, Mesh, Real};
 use block::{BLOCK, Block};
 pub(super) use of_mesh::fill as fill_from_mesh;
 pub use of_mesh::{Sign, forward_of_mesh};
@@ -31,7 +32,7 @@ pub use pullback::{PullbackScratch, pullback};
 use sides::Sides;
 use sites::Sites;
 use task::{NEAR, Output, Task};
-use workspace::Pool;
+use workspace::Workspace;
 
 /// Region in which the distance is computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -71,7 +72,7 @@ pub struct Scratch<T> {
     pseudonormals: Pseudonormals,
     distance: Vec<T>,
     closest: Vec<u32>,
-    workspaces: Pool,
+    workspaces: Pool<Workspace>,
 }
 
 impl<T: Real> Scratch<T> {
@@ -249,9 +250,9 @@ fn solve_wave<T: Real>(
         ];
         let block = Block::new(start, BLOCK, [planes.end, shape[1], shape[2]]);
         let mut output = Output { distance, closest };
-        scratch
-            .workspaces
-            .with(|workspace| task.solve(&block, workspace, &mut output));
+        scratch.workspaces.with(Workspace::default, |workspace| {
+            task.solve(&block, workspace, &mut output)
+        });
     });
 }
 

@@ -1,7 +1,5 @@
 //! Scratch buffers of the recursion.
 
-use std::sync::{Mutex, PoisonError};
-
 use super::block::CHILDREN;
 use super::packet::CELLS;
 use super::site_list::{ChildLists, Site};
@@ -23,27 +21,6 @@ pub(super) struct Workspace {
     pub large: Vec<u32>,
     pub levels: [ChildCandidates; LEVELS],
     pub measured: Candidates,
-}
-
-/// Idle workspaces. Their contents have no influence on results.
-#[derive(Debug, Default)]
-pub(super) struct Pool(Mutex<Vec<Workspace>>);
-
-impl Pool {
-    /// Runs `work` with a workspace of the pool.
-    pub(super) fn with(&self, work: impl FnOnce(&mut Workspace)) {
-        let waiting = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut workspace = waiting().pop().unwrap_or_default();
-        work(&mut workspace);
-        waiting().push(workspace);
-    }
-}
-
-impl Clone for Pool {
-    /// An empty pool.
-    fn clone(&self) -> Self {
-        Self::default()
-    }
 }
 
 /// A small triangle that may be closest to some cell of a packet.
