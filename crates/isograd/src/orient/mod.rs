@@ -63,6 +63,7 @@ mod domains;
 pub mod doubt;
 mod error;
 mod evidence;
+mod field;
 mod fill;
 mod graph;
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! Sampled bodies with known outward normals, for the tests.
 
+use super::graph::{Graph, NEIGHBORS};
+use super::signs::Place;
 use super::{Error, Method, Orientation, Scratch, forward};
 use crate::neighbors::{self, Neighborhoods, Radius};
 use crate::{Real, vector};
@@ -26,6 +28,40 @@ pub(super) fn oriented<T: Real>(
 
 /// Points and their outward normals.
 pub(super) type Sampled = (Vec<[f64; 3]>, Vec<[f64; 3]>);
+
+impl Place for Vec<[f64; 3]> {
+    fn user(&self, p: usize) -> [f64; 3] {
+        self[p]
+    }
+
+    fn spacing(&self) -> f64 {
+        1.0
+    }
+}
+
+/// Samples with correct axes, each for an area of 1. The faces of a box are hardly coupled to each other.
+pub(super) fn graph((points, normals): &Sampled) -> Graph {
+    let axis: Vec<[f32; 3]> = normals.iter().map(|&n| vector::of_f64(n)).collect();
+    let nearest = |p: &[f64; 3]| -> [u32; NEIGHBORS] {
+        let mut order: Vec<u32> = (0..points.len() as u32).collect();
+        let distance = |&q: &u32| vector::norm_squared(vector::sub(points[q as usize], *p));
+        order.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        std::array::from_fn(|slot| order[slot + 1])
+    };
+    let near: Vec<_> = points.iter().map(nearest).collect();
+    let coupling = |(a, near): (&[f32; 3], &[u32; NEIGHBORS])| {
+        near.map(|q| vector::dot(*a, axis[q as usize]).max(0.1))
+    };
+    Graph {
+        coupling: axis.iter().zip(&near).map(coupling).collect(),
+        area: vec![1.0; points.len()],
+        spread: vec![0.0; points.len()],
+        scatter: vec![0.0; points.len()],
+        near,
+        axis,
+        ..Graph::default()
+    }
+}
 
 /// A seeded xorshift generator.
 pub(super) struct Random(pub u64);

@@ -6,6 +6,7 @@
 
 use super::confidence;
 use super::domains::{self, DomainSigns};
+use super::field;
 use super::graph::Graph;
 use crate::vector;
 
@@ -144,8 +145,24 @@ impl Signs {
                 }
             }
         }
-        let Solution { sign, belief, .. } = &self.best;
+        let Solution {
+            sign,
+            evidence,
+            belief,
+        } = &mut self.best;
         confidence::measure(graph, sign, belief, &mut self.confidence);
+        if !sensors {
+            let turned = field::turn_patches(graph, place, evidence, &self.confidence, sign);
+            for &p in &turned {
+                let p = p as usize;
+                if sign[p] * belief[p] < 0.0 {
+                    belief[p] *= -OVERRULED;
+                }
+            }
+            if !turned.is_empty() {
+                confidence::measure(graph, sign, belief, &mut self.confidence);
+            }
+        }
     }
 
     fn keep(&mut self) {

@@ -15,7 +15,7 @@ use super::signs::{Domains, Place};
 use crate::{parallel, simd, vector};
 use tree::{Dipole, Tree};
 
-mod tree;
+pub(super) mod tree;
 
 /// Number of samples at which the winding number is computed, and the fewest in one domain.
 const PROBES: usize = 2048;

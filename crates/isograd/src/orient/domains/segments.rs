@@ -145,10 +145,9 @@ fn is_noisy(graph: &Graph) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::shapes::sphere;
+    use super::super::super::shapes::{graph, sphere};
     use super::super::{Domains, Misfit};
     use super::*;
-    use crate::vector::{dot, norm_squared, of_f64, sub};
 
     const WINDING: f64 = 4.0;
 
@@ -160,33 +159,14 @@ mod tests {
         signs: DomainSigns,
     }
 
-    impl Place for Vec<[f64; 3]> {
-        fn user(&self, p: usize) -> [f64; 3] {
-            self[p]
-        }
-
-        fn spacing(&self) -> f64 {
-            1.0
-        }
-    }
-
     impl Scene {
         /// The polar cap has wrong signs, and evidence for them.
         fn with_wrong_cap() -> Self {
             let n = 2000;
             let radius = (n as f64 / (4.0 * std::f64::consts::PI)).sqrt();
-            let (points, normals) = sphere(n, [0.0; 3], radius, 5);
-            let nearest = |p: &[f64; 3]| {
-                let mut order: Vec<u32> = (0..n as u32).collect();
-                let distance = |&q: &u32| norm_squared(sub(points[q as usize], *p));
-                order.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
-                std::array::from_fn(|slot| order[slot + 1])
-            };
-            let near: Vec<[u32; 16]> = points.iter().map(nearest).collect();
-            let axis: Vec<[f32; 3]> = normals.iter().map(|&n| of_f64(n)).collect();
-            let coupling =
-                |(a, near): (&[f32; 3], &[u32; 16])| near.map(|q| dot(*a, axis[q as usize]));
-            let coupling = axis.iter().zip(&near).map(coupling).collect();
+            let sampled = sphere(n, [0.0; 3], radius, 5);
+            let graph = graph(&sampled);
+            let (points, normals) = sampled;
             let cap: Vec<bool> = normals.iter().map(|n| n[2] > 0.4).collect();
             let signed = |size: f32| {
                 cap.iter()
@@ -195,15 +175,7 @@ mod tests {
             };
             let (evidence, sign) = (signed(0.3), signed(1.0));
             Self {
-                graph: Graph {
-                    near,
-                    axis,
-                    coupling,
-                    area: vec![1.0; n],
-                    spread: vec![0.0; n],
-                    scatter: vec![0.0; n],
-                    ..Graph::default()
-                },
+                graph,
                 points,
                 evidence,
                 signs: DomainSigns {

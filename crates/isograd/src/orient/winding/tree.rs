@@ -1,4 +1,4 @@
-//! The winding number of samples as a sum over clusters of them.
+//! The winding number of samples, and its slope, as sums over clusters of them.
 //!
 //! A cluster far from a place acts as one sample with the sum of all moments. Samples nearby are summed one by one.
 //!
@@ -12,9 +12,12 @@ use crate::{parallel, vector};
 /// only its noise would speak.
 const SOFT: f32 = 0.3;
 
+/// This distance for slopes, which vary more.
+const SMOOTH: f32 = 1.0;
+
 /// A sample as a piece of surface; lengths in sample spacings.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Dipole {
+pub(in crate::orient) struct Dipole {
     position: [f32; 3],
     /// Area times normal over 4π.
     moment: [f32; 3],
@@ -22,7 +25,7 @@ pub(super) struct Dipole {
 
 impl Dipole {
     /// A sample with its outward unit normal.
-    pub(super) fn new(position: [f32; 3], normal: [f32; 3], area: f32) -> Self {
+    pub(in crate::orient) fn new(position: [f32; 3], normal: [f32; 3], area: f32) -> Self {
         Self {
             position,
             moment: normal.map(|n| n * area / (4.0 * PI)),
@@ -59,14 +62,14 @@ struct Cluster {
 
 /// The samples of a domain: clusters, each before its two halves.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Tree {
+pub(in crate::orient) struct Tree {
     blocks: Vec<Block>,
     clusters: Vec<Cluster>,
 }
 
 impl Tree {
     /// The tree of samples, in any order.
-    pub(super) fn new(mut dipoles: Vec<Dipole>) -> Self {
+    pub(in crate::orient) fn new(mut dipoles: Vec<Dipole>) -> Self {
         match dipoles.is_empty() {
             true => Self::default(),
             false => Self::of(&mut dipoles, MANY),
@@ -128,20 +131,45 @@ impl Tree {
     /// The winding number at a place; off by up to 1 % where clusters stand for their samples.
     #[inline(always)]
     pub(super) fn winding_number(&self, at: [f32; 3]) -> f64 {
+        self.sum(
+            at,
+            #[inline(always)]
+            |offset, moment| {
+                let square = softened(offset, SOFT);
+                share(vector::dot(offset, moment), square)
+            },
+        )
+    }
+
+    /// How steeply the winding number falls at a place, along a unit vector: its derivative, with the opposite sign, per
+    /// spacing.
+    #[inline(always)]
+    pub(in crate::orient) fn slope(&self, at: [f32; 3], along: [f32; 3]) -> f64 {
+        self.sum(
+            at,
+            #[inline(always)]
+            |offset, moment| {
+                let square = softened(offset, SMOOTH);
+                let both = 3.0 * vector::dot(offset, moment) * vector::dot(offset, along) / square;
+                share(vector::dot(along, moment) - both, square)
+            },
+        )
+    }
+
+    /// The sum over all samples of a function of their offset from a place, and of their moment.
+    #[inline(always)]
+    fn sum(&self, at: [f32; 3], of: impl Fn([f32; 3], [f32; 3]) -> f32) -> f64 {
         let mut total = 0.0;
         let mut c = 0;
         while let Some(cluster) = self.clusters.get(c) {
-            let [x, y, z] = [0, 1, 2].map(|a| cluster.whole.position[a] - at[a]);
-            let square = x * x + y * y + z * z;
-            if square > cluster.far {
-                let [mx, my, mz] = cluster.whole.moment;
-                let square = softened(square);
-                total += f64::from(share(x * mx + y * my + z * mz, square, square.sqrt()));
+            let offset = [0, 1, 2].map(|a| cluster.whole.position[a] - at[a]);
+            if vector::norm_squared(offset) > cluster.far {
+                total += f64::from(of(offset, cluster.whole.moment));
                 c = cluster.next as usize;
                 continue;
             }
             let [first, last] = cluster.blocks.map(|b| b as usize);
-            total += near(&self.blocks[first..last], at);
+            total += near(&self.blocks[first..last], at, &of);
             c += 1;
         }
         total
@@ -208,13 +236,12 @@ fn blocks(dipoles: &[Dipole]) -> Vec<Block> {
 
 /// The sum over all samples of some blocks.
 #[inline(always)]
-fn near(blocks: &[Block], at: [f32; 3]) -> f64 {
+fn near(blocks: &[Block], at: [f32; 3], of: impl Fn([f32; 3], [f32; 3]) -> f32) -> f64 {
     let mut sums = [0.0f32; WIDTH];
     for [px, py, pz, mx, my, mz] in blocks {
         for l in 0..WIDTH {
-            let (x, y, z) = (px[l] - at[0], py[l] - at[1], pz[l] - at[2]);
-            let square = softened(x * x + y * y + z * z);
-            sums[l] += share(x * mx[l] + y * my[l] + z * mz[l], square, square.sqrt());
+            let offset = [px[l] - at[0], py[l] - at[1], pz[l] - at[2]];
+            sums[l] += of(offset, [mx[l], my[l], mz[l]]);
         }
     }
     sums.iter().map(|&s| f64::from(s)).sum()
@@ -222,15 +249,14 @@ fn near(blocks: &[Block], at: [f32; 3]) -> f64 {
 
 /// The square of the distance that counts, in squares of the spacing.
 #[inline(always)]
-fn softened(square: f32) -> f32 {
-    square + SOFT * SOFT
+fn softened(offset: [f32; 3], by: f32) -> f32 {
+    vector::norm_squared(offset) + by * by
 }
 
-/// The share of a sample whose moment (area times outward normal, over 4π) is `along` its offset from the place, by
-/// the softened square of their distance and its root.
+/// `along` over the third power of the distance with this square.
 #[inline(always)]
-fn share(along: f32, square: f32, root: f32) -> f32 {
-    along / (square * root)
+fn share(along: f32, square: f32) -> f32 {
+    along / (square * square.sqrt())
 }
 
 #[cfg(test)]
@@ -290,5 +316,40 @@ mod tests {
                 "{sum} {plain}"
             );
         }
+    }
+
+    #[test]
+    fn slopes_are_differences_of_the_winding_number() {
+        let ball = ball(1003);
+        let tree = Tree::new(ball.clone());
+        let smooth = |at: [f64; 3]| -> f64 {
+            let one = |d: &Dipole| {
+                let r = vector::sub(vector::to_f64(d.position), at);
+                let square = vector::norm_squared(r) + f64::from(SMOOTH * SMOOTH);
+                vector::dot(r, vector::to_f64(d.moment)) / square.powf(1.5)
+            };
+            ball.iter().map(one).sum()
+        };
+        let along = [0.6, 0.0, -0.8f32];
+        for at in [
+            [2.0, 3.0, 1.0],
+            [1.0, 2.0, 11.9],
+            [1.0, -7.0, 3.0],
+            [14.0, 9.0, 1.0f32],
+        ] {
+            let step = vector::scale(vector::to_f64(along), 1e-4);
+            let ends = [vector::sub, vector::add].map(|by| smooth(by(vector::to_f64(at), step)));
+            let expected = (ends[0] - ends[1]) / 2e-4;
+            let slope = tree.slope(at, along);
+            assert!(
+                (slope - expected).abs() < 0.01 * expected.abs() + 1e-3,
+                "{slope} {expected}"
+            );
+        }
+        // From 1 to 0 across the surface, half of it by the sample's own sheet.
+        let at = ball[0].position;
+        let outward = vector::scale(ball[0].moment, 4.0 * PI);
+        assert!((tree.slope(at, outward) - 0.5).abs() < 0.1);
+        assert!((tree.slope(at, outward.map(|x| -x)) + 0.5).abs() < 0.1);
     }
 }
