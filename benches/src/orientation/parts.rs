@@ -151,6 +151,38 @@ pub fn ribbed_plate(thickness: f64) -> Vec<Prism> {
     std::iter::once(plate).chain((0..6).map(rib)).collect()
 }
 
+/// Walls of the given thickness, seven along x and seven along y.
+pub fn grating(thickness: f64) -> Vec<Prism> {
+    let places = (0..7).map(|k| -0.48 + 0.16 * f64::from(k));
+    let walls = places.flat_map(|at| {
+        [
+            Prism::cuboid([thickness, 1.0, 0.3], [at, 0.0, 0.0]),
+            Prism::cuboid([1.0, thickness, 0.3], [0.0, at, 0.0]),
+        ]
+    });
+    walls.collect()
+}
+
+/// Seven discs of the given thickness on a shaft, twice that apart.
+pub fn discs(thickness: f64) -> Vec<Prism> {
+    let at = |y: f64| [0.0, thickness * y, 0.0];
+    let discs = (0..7).map(|k| Prism::regular(24, 0.3, thickness, at(3.0 * f64::from(k))));
+    let shaft = Prism::regular(8, 0.1, 21.0 * thickness, at(9.5));
+    discs.chain([shaft]).collect()
+}
+
+/// A hub with seven slanted blades of the given thickness.
+pub fn rotor(thickness: f64) -> Vec<Prism> {
+    let blade = |k: u32| {
+        let turn = 360.0 * f64::from(k) / 7.0;
+        let (sin, cos) = turn.to_radians().sin_cos();
+        let center = [-0.31 * sin, 0.31 * cos, 0.0];
+        Prism::cuboid([0.25, 0.42, thickness], center).turned([40.0, turn])
+    };
+    let hub = Prism::cuboid([0.25, 0.25, 0.4], [0.0; 3]);
+    (0..7).map(blade).chain([hub]).collect()
+}
+
 /// A blade with two sharp edges, a diamond in cross-section: chord 1, length 3.
 pub fn blade(thickness: f64) -> Prism {
     let t = 0.5 * thickness;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::body::{Body, RANDOM, shell, wing};
-use super::parts;
+use super::parts::{self, Prism};
 use crate::sampling::Draw;
 
 /// Extension of the files of real clouds.
@@ -235,12 +235,24 @@ impl Suite {
         }
     }
 
-    /// Ribbed plates, blades, bundles of tubes, and brackets with and without holes.
+    /// Ribbed plates, gratings, discs, rotors, blades, bundles of tubes, and brackets with and without holes.
     fn add_parts(&mut self) {
         for thickness in [0.01, 0.02] {
             self.add(Family::Parts, format!("ribs {thickness}"), move || {
                 parts::union(&parts::ribbed_plate(thickness), SAMPLES, 31)
             });
+        }
+        let thin: [(&str, fn(f64) -> Vec<Prism>); 3] = [
+            ("grating", parts::grating),
+            ("discs", parts::discs),
+            ("rotor", parts::rotor),
+        ];
+        for (name, prisms) in thin {
+            for thickness in [0.02, 0.03] {
+                self.add(Family::Parts, format!("{name} {thickness}"), move || {
+                    parts::union(&prisms(thickness), SAMPLES, 34)
+                });
+            }
         }
         for thickness in [0.02, 0.05, 0.1] {
             self.add(Family::Parts, format!("blade {thickness}"), move || {

@@ -62,7 +62,13 @@ fn noise_that_is_small_beside_the_body_turns_few_signs() {
 }
 
 #[test]
-fn patches_beside_holes_and_between_touching_bodies_are_right() {
-    let failed = too_many_wrong(&["bracket 1 holes", "bracket 4 holes", "tubes 0.01"]);
+fn patches_beside_holes_and_narrow_faces_are_right() {
+    let failed = too_many_wrong(&[
+        "bracket 1 holes",
+        "bracket 4 holes",
+        "tubes 0.01",
+        "grating 0.02",
+        "discs 0.02",
+    ]);
     assert!(failed.is_empty(), "{failed:?}");
 }

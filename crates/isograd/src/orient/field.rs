@@ -7,8 +7,8 @@
 //!
 //! The winding number itself cannot tell the two sides of a flat patch from each other, since it is 0 all over the plane of
 //! a patch. The slope can: the walls below the top of a rib make it. So patches that are narrow and have edges all round,
-//! where couplings and evidence often fail, are decided here. A patch is a set of doubtful neighbors that face the same way;
-//! it turns if energy, couplings and evidence together gain clearly, the patch that gains most first.
+//! where couplings and evidence often fail, are decided here. A patch is a set of neighbors that face the same way, most of them
+//! doubtful; it turns if energy, couplings and evidence together gain clearly, the patch that gains most first.
 //!
 //! Source: the energy is that of S. Lin et al., "Fast and globally consistent normal orientation based on the winding number
 //! normal consistency" (2024), who move the normals of all samples.
@@ -19,7 +19,8 @@ use super::signs::{Domains, Place};
 use super::winding::tree::{Dipole, Tree};
 use crate::{parallel, simd, vector};
 
-/// Confidence below which a sample belongs to a patch.
+/// A sample of a patch has less confidence than this, and all of them in the mean less than that.
+const SURE: f32 = 0.9;
 const UNSURE: f32 = 0.25;
 
 /// Neighbors of a patch are coupled at least this strongly.
@@ -78,13 +79,15 @@ struct Patches {
 
 impl Patches {
     fn find(graph: &Graph, place: &impl Place, confidence: &[f32], sign: &[f32]) -> Self {
-        let (patch, count) = join(graph, confidence, sign);
-        let domains = Domains {
-            domain: &patch,
-            sign,
-            count,
-        };
-        let members = domains.members();
+        let mut members = join(graph, confidence, sign);
+        members.retain(|members| {
+            let sum: f32 = members.iter().map(|&p| confidence[p as usize]).sum();
+            sum < UNSURE * members.len() as f32
+        });
+        let mut patch = vec![Domains::NONE; sign.len()];
+        for (k, members) in (0..).zip(&members) {
+            members.iter().for_each(|&p| patch[p as usize] = k);
+        }
         let dipole = |p: usize| dipole(graph, place, p, sign[p]);
         let own = parallel::map_each(&members, |_, members| {
             Tree::new(members.iter().map(|&p| dipole(p as usize)).collect())
@@ -96,7 +99,7 @@ impl Patches {
         };
         let mut patches = Self {
             slope: vec![0.0; samples.len()],
-            turn: vec![1.0; count],
+            turn: vec![1.0; members.len()],
             patch,
             members,
             samples,
@@ -200,9 +203,9 @@ fn dipole(graph: &Graph, place: &impl Place, p: usize, sign: f32) -> Dipole {
     Dipole::new(place.in_spacings(p), normal, graph.area[p])
 }
 
-/// The patch of each sample, and their number.
-fn join(graph: &Graph, confidence: &[f32], sign: &[f32]) -> (Vec<u32>, usize) {
-    let is_unsure = |p: usize| confidence[p] < UNSURE;
+/// Neighbors that face the same way and are not sure, joined.
+fn join(graph: &Graph, confidence: &[f32], sign: &[f32]) -> Vec<Vec<u32>> {
+    let is_unsure = |p: usize| confidence[p] < SURE;
     let unsure = || (0..sign.len()).filter(|&p| is_unsure(p));
     let mut parent: Vec<u32> = (0..sign.len() as u32).collect();
     for p in unsure() {
@@ -216,14 +219,19 @@ fn join(graph: &Graph, confidence: &[f32], sign: &[f32]) -> (Vec<u32>, usize) {
             }
         }
     }
-    let (mut patch, mut count) = (vec![Domains::NONE; sign.len()], 0);
+    let (mut domain, mut count) = (vec![Domains::NONE; sign.len()], 0);
     for p in unsure() {
-        // A root comes before all others of its patch.
+        // A root comes before all others of its set.
         let root = root(&mut parent, p as u32) as usize;
-        patch[p] = if root == p { count } else { patch[root] };
+        domain[p] = if root == p { count } else { domain[root] };
         count += u32::from(root == p);
     }
-    (patch, count as usize)
+    let joined = Domains {
+        domain: &domain,
+        sign,
+        count: count as usize,
+    };
+    joined.members()
 }
 
 #[cfg(test)]

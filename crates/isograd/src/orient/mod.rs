@@ -17,6 +17,8 @@
 //!   each other the *winding number* decides: with the correct signs it is ½ on the surface.
 //!   Where signs within a domain contradict the couplings, as along the border of a patch beside a hole, it is cut
 //!   into segments, and these are decided between in the same way.
+//!   Patches of doubtful samples, such as the narrow top of a wall, turn where the winding number of all others falls
+//!   against their normals.
 //!   Signs are those of the sheets; an axis far from that of its sheet, as beside an edge, gets the side of its neighbors.
 //!   Thin bodies and narrow gaps are locally the same; where that matters, both interpretations are solved, and
 //!   the winding number selects one. Time and memory are `O(N log N)`, regardless of outliers.
