@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::body::{Body, RANDOM, shell, wing};
-use super::parts::{self, Prism};
+use super::parts;
 use crate::sampling::Draw;
 
 /// Extension of the files of real clouds.
@@ -242,15 +242,14 @@ impl Suite {
                 parts::union(&parts::ribbed_plate(thickness), SAMPLES, 31)
             });
         }
-        let thin: [(&str, fn(f64) -> Vec<Prism>); 3] = [
-            ("grating", parts::grating),
-            ("discs", parts::discs),
-            ("rotor", parts::rotor),
-        ];
-        for (name, prisms) in thin {
-            for thickness in [0.02, 0.03] {
+        for thickness in [0.02, 0.03] {
+            for (name, prisms) in [
+                ("grating", parts::grating(thickness)),
+                ("discs", parts::discs(thickness)),
+                ("rotor", parts::rotor(thickness)),
+            ] {
                 self.add(Family::Parts, format!("{name} {thickness}"), move || {
-                    parts::union(&prisms(thickness), SAMPLES, 34)
+                    parts::union(&prisms, SAMPLES, 34)
                 });
             }
         }

@@ -8,7 +8,8 @@
 //! The winding number itself cannot tell the two sides of a flat patch from each other, since it is 0 all over the plane of
 //! a patch. The slope can: the walls below the top of a rib make it. So patches that are narrow and have edges all round,
 //! where couplings and evidence often fail, are decided here. A patch is a set of neighbors that face the same way, most of them
-//! doubtful; it turns if energy, couplings and evidence together gain clearly, the patch that gains most first.
+//! doubtful; it turns if energy, couplings and evidence together gain clearly. Of patches next to each other the one that
+//! gains most turns first.
 //!
 //! Source: the energy is that of S. Lin et al., "Fast and globally consistent normal orientation based on the winding number
 //! normal consistency" (2024), who move the normals of all samples.
@@ -21,7 +22,7 @@ use crate::{parallel, simd, vector};
 
 /// A sample of a patch has less confidence than this, and all of them in the mean less than that.
 const SURE: f32 = 0.9;
-const UNSURE: f32 = 0.25;
+const UNSURE: f64 = 0.25;
 
 /// Neighbors of a patch are coupled at least this strongly.
 const STRONG: f32 = 0.5;
@@ -36,6 +37,9 @@ const WEIGHT: f64 = 8.0;
 /// the fewer they are, the less such deviations cancel.
 const GAIN: f64 = 1.0;
 const GAIN_OF_PATCH: f64 = 4.0;
+
+/// Most samples of a patch at which slopes are computed.
+const PROBES: usize = 256;
 
 /// Rounds, in each of which patches turn that are not next to each other; few patches turn after the third.
 const ROUNDS: usize = 8;
@@ -67,9 +71,9 @@ struct Patches {
     patch: Vec<u32>,
     /// The samples of each patch.
     members: Vec<Vec<u32>>,
-    /// All samples of patches, by patch.
-    samples: Vec<u32>,
-    /// The slope at each of these along its axis, of all samples but those of its own patch.
+    /// Samples of each patch, spread evenly over it, and how many each of them stands for.
+    probes: Vec<(u32, f64)>,
+    /// The slope at each probe along its axis, of all samples but those of its own patch.
     slope: Vec<f64>,
     /// The samples of each patch, with their first signs.
     own: Vec<Tree>,
@@ -81,8 +85,11 @@ impl Patches {
     fn find(graph: &Graph, place: &impl Place, confidence: &[f32], sign: &[f32]) -> Self {
         let mut members = join(graph, confidence, sign);
         members.retain(|members| {
-            let sum: f32 = members.iter().map(|&p| confidence[p as usize]).sum();
-            sum < UNSURE * members.len() as f32
+            let sum: f64 = members
+                .iter()
+                .map(|&p| f64::from(confidence[p as usize]))
+                .sum();
+            sum < UNSURE * members.len() as f64
         });
         let mut patch = vec![Domains::NONE; sign.len()];
         for (k, members) in (0..).zip(&members) {
@@ -92,17 +99,17 @@ impl Patches {
         let own = parallel::map_each(&members, |_, members| {
             Tree::new(members.iter().map(|&p| dipole(p as usize)).collect())
         });
-        let samples = members.concat();
-        let all = match samples.is_empty() {
+        let probes: Vec<(u32, f64)> = members.iter().flat_map(|m| probes(m)).collect();
+        let all = match probes.is_empty() {
             true => Tree::default(),
             false => Tree::new(parallel::map(sign.len(), dipole)),
         };
         let mut patches = Self {
-            slope: vec![0.0; samples.len()],
+            slope: vec![0.0; probes.len()],
             turn: vec![1.0; members.len()],
             patch,
             members,
-            samples,
+            probes,
             own,
         };
         patches.add(graph, place, &all, |_| -1.0);
@@ -118,7 +125,7 @@ impl Patches {
         factor: impl Fn(usize) -> f64 + Sync,
     ) {
         let Self {
-            samples,
+            probes,
             patch,
             own,
             slope,
@@ -126,7 +133,7 @@ impl Patches {
         } = self;
         let arch = pulp::Arch::new();
         parallel::for_each(slope, |i, slope| {
-            let p = samples[i] as usize;
+            let p = probes[i].0 as usize;
             let (at, along) = (place.in_spacings(p), graph.axis[p]);
             let of = |tree: &Tree| simd::vectorized!(arch, tree.slope(at, along));
             let k = patch[p] as usize;
@@ -144,13 +151,18 @@ impl Patches {
             f64::from(turn) * (GAIN * members.len() as f64 + GAIN_OF_PATCH)
         };
         let mut scores: Vec<f64> = self.turn.iter().zip(&self.members).map(stays).collect();
-        for (&p, slope) in self.samples.iter().zip(&self.slope) {
+        let mut add = |p: usize, outward: f64| {
+            scores[self.patch[p] as usize] += f64::from(sign[p]) * outward;
+        };
+        for (&(p, count), slope) in self.probes.iter().zip(&self.slope) {
+            let p = p as usize;
+            add(p, WEIGHT * count * f64::from(graph.area[p]) * slope);
+        }
+        for &p in self.members.iter().flatten() {
             let p = p as usize;
             let beside = self.beside(graph, p);
             let coupled: f32 = beside.map(|(q, coupling)| coupling * sign[q]).sum();
-            let known = coupled + evidence[p] * evidence[p].abs();
-            let total = WEIGHT * f64::from(graph.area[p]) * slope + f64::from(known);
-            scores[self.patch[p] as usize] += f64::from(sign[p]) * total;
+            add(p, f64::from(coupled + evidence[p] * evidence[p].abs()));
         }
         scores
     }
@@ -166,7 +178,7 @@ impl Patches {
     fn choose(&self, graph: &Graph, evidence: &[f32], sign: &[f32]) -> Vec<usize> {
         let scores = self.scores(graph, evidence, sign);
         let mut turns: Vec<bool> = scores.iter().map(|&score| score < 0.0).collect();
-        for &p in &self.samples {
+        for &p in self.members.iter().flatten() {
             let p = p as usize;
             let a = self.patch[p] as usize;
             for (q, _) in self.beside(graph, p) {
@@ -196,6 +208,18 @@ impl Patches {
         }
         self.add(graph, place, &Tree::new(dipoles), |k| changed[k]);
     }
+}
+
+/// Samples of a patch at which slopes are computed, and how many each of them stands for.
+fn probes(members: &[u32]) -> impl Iterator<Item = (u32, f64)> + '_ {
+    let n = members.len();
+    let share = n.min(PROBES);
+    (0..share).map(move |k| {
+        (
+            members[(2 * k + 1) * n / (2 * share)],
+            n as f64 / share as f64,
+        )
+    })
 }
 
 fn dipole(graph: &Graph, place: &impl Place, p: usize, sign: f32) -> Dipole {
@@ -337,7 +361,7 @@ mod tests {
             patches.turn(&graph, &wall.0, &turned, &mut sign);
         }
         let at = |p: usize| wall.0.in_spacings(p);
-        for (&p, &slope) in patches.samples.iter().zip(&patches.slope) {
+        for (&(p, _), &slope) in patches.probes.iter().zip(&patches.slope) {
             let p = p as usize;
             let others = (0..sign.len()).filter(|&q| patches.patch[q] != patches.patch[p]);
             let slopes = others.map(|q| {
