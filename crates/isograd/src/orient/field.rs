@@ -14,18 +14,17 @@
 //! Source: the energy is that of S. Lin et al., "Fast and globally consistent normal orientation based on the winding number
 //! normal consistency" (2024), who move the normals of all samples.
 
+use super::domains::STRONG;
 use super::graph::Graph;
-use super::regions::root;
+use super::regions;
 use super::signs::{Domains, Place};
-use super::winding::tree::{Dipole, Tree};
+use super::winding::tree::Tree;
+use super::winding::{dipole, spread_evenly};
 use crate::{parallel, simd, vector};
 
 /// A sample of a patch has less confidence than this, and all of them in the mean less than that.
 const SURE: f32 = 0.9;
 const UNSURE: f64 = 0.25;
-
-/// Neighbors of a patch are coupled at least this strongly.
-const STRONG: f32 = 0.5;
 
 /// Least cosine between the normals of neighbors of a patch: 45°.
 const SMOOTH: f32 = 0.7;
@@ -53,13 +52,12 @@ pub(super) fn turn_patches(
     sign: &mut [f32],
 ) -> Vec<u32> {
     let mut patches = Patches::find(graph, place, confidence, sign);
-    let mut turned = patches.choose(graph, evidence, sign);
     for _ in 0..ROUNDS {
+        let turned = patches.choose(graph, evidence, sign);
         if turned.is_empty() {
             break;
         }
         patches.turn(graph, place, &turned, sign);
-        turned = patches.choose(graph, evidence, sign);
     }
     let turned = (0..patches.turn.len()).filter(|&k| patches.turn[k] < 0.0);
     turned.flat_map(|k| patches.members[k].clone()).collect()
@@ -145,7 +143,7 @@ impl Patches {
         });
     }
 
-    /// What speaks for the signs of each patch, in units of evidence; negative where it should turn.
+    /// Energy, couplings and evidence in favor of the sign of each patch; negative where it should turn.
     fn scores(&self, graph: &Graph, evidence: &[f32], sign: &[f32]) -> Vec<f64> {
         let stays = |(&turn, members): (&f32, &Vec<u32>)| {
             f64::from(turn) * (GAIN * members.len() as f64 + GAIN_OF_PATCH)
@@ -212,19 +210,9 @@ impl Patches {
 
 /// Samples of a patch at which slopes are computed, and how many each of them stands for.
 fn probes(members: &[u32]) -> impl Iterator<Item = (u32, f64)> + '_ {
-    let n = members.len();
-    let share = n.min(PROBES);
-    (0..share).map(move |k| {
-        (
-            members[(2 * k + 1) * n / (2 * share)],
-            n as f64 / share as f64,
-        )
-    })
-}
-
-fn dipole(graph: &Graph, place: &impl Place, p: usize, sign: f32) -> Dipole {
-    let normal = vector::scale(graph.axis[p], sign);
-    Dipole::new(place.in_spacings(p), normal, graph.area[p])
+    let share = members.len().min(PROBES);
+    let count = members.len() as f64 / share as f64;
+    spread_evenly(members, share).map(move |p| (p, count))
 }
 
 /// Neighbors that face the same way and are not sure, joined.
@@ -238,15 +226,14 @@ fn join(graph: &Graph, confidence: &[f32], sign: &[f32]) -> Vec<Vec<u32>> {
             let signs = sign[p] * sign[q];
             let cosine = signs * vector::dot(graph.axis[p], graph.axis[q]);
             if is_unsure(q) && signs * coupling > STRONG && cosine > SMOOTH {
-                let (a, b) = (root(&mut parent, p as u32), root(&mut parent, near));
-                parent[a.max(b) as usize] = a.min(b);
+                regions::join(&mut parent, p as u32, near);
             }
         }
     }
     let (mut domain, mut count) = (vec![Domains::NONE; sign.len()], 0);
     for p in unsure() {
         // A root comes before all others of its set.
-        let root = root(&mut parent, p as u32) as usize;
+        let root = regions::root(&mut parent, p as u32) as usize;
         domain[p] = if root == p { count } else { domain[root] };
         count += u32::from(root == p);
     }

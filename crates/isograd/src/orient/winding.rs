@@ -23,12 +23,8 @@ const FEWEST_PROBES: usize = 4;
 
 /// `(probes, domains)` the winding number that each domain gives at each of the `probes`.
 fn numbers(graph: &Graph, place: &impl Place, domains: &Domains<'_>, probes: &[u32]) -> Vec<f64> {
-    let dipole = |&p: &u32| {
-        let p = p as usize;
-        let normal = vector::scale(graph.axis[p], domains.sign[p]);
-        Dipole::new(place.in_spacings(p), normal, graph.area[p])
-    };
     let trees = parallel::map_each(domains.members(), |_, members| {
+        let dipole = |&p: &u32| dipole(graph, place, p as usize, domains.sign[p as usize]);
         Tree::new(members.iter().map(dipole).collect())
     });
     let arch = pulp::Arch::new();
@@ -106,10 +102,21 @@ fn probes(members: &[Vec<u32>], samples: usize) -> (Vec<u32>, Vec<f64>) {
     for members in members {
         let n = members.len();
         let share = (PROBES * n / samples.max(1)).max(FEWEST_PROBES).min(n);
-        probes.extend((0..share).map(|k| members[(2 * k + 1) * n / (2 * share)]));
+        probes.extend(spread_evenly(members, share));
         weights.extend((0..share).map(|_| n as f64 / share as f64));
     }
     (probes, weights)
+}
+
+/// So many of some samples, spread evenly over them.
+pub(super) fn spread_evenly(members: &[u32], share: usize) -> impl Iterator<Item = u32> + '_ {
+    (0..share).map(move |k| members[(2 * k + 1) * members.len() / (2 * share)])
+}
+
+/// A sample with this sign of its axis; lengths in spacings.
+pub(super) fn dipole(graph: &Graph, place: &impl Place, p: usize, sign: f32) -> Dipole {
+    let normal = vector::scale(graph.axis[p], sign);
+    Dipole::new(place.in_spacings(p), normal, graph.area[p])
 }
 
 /// Rows of the matrix of a cost that one task computes.

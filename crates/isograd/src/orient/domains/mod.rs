@@ -11,7 +11,7 @@ use crate::vector;
 mod segments;
 
 /// Neighbors whose coupling is at least this strong belong to one domain if their beliefs agree.
-const STRONG: f32 = 0.5;
+pub(super) const STRONG: f32 = 0.5;
 
 /// Fewest points of a domain whose winding number is computed, and the largest number of such domains: the
 /// others have too little surface to matter.
