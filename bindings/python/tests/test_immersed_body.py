@@ -253,7 +253,7 @@ def test_derivatives_of_loads_agree_with_differences_and_a_closed_form(x64):  # 
         found = immersed.loads(fluid, blended, body, spacing=H, dt=0.1, inner=inner, positions=where)
         return jnp.concatenate([found.force, found.torque, found.power[None]]) @ weights
 
-    check_grads(loss, (jnp.array([0.02, 0.01, -0.03]), jnp.float64(0.9), jnp.array([1.0, 0.5, -0.2])), **REVERSE)
+    check_grads(jax.jit(loss), (jnp.array([0.02, 0.01, -0.03]), jnp.float64(0.9), jnp.array([1.0, 0.5, -0.2])), **REVERSE)
 
     def stop(radius):
         body = sphere((0.02, 0.01, -0.03), radius, (0, 0, 0))
@@ -261,7 +261,7 @@ def test_derivatives_of_loads_agree_with_differences_and_a_closed_form(x64):  # 
         return immersed.loads(uniform((1, 0, 0)), blended, body, spacing=H, dt=1.0).force[0]
 
     # The force is the volume: its derivative in the radius is the area.
-    assert abs(jax.grad(stop)(1.0) / (4 * np.pi) - 1) < 0.01
+    assert abs(jax.jit(jax.grad(stop))(1.0) / (4 * np.pi) - 1) < 0.01
 
 
 def test_the_derivative_of_a_force_in_every_point_agrees_with_differences(x64):  # noqa: F811
@@ -278,9 +278,9 @@ def test_the_derivative_of_a_force_in_every_point_agrees_with_differences(x64): 
 
     # Velocities jump a little where the triangles change: so small a step seldom meets that.
     steps = {**REVERSE, "eps": 1e-8, "atol": 1e-5, "rtol": 1e-5}
-    check_grads(loss, (points, jnp.cross(jnp.array([0.2, 0.1, 1.0]), points)), **steps)
+    check_grads(jax.jit(loss), (points, jnp.cross(jnp.array([0.2, 0.1, 1.0]), points)), **steps)
     # Growth alone: the derivative is the integral of the fluid over the area.
-    slope = jax.grad(loss)(points, jnp.zeros_like(points))
+    slope = jax.jit(jax.grad(loss))(points, jnp.zeros_like(points))
     growth = float(jnp.sum(slope * points))
     at = ball(20_000)
     speeds = np.stack([1 + 0.3 * np.sin(2 * at[:, 1] - at[:, 2] + k) for k in range(3)], axis=1)

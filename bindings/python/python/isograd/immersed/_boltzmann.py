@@ -40,26 +40,20 @@ def links(sdf: jax.Array, directions: ArrayLike, normal: jax.Array | None = None
     wanted = np.asarray(directions)
     if wanted.ndim != 2 or wanted.shape[1] != 3 or (wanted != np.round(wanted)).any():
         raise ValueError(f"directions has the shape {wanted.shape} and must be (K, 3) whole numbers")
-    parts = [_along(sdf, (int(i), int(j), int(k)), normal, spacing) for i, j, k in wanted]
-    fraction, is_cut = (jnp.stack(part, axis=-1) for part in zip(*parts))
-    return Links(fraction, is_cut)
-
-
-def _along(
-    sdf: jax.Array, direction: tuple[int, int, int], normal: jax.Array | None, spacing: float
-) -> tuple[jax.Array, jax.Array]:
-    end = _neighbor(sdf, direction, jnp.inf)
-    is_cut = (sdf > 0) & (end <= 0)
+    ways = [tuple(map(int, way)) for way in wanted]
+    start, end = sdf[..., None], jnp.stack([_neighbor(sdf, way, jnp.inf) for way in ways], axis=-1)
+    is_cut = (start > 0) & (end <= 0)
     # Where there is no link, numbers that have one, so that no derivative is NaN.
-    start, end = jnp.where(is_cut, sdf, 1), jnp.where(is_cut, end, -1)
+    start, end = jnp.where(is_cut, start, 1), jnp.where(is_cut, end, -1)
     fraction = start / (start - end)
     if normal is not None:
-        way = spacing * jnp.asarray(direction, sdf.dtype)
-        first, last = (
-            jnp.where(is_cut, jnp.sum(_neighbor(normal, by, 0) * way, axis=-1), -2) for by in ((0, 0, 0), direction)
-        )
+        step = spacing * jnp.asarray(wanted, sdf.dtype)
+        slopes = [jnp.sum(normal * along, axis=-1) for along in step]
+        first = jnp.stack(slopes, axis=-1)
+        last = jnp.stack([_neighbor(slope, way, 0) for slope, way in zip(slopes, ways)], axis=-1)
+        first, last = jnp.where(is_cut, first, -2), jnp.where(is_cut, last, -2)
         fraction = _root(start, end, first, last, fraction)
-    return jnp.where(is_cut, fraction, 1), is_cut
+    return Links(jnp.where(is_cut, fraction, 1), is_cut)
 
 
 def _root(start: jax.Array, end: jax.Array, first: jax.Array, last: jax.Array, guess: jax.Array) -> jax.Array:
@@ -76,11 +70,6 @@ def _root(start: jax.Array, end: jax.Array, first: jax.Array, last: jax.Array, g
     return t
 
 
-def _neighbor(field: jax.Array, direction: tuple[int, int, int], beyond: float) -> jax.Array:
+def _neighbor(field: jax.Array, way: tuple[int, ...], beyond: float) -> jax.Array:
     """The field at the neighbor in a direction; ``beyond`` where it is off the grid."""
-    for axis, step in enumerate(direction):
-        size = field.shape[axis]
-        index = np.arange(size) + step
-        valid = ((index >= 0) & (index < size)).reshape([-1 if k == axis else 1 for k in range(field.ndim)])
-        field = jnp.where(valid, jnp.roll(field, -step, axis), beyond)
-    return field
+    return jax.lax.pad(field, jnp.asarray(beyond, field.dtype), [(-step, step, 0) for step in way])
