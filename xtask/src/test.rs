@@ -1,5 +1,6 @@
 //! `cargo xtask test [--all]`: everything a change must pass, cheapest first.
 
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::thread;
 
@@ -131,15 +132,13 @@ fn run_steps(scope: Scope, steps: &mut Steps, tally: &mut Tally) -> Outcome {
 
 fn steps_of_packages(steps: &mut Steps) -> Outcome {
     thread::scope(|threads| {
-        // Its build is silent, has a folder of its own, and the others use one core most of the time.
-        let distribution = threads.spawn(packages::source_distribution);
+        // They are silent, build in a folder of their own, and use one core, as fuzz does.
+        let others = threads.spawn(|| (packages::source_distribution(), pages::check()));
         steps.step("fuzz", fuzz::short)?;
-        steps.step("pages", pages::check)?;
         steps.step("crates", packages::crates)?;
-        steps.step("source distribution", || {
-            let result = distribution.join();
-            result.unwrap_or_else(|_| Err("it panicked".to_owned()))
-        })
+        let (distribution, pages) = others.join().map_err(|_| "a step panicked".to_owned())?;
+        steps.step("source distribution", || distribution)?;
+        steps.step("pages", || pages)
     })
 }
 
@@ -162,10 +161,30 @@ fn clippy(scope: Scope) -> Outcome<Vec<String>> {
     Ok(Vec::new())
 }
 
+/// As clippy ran before, it has checked all that `cargo doc` needs: with its driver in place of the compiler, nothing is
+/// checked twice.
 fn docs(scope: Scope) -> Outcome<Vec<String>> {
     let mut docs = scope.cargo_checked("doc");
-    process::run(docs.arg("--no-deps").env("RUSTDOCFLAGS", "-D warnings"))?;
+    docs.arg("--no-deps").env("RUSTDOCFLAGS", "-D warnings");
+    if let Some(driver) = clippy_driver() {
+        // As `cargo clippy -- -D warnings` sets them; with others, cargo would check everything again.
+        docs.env("RUSTC_WORKSPACE_WRAPPER", driver);
+        docs.env(
+            "CLIPPY_ARGS",
+            ["-D", "warnings", ""].join("__CLIPPY_HACKERY__"),
+        );
+    }
+    process::run(&mut docs)?;
     Ok(Vec::new())
+}
+
+/// The compiler with clippy's lints, where it is installed.
+fn clippy_driver() -> Option<PathBuf> {
+    let output = Command::new("rustc").args(["--print", "sysroot"]).output();
+    let sysroot = String::from_utf8(output.ok()?.stdout).ok()?;
+    let name = format!("clippy-driver{}", std::env::consts::EXE_SUFFIX);
+    let driver = Path::new(sysroot.trim()).join("bin").join(name);
+    driver.is_file().then_some(driver)
 }
 
 /// Runs test programs, and returns the `SKIPPED` lines of this call.

@@ -1,11 +1,9 @@
 //! Errors of one orientation method on one cloud.
 
-use std::time::Instant;
-
-use isograd::neighbors::{self, CellIndex, Neighborhoods, Radius};
-use isograd::normals;
+use isograd::neighbors::{CellIndex, Radius};
 use isograd::orient::doubt::{Doubt, Reason, reasons};
-use isograd::orient::{self, Known, Method, Orientation};
+use isograd::orient::{Method, Orientation, ParityOptions};
+use isograd::{Orienter, PointCloud, Stage};
 use isograd_element::vector;
 use serde::Serialize;
 
@@ -55,78 +53,38 @@ pub struct Measured {
     pub orientation: Orientation<f32>,
 }
 
-/// A cloud with neighborhoods and axes, in single precision.
-pub struct Prepared {
-    /// `(N, 3)`.
-    pub points: Vec<[f32; 3]>,
-    /// Neighborhoods of the points.
-    pub neighborhoods: Neighborhoods<f32>,
-    /// Unoriented normals.
-    pub axes: normals::Residual<f32>,
-    /// Seconds for neighborhoods and axes.
-    pub seconds: f64,
+/// A cloud in single precision.
+///
+/// # Panics
+/// On a degenerate cloud; the suite has none.
+pub fn cloud(points: &[[f64; 3]]) -> PointCloud<f32> {
+    PointCloud::new(points.iter().map(|&p| vector::of_f64(p)).collect()).expect("a cloud")
 }
 
-impl Prepared {
-    /// Neighborhoods and axes of points.
-    ///
-    /// # Panics
-    /// On a degenerate cloud; the suite has none.
-    pub fn new(points: &[[f64; 3]]) -> Self {
-        let points: Vec<[f32; 3]> = points.iter().map(|&p| vector::of_f64(p)).collect();
-        let start = Instant::now();
-        let mut neighborhoods = Neighborhoods::default();
-        neighbors::forward(&points, Radius::Auto, &mut neighborhoods).expect("neighborhoods");
-        let mut axes = normals::Residual::default();
-        normals::forward(&neighborhoods, &mut axes);
-        Self {
-            points,
-            neighborhoods,
-            axes,
-            seconds: start.elapsed().as_secs_f64(),
-        }
-    }
-
-    /// Chooses signs, and returns them with the seconds taken.
-    ///
-    /// # Panics
-    /// On a method that fails; those of the suite do not.
-    pub fn orient(
-        &self,
-        known: Known<'_, f32>,
-        method: &Method,
-        scratch: &mut orient::Scratch,
-    ) -> (Orientation<f32>, f64) {
-        let mut out = Orientation::default();
-        let start = Instant::now();
-        orient::forward(
-            &self.points,
-            &self.axes,
-            &self.neighborhoods,
-            known,
-            method,
-            scratch,
-            &mut out,
-        )
-        .expect("signs");
-        (out, start.elapsed().as_secs_f64())
-    }
+/// A plan for normals with this radius, without checks.
+pub fn plan(radius: Radius, method: Method) -> Orienter<f32> {
+    Orienter::new(radius, method).with_checks(false)
 }
 
 /// Evaluates a method on a cloud. The fastest of `runs` counts.
+///
+/// # Panics
+/// On a method that fails; those of the suite do not.
 pub fn measure(body: &Body, method: &Method, runs: usize) -> Measured {
-    let prepared = Prepared::new(&body.points);
-    let mut scratch = orient::Scratch::default();
-    let known = || Known::from(None);
-    let (orientation, mut seconds) = prepared.orient(known(), method, &mut scratch);
-    for _ in 1..runs {
-        seconds = seconds.min(prepared.orient(known(), method, &mut scratch).1);
+    let cloud = cloud(&body.points);
+    let mut plan = plan(Radius::Auto, *method);
+    let mut seconds = [f64::INFINITY; 2];
+    for _ in 0..runs {
+        plan.orient(&cloud).expect("signs");
+        for (least, stage) in seconds.iter_mut().zip([Stage::Normals, Stage::Orient]) {
+            *least = least.min(plan.report().seconds.of(stage));
+        }
     }
     Measured {
         points: body.points.len(),
-        errors: evaluate(body, &prepared, &orientation),
-        seconds: [prepared.seconds, seconds],
-        orientation,
+        errors: evaluate(body, &cloud, &plan),
+        seconds,
+        orientation: plan.into_parts().0,
     }
 }
 
@@ -181,13 +139,15 @@ fn percent(part: usize, whole: usize) -> f64 {
     100.0 * part as f64 / whole.max(1) as f64
 }
 
-fn evaluate(body: &Body, prepared: &Prepared, out: &Orientation<f32>) -> Errors {
+/// Errors of the last result of a plan, on this cloud.
+fn evaluate(body: &Body, cloud: &PointCloud<f32>, plan: &Orienter<f32>) -> Errors {
+    let (out, neighborhoods) = (plan.orientation(), plan.neighborhoods());
     let signs = Signs::new(body, out);
     let wrong = &signs.wrong;
-    let angles_of_narrow = angles(body, &narrow_axes(prepared));
+    let angles_of_narrow = angles(body, &narrow_axes(cloud, neighborhoods.common_radius));
     let mut angles = angles(body, &out.normals);
     angles.sort_by(f64::total_cmp);
-    let why = reasons(&prepared.points, out, &prepared.neighborhoods);
+    let why = reasons(cloud.points(), out, neighborhoods);
     let is_doubtful = |i: &&usize| why.binary_search_by_key(*i, |f| f.0 as usize).is_ok();
     let caught = wrong.iter().filter(is_doubtful).count();
     let doubt = Doubt::count(body.points.len(), &why);
@@ -208,13 +168,13 @@ fn evaluate(body: &Body, prepared: &Prepared, out: &Orientation<f32>) -> Errors 
     }
 }
 
-/// Axes with the common radius for all neighborhoods.
-fn narrow_axes(prepared: &Prepared) -> Vec<[f32; 3]> {
-    let common = Radius::Fixed(f64::from(prepared.neighborhoods.common_radius));
-    let (mut fixed, mut narrow) = (Neighborhoods::default(), normals::Residual::default());
-    neighbors::forward(&prepared.points, common, &mut fixed).expect("neighborhoods");
-    normals::forward(&fixed, &mut narrow);
-    narrow.normals
+/// Axes with this radius for all neighborhoods.
+fn narrow_axes(cloud: &PointCloud<f32>, radius: f32) -> Vec<[f32; 3]> {
+    // The method does not change axes; this one is the fastest.
+    let method = Method::Parity(ParityOptions::default());
+    let mut plan = plan(Radius::Fixed(f64::from(radius)), method);
+    plan.orient(cloud).expect("signs");
+    plan.axes().normals.clone()
 }
 
 /// Fraction of these samples whose true normal disagrees with the expected one, given the clean surface: the mean of the

@@ -8,14 +8,16 @@ pub mod suite;
 use std::fs;
 use std::path::Path;
 
-use isograd::orient::{self, Known, Method, MethodUsed, ParityOptions};
+use isograd::Stage;
+use isograd::neighbors::Radius;
+use isograd::orient::{Method, MethodUsed, ParityOptions};
 use isograd_element::vector;
 use isograd_shapes::by_name;
 use serde::Serialize;
 
 use crate::output::{Json, Outcome, root};
 use body::RANDOM;
-use measure::{Errors, Prepared, measure};
+use measure::{Errors, measure};
 use suite::{Cloud, Family};
 
 /// Runs of the automatic method on each cloud; the fastest counts.
@@ -136,17 +138,20 @@ fn swim() -> Vec<Step> {
     fish.set("amplitude", 0.12).expect("in range");
     let period = fish.get("period").expect("a parameter");
     let samples = fish.sample::<f64>(SWIMMER, &RANDOM, 3).expect("samples");
-    let (mut plan, mut auto_scratch) = (orient::Scratch::default(), orient::Scratch::default());
+    let methods = [Method::Previous, Method::Auto];
+    let [mut plan, mut auto] = methods.map(|method| measure::plan(Radius::Auto, method));
     let mut steps = Vec::new();
     for step in 0..=STEPS {
         let time = period * step as f64 / STEPS as f64;
         fish.set("time", time).expect("in range");
         let points = fish.points_at(&samples.coordinates).expect("points");
         let truth = fish.normals_at(&samples.coordinates).expect("normals");
-        let prepared = Prepared::new(&points);
-        let known = || Known::from(None);
-        let (out, seconds) = prepared.orient(known(), &Method::Previous, &mut plan);
-        let (_, auto) = prepared.orient(known(), &Method::Auto, &mut auto_scratch);
+        let cloud = measure::cloud(&points);
+        for plan in [&mut plan, &mut auto] {
+            plan.orient(&cloud).expect("signs");
+        }
+        let [seconds, of_auto] = [&plan, &auto].map(|plan| plan.report().seconds.of(Stage::Orient));
+        let out = plan.orientation();
         let cosines = out.normals.iter().zip(&truth);
         let cosines = cosines.map(|(&n, &t)| vector::dot(vector::to_f64(n), t));
         let evaluated: Vec<f64> = cosines.filter(|c: &f64| c.abs() > 0.5).collect();
@@ -158,7 +163,7 @@ fn swim() -> Vec<Step> {
                 _ => 0,
             },
             follows: matches!(out.method, MethodUsed::Previous { .. }),
-            time: seconds / auto,
+            time: seconds / of_auto,
         });
     }
     steps

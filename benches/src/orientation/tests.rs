@@ -1,9 +1,11 @@
 //! Wrong signs of the automatic method on clouds whose normals are known. `cargo test -p isograd-benches orientation --
 //! --nocapture` prints them.
 
-use isograd::orient::{Known, Method, Scratch};
+use isograd::Stage;
+use isograd::neighbors::Radius;
+use isograd::orient::Method;
 
-use super::measure::{Prepared, Signs};
+use super::measure::{Signs, cloud, plan};
 use super::suite::by_name;
 
 /// Largest share of wrong signs, in percent.
@@ -14,10 +16,10 @@ fn too_many_wrong(names: &[&str]) -> Vec<String> {
     let mut failed = Vec::new();
     for name in names {
         let body = by_name(name).expect("in the suite").body();
-        let prepared = Prepared::new(&body.points);
-        let known = Known::from(None);
-        let (out, seconds) = prepared.orient(known, &Method::Auto, &mut Scratch::default());
-        let (wrong, doubtful) = (Signs::new(&body, &out).percent(), 100.0 * out.doubtful());
+        let mut plan = plan(Radius::Auto, Method::Auto);
+        let out = plan.orient(&cloud(&body.points)).expect("signs");
+        let (wrong, doubtful) = (Signs::new(&body, out).percent(), 100.0 * out.doubtful());
+        let seconds = plan.report().seconds.of(Stage::Orient);
         println!(
             "{name:20} {:6} points  wrong {wrong:5.2} %  doubtful {doubtful:5.2} %  {seconds:.3} s",
             body.points.len()
