@@ -177,8 +177,10 @@ def test_apertures_and_fractions_obey_the_divergence_theorem(x64):  # noqa: F811
 
 
 def test_derivatives_of_fractions_agree_with_differences(x64):  # noqa: F811
-    normal = jnp.asarray(directions(40)[9:])
-    sdf = jnp.asarray(RNG.uniform(-0.1, 0.1, len(normal)))
+    normal, sdf = directions(40)[8:], RNG.uniform(-0.1, 0.1, 32)
+    # Equal components, and planes through the center of a cell; for both at once second derivatives jump.
+    sdf[1:6] = 0
+    normal, sdf = jnp.asarray(normal), jnp.asarray(sdf)
     check_gradients(lambda s, n: immersed.volume_fraction(s, n, 0.3), (sdf, normal))
     for axis in range(3):
         check_gradients(lambda s, n: immersed.apertures(s, n, 0.3, axis), (sdf, normal))
