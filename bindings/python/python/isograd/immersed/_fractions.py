@@ -65,7 +65,7 @@ def apertures(sdf: jax.Array, normal: jax.Array, spacing: float, axis: int) -> j
 
 
 def _widths(sdf: jax.Array, normal: jax.Array, spacing: float) -> tuple[jax.Array, jax.Array]:
-    """``(K, *S)`` extents of φ along each axis of the box, ascending, and φ at its highest corner, in units of their sum."""
+    """``(K, *S)`` extents of φ along the axes of the box, ascending, and φ at its highest corner, divided by their sum."""
     smallest = np.finfo(sdf.dtype).eps ** (1 / 3)
     extent = jnp.abs(normal) * spacing
     largest = jnp.maximum(jnp.max(extent, axis=-1, keepdims=True), smallest * spacing)
