@@ -245,6 +245,22 @@ def test_derivatives_of_links_agree_with_differences(x64):  # noqa: F811
         check_gradients(lambda c, r: loss(c, r, curved), (jnp.array([0.02, -0.03, 0.01]), jnp.float64(1.0)))
 
 
+def test_links_that_end_on_the_surface_have_derivatives(x64):  # noqa: F811
+    # At the nodes of the second plane φ is 0, or a little less.
+    normal = jnp.broadcast_to(jnp.array([-1.0, 0.0, 0.0]), (3, 2, 2, 3))
+
+    def loss(sdf, normal):
+        return jnp.sum(immersed.links(sdf, [(1, 0, 0)], normal, 0.5).fraction)
+
+    for normals in (None, normal):
+        slopes = []
+        for depth in (0.0, 1e-9):
+            sdf = jnp.broadcast_to(jnp.array([0.5, -depth, -0.5])[:, None, None], (3, 2, 2))
+            slopes.append(jax.grad(loss)(sdf, normals))
+        np.testing.assert_allclose(*slopes, atol=1e-6)
+        assert (jnp.abs(slopes[0][1]) > 1).all()
+
+
 def test_markers_of_a_sphere_have_its_area_and_volume(x64):  # noqa: F811
     points = isograd.sample("sphere", 4000).points
     points = points / np.linalg.norm(points, axis=1, keepdims=True)

@@ -66,7 +66,9 @@ def _root(start: jax.Array, end: jax.Array, first: jax.Array, last: jax.Array, g
         slope = first + t * (2 * square + 3 * t * cube)
         # φ falls from start > 0 to end ≤ 0; a slope that does not is that of a kink, and the chord replaces it.
         slope = jnp.minimum(slope, 0.25 * (end - start))
-        t = jnp.clip(t - value / slope, 0, 1)
+        t = t - value / slope
+        # Not by `clip`, which halves the derivative of a link that ends on the surface.
+        t = jnp.where(t < 0, 0, jnp.where(t > 1, 1, t))
     return t
 
 
