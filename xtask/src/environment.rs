@@ -73,10 +73,10 @@ impl Environment {
         arguments: &[&dyn AsRef<OsStr>],
         variables: &[(&str, String)],
     ) -> Result<(), Obstacle> {
-        // Most modules are never imported: Python compiles those that are.
-        let options = ["--quiet", "--no-compile", "--disable-pip-version-check"];
-        let mut pip = self.module("pip", &["install"]);
-        pip.args(options);
+        let mut pip = self.module(
+            "pip",
+            &["install", "--quiet", "--disable-pip-version-check"],
+        );
         pip.args(arguments.iter().map(|argument| argument.as_ref()));
         pip.envs(variables.iter().map(|(name, value)| (name, value)));
         capture(&mut pip).map_err(|output| {

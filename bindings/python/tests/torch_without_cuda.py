@@ -52,8 +52,8 @@ def main() -> int:
 
 def install() -> None:
     requirements = str(HERE / "requirements-torch.txt")
-    # Not kept in pip's cache: half a gigabyte that is asked for once. Most modules are never imported.
-    options = ["--quiet", "--no-cache-dir", "--no-compile", "--no-deps", "--disable-pip-version-check"]
+    # Not kept in pip's cache: half a gigabyte that is asked for once.
+    options = ["--quiet", "--no-cache-dir", "--no-deps", "--disable-pip-version-check"]
     output("pip", *PIP, "install", *options, "--requirement", requirements)
 
 
