@@ -163,12 +163,13 @@ pub fn grating(thickness: f64) -> Vec<Prism> {
     walls.collect()
 }
 
-/// Seven discs of the given thickness on a shaft, twice that apart.
-pub fn discs(thickness: f64) -> Vec<Prism> {
-    let at = |y: f64| [0.0, thickness * y, 0.0];
-    let discs = (0..7).map(|k| Prism::regular(24, 0.3, thickness, at(3.0 * f64::from(k))));
-    let shaft = Prism::regular(8, 0.1, 21.0 * thickness, at(9.5));
-    discs.chain([shaft]).collect()
+/// Seven discs of the given thickness on a shaft, so far apart.
+pub fn discs(thickness: f64, gap: f64) -> Vec<Prism> {
+    let pitch = thickness + gap;
+    let disc = |k: u32| Prism::regular(24, 0.3, thickness, [0.0, pitch * f64::from(k), 0.0]);
+    let middle = [0.0, 3.0 * pitch + 0.5 * thickness, 0.0];
+    let shaft = Prism::regular(8, 0.1, 6.0 * pitch + 3.0 * thickness, middle);
+    (0..7).map(disc).chain([shaft]).collect()
 }
 
 /// A hub with seven slanted blades of the given thickness.

@@ -235,7 +235,7 @@ impl Suite {
         }
     }
 
-    /// Ribbed plates, gratings, discs, rotors, blades, bundles of tubes, and brackets with and without holes.
+    /// Ribbed plates, gratings, discs, stacks, rotors, blades, bundles of tubes, and brackets with and without holes.
     fn add_parts(&mut self) {
         for thickness in [0.01, 0.02] {
             self.add(Family::Parts, format!("ribs {thickness}"), move || {
@@ -245,7 +245,8 @@ impl Suite {
         for thickness in [0.02, 0.03] {
             for (name, prisms) in [
                 ("grating", parts::grating(thickness)),
-                ("discs", parts::discs(thickness)),
+                ("discs", parts::discs(thickness, 2.0 * thickness)),
+                ("stack", parts::discs(thickness, 0.01)),
                 ("rotor", parts::rotor(thickness)),
             ] {
                 self.add(Family::Parts, format!("{name} {thickness}"), move || {

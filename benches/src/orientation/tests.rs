@@ -71,6 +71,7 @@ fn patches_beside_holes_and_narrow_faces_are_right() {
         "tubes 0.01",
         "grating 0.02",
         "discs 0.02",
+        "stack 0.02",
     ]);
     assert!(failed.is_empty(), "{failed:?}");
 }

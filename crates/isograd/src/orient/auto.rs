@@ -5,6 +5,7 @@ use super::clusters::Clusters;
 use super::evidence::{self, of_view};
 use super::fill::Fill;
 use super::graph::Graph;
+use super::layers::{self, Surroundings};
 use super::signs::{Interpretation, Place, Signs, Verdict};
 use super::sites::Sites;
 use crate::neighbors::Neighborhoods;
@@ -35,6 +36,8 @@ struct Evidence {
     light: Vec<[f32; 2]>,
     /// Evidence of a second sheet close by.
     sheets: Vec<f32>,
+    /// Whether a third sheet is on the other side of the sample.
+    between: Vec<bool>,
     /// Light on the darker side of each sample: 0..1.
     slabs: Vec<f32>,
     /// Evidence of sensors; empty without them.
@@ -54,6 +57,16 @@ impl<T: Real> Place for Places<'_, T> {
 
     fn spacing(&self) -> f64 {
         self.neighborhoods.spacing().f64()
+    }
+}
+
+impl<T: Real> Surroundings for Places<'_, T> {
+    fn for_each_within(&self, center: [f64; 3], radius: f64, mut visit: impl FnMut(usize)) {
+        let (center, radius) = (center.map(T::of), T::of(radius));
+        let visit = |i: usize, _| visit(self.sites.of(i as u32) as usize);
+        self.neighborhoods
+            .index
+            .for_each_within(center, radius, visit);
     }
 }
 
@@ -106,12 +119,13 @@ impl Auto {
     }
 
     /// Collects the evidence of the fills and of the sheets.
-    fn collect(&mut self, place: &impl Place) {
+    fn collect<T: Real>(&mut self, place: &Places<'_, T>) {
         let n = self.graph.near.len();
         let Evidence {
             filled,
             light,
             sheets,
+            between,
             slabs,
             ..
         } = &mut self.evidence;
@@ -142,7 +156,10 @@ impl Auto {
         }
         self.graph.part_slabs(slabs);
         let graph = &self.graph;
-        parallel::fill(sheets, n, |p| graph.sheet_evidence(p));
+        parallel::fill(sheets, n, |p| graph.second_sheet(p).evidence);
+        parallel::fill(between, n, |p| {
+            evidence::differs(sheets[p], 0.0) && layers::is_between(graph, place, p)
+        });
     }
 }
 
@@ -160,6 +177,9 @@ impl Evidence {
 
     /// In 0..1, the openness of the side that a second sheet behind the point makes the outer one.
     fn openness(&self, p: usize) -> f32 {
+        if self.between[p] {
+            return 0.0;
+        }
         let side = usize::from(self.sheets[p] < 0.0);
         evidence::openness(self.light[p][side])
     }

@@ -176,19 +176,30 @@ pub(super) fn parted(coupling: f32, both: f32, parallel: f32, side: f32, other: 
     coupling + both * (trusted(parallel * side * other) - coupling)
 }
 
-/// Whether a neighbor lies on the same sheet, and takes a share of its area.
+/// Whether a neighbor takes a share of the area of a sample: it lies on the same sheet or beyond an edge, and does not face
+/// it.
+#[inline(always)]
+pub(super) fn on_same_surface(coupling: f32, parallel: f32) -> bool {
+    coupling * parallel > -SAME_SHEET
+}
+
+/// The area that a sample stands for, from how many of its neighbors are on the same surface, and the distance to the
+/// farthest of all.
+#[inline(always)]
+pub(super) fn area(farthest: f32, same: f32) -> f32 {
+    PI * farthest * farthest / same.max(LEAST_SHARE * SOURCES)
+}
+
+/// Whether a neighbor of a sample that scatters lies on the same sheet.
 #[inline(always)]
 pub(super) fn on_same_sheet(coupling: f32, parallel: f32) -> bool {
     coupling * parallel > SAME_SHEET
 }
 
-/// The area that a sample stands for with so many neighbors on the same sheet.
+/// The area that a sample that scatters stands for with so many neighbors on the same sheet: far neighbors are on any.
 #[inline(always)]
-pub(super) fn area(reach: f32, same: f32) -> f32 {
-    let mut share = (1.0 + same) / ALL;
-    if share < LEAST_SHARE {
-        share = LEAST_SHARE;
-    }
+pub(super) fn scattered_area(reach: f32, same: f32) -> f32 {
+    let share = ((1.0 + same) / ALL).max(LEAST_SHARE);
     PI * reach * reach / (IN_RING * share)
 }
 

@@ -30,7 +30,7 @@ const UNSURE: f64 = 0.25;
 const SMOOTH: f32 = 0.7;
 
 /// Weight of a slope of 1, relative to evidence of 1. In the middle of a smooth surface it is ½.
-const WEIGHT: f64 = 8.0;
+const WEIGHT: f64 = 16.0;
 
 /// Least gain for each turned sample, and for each patch, in units of evidence. Slopes of random samples deviate by 0.1, and
 /// the fewer they are, the less such deviations cancel.

@@ -54,6 +54,16 @@ pub struct Graph {
     pub(super) values: Vec<f32>,
 }
 
+/// A second sheet close to a sample; none where its evidence is 0.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SecondSheet {
+    /// Evidence in −1..1 for the sign of the axis, if the sheet is the other side of a thin body, behind the sample:
+    /// positive where the axis points away from it.
+    pub evidence: f32,
+    /// How far it is, in spacings.
+    pub distance: f32,
+}
+
 impl Graph {
     /// Builds the graph, reusing its memory. The axes are those of the same points.
     ///
@@ -229,15 +239,29 @@ impl Graph {
     }
 
     fn measure_areas(&mut self) {
-        let (near, coupling, axis, reach) = (&self.near, &self.coupling, &self.axis, &self.reach);
-        parallel::fill(&mut self.area, near.len(), |p| {
-            let same = |&(slot, &q): &(usize, &u32)| {
-                let parallel = vector::dot(axis[p], axis[q as usize]);
-                coupling::on_same_sheet(coupling[p][slot], parallel)
+        let mut areas = std::mem::take(&mut self.area);
+        parallel::fill(&mut areas, self.near.len(), |p| {
+            let scatters = self.spread[p] > 0.0 && self.scatter[p] == 0.0;
+            let shares = match scatters {
+                true => coupling::on_same_sheet,
+                false => coupling::on_same_surface,
             };
-            let same = near[p].iter().enumerate().filter(same).count();
-            coupling::area(reach[p], same as f32)
+            let ties = self.near[p].iter().zip(&self.coupling[p]);
+            let same = ties.filter(|&(&q, &tie)| {
+                shares(tie, vector::dot(self.axis[p], self.axis[q as usize]))
+            });
+            let (same, reach) = (same.count() as f32, self.reach[p]);
+            if scatters {
+                return coupling::scattered_area(reach, same);
+            }
+            let bound = match self.ring[p] {
+                0.0 => 1.0,
+                ring => reach / ring,
+            };
+            let farthest = vector::norm(self.offset[p][NEIGHBORS - 1]);
+            coupling::area(bound * farthest, same)
         });
+        self.area = areas;
         self.values.clone_from(&self.area);
         if !self.values.is_empty() {
             let median = median(&mut self.values);
@@ -246,13 +270,12 @@ impl Graph {
         }
     }
 
-    /// Evidence in −1..1 for the sign of the axis of a site from a second sheet close by: the samples of
-    /// the other side of a thin body lie behind this one. Positive where the axis points away from them.
+    /// The second sheet close to a site: the samples of the other side of a thin body, or of a narrow gap.
     ///
     /// # Panics
     /// There is no such point.
-    pub fn sheet_evidence(&self, p: usize) -> f32 {
-        let (mut signed, mut total) = (0.0, 0.0);
+    pub fn second_sheet(&self, p: usize) -> SecondSheet {
+        let (mut signed, mut total, mut heights) = (0.0, 0.0, 0.0);
         for (slot, &d) in self.offset[p].iter().enumerate() {
             let square = vector::norm_squared(d);
             if square > 0.0 {
@@ -262,9 +285,13 @@ impl Graph {
                 let across = coupling::across(height, square, parallel, self.least_gap(p, q));
                 signed += across;
                 total += across.abs();
+                heights += across * height;
             }
         }
-        coupling::sheet_evidence(signed, total)
+        SecondSheet {
+            evidence: coupling::sheet_evidence(signed, total),
+            distance: if total > 0.0 { heights / total } else { 0.0 },
+        }
     }
 
     /// Propagates some kinds of evidence `(N, K)`, in −1..1, each by itself: repeated means of the beliefs of the neighbors
@@ -336,4 +363,44 @@ fn scatter<T: Real>(plane: &Plane<T>, axis: [T; 3], spacing: f64) -> (f32, f32) 
 fn median(values: &mut [f32]) -> f32 {
     let middle = values.len() / 2;
     *values.select_nth_unstable_by(middle, f32::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::shapes::{Sampled, cuboid, join, neighborhoods, sphere};
+    use super::*;
+    use crate::normals;
+
+    /// The sum of the areas of all samples.
+    fn area((points, _): &Sampled) -> f64 {
+        let near = neighborhoods(points);
+        let (mut axes, mut sites) = (normals::Residual::default(), Sites::default());
+        normals::forward(&near, &mut axes);
+        sites.find(&near);
+        let mut graph = Graph::default();
+        graph.build(&Axes::from(&axes), &near, &sites);
+        let sum: f64 = graph.area.iter().map(|&a| f64::from(a)).sum();
+        sum * near.spacing().powi(2)
+    }
+
+    /// A plate of this thickness at this height, with about one sample for each unit of area; and its area.
+    fn plate(thickness: f64, height: f64, seed: u64) -> (Sampled, f64) {
+        let area = 2.0 * 40.0 * 40.0 + 4.0 * 40.0 * thickness;
+        let (points, normals) = cuboid(area as usize, [20.0, 20.0, 0.5 * thickness], seed);
+        let points = points.iter().map(|&x| vector::add(x, [0.0, 0.0, height]));
+        ((points.collect(), normals), area)
+    }
+
+    #[test]
+    fn areas_of_samples_add_up_whether_sheets_are_close_or_not() {
+        let ball = sphere(5000, [0.0; 3], 20.0, 3);
+        let ball = (ball, 4.0 * std::f64::consts::PI * 400.0);
+        let [a, b] = [plate(2.0, 0.0, 5), plate(2.0, 2.9, 7)];
+        let stack = (join(a.0, b.0), a.1 + b.1);
+        let all = [ball, plate(20.0, 0.0, 3), plate(1.5, 0.0, 3), stack];
+        for (k, (sampled, expected)) in all.iter().enumerate() {
+            let ratio = area(sampled) / expected;
+            assert!((0.95..1.05).contains(&ratio), "{k}: {ratio}");
+        }
+    }
 }

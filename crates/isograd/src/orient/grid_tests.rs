@@ -1,8 +1,5 @@
 //! The grid's parts against plain versions.
 
-use std::collections::BTreeMap;
-
-use super::domains::contract;
 use super::regions::{Regions, sides};
 use super::shapes::Random;
 use super::visibility::Visibility;
@@ -125,51 +122,4 @@ fn a_grid_without_a_free_cell_has_no_sides() {
     let mut found = vec![1];
     sides(regions.len, &mut [], &mut found);
     assert_eq!((regions.len, found.len()), (0, 0));
-}
-
-#[test]
-fn ties_that_agree_are_all_kept() {
-    let mut random = Random(31);
-    let n = 40u32;
-    let signs: Vec<f64> = (0..=n)
-        .map(|_| if random.unit() < 0.5 { -1.0 } else { 1.0 })
-        .collect();
-    let mut ties = vec![BTreeMap::new(); n as usize + 1];
-    for a in 0..=n {
-        for b in a + 1..=n {
-            // A path through all nodes, and some chords.
-            if b == a + 1 || random.unit() < 0.1 {
-                let weight = signs[a as usize] * signs[b as usize] * (0.1 + random.unit());
-                ties[a as usize].insert(b, weight);
-                ties[b as usize].insert(a, weight);
-            }
-        }
-    }
-    let outcome = contract(ties);
-    for (k, &(cluster, sign)) in outcome.iter().enumerate() {
-        assert_eq!(cluster, outcome[0].0);
-        assert_eq!(f64::from(sign * outcome[0].1), signs[k] * signs[0]);
-    }
-}
-
-#[test]
-fn many_weak_ties_outweigh_a_strong_one() {
-    // 0 and 1 are strongly opposed; 2, 3 and 4 tie them together, each of them to both, more strongly
-    // on the sum once they have gone to one of the two.
-    let mut ties = vec![BTreeMap::new(); 5];
-    let mut tie = |a: usize, b: usize, weight: f64| {
-        ties[a].insert(b as u32, weight);
-        ties[b].insert(a as u32, weight);
-    };
-    tie(0, 1, -2.0);
-    for k in 2..5 {
-        tie(0, k, 3.0);
-        tie(1, k, 1.5);
-    }
-    let outcome = contract(ties);
-    assert!(
-        outcome
-            .iter()
-            .all(|&node| node.1 == outcome[0].1 && node.0 == outcome[0].0)
-    );
 }

@@ -20,7 +20,8 @@
 //!   Patches of doubtful samples, such as the narrow top of a wall, turn where the winding number of all others falls
 //!   against their normals.
 //!   Signs are those of the sheets; an axis far from that of its sheet, as beside an edge, gets the side of its neighbors.
-//!   Thin bodies and narrow gaps are locally the same; where that matters, both interpretations are solved, and
+//!   Thin bodies and narrow gaps are locally the same, above all in stacks of plates, where sheets lie on both sides
+//!   of a sample; where that matters, both interpretations are solved, and
 //!   the winding number selects one. Time and memory are `O(N log N)`, regardless of outliers.
 //! - [`Method::Parity`]: the paper's method as printed (its §2.2), with its hyperparameters.
 //! - [`Method::Given`]: the cloud's own normals, trusted as they are.
@@ -72,6 +73,7 @@ mod graph;
 mod grid_tests;
 #[cfg(test)]
 mod known_tests;
+mod layers;
 mod orientation;
 mod parity;
 #[cfg(test)]

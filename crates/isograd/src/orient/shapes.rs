@@ -49,10 +49,14 @@ pub(super) fn graph((points, normals): &Sampled) -> Graph {
         std::array::from_fn(|slot| order[slot + 1])
     };
     let near: Vec<_> = points.iter().map(nearest).collect();
+    let offset = |(p, near): (&[f64; 3], &[u32; NEIGHBORS])| {
+        near.map(|q| vector::of_f64(vector::sub(points[q as usize], *p)))
+    };
     let coupling = |(a, near): (&[f32; 3], &[u32; NEIGHBORS])| {
         near.map(|q| vector::dot(*a, axis[q as usize]).max(0.1))
     };
     Graph {
+        offset: points.iter().zip(&near).map(offset).collect(),
         coupling: axis.iter().zip(&near).map(coupling).collect(),
         area: vec![1.0; points.len()],
         spread: vec![0.0; points.len()],

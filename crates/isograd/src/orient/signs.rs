@@ -22,7 +22,7 @@ const CLEAR: f32 = 0.1;
 /// Interpretation of two sheets close to each other: the two sides of a thin body, or of a narrow gap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpretation {
-    /// A thin body, unless there seems to be matter on the far side of the sheet.
+    /// A thin body, unless there seems to be matter, or is another sheet, on the far side of the sheet.
     Careful,
     /// A thin body.
     Bold,

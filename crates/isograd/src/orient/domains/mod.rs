@@ -1,7 +1,7 @@
 //! From beliefs to signs: domains that agree within themselves, and conflicts between them.
 
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BTreeMap;
 
 use super::graph::Graph;
 use super::signs::{Domains, Place};
@@ -9,6 +9,9 @@ use super::winding::Misfit;
 use crate::vector;
 
 mod segments;
+mod ties;
+
+use ties::Ties;
 
 /// Neighbors whose coupling is at least this strong belong to one domain if their beliefs agree.
 pub(super) const STRONG: f32 = 0.5;
@@ -21,14 +24,8 @@ const MOST_DOMAINS: usize = 512;
 /// A domain is overruled if the beliefs against its signs outweigh those for them by this factor.
 const MOSTLY: f64 = 3.0;
 
-/// Rounds of flips of single domains.
-const SWEEPS: usize = 20;
-
 /// A belief below this is none.
 const NEGLIGIBLE: f32 = 1e-2;
-
-/// Weights of the ties of each node to others; a tie stands at both of its ends.
-type Ties = Vec<BTreeMap<u32, f64>>;
 
 /// Turns beliefs into one sign for each point; all in sorted order.
 #[derive(Clone, Debug, Default)]
@@ -130,8 +127,7 @@ impl DomainSigns {
         if winding > 0.0 {
             self.add_winding(graph, place, winding, &mut ties);
         }
-        let mut outcome = contract(ties.clone());
-        improve(&ties, &mut outcome);
+        let outcome = ties::satisfy(&ties);
         (ties, outcome)
     }
 
@@ -329,70 +325,4 @@ fn number(domain: &mut Vec<u32>, points: u32, mut root: impl FnMut(u32) -> u32) 
         count += u32::from(root == p);
     }
     count as usize
-}
-
-/// Turns single nodes as long as that satisfies more of their ties: a contraction can't take back what it
-/// has joined.
-fn improve(ties: &Ties, outcome: &mut [(u32, f32)]) {
-    let ground = outcome.len() - 1;
-    for _ in 0..SWEEPS {
-        for a in 0..ground {
-            let tied = |(&b, &weight): (&u32, &f64)| weight * f64::from(outcome[b as usize].1);
-            let sum: f64 = ties[a].iter().map(tied).sum();
-            if sum * f64::from(outcome[a].1) < 0.0 && outcome[a].0 == outcome[ground].0 {
-                outcome[a].1 = -outcome[a].1;
-            }
-        }
-    }
-}
-
-/// Contracts the tie of the largest magnitude again and again, adding up ties that become parallel;
-/// returns for each node the cluster it ends in, and its sign there.
-///
-/// Source: greedy additive edge contraction, M. Keuper et al., "Efficient decomposition of image and
-/// mesh graphs by lifted multicuts" (2015), here with signs in place of cuts.
-pub(super) fn contract(mut ties: Ties) -> Vec<(u32, f32)> {
-    let mut parent: Vec<(u32, f32)> = (0..ties.len() as u32).map(|a| (a, 1.0)).collect();
-    // Magnitudes are positive, so their bits are ordered as they are.
-    let entry = |a: u32, b: u32, w: f64| (w.abs().to_bits(), Reverse((a.min(b), a.max(b))));
-    let mut queue = BinaryHeap::new();
-    for (a, tied) in (0u32..).zip(&ties) {
-        queue.extend(tied.range(a + 1..).map(|(&b, &w)| entry(a, b, w)));
-    }
-    while let Some((magnitude, Reverse((a, b)))) = queue.pop() {
-        let Some(&weight) = ties[a as usize].get(&b) else {
-            continue;
-        };
-        if weight.abs().to_bits() != magnitude || weight == 0.0 {
-            continue;
-        }
-        // The smaller one moves, so that every tie moves at most log N times.
-        let larger = ties[a as usize].len() >= ties[b as usize].len();
-        let (stays, goes) = if larger { (a, b) } else { (b, a) };
-        let sign = if weight > 0.0 { 1.0 } else { -1.0 };
-        parent[goes as usize] = (stays, sign);
-        let moved = std::mem::take(&mut ties[goes as usize]);
-        ties[stays as usize].remove(&goes);
-        for (&other, &w) in moved.iter().filter(|&(&other, _)| other != stays) {
-            ties[other as usize].remove(&goes);
-            let sum = ties[stays as usize].entry(other).or_insert(0.0);
-            *sum += f64::from(sign) * w;
-            let sum = *sum;
-            ties[other as usize].insert(stays, sum);
-            queue.push(entry(stays, other, sum));
-        }
-    }
-    (0..parent.len() as u32)
-        .map(|a| resolve(&parent, a))
-        .collect()
-}
-
-/// The end of the chain from `a`, and the product of the signs along it.
-fn resolve(parent: &[(u32, f32)], mut a: u32) -> (u32, f32) {
-    let mut sign = 1.0;
-    while parent[a as usize].0 != a {
-        sign *= parent[a as usize].1;
-        a = parent[a as usize].0;
-    }
-    (a, sign)
 }
