@@ -4,7 +4,7 @@ use super::Axes;
 use super::clusters::Clusters;
 use super::evidence::{self, of_view};
 use super::fill::Fill;
-use super::graph::Graph;
+use super::graph::{Graph, SecondSheet};
 use super::layers::{self, Surroundings};
 use super::signs::{Interpretation, Place, Signs, Verdict};
 use super::sites::Sites;
@@ -34,8 +34,8 @@ struct Evidence {
     /// Evidence of the exterior fill, and the light on both sides of each axis.
     filled: Vec<f32>,
     light: Vec<[f32; 2]>,
-    /// Evidence of a second sheet close by.
-    sheets: Vec<f32>,
+    /// Second sheets close by.
+    sheets: Vec<SecondSheet>,
     /// Whether a third sheet is on the other side of the sample.
     between: Vec<bool>,
     /// Light on the darker side of each sample: 0..1.
@@ -119,7 +119,7 @@ impl Auto {
     }
 
     /// Collects the evidence of the fills and of the sheets.
-    fn collect<T: Real>(&mut self, place: &Places<'_, T>) {
+    fn collect(&mut self, place: &impl Surroundings) {
         let n = self.graph.near.len();
         let Evidence {
             filled,
@@ -156,9 +156,9 @@ impl Auto {
         }
         self.graph.part_slabs(slabs);
         let graph = &self.graph;
-        parallel::fill(sheets, n, |p| graph.second_sheet(p).evidence);
+        parallel::fill(sheets, n, |p| graph.second_sheet(p));
         parallel::fill(between, n, |p| {
-            evidence::differs(sheets[p], 0.0) && layers::is_between(graph, place, p)
+            layers::is_between(graph, place, p, sheets[p])
         });
     }
 }
@@ -171,7 +171,7 @@ impl Evidence {
             Interpretation::Bold => 1.0,
         };
         let view = self.views.get(p).copied().unwrap_or(0.0);
-        let (filled, sheet, slab) = (self.filled[p], self.sheets[p], self.slabs[p]);
+        let (filled, sheet, slab) = (self.filled[p], self.sheets[p].evidence, self.slabs[p]);
         evidence::weighed(filled, sheet, openness, slab, side, view)
     }
 
@@ -180,13 +180,13 @@ impl Evidence {
         if self.between[p] {
             return 0.0;
         }
-        let side = usize::from(self.sheets[p] < 0.0);
+        let side = usize::from(self.sheets[p].evidence < 0.0);
         evidence::openness(self.light[p][side])
     }
 
     /// Whether the two interpretations differ anywhere.
     fn is_ambiguous(&self) -> bool {
         let mut sheets = self.sheets.iter().enumerate();
-        sheets.any(|(p, &sheet)| evidence::differs(sheet, self.openness(p)))
+        sheets.any(|(p, &sheet)| evidence::differs(sheet.evidence, self.openness(p)))
     }
 }

@@ -238,10 +238,19 @@ impl Graph {
         coupling::least_gap(self.scatter[p], self.scatter[q])
     }
 
+    /// Whether the axis of a site comes from a wider neighborhood because samples scatter, and not because they lie on several
+    /// sheets.
+    ///
+    /// # Panics
+    /// There is no such point.
+    pub fn scatters(&self, p: usize) -> bool {
+        self.spread[p] > 0.0 && self.scatter[p] == 0.0
+    }
+
     fn measure_areas(&mut self) {
         let mut areas = std::mem::take(&mut self.area);
         parallel::fill(&mut areas, self.near.len(), |p| {
-            let scatters = self.spread[p] > 0.0 && self.scatter[p] == 0.0;
+            let scatters = self.scatters(p);
             let shares = match scatters {
                 true => coupling::on_same_sheet,
                 false => coupling::on_same_surface,
@@ -367,7 +376,7 @@ fn median(values: &mut [f32]) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::shapes::{Sampled, cuboid, join, neighborhoods, sphere};
+    use super::super::shapes::{Sampled, join, neighborhoods, plate, sphere};
     use super::*;
     use crate::normals;
 
@@ -383,18 +392,11 @@ mod tests {
         sum * near.spacing().powi(2)
     }
 
-    /// A plate of this thickness at this height, with about one sample for each unit of area; and its area.
-    fn plate(thickness: f64, height: f64, seed: u64) -> (Sampled, f64) {
-        let area = 2.0 * 40.0 * 40.0 + 4.0 * 40.0 * thickness;
-        let (points, normals) = cuboid(area as usize, [20.0, 20.0, 0.5 * thickness], seed);
-        let points = points.iter().map(|&x| vector::add(x, [0.0, 0.0, height]));
-        ((points.collect(), normals), area)
-    }
-
     #[test]
     fn areas_of_samples_add_up_whether_sheets_are_close_or_not() {
         let ball = sphere(5000, [0.0; 3], 20.0, 3);
         let ball = (ball, 4.0 * std::f64::consts::PI * 400.0);
+        let plate = |thickness, height, seed| plate([40.0, thickness], height, seed);
         let [a, b] = [plate(2.0, 0.0, 5), plate(2.0, 2.9, 7)];
         let stack = (join(a.0, b.0), a.1 + b.1);
         let all = [ball, plate(20.0, 0.0, 3), plate(1.5, 0.0, 3), stack];

@@ -4,7 +4,8 @@
 //! not much farther away, both are at hand, and that the body is the thinner of the two is no more than a guess: it holds
 //! for fins, and not for plates thicker than the gaps between them.
 
-use super::graph::Graph;
+use super::evidence;
+use super::graph::{Graph, SecondSheet};
 use super::signs::Place;
 use crate::vector;
 
@@ -22,9 +23,16 @@ pub(super) trait Surroundings: Place {
     fn for_each_within(&self, center: [f64; 3], radius: f64, visit: impl FnMut(usize));
 }
 
-/// Whether a sample lies between its [second sheet](Graph::second_sheet) and a third one.
-pub(super) fn is_between(graph: &Graph, place: &impl Surroundings, p: usize) -> bool {
-    let second = graph.second_sheet(p);
+/// Whether a sample lies between its [second sheet](Graph::second_sheet), if that matters, and a third one.
+pub(super) fn is_between(
+    graph: &Graph,
+    place: &impl Surroundings,
+    p: usize,
+    second: SecondSheet,
+) -> bool {
+    if !evidence::differs(second.evidence, 0.0) {
+        return false;
+    }
     let away = vector::scale(graph.axis[p], second.evidence.signum());
     let distance = f64::from(second.distance) * place.spacing();
     let (here, away) = (place.user(p), vector::to_f64(away));
@@ -44,8 +52,7 @@ pub(super) fn is_between(graph: &Graph, place: &impl Surroundings, p: usize) -> 
 
 #[cfg(test)]
 mod tests {
-    use super::super::evidence;
-    use super::super::shapes::{Sampled, cuboid, graph, join};
+    use super::super::shapes::{Sampled, graph, join, plate};
     use super::*;
 
     impl Surroundings for Vec<[f64; 3]> {
@@ -54,15 +61,6 @@ mod tests {
             let near = (0..).zip(self).filter(|(_, x)| is_near(x));
             near.for_each(|(q, _)| visit(q));
         }
-    }
-
-    /// A plate of this thickness at this height, with about one sample for each unit of area.
-    fn plate(thickness: f64, height: f64, seed: u64) -> Sampled {
-        let size = [24.0, 24.0, thickness];
-        let area = 2.0 * 24.0 * 24.0 + 4.0 * 24.0 * thickness;
-        let (points, normals) = cuboid(area as usize, size.map(|s| 0.5 * s), seed);
-        let points = points.iter().map(|&x| vector::add(x, [0.0, 0.0, height]));
-        (points.collect(), normals)
     }
 
     /// Shares of the samples that lie between two sheets: of those on the lowest and highest face, and on all others, away
@@ -78,8 +76,7 @@ mod tests {
         for p in 0..place.len() {
             let [x, y, z] = place[p];
             if x.abs().max(y.abs()) < 9.0 {
-                let second = graph.second_sheet(p).evidence;
-                let is_between = evidence::differs(second, 0.0) && is_between(&graph, place, p);
+                let is_between = is_between(&graph, place, p, graph.second_sheet(p));
                 counts[usize::from(!ends.contains(&z))][usize::from(is_between)] += 1;
             }
         }
@@ -89,14 +86,21 @@ mod tests {
     #[test]
     fn one_thin_plate_has_no_third_sheet() {
         for thickness in [0.3, 1.0] {
-            assert_eq!(between(&plate(thickness, 0.0, 3)), [0.0; 2], "{thickness}");
+            assert_eq!(
+                between(&plate([24.0, thickness], 0.0, 3).0),
+                [0.0; 2],
+                "{thickness}"
+            );
         }
     }
 
     #[test]
     fn inner_faces_of_stacks_are_between_sheets_whether_body_or_gap_is_thinner() {
         for (thickness, gap) in [(2.0, 0.8), (0.8, 2.0)] {
-            let at = |k: usize| plate(thickness, k as f64 * (thickness + gap), 3 + k as u64);
+            let at = |k: u32| {
+                let height = f64::from(k) * (thickness + gap);
+                plate([24.0, thickness], height, 3 + u64::from(k)).0
+            };
             let stack = join(join(at(0), at(1)), join(at(2), at(3)));
             let [outer, inner] = between(&stack);
             assert!(

@@ -138,6 +138,15 @@ pub(super) fn cuboid(n: usize, half: [f64; 3], seed: u64) -> Sampled {
     sampled
 }
 
+/// A square plate at a height, with about one sample for each unit of area; and its area. Its size is side and thickness.
+pub(super) fn plate([side, thickness]: [f64; 2], height: f64, seed: u64) -> (Sampled, f64) {
+    let area = 2.0 * side * side + 4.0 * side * thickness;
+    let half = [side, side, thickness].map(|size| 0.5 * size);
+    let (points, normals) = cuboid(area as usize, half, seed);
+    let points = points.iter().map(|&x| vector::add(x, [0.0, 0.0, height]));
+    ((points.collect(), normals), area)
+}
+
 /// Both together.
 pub(super) fn join(a: Sampled, b: Sampled) -> Sampled {
     ([a.0, b.0].concat(), [a.1, b.1].concat())

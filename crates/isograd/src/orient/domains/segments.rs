@@ -136,11 +136,11 @@ impl DomainSigns {
     }
 }
 
-/// Whether many axes come from wider neighborhoods because samples scatter, and not because they lie on several sheets.
+/// Whether many samples [scatter](Graph::scatters).
 fn is_noisy(graph: &Graph) -> bool {
-    let samples = graph.spread.iter().zip(&graph.scatter);
-    let noisy = samples.filter(|&(&spread, &scatter)| spread > 0.0 && scatter == 0.0);
-    noisy.count() as f64 > NOISY * graph.spread.len() as f64
+    let samples = graph.spread.len();
+    let noisy = (0..samples).filter(|&p| graph.scatters(p));
+    noisy.count() as f64 > NOISY * samples as f64
 }
 
 #[cfg(test)]

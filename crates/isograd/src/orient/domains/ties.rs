@@ -52,12 +52,17 @@ fn rows(ties: &Ties) -> Rows {
 
 /// The outcome with other signs of the nodes that are tied to the last one, from the number of a node and its sign.
 fn with_signs(outcome: &[(u32, f32)], sign: impl Fn(usize, f32) -> f32) -> Vec<(u32, f32)> {
-    let ground = outcome.len() - 1;
     let changed = |(a, &(cluster, own)): (usize, &(u32, f32))| {
-        let is_free = a < ground && cluster == outcome[ground].0;
-        (cluster, if is_free { sign(a, own) } else { own })
+        let may_turn = may_turn(outcome, a);
+        (cluster, if may_turn { sign(a, own) } else { own })
     };
     outcome.iter().enumerate().map(changed).collect()
+}
+
+/// Whether a node is tied to the last one, and not that itself.
+fn may_turn(outcome: &[(u32, f32)], a: usize) -> bool {
+    let ground = outcome.len() - 1;
+    a < ground && outcome[a].0 == outcome[ground].0
 }
 
 /// The sum of all satisfied ties, less those that are not.
@@ -120,23 +125,21 @@ impl Ord for Turn {
 }
 
 /// Turns sequences of nodes as long as that satisfies more of their ties: a contraction can't take back what it has joined.
-/// In a sequence each node of the cluster of the last one turns once, always the one that gains most or loses least; of
+/// In a sequence each node that [may](may_turn) turns once, always the one that gains most or loses least; of
 /// the sequence so much is kept that the gain is largest.
 ///
 /// Source: B. Kernighan, S. Lin, "An efficient heuristic procedure for partitioning graphs" (1970).
 fn improve(rows: &Rows, outcome: &mut [(u32, f32)]) {
-    let ground = outcome.len() - 1;
+    let nodes = outcome.len();
     for _ in 0..SEQUENCES {
         let gain = |a: usize| -2.0 * pull(&rows[a], outcome) * f64::from(outcome[a].1);
-        let mut gains: Vec<f64> = (0..ground).map(gain).collect();
-        let mut is_free: Vec<bool> = (0..ground)
-            .map(|a| outcome[a].0 == outcome[ground].0)
-            .collect();
+        let mut gains: Vec<f64> = (0..nodes).map(gain).collect();
+        let mut is_free: Vec<bool> = (0..nodes).map(|a| may_turn(outcome, a)).collect();
         let turn = |gains: &[f64], node: usize| Turn {
             gain: gains[node],
             node: node as u32,
         };
-        let free = (0..ground).filter(|&a| is_free[a]);
+        let free = (0..nodes).filter(|&a| is_free[a]);
         let mut queue: BinaryHeap<Turn> = free.map(|a| turn(&gains, a)).collect();
         let (mut total, mut largest, mut kept) = (0.0, 0.0, 0);
         let mut turned = Vec::new();
@@ -154,7 +157,7 @@ fn improve(rows: &Rows, outcome: &mut [(u32, f32)]) {
             }
             for &(b, weight) in &rows[a] {
                 let b = b as usize;
-                if b < ground && is_free[b] {
+                if is_free[b] {
                     gains[b] -= 4.0 * weight * f64::from(outcome[a].1 * outcome[b].1);
                     queue.push(turn(&gains, b));
                 }
