@@ -52,6 +52,15 @@ def torch_tensors(sdf: np.ndarray, gradient: np.ndarray) -> None:
     assert torch.equal(again, found)
     vertices = isograd.torch.mesh(there.detach(), grid, options=options, backend="cuda").vertices
     assert vertices.is_cuda and len(vertices) > 1000
+
+    def at_faces(device: str) -> list[np.ndarray]:
+        cloud = torch.tensor(points, device=device, requires_grad=True)
+        field = isograd.torch.surface(cloud, grid, (1.0, 0.5, 0.5), values=cloud * 2)
+        (field.sdf + (field.values * field.normal).sum(-1)).sum().backward()
+        return [array.detach().cpu().numpy() for array in (field.sdf, field.values, cloud.grad)]
+
+    for found, wanted in zip(at_faces("cuda"), at_faces("cpu")):
+        assert np.allclose(found, wanted, rtol=0, atol=1e-4 * abs(wanted).max())
     try:
         isograd.torch.signed_distance(there, grid, options=options)
         raise AssertionError("copied without being asked")
@@ -64,6 +73,7 @@ def jax_arrays(sdf: np.ndarray) -> None:
     import jax
     import jax.numpy as jnp
 
+    import isograd.immersed
     import isograd.jax
 
     if jax.devices()[0].platform != "gpu":
@@ -84,6 +94,20 @@ def jax_arrays(sdf: np.ndarray) -> None:
         lambda start: jax.lax.scan(lambda x, _: ((v := step(x)) and x - 0.5 * v[1], v[0]), start, length=10)
     )(start)
     assert losses[-1] < losses[0] / 2, losses
+
+    @jax.jit
+    def at_faces(cloud: jax.Array) -> tuple[jax.Array, ...]:
+        def total(cloud: jax.Array) -> tuple[jax.Array, jax.Array]:
+            body = isograd.immersed.staggered(cloud, 2 * cloud, grid)
+            return sum(jnp.sum(sdf) + jnp.sum(u) for sdf, u in zip(body.sdf, body.velocity)), body.sdf[0]
+
+        (_, sdf), slope = jax.value_and_grad(total, has_aux=True)(cloud)
+        return sdf, slope, isograd.jax.orient(cloud, cloud)
+
+    there, here = (at_faces(jax.device_put(points, jax.devices(name)[0])) for name in ("gpu", "cpu"))
+    assert there[0].devices() == {jax.devices()[0]}
+    for found, wanted in zip(there, here):
+        assert np.allclose(found, wanted, rtol=0, atol=1e-4 * abs(wanted).max())
 
 
 def main() -> None:

@@ -91,7 +91,7 @@ def surface(
     at_centers = are_centers(regular, grid)
     points, normals, settings = prepare(points, grid, normals, options, "cpu", sdf=at_centers)
     columns, is_scalar = rows(values, points)
-    positions, shapes = _positions(places, regular, points.dtype)
+    positions, shapes = _positions(places, regular, points)
     given = positions[:0] if at_centers else positions
     found = _surface(points, given, columns, normals, settings, float(width), len(positions))[:4]
     if fill == "band":
@@ -104,14 +104,14 @@ def surface(
     return tuple(parts) if is_many(places) else parts[0]
 
 
-def _positions(places: Any, regular: Any, dtype: Any) -> tuple[Tensor, list[tuple[int, ...]]]:
-    """``(M, 3)`` positions of all places, and the shape of each part."""
+def _positions(places: Any, regular: Any, points: Tensor) -> tuple[Tensor, list[tuple[int, ...]]]:
+    """``(M, 3)`` positions of all places, of the type and on the device of the points, and the shape of each part."""
     if regular is None:
-        positions = checked(places, "places").to(dtype)
+        positions = checked(places, "places").to(points.dtype)
         return positions, [tuple(positions.shape[:1])]
     each = []
     for grid, offset in regular:
-        axes = [torch.from_numpy(axis).to(dtype) for axis in axes_at(grid, offset, np.float64)]
+        axes = [torch.from_numpy(axis).to(points) for axis in axes_at(grid, offset, np.float64)]
         each.append(torch.stack(torch.meshgrid(*axes, indexing="ij"), dim=-1).reshape(-1, 3))
     return torch.cat(each), [grid.shape for grid, _ in regular]
 

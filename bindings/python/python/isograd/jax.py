@@ -7,7 +7,8 @@
 Points and normals are traced; grid and options are static. float32 and float64 are unchanged (float64 needs
 ``jax_enable_x64``), half precision becomes float32, integers JAX's default float. XLA calls the handlers without Python.
 With ``backend="cuda"`` or ``"vulkan"`` they compute on that device: arrays of the CPU are copied at every call; of
-arrays on a CUDA device, which need ``backend="cuda"``, φ and its cotangent stay there. Other arrays are errors, unless
+arrays on a CUDA device, which need ``backend="cuda"``, φ and its cotangent stay there. :func:`surface` and :func:`orient`
+compute on the CPU, and copy such arrays at every call. Other arrays are errors, unless
 the environment has ``ISOGRAD_JAX_CALLBACK=1``: then they are copied, and computed through ``jax.pure_callback``, with
 the same bits.
 

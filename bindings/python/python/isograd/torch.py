@@ -3,7 +3,8 @@
 
 Computations use the number type of the tensors. With another ``backend``, points, φ and their cotangents
 are copied to the device and back at every call. Tensors on a CUDA device need ``backend="cuda"``: then φ and its cotangent
-stay there, and the points, a few numbers each, are copied to the CPU. The operators are registered with
+stay there, and the points, a few numbers each, are copied to the CPU. :func:`surface` and :func:`orient` compute on the
+CPU, and copy such tensors at every call. The operators are registered with
 ``torch.library``, such as ``isograd::signed_distance`` and ``isograd::signed_distance_pullback``. ``torch.func.grad``
 does not support custom operators: call ``torch.autograd.grad``. Needs PyTorch 2.5.
 

@@ -30,6 +30,9 @@ trait Target {
     /// Its name in compiled programs.
     const NAME: &'static str;
 
+    /// Whether it computes on the backend that the settings name, not always on the CPU.
+    const HAS_BACKEND: bool = true;
+
     /// The function of one cloud, in one number type.
     ///
     /// # Errors
@@ -44,7 +47,9 @@ trait Target {
     /// [`Self::run_batch`] with arrays on a CUDA device: by copies in the host's memory, unless a target does better.
     #[cfg(feature = "cuda")]
     fn run_on_cuda(batch: Batch<'_>) -> Result<(), Failure> {
-        cuda::check_backend(batch.settings)?;
+        if Self::HAS_BACKEND {
+            cuda::check_backend(batch.settings)?;
+        }
         cuda::by_copies(batch, Self::run_batch)
     }
 }

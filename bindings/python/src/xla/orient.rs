@@ -3,8 +3,6 @@
 use isograd::{Options, Orienter};
 
 use super::Target;
-#[cfg(feature = "cuda")]
-use super::buffers::Batch;
 use super::buffers::Call;
 use super::common::{Float, cloud, copy};
 use crate::backend::Failure;
@@ -14,6 +12,7 @@ pub struct Forward;
 
 impl Target for Forward {
     const NAME: &'static str = "isograd_orient";
+    const HAS_BACKEND: bool = false;
 
     fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {
         let cloud = cloud(call.vectors::<T>("the points")?, call.normals()?)?;
@@ -24,11 +23,5 @@ impl Target for Forward {
         let mut plan = Orienter::<T>::new(options.radius, options.orient).with_checks(false);
         let orientation = plan.orient(&cloud).map_err(|error| error.to_string())?;
         copy("the normals", &orientation.normals, out)
-    }
-
-    /// By copies: there are a few numbers a sample, and no backend to ask for.
-    #[cfg(feature = "cuda")]
-    fn run_on_cuda(batch: Batch<'_>) -> Result<(), Failure> {
-        super::cuda::by_copies(batch, Self::run_batch)
     }
 }

@@ -22,6 +22,7 @@ pub struct Forward;
 
 impl Target for Forward {
     const NAME: &'static str = "isograd_surface";
+    const HAS_BACKEND: bool = false;
 
     fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {
         let points = call.vectors::<T>("the points")?;
@@ -67,6 +68,7 @@ pub struct Pullback;
 
 impl Target for Pullback {
     const NAME: &'static str = "isograd_surface_pullback";
+    const HAS_BACKEND: bool = false;
 
     fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {
         let points = call.vectors::<T>("the points")?;
