@@ -134,8 +134,18 @@ pub(crate) fn fill<T: Clone + Default + Send>(
     n: usize,
     f: impl Fn(usize) -> T + Sync,
 ) {
-    out.resize(n, T::default());
+    resize(out, n, T::default());
     for_each(out, |i, item| *item = f(i));
+}
+
+/// Makes `out` hold `n` items, which are written later: `value`, or what it holds. New memory that is 0 is not touched here.
+pub(crate) fn resize<T: Clone>(out: &mut Vec<T>, n: usize, value: T) {
+    if out.capacity() < n {
+        *out = Vec::new();
+        *out = vec![value; n];
+    } else {
+        out.resize(n, value);
+    }
 }
 
 /// [`fill`] for large items, which are written once and need no default. Compiled once for each `T`.

@@ -31,6 +31,7 @@ trait Target {
     const NAME: &'static str;
 
     /// Whether it computes on the backend that the settings name, not always on the CPU.
+    #[cfg(feature = "cuda")]
     const HAS_BACKEND: bool = true;
 
     /// The function of one cloud, in one number type.

@@ -12,6 +12,7 @@ pub struct Forward;
 
 impl Target for Forward {
     const NAME: &'static str = "isograd_orient";
+    #[cfg(feature = "cuda")]
     const HAS_BACKEND: bool = false;
 
     fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {

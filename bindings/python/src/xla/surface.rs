@@ -22,6 +22,7 @@ pub struct Forward;
 
 impl Target for Forward {
     const NAME: &'static str = "isograd_surface";
+    #[cfg(feature = "cuda")]
     const HAS_BACKEND: bool = false;
 
     fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {
@@ -68,6 +69,7 @@ pub struct Pullback;
 
 impl Target for Pullback {
     const NAME: &'static str = "isograd_surface_pullback";
+    #[cfg(feature = "cuda")]
     const HAS_BACKEND: bool = false;
 
     fn run<T: Float>(mut call: Call<'_>) -> Result<(), Failure> {

@@ -172,25 +172,24 @@ impl<T: Real> Neighborhoods<T> {
     }
 
     /// Fills `out`, which has a place for each point in sorted order, in parallel:
-    /// `fill(point, R_i, candidates)`, where the candidates hold all of `N_i`.
+    /// `fill(i, point, R_i, candidates)`, where `i` is its input index and the candidates hold all of `N_i`.
     pub(crate) fn for_each_neighborhood<U: Send>(
         &self,
         out: &mut [U],
-        fill: &(impl Fn([T; 3], T, &Candidates<T>) -> U + Sync),
+        fill: &(impl Fn(usize, [T; 3], T, &Candidates<T>) -> U + Sync),
     ) {
         let index = &self.index;
-        let radius_at = |position: usize| self.radius[index.order()[position] as usize];
         index.for_each_cell(self.common_radius, [], out, &|cell, candidates, out| {
             let mut own = None;
             for (position, out) in cell.zip(out) {
-                let (point, radius) = (index.point(position), radius_at(position));
+                let i = index.order()[position] as usize;
+                let (point, radius) = (index.point(position), self.radius[i]);
                 *out = if radius <= self.common_radius {
-                    fill(point, radius, candidates)
+                    fill(i, point, radius, candidates)
                 } else {
-                    let own = own.get_or_insert_with(Candidates::default);
-                    let values = [];
+                    let (own, values) = (own.get_or_insert_with(Candidates::default), []);
                     index.candidates(point, Search { radius, values }, own);
-                    fill(point, radius, own)
+                    fill(i, point, radius, own)
                 };
             }
         });

@@ -31,7 +31,7 @@ fn find_in_own<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residual<T>)
     let (arch, rule) = (Arch::new(), neighborhoods.rule);
     out.sorted
         .resize(neighborhoods.index.len(), Found::default());
-    neighborhoods.for_each_neighborhood(&mut out.sorted, &|center, radius, candidates| {
+    neighborhoods.for_each_neighborhood(&mut out.sorted, &|_, center, radius, candidates| {
         Found::only(moments(arch, rule, center, radius, candidates))
     });
     find_all_planes(neighborhoods, arch, out);
@@ -137,7 +137,7 @@ fn find_all_planes<T: Real>(neighborhoods: &Neighborhoods<T>, arch: Arch, out: &
     let n = neighborhoods.index.len();
     out.radius.clone_from(&neighborhoods.radius);
     out.count.clone_from(&neighborhoods.count);
-    out.normals.resize(n, [T::zero(); 3]);
+    parallel::resize(&mut out.normals, n, [T::zero(); 3]);
     out.planes.resize(n, Plane::default());
     let sorted = &out.sorted;
     let normals = out.normals.chunks_mut(CHUNK);

@@ -131,7 +131,7 @@ impl Auto {
         } = &mut self.evidence;
         for values in [&mut *filled, &mut *slabs] {
             values.clear();
-            values.resize(n, 0.0);
+            parallel::resize(values, n, 0.0);
         }
         light.clear();
         light.resize(n, [1.0; 2]);

@@ -77,7 +77,7 @@ impl Graph {
     ) {
         let n = neighborhoods.index.len();
         self.take_axes(axes, neighborhoods, sites);
-        self.near.resize(n, [0; NEIGHBORS]);
+        parallel::resize(&mut self.near, n, [0; NEIGHBORS]);
         self.find_neighbors(neighborhoods, sites);
         self.find_sheets();
         self.measure();
@@ -108,8 +108,8 @@ impl Graph {
                 _ => (0.0, 0.0),
             }
         };
-        self.spread.resize(order.len(), 0.0);
-        self.side.resize(order.len(), 0.0);
+        parallel::resize(&mut self.spread, order.len(), 0.0);
+        parallel::resize(&mut self.side, order.len(), 0.0);
         let chunks = self.spread.chunks_mut(CHUNK);
         let chunks = chunks.zip(self.side.chunks_mut(CHUNK));
         parallel::each(chunks, |chunk, (spread, side)| {
@@ -144,18 +144,21 @@ impl Graph {
             offset: &self.offset,
         };
         self.sheets.find(near, &self.axis);
-        self.scatter.clear();
         let sheets = self.sheets.sheets();
-        self.scatter
-            .extend(sheets.iter().map(|sheet| sheet.scatter));
-        self.parallel.clear();
-        for (axis, sheet) in self.axis.iter_mut().zip(sheets) {
-            let given = *axis;
-            if sheet.scatter > 0.0 {
-                *axis = sheet.axis;
+        parallel::fill(&mut self.scatter, sheets.len(), |p| sheets[p].scatter);
+        let given = &self.axis;
+        let own = |p: usize| match sheets[p].scatter > 0.0 {
+            true => sheets[p].axis,
+            false => given[p],
+        };
+        parallel::fill(&mut self.parallel, sheets.len(), |p| {
+            vector::dot(given[p], own(p))
+        });
+        parallel::for_each(&mut self.axis, |p, axis| {
+            if sheets[p].scatter > 0.0 {
+                *axis = sheets[p].axis;
             }
-            self.parallel.push(vector::dot(given, *axis));
-        }
+        });
         let offset = &self.offset;
         parallel::fill(&mut self.interleaved, sheets.len(), |p| {
             sheets::interleaved(&offset[p], sheets[p])
@@ -321,7 +324,7 @@ impl Graph {
         });
         belief.clear();
         belief.extend_from_slice(evidence);
-        next.resize(belief.len(), [0.0; K]);
+        parallel::resize(next, belief.len(), [0.0; K]);
         for _ in 0..ROUNDS {
             let before = &*belief;
             parallel::for_each(next, |p, next| {

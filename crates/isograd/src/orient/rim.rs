@@ -32,9 +32,11 @@ pub(crate) fn rims<T: Real>(
 ) -> Vec<bool> {
     let mut one_sided = vec![false; points.len()];
     let arch = Arch::new();
-    neighborhoods.for_each_neighborhood(&mut one_sided, &|center, radius, candidates| {
-        let offset = vectorized!(arch, offset(center, radius, candidates));
-        offset > T::of(RIM_OFFSET)
+    neighborhoods.for_each_neighborhood(&mut one_sided, &|i, center, radius, candidates| {
+        vectorized!(arch, {
+            offset(center, radius, candidates) > T::of(RIM_OFFSET)
+                && leaves_out_octants(center, radius, candidates, normals[i])
+        })
     });
     let position = neighborhoods.position();
     let at_rim = parallel::map_with(Vec::new, position.len(), |directions, i| {
@@ -71,6 +73,44 @@ fn offset<T: Real>(center: [T; 3], radius: T, candidates: &Candidates<T>) -> T {
     let [x, y, z, weight] = sums.map(|sum| sum.into_iter().sum::<T>());
     vector::norm([x, y, z]) / (weight.max(T::min_positive_value()) * radius)
 }
+
+/// Whether the neighbors leave out two octants side by side of the plane across `normal`: so they do where they leave out a
+/// sector of [`RIM_GAP`], three octants wide. Most samples of a sheet are told apart by this, without their neighbors' normals.
+#[inline(always)]
+fn leaves_out_octants<T: Real>(
+    center: [T; 3],
+    radius: T,
+    candidates: &Candidates<T>,
+    normal: [T; 3],
+) -> bool {
+    let Some([first, second]) = vector::tangents(normal) else {
+        return false;
+    };
+    let mut seen = [0u32; LANES];
+    candidates.for_each_lanes(
+        radius,
+        #[inline(always)]
+        |lanes| {
+            for l in 0..LANES {
+                let d = [0, 1, 2].map(|a| lanes.point[a][l] - center[a]);
+                let (a, b) = (vector::dot(d, first), vector::dot(d, second));
+                let steeper = b.abs() > a.abs();
+                let octant = u32::from(a > T::zero())
+                    | u32::from(b > T::zero()) << 1
+                    | u32::from(steeper) << 2;
+                let is_aside = a != T::zero() || b != T::zero();
+                let counts = vector::norm_squared(d) <= lanes.limit[l] && is_aside;
+                seen[l] |= u32::from(counts) << octant;
+            }
+        },
+    );
+    let seen = seen.into_iter().fold(0, |all, lane| all | lane);
+    let is_empty = |k: usize| seen >> AROUND[k % AROUND.len()] & 1 == 0;
+    (0..AROUND.len()).any(|k| is_empty(k) && is_empty(k + 1))
+}
+
+/// The octants by the signs of the two coordinates and which of these is larger, counter-clockwise.
+const AROUND: [u32; 8] = [0b011, 0b111, 0b110, 0b010, 0b000, 0b100, 0b101, 0b001];
 
 /// Whether the neighbors face the same way but leave out a wide sector of the tangent plane.
 fn borders_a_gap<T: Real>(
@@ -132,4 +172,62 @@ fn rim_neighbors<T: Real>(
             count += usize::from(j != i && at_rim[j]);
         });
     count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::shapes::sphere;
+    use super::*;
+    use crate::neighbors::{self, Radius};
+
+    /// [`rims`] of all pairs of points, one after the other.
+    fn plain(points: &[[f64; 3]], normals: &[[f64; 3]], near: &Neighborhoods<f64>) -> Vec<bool> {
+        let within = |i: usize, radius: f64| {
+            let offsets = points.iter().map(move |&x| vector::sub(x, points[i]));
+            let all = offsets.enumerate();
+            all.filter(move |&(j, d)| j != i && vector::norm(d) <= radius)
+        };
+        let at_rim = |i: usize| {
+            let (mut sum, mut weight) = ([0.0; 3], 0.0);
+            for (_, d) in within(i, near.radius[i]) {
+                sum = vector::add(sum, vector::scale(d, 1.0 / vector::norm(d)));
+                weight += 1.0 / vector::norm(d);
+            }
+            let around: Vec<_> = within(i, radius(i, near)).collect();
+            let directions: Vec<_> = around.iter().map(|&(_, d)| d).collect();
+            let facing = |&(j, _): &(usize, _)| vector::dot(normals[i], normals[j]);
+            let facing = 1.0 + around.iter().map(facing).sum::<f64>();
+            vector::norm(sum) > RIM_OFFSET * weight * near.radius[i]
+                && facing > RIM_FLATNESS * (around.len() + 1) as f64
+                && widest_gap(&directions, normals[i]) > RIM_GAP
+        };
+        let at_rim: Vec<bool> = (0..points.len()).map(at_rim).collect();
+        let company = |i: usize| {
+            within(i, radius(i, near))
+                .filter(|&(j, _)| at_rim[j])
+                .count()
+        };
+        let is_rim = |i: usize| at_rim[i] && company(i) >= RIM_NEIGHBORS;
+        (0..points.len()).map(is_rim).collect()
+    }
+
+    #[test]
+    fn they_are_those_of_all_pairs() {
+        let mut found = 0;
+        for (count, turn) in [(300, 0.0), (900, 0.4), (2000, -0.3)] {
+            let (points, normals) = sphere(count, [0.0; 3], 1.0, 7);
+            // Part of a sphere, with few samples and with many to a neighborhood.
+            let kept = |p: &[f64; 3]| p[2] + turn * p[0] > -0.2;
+            let samples = points.into_iter().zip(normals).filter(|(p, _)| kept(p));
+            let (points, normals): (Vec<_>, Vec<_>) = samples.unzip();
+            for radius in [Radius::Auto, Radius::Fixed(0.15), Radius::Fixed(0.4)] {
+                let mut near = Neighborhoods::default();
+                neighbors::forward(&points, radius, &mut near).expect("a cloud");
+                let rims = rims(&points, &normals, &near);
+                assert_eq!(rims, plain(&points, &normals, &near), "{count} {radius:?}");
+                found += rims.iter().filter(|&&rim| rim).count();
+            }
+        }
+        assert!(found > 100, "{found}");
+    }
 }

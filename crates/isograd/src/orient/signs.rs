@@ -8,7 +8,7 @@ use super::confidence;
 use super::domains::{self, DomainSigns};
 use super::field;
 use super::graph::Graph;
-use crate::vector;
+use crate::{parallel, vector};
 
 /// Weight of a sample at which the winding number is wrong by 1, relative to evidence of 1.
 const WINDING: f64 = 4.0;
@@ -60,7 +60,13 @@ impl Domains<'_> {
 
     /// The samples of each domain, in order.
     pub fn members(&self) -> Vec<Vec<u32>> {
-        let mut members = vec![Vec::new(); self.count];
+        let mut counts = vec![0; self.count];
+        for &domain in self.domain {
+            if let Some(count) = counts.get_mut(domain as usize) {
+                *count += 1;
+            }
+        }
+        let mut members: Vec<_> = counts.into_iter().map(Vec::with_capacity).collect();
         for (p, &domain) in (0..).zip(self.domain) {
             if let Some(members) = members.get_mut(domain as usize) {
                 members.push(p);
@@ -125,10 +131,9 @@ impl Signs {
         let winding = if sensors { 0.0 } else { WINDING };
         let solve = |signs: &mut Self, interpretation: Interpretation| {
             let of_one = |both: &[f32; 2]| both[interpretation as usize];
-            signs.evidence.clear();
-            signs.evidence.extend(evidence.iter().map(of_one));
-            signs.belief.clear();
-            signs.belief.extend(belief.iter().map(of_one));
+            let n = belief.len();
+            parallel::fill(&mut signs.evidence, n, |p| of_one(&evidence[p]));
+            parallel::fill(&mut signs.belief, n, |p| of_one(&belief[p]));
             let observed = (&*signs.evidence, &*signs.belief);
             signs.domains.run(graph, observed, winding, place);
         };
@@ -166,15 +171,13 @@ impl Signs {
     }
 
     fn keep(&mut self) {
-        self.best.sign.clone_from(&self.domains.sign);
-        self.best.evidence.clone_from(&self.evidence);
-        let overruled = self.domains.overruled.iter();
-        let kept =
-            |(&belief, &over): (&f32, &bool)| if over { -OVERRULED * belief } else { belief };
-        self.best.belief.clear();
-        self.best
-            .belief
-            .extend(self.belief.iter().zip(overruled).map(kept));
+        std::mem::swap(&mut self.best.sign, &mut self.domains.sign);
+        std::mem::swap(&mut self.best.evidence, &mut self.evidence);
+        let (belief, overruled) = (&self.belief, &self.domains.overruled);
+        parallel::fill(&mut self.best.belief, belief.len(), |p| {
+            let factor = if overruled[p] { -OVERRULED } else { 1.0 };
+            factor * belief[p]
+        });
     }
 
     /// The sign of a sample.

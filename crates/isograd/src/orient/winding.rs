@@ -24,8 +24,11 @@ const FEWEST_PROBES: usize = 4;
 /// `(probes, domains)` the winding number that each domain gives at each of the `probes`.
 fn numbers(graph: &Graph, place: &impl Place, domains: &Domains<'_>, probes: &[u32]) -> Vec<f64> {
     let trees = parallel::map_each(domains.members(), |_, members| {
-        let dipole = |&p: &u32| dipole(graph, place, p as usize, domains.sign[p as usize]);
-        Tree::new(members.iter().map(dipole).collect())
+        let dipole = |k: usize| {
+            let p = members[k] as usize;
+            dipole(graph, place, p, domains.sign[p])
+        };
+        Tree::new(parallel::map(members.len(), dipole))
     });
     let arch = pulp::Arch::new();
     let at_probe = |k: usize| -> Vec<f64> {

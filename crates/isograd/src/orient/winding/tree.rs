@@ -49,7 +49,7 @@ const MANY: usize = 1 << 17;
 const FAR: f32 = 4.0;
 
 /// A cluster of samples, and the one that stands for them from afar.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Cluster {
     whole: Dipole,
     /// Square of the distance from which on it stands for them.
@@ -70,62 +70,21 @@ pub(in crate::orient) struct Tree {
 impl Tree {
     /// The tree of samples, in any order.
     pub(in crate::orient) fn new(mut dipoles: Vec<Dipole>) -> Self {
-        match dipoles.is_empty() {
-            true => Self::default(),
-            false => Self::of(&mut dipoles, MANY),
-        }
+        Self::of(&mut dipoles, MANY)
     }
 
-    /// The tree of one sample or more. The halves of more than `many` are built side by side.
+    /// [`Self::new`]; the halves of more than `many` samples are built side by side.
     fn of(dipoles: &mut [Dipole], many: usize) -> Self {
-        let mut tree = Self::default();
-        if dipoles.len() <= many {
-            tree.add(dipoles);
-            return tree;
+        let size = Size::of(dipoles.len());
+        let mut tree = Self {
+            blocks: vec![[[0.0; WIDTH]; 6]; size.blocks],
+            clusters: vec![Cluster::default(); size.clusters],
+        };
+        if !dipoles.is_empty() {
+            let (blocks, clusters) = (&mut tree.blocks[..], &mut tree.clusters[..]);
+            build(dipoles, Part { blocks, clusters }, Size::default(), many);
         }
-        tree.push(dipoles);
-        let (low, high) = halves(dipoles);
-        let (low, high) = parallel::join(|| Self::of(low, many), || Self::of(high, many));
-        tree.append(low);
-        tree.append(high);
-        tree.clusters[0].next = tree.clusters.len() as u32;
         tree
-    }
-
-    /// Adds the cluster of some samples, without its parts.
-    fn push(&mut self, dipoles: &[Dipole]) {
-        let (whole, radius) = combined(dipoles);
-        self.clusters.push(Cluster {
-            whole,
-            far: (FAR * radius).powi(2),
-            blocks: [self.blocks.len() as u32; 2],
-            next: 0,
-        });
-    }
-
-    fn append(&mut self, part: Self) {
-        let (clusters, blocks) = (self.clusters.len() as u32, self.blocks.len() as u32);
-        self.blocks.extend(part.blocks);
-        self.clusters
-            .extend(part.clusters.iter().map(|cluster| Cluster {
-                blocks: cluster.blocks.map(|block| block + blocks),
-                next: cluster.next + clusters,
-                ..*cluster
-            }));
-    }
-
-    fn add(&mut self, dipoles: &mut [Dipole]) {
-        let place = self.clusters.len();
-        self.push(dipoles);
-        if dipoles.len() > LEAF {
-            let (low, high) = halves(dipoles);
-            self.add(low);
-            self.add(high);
-        } else {
-            self.blocks.extend(blocks(dipoles));
-            self.clusters[place].blocks[1] = self.blocks.len() as u32;
-        }
-        self.clusters[place].next = self.clusters.len() as u32;
     }
 
     /// The winding number at a place; off by up to 1 % where clusters stand for their samples.
@@ -176,6 +135,79 @@ impl Tree {
     }
 }
 
+/// Numbers of blocks and clusters.
+#[derive(Clone, Copy, Debug, Default)]
+struct Size {
+    blocks: usize,
+    clusters: usize,
+}
+
+impl Size {
+    /// Those of the tree of so many samples.
+    fn of(samples: usize) -> Self {
+        if samples <= LEAF {
+            return Self {
+                blocks: samples.div_ceil(WIDTH),
+                clusters: samples.min(1),
+            };
+        }
+        let (low, high) = (Self::of(samples / 2), Self::of(samples.div_ceil(2)));
+        Self {
+            blocks: low.blocks + high.blocks,
+            clusters: 1 + low.clusters + high.clusters,
+        }
+    }
+}
+
+/// The blocks and clusters of some samples, those of a tree one after the other.
+struct Part<'a> {
+    blocks: &'a mut [Block],
+    clusters: &'a mut [Cluster],
+}
+
+/// Builds the cluster of one sample or more, and its parts; `before` it are so many others.
+fn build(dipoles: &mut [Dipole], part: Part<'_>, before: Size, many: usize) {
+    let Some((cluster, clusters)) = part.clusters.split_first_mut() else {
+        return;
+    };
+    let (whole, radius) = combined(dipoles);
+    let first = before.blocks as u32;
+    *cluster = Cluster {
+        whole,
+        far: (FAR * radius).powi(2),
+        blocks: [first; 2],
+        next: (before.clusters + 1 + clusters.len()) as u32,
+    };
+    if dipoles.len() <= LEAF {
+        cluster.blocks[1] += part.blocks.len() as u32;
+        fill_blocks(dipoles, part.blocks);
+        return;
+    }
+    let is_large = dipoles.len() > many;
+    let (low, high) = halves(dipoles);
+    let size = Size::of(low.len());
+    let blocks = part.blocks.split_at_mut(size.blocks);
+    let clusters = clusters.split_at_mut(size.clusters);
+    let of = |blocks, clusters| Part { blocks, clusters };
+    let (part_low, part_high) = (of(blocks.0, clusters.0), of(blocks.1, clusters.1));
+    let before_low = Size {
+        clusters: before.clusters + 1,
+        ..before
+    };
+    let before_high = Size {
+        blocks: before.blocks + size.blocks,
+        clusters: before_low.clusters + size.clusters,
+    };
+    let build_low = || build(low, part_low, before_low, many);
+    let build_high = || build(high, part_high, before_high, many);
+    if is_large {
+        parallel::join(build_low, build_high);
+    } else {
+        build_low();
+        build_high();
+    }
+}
+
 /// The lower and the upper half of samples, along the axis in which they extend furthest.
 fn halves(dipoles: &mut [Dipole]) -> (&mut [Dipole], &mut [Dipole]) {
     let extent = |a: usize| {
@@ -220,18 +252,16 @@ fn combined(dipoles: &[Dipole]) -> (Dipole, f32) {
     (whole, radius as f32)
 }
 
-fn blocks(dipoles: &[Dipole]) -> Vec<Block> {
-    let block = |chunk: &[Dipole]| {
-        let mut block = [[0.0; WIDTH]; 6];
+/// Writes samples into blocks that are 0.
+fn fill_blocks(dipoles: &[Dipole], blocks: &mut [Block]) {
+    for (block, chunk) in blocks.iter_mut().zip(dipoles.chunks(WIDTH)) {
         for (l, dipole) in chunk.iter().enumerate() {
             for a in 0..3 {
                 block[a][l] = dipole.position[a];
                 block[3 + a][l] = dipole.moment[a];
             }
         }
-        block
-    };
-    dipoles.chunks(WIDTH).map(block).collect()
+    }
 }
 
 /// The sum over all samples of some blocks.
