@@ -83,8 +83,10 @@ impl Regions {
 
 /// Joins the sets of `a` and `b`; the lower root stays.
 pub(super) fn join(parent: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (root(parent, a), root(parent, b));
-    parent[a.max(b) as usize] = a.min(b);
+    if parent[a as usize] != parent[b as usize] {
+        let (a, b) = (root(parent, a), root(parent, b));
+        parent[a.max(b) as usize] = a.min(b);
+    }
 }
 
 /// The root of `a`, with the path to it halved.

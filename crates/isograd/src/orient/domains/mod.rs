@@ -62,6 +62,11 @@ impl SignedUnionFind {
             .extend(belief.iter().map(|b| b.abs() >= NEGLIGIBLE));
     }
 
+    /// Whether two points are seen to be of one domain already, without a look for its root.
+    fn share_parent(&self, p: usize, q: usize) -> bool {
+        self.parent[p] == self.parent[q]
+    }
+
     /// Root of `p`, and the sign of `p` relative to it.
     fn root(&mut self, mut p: u32) -> (u32, f32) {
         let mut sign = 1.0;
@@ -137,7 +142,8 @@ impl DomainSigns {
                 let (mine, other) = (belief[p], belief[q as usize]);
                 let both_decided = mine.abs() >= NEGLIGIBLE && other.abs() >= NEGLIGIBLE;
                 let product = mine.signum() * other.signum();
-                if both_decided && coupling * product >= STRONG {
+                let agree = both_decided && coupling * product >= STRONG;
+                if agree && !self.domains.share_parent(p, q as usize) {
                     let (a, b) = (self.domains.root(p as u32), self.domains.root(q));
                     self.domains.join(a, b, product);
                 }
