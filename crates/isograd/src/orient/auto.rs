@@ -186,7 +186,7 @@ impl Evidence {
 
     /// Whether the two interpretations differ anywhere.
     fn is_ambiguous(&self) -> bool {
-        let mut sheets = self.sheets.iter().enumerate();
-        sheets.any(|(p, &sheet)| evidence::differs(sheet.evidence, self.openness(p)))
+        let differs = |p: usize| evidence::differs(self.sheets[p].evidence, self.openness(p));
+        parallel::first(self.sheets.len(), differs).is_some()
     }
 }

@@ -1,7 +1,7 @@
 //! The order in which the automatic method works.
 
-use crate::Real;
 use crate::neighbors::Neighborhoods;
+use crate::{Real, parallel};
 
 /// Numbers the points by their places. Signs are decided one after the other, and among equals the first one wins: in this
 /// order, unlike that of the input, the outcome is a function of the cloud alone. Points that are close in it are close in
@@ -21,11 +21,11 @@ impl Sites {
     pub fn find<T: Real>(&mut self, neighborhoods: &Neighborhoods<T>) {
         let index = &neighborhoods.index;
         index.positions_by_place(&mut self.position);
-        self.order.clear();
-        let input = |&position: &u32| index.order()[position as usize];
-        self.order.extend(self.position.iter().map(input));
-        self.of.clear();
-        self.of.resize(index.len(), 0);
+        let position = &self.position;
+        parallel::fill(&mut self.order, position.len(), |site| {
+            index.order()[position[site] as usize]
+        });
+        parallel::resize(&mut self.of, index.len(), 0);
         for (site, &i) in (0u32..).zip(&self.order) {
             self.of[i as usize] = site;
         }

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use super::graph::Graph;
 use super::signs::{Domains, Place};
 use super::winding::Misfit;
-use crate::vector;
+use crate::{parallel, vector};
 
 mod segments;
 mod ties;
@@ -224,7 +224,7 @@ impl DomainSigns {
         for (k, &domain) in (0..).zip(&large) {
             row[domain] = k;
         }
-        let domain: Vec<u32> = self.domain.iter().map(|&d| row[d as usize]).collect();
+        let domain = parallel::map(self.domain.len(), |p| row[self.domain[p] as usize]);
         let misfit = Misfit::new(graph, place, &self.signed(&domain, large.len()));
         let mut tie = |a: usize, b: usize, weight: f64| {
             *ties[a].entry(b as u32).or_insert(0.0) += weight;
@@ -264,16 +264,19 @@ impl DomainSigns {
             let signed = f64::from(self.sign[p] * belief[p]);
             totals[domain as usize][usize::from(signed < 0.0)] += signed.abs();
         }
-        let against = |&d: &u32| totals[d as usize][1] > MOSTLY * totals[d as usize][0];
-        self.overruled.clear();
-        self.overruled.extend(self.domain.iter().map(against));
+        let against = |[for_it, against]: [f64; 2]| against > MOSTLY * for_it;
+        let domain = &self.domain;
+        parallel::fill(&mut self.overruled, domain.len(), |p| {
+            against(totals[domain[p] as usize])
+        });
     }
 
     fn apply(&mut self, outcome: &[(u32, f32)]) {
         let ground = outcome[outcome.len() - 1].1;
-        for (sign, &domain) in self.sign.iter_mut().zip(&self.domain) {
-            *sign *= outcome[domain as usize].1 * ground;
-        }
+        let domain = &self.domain;
+        parallel::for_each(&mut self.sign, |p, sign| {
+            *sign *= outcome[domain[p] as usize].1 * ground;
+        });
     }
 
     /// The rule for clusters without evidence: on the sum, axes point away from the centroid.
