@@ -102,26 +102,48 @@ fn relax(rows: &Rows) -> Vec<f64> {
     values
 }
 
-/// Gain of turning a node, the largest last.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Turn {
-    gain: f64,
-    node: u32,
+/// Nodes that are searched together for the largest gain.
+const BLOCK: usize = 64;
+
+/// What turning each node gains, and the largest of that: where few ties change, few blocks are searched again.
+struct Gains {
+    /// [`TURNED`] for nodes that may not turn, or not again.
+    gains: Vec<f64>,
+    /// The best node of each block, unless gains changed there.
+    best: Vec<Option<usize>>,
 }
 
-impl Eq for Turn {}
+const TURNED: f64 = f64::NEG_INFINITY;
 
-impl PartialOrd for Turn {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
+impl Gains {
+    fn new(gains: Vec<f64>) -> Self {
+        let best = vec![None; gains.len().div_ceil(BLOCK)];
+        Self { gains, best }
+    }
+
+    /// The node that gains most, the first of equals, and its gain.
+    fn largest(&mut self) -> Option<(usize, f64)> {
+        let Self { gains, best } = self;
+        for (k, best) in best.iter_mut().enumerate() {
+            let block = k * BLOCK..gains.len().min((k + 1) * BLOCK);
+            *best = best.or_else(|| first_largest(gains, block));
+        }
+        let largest = first_largest(gains, best.iter().copied().flatten())?;
+        Some((largest, gains[largest])).filter(|&(_, gain)| gain > TURNED)
+    }
+
+    fn set(&mut self, a: usize, gain: f64) {
+        self.gains[a] = gain;
+        self.best[a / BLOCK] = None;
     }
 }
 
-impl Ord for Turn {
-    fn cmp(&self, other: &Self) -> Ordering {
-        let gains = self.gain.total_cmp(&other.gain);
-        gains.then(other.node.cmp(&self.node))
-    }
+/// The first of some nodes with the largest gain.
+fn first_largest(gains: &[f64], nodes: impl Iterator<Item = usize>) -> Option<usize> {
+    nodes.reduce(|best, a| match gains[a].total_cmp(&gains[best]) {
+        Ordering::Greater => a,
+        _ => best,
+    })
 }
 
 /// Turns sequences of nodes as long as that satisfies more of their ties: a contraction can't take back what it has joined.
@@ -132,23 +154,15 @@ impl Ord for Turn {
 fn improve(rows: &Rows, outcome: &mut [(u32, f32)]) {
     let nodes = outcome.len();
     for _ in 0..SEQUENCES {
-        let gain = |a: usize| -2.0 * pull(&rows[a], outcome) * f64::from(outcome[a].1);
-        let mut gains: Vec<f64> = (0..nodes).map(gain).collect();
-        let mut is_free: Vec<bool> = (0..nodes).map(|a| may_turn(outcome, a)).collect();
-        let turn = |gains: &[f64], node: usize| Turn {
-            gain: gains[node],
-            node: node as u32,
+        let gain = |a: usize| match may_turn(outcome, a) {
+            true => -2.0 * pull(&rows[a], outcome) * f64::from(outcome[a].1),
+            false => TURNED,
         };
-        let free = (0..nodes).filter(|&a| is_free[a]);
-        let mut queue: BinaryHeap<Turn> = free.map(|a| turn(&gains, a)).collect();
+        let mut gains = Gains::new((0..nodes).map(gain).collect());
         let (mut total, mut largest, mut kept) = (0.0, 0.0, 0);
         let mut turned = Vec::new();
-        while let Some(Turn { gain, node }) = queue.pop() {
-            let a = node as usize;
-            if !is_free[a] || gain != gains[a] {
-                continue;
-            }
-            is_free[a] = false;
+        while let Some((a, gain)) = gains.largest() {
+            gains.set(a, TURNED);
             outcome[a].1 = -outcome[a].1;
             turned.push(a);
             total += gain;
@@ -157,9 +171,10 @@ fn improve(rows: &Rows, outcome: &mut [(u32, f32)]) {
             }
             for &(b, weight) in &rows[a] {
                 let b = b as usize;
-                if is_free[b] {
-                    gains[b] -= 4.0 * weight * f64::from(outcome[a].1 * outcome[b].1);
-                    queue.push(turn(&gains, b));
+                let before = gains.gains[b];
+                if before > TURNED {
+                    let change = -4.0 * weight * f64::from(outcome[a].1 * outcome[b].1);
+                    gains.set(b, before + change);
                 }
             }
         }
