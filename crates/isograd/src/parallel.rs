@@ -141,6 +141,7 @@ pub(crate) fn fill<T: Clone + Default + Send>(
 /// Makes `out` hold `n` items, which are written later: `value`, or what it holds. New memory that is 0 is not touched here.
 pub(crate) fn resize<T: Clone>(out: &mut Vec<T>, n: usize, value: T) {
     if out.capacity() < n {
+        // Free before new memory is taken.
         *out = Vec::new();
         *out = vec![value; n];
     } else {

@@ -146,19 +146,15 @@ impl Graph {
         self.sheets.find(near, &self.axis);
         let sheets = self.sheets.sheets();
         parallel::fill(&mut self.scatter, sheets.len(), |p| sheets[p].scatter);
-        let given = &self.axis;
-        let own = |p: usize| match sheets[p].scatter > 0.0 {
+        let own = |p: usize, given: [f32; 3]| match sheets[p].scatter > 0.0 {
             true => sheets[p].axis,
-            false => given[p],
+            false => given,
         };
+        let given = &self.axis;
         parallel::fill(&mut self.parallel, sheets.len(), |p| {
-            vector::dot(given[p], own(p))
+            vector::dot(given[p], own(p, given[p]))
         });
-        parallel::for_each(&mut self.axis, |p, axis| {
-            if sheets[p].scatter > 0.0 {
-                *axis = sheets[p].axis;
-            }
-        });
+        parallel::for_each(&mut self.axis, |p, axis| *axis = own(p, *axis));
         let offset = &self.offset;
         parallel::fill(&mut self.interleaved, sheets.len(), |p| {
             sheets::interleaved(&offset[p], sheets[p])

@@ -83,6 +83,7 @@ impl Regions {
 
 /// Joins the sets of `a` and `b`; the lower root stays.
 pub(super) fn join(parent: &mut [u32], a: u32, b: u32) {
+    // Most pairs share a parent: they are joined already.
     if parent[a as usize] != parent[b as usize] {
         let (a, b) = (root(parent, a), root(parent, b));
         parent[a.max(b) as usize] = a.min(b);

@@ -19,6 +19,8 @@ const RIM_NEIGHBORS: usize = 3;
 /// Neighborhoods of fewer samples are widened to about this many: few directions leave out wide sectors by chance, and at a
 /// rim, where half of the disc is empty, few neighbors are at the rim themselves.
 const RIM_COUNT: u32 = 24;
+/// The octants of a plane, counter-clockwise, each by the signs of its two coordinates and which of them is larger.
+const AROUND: [u32; 8] = [0b011, 0b111, 0b110, 0b010, 0b000, 0b100, 0b101, 0b001];
 
 /// `(N,)` whether each sample is at a rim, of an open surface or of a hole in the sampling.
 ///
@@ -108,9 +110,6 @@ fn leaves_out_octants<T: Real>(
     let is_empty = |k: usize| seen >> AROUND[k % AROUND.len()] & 1 == 0;
     (0..AROUND.len()).any(|k| is_empty(k) && is_empty(k + 1))
 }
-
-/// The octants by the signs of the two coordinates and which of these is larger, counter-clockwise.
-const AROUND: [u32; 8] = [0b011, 0b111, 0b110, 0b010, 0b000, 0b100, 0b101, 0b001];
 
 /// Whether the neighbors face the same way but leave out a wide sector of the tangent plane.
 fn borders_a_gap<T: Real>(

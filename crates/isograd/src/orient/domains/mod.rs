@@ -264,10 +264,11 @@ impl DomainSigns {
             let signed = f64::from(self.sign[p] * belief[p]);
             totals[domain as usize][usize::from(signed < 0.0)] += signed.abs();
         }
-        let against = |[for_it, against]: [f64; 2]| against > MOSTLY * for_it;
+        let overruled = |[agree, against]: &[f64; 2]| *against > MOSTLY * agree;
+        let overruled: Vec<bool> = totals.iter().map(overruled).collect();
         let domain = &self.domain;
         parallel::fill(&mut self.overruled, domain.len(), |p| {
-            against(totals[domain[p] as usize])
+            overruled[domain[p] as usize]
         });
     }
 

@@ -105,15 +105,15 @@ fn relax(rows: &Rows) -> Vec<f64> {
 /// Nodes that are searched together for the largest gain.
 const BLOCK: usize = 64;
 
-/// What turning each node gains, and the largest of that: where few ties change, few blocks are searched again.
+/// Gain of a node that may not turn, or not again.
+const TURNED: f64 = f64::NEG_INFINITY;
+
+/// Gain of turning each node, searched for the largest by blocks: only those where a gain changed are searched again.
 struct Gains {
-    /// [`TURNED`] for nodes that may not turn, or not again.
     gains: Vec<f64>,
     /// The best node of each block, unless gains changed there.
     best: Vec<Option<usize>>,
 }
-
-const TURNED: f64 = f64::NEG_INFINITY;
 
 impl Gains {
     fn new(gains: Vec<f64>) -> Self {
@@ -130,6 +130,13 @@ impl Gains {
         }
         let largest = first_largest(gains, best.iter().copied().flatten())?;
         Some((largest, gains[largest])).filter(|&(_, gain)| gain > TURNED)
+    }
+
+    /// Changes the gain of a node, if that may still turn.
+    fn add(&mut self, a: usize, change: f64) {
+        if self.gains[a] > TURNED {
+            self.set(a, self.gains[a] + change);
+        }
     }
 
     fn set(&mut self, a: usize, gain: f64) {
@@ -171,11 +178,7 @@ fn improve(rows: &Rows, outcome: &mut [(u32, f32)]) {
             }
             for &(b, weight) in &rows[a] {
                 let b = b as usize;
-                let before = gains.gains[b];
-                if before > TURNED {
-                    let change = -4.0 * weight * f64::from(outcome[a].1 * outcome[b].1);
-                    gains.set(b, before + change);
-                }
+                gains.add(b, -4.0 * weight * f64::from(outcome[a].1 * outcome[b].1));
             }
         }
         for &a in &turned[kept..] {

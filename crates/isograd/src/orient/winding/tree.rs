@@ -80,10 +80,8 @@ impl Tree {
             blocks: vec![[[0.0; WIDTH]; 6]; size.blocks],
             clusters: vec![Cluster::default(); size.clusters],
         };
-        if !dipoles.is_empty() {
-            let (blocks, clusters) = (&mut tree.blocks[..], &mut tree.clusters[..]);
-            build(dipoles, Part { blocks, clusters }, Size::default(), many);
-        }
+        let (blocks, clusters) = (&mut tree.blocks[..], &mut tree.clusters[..]);
+        build(dipoles, Part { blocks, clusters }, Size::default(), many);
         tree
     }
 
@@ -135,7 +133,7 @@ impl Tree {
     }
 }
 
-/// Numbers of blocks and clusters.
+/// Number of blocks and of clusters.
 #[derive(Clone, Copy, Debug, Default)]
 struct Size {
     blocks: usize,
@@ -143,7 +141,7 @@ struct Size {
 }
 
 impl Size {
-    /// Those of the tree of so many samples.
+    /// Size of the tree of a number of samples.
     fn of(samples: usize) -> Self {
         if samples <= LEAF {
             return Self {
@@ -165,7 +163,7 @@ struct Part<'a> {
     clusters: &'a mut [Cluster],
 }
 
-/// Builds the cluster of one sample or more, and its parts; `before` it are so many others.
+/// Builds the cluster of some samples, if there are any, and its parts. `before` is the size of the tree before it.
 fn build(dipoles: &mut [Dipole], part: Part<'_>, before: Size, many: usize) {
     let Some((cluster, clusters)) = part.clusters.split_first_mut() else {
         return;
