@@ -139,8 +139,8 @@ impl<T: Pipeline> Reconstructor<T> {
     }
 
     /// Runs all stages but the checks with the signs of the normals of `held`, a reconstruction of as many points, with its
-    /// isolated samples, and with its resolution of the surface and its automatic smoothing unless that is a function of the
-    /// areas. This is the map that [`Reconstruction::pullback`] differentiates, for comparisons with finite differences.
+    /// isolated samples, and with its resolution of the surface. This is the map that [`Reconstruction::pullback`]
+    /// differentiates, for comparisons with finite differences.
     ///
     /// # Errors
     /// As [`reconstruct`](Self::reconstruct).

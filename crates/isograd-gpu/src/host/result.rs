@@ -320,6 +320,7 @@ impl<T: Number> Reconstruction<T> {
         let near = self.neighborhoods()?;
         let mut radii = RadiiCotangent::of(near, &bars.areas);
         radii.add_common(bars.common);
+        radii.add_spacing(bars.spacing);
         if !bars.axes.is_empty() {
             let [found, own] =
                 [&self.held.radii, &self.held.area_radii].map(|of| self.device.numbers(of));

@@ -107,6 +107,8 @@ pub struct RadiiCotangents<T> {
     pub axes: Vec<T>,
     /// Of the common one, by itself.
     pub common: f64,
+    /// Of the distance between samples.
+    pub spacing: f64,
 }
 
 /// `f32` and `f64`, compiled here.
@@ -338,6 +340,10 @@ impl<R: SharedMemory, T: Scalar> Work<T> for Reconstructor<R, T> {
                 None => Vec::new(),
             },
             common,
+            spacing: match &found.spacing {
+                Some(spacing) => device.download(spacing)?[0].f64(),
+                None => 0.0,
+            },
         };
         Ok((of_cloud, radii))
     }

@@ -12,7 +12,7 @@
 //! [`Reconstructor::pullback`].
 //!
 //! # Not differentiable
-//! RadiiAndSigns radii and signs, and the parts that the stages name.
+//! Radii and signs, which are held constant, and the parts that the stages name.
 
 mod extend;
 mod forward;
@@ -159,14 +159,6 @@ impl From<&isograd::Options> for Options {
     }
 }
 
-impl Options {
-    /// Whether the smoothing follows the areas of the samples, and has a derivative: of a screened solution, what
-    /// the smoothing was done to is not kept.
-    fn smoothing_follows(&self) -> bool {
-        self.smoothing == Smoothing::Auto && self.area_weights && self.screening == 0.0
-    }
-}
-
 /// A plan: a device, a grid and options, with the tables of the stages.
 pub struct Reconstructor<R: Runtime, T: Scalar> {
     device: Device<R>,
@@ -240,6 +232,14 @@ struct Width {
 }
 
 impl<T: Scalar> Reconstruction<T> {
+    fn samples(&self) -> splat::Samples<'_, T> {
+        splat::Samples {
+            points: &self.points,
+            normals: &self.normals,
+            areas: &self.areas,
+        }
+    }
+
     /// `(nx, ny, nz)` the face of the surface closest to each cell center, in C order;
     /// [`NO_TRIANGLE`](distance::NO_TRIANGLE) outside the band.
     pub fn closest(&self) -> &Buffer<u32> {

@@ -1,14 +1,16 @@
 //! The stages in reverse: cotangents of any of the results to those of points and grid.
 
 use cubecl::prelude::*;
+use isograd::poisson::Smoothing;
 
 use super::{Error, Reconstruction, Reconstructor, Source, held};
 use crate::device::{check_length, launch};
 use crate::distance::extend;
 use crate::isosurface::{self, iso_value, local_level as local};
+use crate::poisson::screened;
 use crate::primitives::fill::{add, zeros};
 use crate::primitives::flags;
-use crate::splat::{self, SampleCotangent, Samples, area};
+use crate::splat::{self, SampleCotangent, area};
 use crate::{Buffer, Device, Scalar, distance, normals, orient, poisson};
 
 /// Cotangents of the results of a reconstruction: by how much a scalar (a loss) changes, a unit of each
@@ -80,6 +82,8 @@ pub struct CloudCotangent<T> {
     /// `(1,)` of the radius of extensions, times it: of the common radius or, where it is larger, of the cell size, whose
     /// part of [`grid`](Self::grid) this is not in. None where nothing was extended.
     pub extension_radius: Option<Buffer<T>>,
+    /// `(1,)` of the distance between samples, times it: where the smoothing goes with that, and not with areas.
+    pub spacing: Option<Buffer<T>>,
     /// `(N, 3)` of the given normals; none where the normals were found.
     pub normals: Option<Buffer<T>>,
     /// Of each extended attribute, `(N, components)`, in the order of [`Cotangent::extensions`].
@@ -121,9 +125,11 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             }
         }
         let mut extended = self.pull_extensions(result, cotangent, &bars)?;
+        let mut spacing = None;
         if cotangent.reaches_indicator() {
             let vertices_bar = self.pull_distance(result, cotangent, &extended, &bars)?;
-            let guarded = self.pull_indicator(result, cotangent, &vertices_bar, &bars)?;
+            let guarded;
+            (guarded, spacing) = self.pull_indicator(result, cotangent, &vertices_bar, &bars)?;
             extended.guarded.push(guarded);
         }
         let guarded = match &extended.guarded[..] {
@@ -158,6 +164,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             radii,
             axis_radii,
             extension_radius: extended.radius,
+            spacing,
             normals: given,
             attributes: extended.attributes,
             grid: bars.grid,
@@ -201,20 +208,17 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         Ok(out)
     }
 
-    /// From the vertices, the indicator and the iso-value to samples and grid; how many vertices were guarded.
+    /// From the vertices, the indicator and the iso-value to samples and grid: how many vertices were guarded, and
+    /// [`CloudCotangent::spacing`].
     fn pull_indicator(
         &self,
         result: &Reconstruction<T>,
         cotangent: &Cotangent<'_, T>,
         vertices_bar: &Buffer<T>,
         bars: &SampleCotangent<T>,
-    ) -> Result<Buffer<u32>, Error> {
+    ) -> Result<(Buffer<u32>, Option<Buffer<T>>), Error> {
         let (device, residuals) = (&self.device, &result.residuals);
-        let samples = Samples {
-            points: &result.points,
-            normals: &result.normals,
-            areas: &result.areas,
-        };
+        let samples = result.samples();
         let isosurface::Cotangent {
             chi,
             level,
@@ -248,13 +252,13 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         )?;
         if self.options.screening > 0.0 {
             let equation = self.screened_equation(samples, &residuals.splat);
-            poisson::screened::pullback(device, &equation, &residuals.iso_value, &chi, bars)?;
+            screened::pullback(device, &equation, &residuals.iso_value, &chi, bars)?;
         }
-        self.pull_smoothing(result, local, &chi, bars)?;
+        let spacing = self.pull_smoothing(result, local, &chi, bars)?;
         let b_bar = self.solver.solve(device, &chi, residuals.smoothing.cells)?;
         drop(chi);
         splat::pullback(device, &residuals.splat, samples, &b_bar, bars)?;
-        Ok(guarded)
+        Ok((guarded, spacing))
     }
 
     /// The cotangent of the vertices, and to the grid what φ has for it.
@@ -284,31 +288,43 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         Ok(sum)
     }
 
-    /// From the smoothing, which goes with the root of the mean area, to areas and cell size.
+    /// From the smoothing, which goes with the distance between samples, to areas or [`CloudCotangent::spacing`], and to the
+    /// cell size.
     fn pull_smoothing(
         &self,
         result: &Reconstruction<T>,
         local: Option<local::Cotangents<T>>,
         chi_bar: &Buffer<T>,
         bars: &SampleCotangent<T>,
-    ) -> Result<(), Error> {
-        let width = result.residuals.smoothing;
-        let (mean, count) = width.areas;
-        if !(self.options.smoothing_follows() && mean > 0.0) {
-            return Ok(());
+    ) -> Result<Option<Buffer<T>>, Error> {
+        let residuals = &result.residuals;
+        let (mean, count) = residuals.smoothing.areas;
+        if self.options.smoothing != Smoothing::Auto || !(mean > 0.0) {
+            return Ok(None);
         }
-        let (device, cells) = (&self.device, width.cells);
+        let (device, cells) = (&self.device, residuals.smoothing.cells);
         // χ before the local level, and the level's own derivative by the smoothing.
         let (chi, by_level) = match &local {
             Some(found) => (&found.chi, found.smoothing),
             None => (&result.indicator, 0.0),
         };
         let bar = poisson::smoothing::pullback(device, cells, self.grid.shape(), chi, chi_bar)?;
-        launch!(device, bars.areas.len() => share_smoothing<T>(
-            bar, bars.areas, bars.grid, T::of(by_level), T::of(0.5 * cells / (mean * count as f64)),
+        if self.options.screening > 0.0 {
+            let equation = self.screened_equation(result.samples(), &residuals.splat);
+            let level = &residuals.iso_value;
+            let part = screened::smoothing_pullback(device, &equation, level, cells, chi_bar)?;
+            add(device, &part, &bar)?;
+        }
+        let spacing = zeros(device, 1)?;
+        let (out, share) = match self.options.area_weights {
+            true => (&bars.areas, 0.5 * cells / (mean * count as f64)),
+            false => (&spacing, cells),
+        };
+        launch!(device, out.len() => share_smoothing<T>(
+            bar, out, bars.grid, T::of(by_level), T::of(share),
             T::of(cells / self.grid.spacing().f64()),
         ));
-        Ok(())
+        Ok((!self.options.area_weights).then_some(spacing))
     }
 }
 
@@ -326,18 +342,19 @@ fn add_or_set<R: Runtime, T: Scalar>(
     }
 }
 
-/// Adds to each area, and takes off the cell size, its share of the cotangent of the smoothing.
+/// Adds to each of `out`, the areas or the distance between samples, and subtracts from the cell size, its share of the
+/// cotangent of the smoothing.
 #[cube(launch)]
 fn share_smoothing<F: Float + CubeElement>(
     bar: &Array<F>,
-    areas_bar: &mut Array<F>,
+    out: &mut Array<F>,
     grid_bar: &mut Array<F>,
     by_level: F,
-    of_area: F,
+    share: F,
     of_spacing: F,
 ) {
-    if ABSOLUTE_POS < areas_bar.len() {
-        areas_bar[ABSOLUTE_POS] += (bar[0] + by_level) * of_area;
+    if ABSOLUTE_POS < out.len() {
+        out[ABSOLUTE_POS] += (bar[0] + by_level) * share;
     }
     if ABSOLUTE_POS == 0 {
         grid_bar[3] -= (bar[0] + by_level) * of_spacing;

@@ -171,8 +171,15 @@ fn phi_and_its_gradient_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Dev
             };
             let bars = plan.pullback(result, &cotangent).unwrap();
             let axis_radii = bars.axis_radii.as_ref().expect("axes");
-            [&bars.points, &bars.radii, axis_radii, &bars.grid]
-                .map(|bar| device.download(bar).unwrap())
+            let spacing = bars
+                .spacing
+                .as_ref()
+                .map(|bar| device.download(bar).unwrap());
+            let spacing = spacing.unwrap_or(vec![T::of(0.0)]);
+            let [points, radii, axis_radii, grid] =
+                [&bars.points, &bars.radii, axis_radii, &bars.grid]
+                    .map(|bar| device.download(bar).unwrap());
+            [points, radii, axis_radii, grid, spacing]
         };
         let samples = on_cpu(cloud.points(), Method::Given).unwrap();
         let near = samples.neighborhoods();
@@ -182,9 +189,10 @@ fn phi_and_its_gradient_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Dev
             let expected = expected.pullback(&only(&bars.on_cpu(), given));
             let expected = expected.unwrap();
             let [x, y, z] = expected.grid.lower;
-            let [fixed, of_radii, of_axis_radii, of_grid] = pull(&result, given);
+            let [fixed, of_radii, of_axis_radii, of_grid, of_spacing] = pull(&result, given);
             let mut of_points = fixed.as_chunks().0.to_vec();
             let mut radii = RadiiCotangent::of(near, &of_radii);
+            radii.add_spacing(Real::f64(of_spacing[0]));
             let widened = [&widened[..], &near.radius];
             isograd::normals::radii_pullback(
                 near,
@@ -206,7 +214,7 @@ fn phi_and_its_gradient_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Dev
             let most = errors.into_iter().fold(0.0, f64::max);
             assert!(most < 10.0 * tolerance, "{name} {given:?}: {most:e}");
             if given == [true; 6] {
-                of_all = Some([fixed, of_radii, of_axis_radii, of_grid]);
+                of_all = Some([fixed, of_radii, of_axis_radii, of_grid, of_spacing]);
             }
         }
 

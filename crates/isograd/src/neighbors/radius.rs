@@ -92,6 +92,8 @@ pub struct Neighborhoods<T> {
     pub isolated: Vec<bool>,
     /// `(N,)` `Σ_j (1 − r_j²/R_i²)²` over the neighborhood, in input order.
     pub(crate) crowd: Vec<T>,
+    /// The automatic radius, also where another is given.
+    pub(super) automatic: T,
     /// See [`Self::spacing`].
     spacing: T,
     /// Squares of the distances to the 24th sample, in sorted order.
@@ -227,10 +229,10 @@ pub(crate) fn forward_with<T: Real, U: Copy + Default + Send + Sync>(
     check(points)?;
     out.index.rebuild(points);
     check_extent(&out.index)?;
-    let automatic = automatic_radius(out);
-    out.spacing = rule::spacing(automatic, points.len());
+    out.automatic = automatic_radius(out);
+    out.spacing = rule::spacing(out.automatic, points.len());
     out.rule = radius;
-    out.common_radius = rule::common(radius, automatic)?;
+    out.common_radius = rule::common(radius, out.automatic)?;
     grow(out, sorted, sum);
     find_isolated(out);
     Ok(())

@@ -13,6 +13,8 @@ use crate::{Real, parallel, vector};
 pub struct RadiiCotangent {
     /// `R R̄` of the common radius.
     common: f64,
+    /// `R R̄` of the automatic radius, whether it is the common one or another is given.
+    automatic: f64,
     /// `R_i R̄_i` of points whose radius has grown.
     grown: Vec<(u32, f64)>,
 }
@@ -30,12 +32,18 @@ impl RadiiCotangent {
     /// Forgets all.
     pub(crate) fn clear(&mut self) {
         self.common = 0.0;
+        self.automatic = 0.0;
         self.grown.clear();
     }
 
     /// Adds `R R̄` of the common radius.
     pub fn add_common(&mut self, bar: f64) {
         self.common += bar;
+    }
+
+    /// Adds `s s̄` of the [spacing](Neighborhoods::spacing) of the samples.
+    pub fn add_spacing(&mut self, bar: f64) {
+        self.automatic += bar;
     }
 
     /// Adds `R_i R̄_i` of a point.
@@ -56,8 +64,13 @@ pub fn pullback<T: Real>(
 ) {
     let index = &neighborhoods.index;
     let mut pairs = grown_pairs(neighborhoods, &radii_bar.grown);
-    if neighborhoods.rule == Radius::Auto && radii_bar.common != 0.0 {
-        pairs.extend(middle_pairs(neighborhoods, radii_bar.common));
+    let of_common = match neighborhoods.rule {
+        Radius::Auto => radii_bar.common,
+        Radius::Fixed(_) | Radius::Cut(_) => 0.0,
+    };
+    let of_automatic = radii_bar.automatic + of_common;
+    if of_automatic != 0.0 {
+        pairs.extend(middle_pairs(neighborhoods, of_automatic));
     }
     let point = |i: u32| index.point(neighborhoods.position()[i as usize] as usize);
     for (i, j, by_distance) in pairs {
@@ -110,7 +123,7 @@ fn middle_pairs<T: Real>(neighborhoods: &Neighborhoods<T>, bar: f64) -> Vec<(u32
         (false, true) => 1.0 - beyond[1] as f64 / at_largest as f64,
         (false, false) => 1.0,
     };
-    let share = AUTO_MARGIN * bar / neighborhoods.common_radius.f64() / inside as f64;
+    let share = AUTO_MARGIN * bar / neighborhoods.automatic.f64() / inside as f64;
     let point = |j: u32| index.point(neighborhoods.position()[j as usize] as usize);
     parallel::map(middle.len(), |k| {
         let position = middle[k];
@@ -143,11 +156,48 @@ mod tests {
         forward(points, Radius::Auto, &mut found).expect("a radius");
         let mut bar = RadiiCotangent::default();
         bar.add_common(found.common_radius);
-        let mut points_bar = vec![[0.0; 3]; points.len()];
-        pullback(&found, &bar, &mut points_bar);
-        let pairs = points_bar.iter().zip(direction);
-        let slope = pairs.map(|(bar, d)| vector::dot(*bar, *d)).sum();
+        let slope = pulled(&found, &bar, direction);
         (found, slope)
+    }
+
+    /// The derivative along `direction` of what has these cotangents of the radii.
+    fn pulled(found: &Neighborhoods<f64>, bar: &RadiiCotangent, direction: &[[f64; 3]]) -> f64 {
+        let mut points_bar = vec![[0.0; 3]; direction.len()];
+        pullback(found, bar, &mut points_bar);
+        let pairs = points_bar.iter().zip(direction);
+        pairs.map(|(bar, d)| vector::dot(*bar, *d)).sum()
+    }
+
+    fn moved(points: &[[f64; 3]], direction: &[[f64; 3]], step: f64) -> Vec<[f64; 3]> {
+        let pairs = points.iter().zip(direction);
+        let pairs = pairs.map(|(x, d)| vector::add(*x, vector::scale(*d, step)));
+        pairs.collect()
+    }
+
+    #[test]
+    fn the_spacing_has_its_derivative_whatever_the_radius() {
+        let mut random = Random::new(3);
+        let mut vectors = |n| -> Vec<[f64; 3]> {
+            let one = |_| [random.uniform(), random.uniform(), 0.1 * random.uniform()];
+            (0..n).map(one).collect()
+        };
+        let (points, direction) = (vectors(300), vectors(300));
+        for rule in [Radius::Auto, Radius::Fixed(0.2), Radius::Cut(0.3)] {
+            let find = |step: f64| {
+                let mut found = Neighborhoods::default();
+                forward(&moved(&points, &direction, step), rule, &mut found).expect("a radius");
+                found
+            };
+            let (found, step) = (find(0.0), 1e-7);
+            let mut bar = RadiiCotangent::default();
+            bar.add_spacing(found.spacing());
+            let slope = pulled(&found, &bar, &direction);
+            let difference = (find(step).spacing() - find(-step).spacing()) / (2.0 * step);
+            assert!(
+                (slope - difference).abs() < 1e-6 * difference.abs(),
+                "{rule:?}: {slope} {difference}"
+            );
+        }
     }
 
     #[test]
@@ -165,9 +215,7 @@ mod tests {
             let between = |r: &&f64| (least..=largest).contains(*r);
             split += usize::from(found.reach.iter().filter(between).count() > 100);
             let at = |step: f64| {
-                let moved = points.iter().zip(&direction);
-                let moved = moved.map(|(x, d)| vector::add(*x, vector::scale(*d, step)));
-                radius(&moved.collect::<Vec<_>>(), &direction)
+                radius(&moved(&points, &direction, step), &direction)
                     .0
                     .common_radius
             };

@@ -69,10 +69,9 @@ options! {
 }
 
 impl Options {
-    /// Whether the smoothing is a differentiable function of the areas: it is automatic, and the solution is not
-    /// screened (the pullback of a screened solution does not keep the unsmoothed one).
+    /// Whether the smoothing is a function of the samples.
     pub(super) fn smoothing_follows(&self) -> bool {
-        self.smoothing == poisson::Smoothing::Auto && self.area && self.screening == 0.0
+        self.smoothing == poisson::Smoothing::Auto
     }
 }
 

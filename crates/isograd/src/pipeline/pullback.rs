@@ -11,6 +11,7 @@ use crate::data::blocks::BlockField;
 use crate::data::cells::CellsMut;
 use crate::distance::extend;
 use crate::isosurface::{Level, local_level};
+use crate::neighbors::RadiiCotangent;
 use crate::orient::Method;
 use crate::poisson::screened;
 use crate::splat::{SampleCotangent, SortedSamples};
@@ -170,7 +171,10 @@ impl<T: Real> Reconstruction<T> {
             None => Bars::Dense(scratch.take_field(&self.indicator, cotangent.indicator)),
         };
         let PullbackScratch {
-            vertices, samples, ..
+            vertices,
+            samples,
+            radii,
+            ..
         } = scratch;
         let found = self.pull_vertices(vertices, bars.cells_mut());
         samples.grid.add(&found.grid);
@@ -210,11 +214,17 @@ impl<T: Real> Reconstruction<T> {
             let level = residuals.screened.as_ref();
             let level = level.unwrap_or(&residuals.iso_value);
             screened::pullback(&equation, level, field.values_mut(), scratch, samples)?;
+            if self.options.smoothing_follows() {
+                let width = residuals.smoothing;
+                let plain_bar = field.values();
+                smoothing_bar +=
+                    screened::smoothing_pullback(&equation, level, width, plain_bar, scratch)?;
+            }
         }
         let smoothing = residuals.smoothing;
         if self.options.smoothing_follows() {
             smoothing_bar += self.smoothing_bar(&bars, &scratch.level);
-            self.pull_smoothing(smoothing_bar, samples);
+            self.pull_smoothing(smoothing_bar, samples, radii);
         }
         match (&mut bars, &self.sparse) {
             (Bars::Blocks(field), Some(sparse)) => {
@@ -284,15 +294,24 @@ impl<T: Real> Reconstruction<T> {
         whole + smoothing * taken
     }
 
-    /// From the smoothing, which goes with the root of the mean area, to areas and cell size.
-    pub(super) fn pull_smoothing(&self, bar: f64, samples: &mut SampleCotangent<T>) {
-        let (mean, count) = splat::area::mean(&self.areas);
+    /// From the smoothing, which goes with the distance between samples, to what that is measured by, and to the cell size.
+    pub(super) fn pull_smoothing(
+        &self,
+        bar: f64,
+        samples: &mut SampleCotangent<T>,
+        radii: &mut RadiiCotangent,
+    ) {
         let by_logarithm = bar * self.residuals.smoothing;
-        if !(mean > 0.0) {
-            return;
+        if self.options.area {
+            let (mean, count) = splat::area::mean(&self.areas);
+            if !(mean > 0.0) {
+                return;
+            }
+            let share = T::of(0.5 * by_logarithm / (mean * count as f64));
+            parallel::for_each(&mut samples.areas, |_, area| *area += share);
+        } else {
+            radii.add_spacing(by_logarithm);
         }
-        let share = T::of(0.5 * by_logarithm / (mean * count as f64));
-        parallel::for_each(&mut samples.areas, |_, area| *area += share);
         samples.grid.spacing -= by_logarithm / self.surface_grid().spacing().f64();
     }
 

@@ -105,7 +105,7 @@ impl<T: Real> Reconstructor<T> {
             Some(held) => held.residuals.is_refined,
             None => octaves == 0 && self.result.would_be_refined(&grid),
         };
-        let smoothing = self.smoothing(&grid, held);
+        let smoothing = self.smoothing(&grid);
         self.result.thicken(&grid, smoothing);
         let Reconstruction {
             options,
@@ -200,15 +200,9 @@ impl<T: Real> Reconstructor<T> {
     }
 
     /// Width `σ` of the smoothing, in cells.
-    fn smoothing(&self, grid: &Grid<T>, held: Option<&Reconstruction<T>>) -> f64 {
-        let result = &self.result;
-        match held.filter(|_| !result.options.smoothing_follows()) {
-            Some(held) => held.residuals.smoothing,
-            None => {
-                let in_cells = result.sample_spacing() / grid.spacing().f64();
-                result.options.smoothing.cells(in_cells)
-            }
-        }
+    fn smoothing(&self, grid: &Grid<T>) -> f64 {
+        let in_cells = self.result.sample_spacing() / grid.spacing().f64();
+        self.result.options.smoothing.cells(in_cells)
     }
 }
 

@@ -114,14 +114,21 @@ impl<T: Real> Reconstruction<T> {
         std::mem::swap(&mut scratch.moved, &mut scratch.samples.points);
         pull(scratch)?;
         std::mem::swap(&mut scratch.moved, &mut scratch.samples.points);
-        let (samples, grid) = (&mut scratch.samples, self.surface_grid());
+        let PullbackScratch {
+            samples,
+            radii,
+            moved,
+            ..
+        } = scratch;
+        let grid = self.surface_grid();
         let inputs = self.thin_inputs(grid);
-        let [length_bar, least_bar] = thicken::pullback(inputs, sums, &scratch.moved, samples);
+        let [length_bar, least_bar] = thicken::pullback(inputs, sums, moved, samples);
         let (width, [_, slope]) = (self.step_width(), self.least_thickness());
         samples.grid.spacing += length_bar * width;
         if self.options.smoothing_follows() {
             let width_bar = length_bar * grid.spacing().f64() + least_bar * slope;
-            self.pull_smoothing(width_bar * self.residuals.smoothing / width, samples);
+            let bar = width_bar * self.residuals.smoothing / width;
+            self.pull_smoothing(bar, samples, radii);
         }
         Ok(())
     }

@@ -24,8 +24,8 @@ const CELLS: usize = 64;
 /// Width `σ` of the Gaussian that the indicator is smoothed with.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Smoothing {
-    /// 0.8 of the typical distance between samples, which removes ripples between them.
-    /// Where samples count by their areas, that distance is the root of the mean area, and is differentiated.
+    /// 0.8 of the typical distance between samples, which removes ripples between them, and is differentiated. Where samples
+    /// count by their areas, that distance is the root of the mean area.
     #[default]
     Auto,
     /// This many cells; 0 for none.

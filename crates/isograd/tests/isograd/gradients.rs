@@ -258,6 +258,7 @@ fn all_results_are_pulled_back_to_all_inputs() {
         .clone()
         .screening(2.0)
         .surface(SurfaceResolution::Factor(1.5));
+    let unweighted = estimated.clone().area(false).level(Level::Local);
     let screened_thin = screened.clone().level(Level::Thin);
     let sparse = estimated
         .clone()
@@ -279,6 +280,7 @@ fn all_results_are_pulled_back_to_all_inputs() {
         coarse,
         signs,
         plain,
+        unweighted,
         screened,
         screened_thin,
         sparse,

@@ -313,14 +313,14 @@ const RECORDED: [[[u64; 5]; 2]; 5] = [
             0x0919de79febce586,
             0xa4a71960b62425ea,
             0x0133fd718c6fc60a,
-            0x38f1c4457835bbd7,
+            0x739ddc387f4eb7a3,
         ],
         [
             0x228950edc1421386,
             0x762da0d9423b4060,
             0xcc9103aea57d9427,
             0xbf5918b86693d771,
-            0xa5add4c545b2bd96,
+            0xb5f6e0714265374a,
         ],
     ],
     [

@@ -4,8 +4,9 @@ use cubecl::prelude::*;
 use isograd::poisson::screened::{self, MOST_ITERATIONS};
 
 use super::{Equation, Error};
-use crate::device::{Ready, launch};
+use crate::device::{Ready, check_length, launch};
 use crate::grid::{Lattice, cell_at, from_center, place};
+use crate::isosurface::iso_value;
 use crate::primitives::fill::zeros;
 use crate::primitives::reduce::{BLOCK, sum, sum_of_group};
 use crate::spread::{Before, spread};
@@ -74,6 +75,17 @@ impl<'a, R: Runtime, T: Scalar> System<'a, R, T> {
             field,
             samples,
             base.unwrap_or(&self.roots), out, T::of(factor), splat.grid, base.is_some(),
+        ));
+        Ok(out)
+    }
+
+    /// `u`: `√â (χ(x) − c)` of each sample.
+    pub fn offsets(&self, level: &iso_value::Residual<T>) -> Result<Buffer<T>, Error> {
+        let (device, places) = (self.device, &self.equation.splat.order.places);
+        check_length("the residual", &level.at_samples, 4 * places.len())?;
+        let out = device.empty(places.len())?;
+        launch!(device, out.len(), BLOCK => find_offsets<T>(
+            level.at_samples, level.sums, places, self.roots, out,
         ));
         Ok(out)
     }
@@ -236,6 +248,21 @@ fn find_at_samples<F: Float + CubeElement>(
             value += base[s];
         }
         out[s] = value;
+    }
+}
+
+#[cube(launch)]
+fn find_offsets<F: Float>(
+    at_samples: &Array<F>,
+    sums: &Array<F>,
+    places: &Array<u32>,
+    roots: &Array<F>,
+    out: &mut Array<F>,
+) {
+    let s = ABSOLUTE_POS;
+    if s < out.len() {
+        let chi = at_samples[4 * places[s] as usize];
+        out[s] = roots[s] * (chi - sums[0] / sums[1]);
     }
 }
 

@@ -17,7 +17,7 @@ mod gradients;
 mod pullback;
 
 pub use forward::forward;
-pub use pullback::pullback;
+pub use pullback::{pullback, smoothing_pullback};
 
 use isograd::poisson::screened;
 

@@ -7,6 +7,7 @@ use super::{Equation, Error};
 use crate::device::{Ready, check_length, launch};
 use crate::grid::{Lattice, check_field, place};
 use crate::isosurface::iso_value;
+use crate::poisson::smoothing;
 use crate::primitives::fill::add;
 use crate::primitives::reduce::{BLOCK, sum_columns};
 use crate::splat::{CotangentArrays, SampleArrays, SampleCotangent, subtract_from_grid};
@@ -59,6 +60,35 @@ pub fn pullback<R: Runtime, T: Scalar>(
     ));
     add(device, &sum_columns(device, &grid_sums, 4)?, &out.grid)?;
     Ok(iterations)
+}
+
+/// The part of the cotangent of the smoothing `σ` of the plain solution, one number, that [`smoothing::pullback`] of the
+/// screened one, `χ`, leaves out. `plain_bar`, `(nx, ny, nz)`, are the cotangents of the plain solution, as [`pullback`]
+/// leaves them; `level` is the residual of the iso-value of `χ`. Waits for the device.
+///
+/// # Errors
+/// Those of the device, and of lengths.
+pub fn smoothing_pullback<R: Runtime, T: Scalar>(
+    device: &Device<R>,
+    equation: &Equation<'_, T>,
+    level: &iso_value::Residual<T>,
+    smoothing: f64,
+    plain_bar: &Buffer<T>,
+) -> Result<Buffer<T>, Error> {
+    let grid = &equation.splat.grid;
+    check_field("the cotangent of the plain solution", plain_bar, grid)?;
+    let Some(system) = System::new(device, equation)? else {
+        return Ok(device.upload(&[T::of(0.0)])?);
+    };
+    let change = system.green(&system.offsets(level)?)?;
+    let factor = equation.screening * smoothing;
+    Ok(smoothing::pullback(
+        device,
+        factor,
+        grid.shape(),
+        &change,
+        plain_bar,
+    )?)
 }
 
 /// Value and gradient of a field at the samples, and the sums of its area-weighted mean.

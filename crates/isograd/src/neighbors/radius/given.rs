@@ -45,6 +45,7 @@ fn count_within<T: Real>(
     check_extent(&out.index)?;
     out.common_radius = radii.common;
     out.spacing = radii.spacing;
+    out.middle = None;
     out.radius.clear();
     out.radius.extend_from_slice(radii.each);
     find_positions(out);

@@ -95,10 +95,9 @@ impl DomainSigns {
     /// Finds the signs, from the `evidence` and the `belief` of each sample. `winding` is the weight of a sample at which
     /// the winding number is wrong by 1, relative to evidence of 1.
     ///
-    /// SignedUnionFind of neighbors that agree are first oriented as a whole, the strongest tie first: to the
-    /// evidence, or to the domain next to them. So a part whose evidence is weak follows the neighbors
-    /// on which it borders, however large it is. What is tied to no evidence at all turns its axes away
-    /// from its centroid.
+    /// Neighbors that agree form domains, which are oriented as a whole, the strongest tie first: to the evidence, or to
+    /// the domain next to them. So a part whose evidence is weak follows the neighbors on which it borders, however large
+    /// it is. A domain that is tied to no evidence at all turns its axes away from its centroid.
     pub(super) fn run(
         &mut self,
         graph: &Graph,

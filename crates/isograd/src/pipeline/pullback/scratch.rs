@@ -31,7 +31,7 @@ pub struct PullbackScratch<T: Real> {
     pub(super) splat: splat::PullbackScratch<T>,
     pub(super) areas: splat::area::PullbackScratch<T>,
     pub(super) normals: normals::Scratch<T>,
-    pub(super) radii: RadiiCotangent,
+    pub(in crate::pipeline) radii: RadiiCotangent,
 }
 
 /// The scratch buffers that stay with a reconstruction between calls of [`Reconstruction::pullback_into`]. A call while

@@ -75,8 +75,14 @@ impl<T: Real> Scratch<T> {
         parallel::fill(&mut self.rest, roots.len(), |i| value(i, roots[i]));
     }
 
+    /// Fills the solution with numbers of the samples.
+    pub(super) fn set_solution(&mut self, value: impl Fn(usize, T) -> T + Sync) {
+        let roots = &self.roots;
+        parallel::fill(&mut self.solution, roots.len(), |i| value(i, roots[i]));
+    }
+
     /// `field = A⁺ Sᵀ u` for the solution `u`.
-    fn spread_solution(&mut self, equation: &Equation<'_, T>) -> Result<(), Error> {
+    pub(super) fn spread_solution(&mut self, equation: &Equation<'_, T>) -> Result<(), Error> {
         let Self {
             field,
             roots,

@@ -24,6 +24,8 @@
 //! ```text
 //! x̂̄_i −= α â_i [ Λ(x_i) ∇χ(x_i) + (χ(x_i) − c) ∇Λ(x_i) ]        â̄_i −= α Λ(x_i) (χ(x_i) − c)
 //! ```
+//! The smoothing of `x₀ = χ + α A⁺ Sᵀ u` has the cotangent that [`smoothing`](super::smoothing) finds for `x₀`. As it is linear
+//! in that, [`smoothing_pullback`] adds the part of `α A⁺ Sᵀ u` to that of `χ`.
 //!
 //! # Not differentiable
 //! `∇χ` jumps where a sample crosses a plane through cell centers. `α` is held.
@@ -34,7 +36,7 @@ mod pullback;
 mod tests;
 
 pub use forward::{Scratch, forward};
-pub use pullback::pullback;
+pub use pullback::{pullback, smoothing_pullback};
 
 use super::Plan;
 use crate::splat::SortedSamples;

@@ -2,6 +2,7 @@
 
 use super::{Equation, Error, Scratch};
 use crate::isosurface::iso_value;
+use crate::poisson::smoothing;
 use crate::splat::SampleCotangent;
 use crate::trilinear::{self, Cube};
 use crate::{Real, parallel, vector};
@@ -44,6 +45,27 @@ pub fn pullback<T: Real>(
     green(chi_bar, scratch)?;
     equation.pull_matrix(&scratch.field, level, out);
     Ok(iterations)
+}
+
+/// The part of the cotangent of the smoothing `σ` of the plain solution that [`smoothing::pullback`] of the screened one,
+/// `χ`, leaves out. `plain_bar` `(nx, ny, nz)` is the cotangent of the plain solution, as [`pullback`] leaves it; `level` is
+/// the residual of the iso-value of `χ`.
+///
+/// # Errors
+/// [`Error::Poisson`].
+pub fn smoothing_pullback<T: Real>(
+    equation: &Equation<'_, T>,
+    level: &iso_value::Residual<T>,
+    smoothing: f64,
+    plain_bar: &[T],
+    scratch: &mut Scratch<T>,
+) -> Result<f64, Error> {
+    scratch.start(equation);
+    let c = T::of(level.value);
+    scratch.set_solution(|i, root| root * (level.at_samples[i].value - c));
+    scratch.spread_solution(equation)?;
+    let of_unit = smoothing::pullback(equation.plan, smoothing, &scratch.field, plain_bar);
+    Ok(equation.screening * of_unit)
 }
 
 impl<T: Real> Equation<'_, T> {
