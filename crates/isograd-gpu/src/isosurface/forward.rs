@@ -62,17 +62,6 @@ pub fn forward<R: Runtime, T: Scalar>(
     Ok((surface, residual))
 }
 
-/// [`forward`] at a level that the host knows.
-pub fn forward_at<R: Runtime, T: Scalar>(
-    device: &Device<R>,
-    plan: &Plan,
-    chi: &Buffer<T>,
-    level: T,
-    grid: &Grid<T>,
-) -> Result<(Surface<T>, Residual<T>), Error> {
-    forward(device, plan, chi, &device.upload(&[level])?, grid)
-}
-
 /// Coordinates and corners must have 32-bit places. Where the vertices do, the sums have not wrapped: there are
 /// fewer than three triangles a vertex.
 fn check_sizes<R: Runtime>(device: &Device<R>, total: &Total) -> Result<(), Error> {

@@ -33,7 +33,7 @@ use isograd::isosurface::{Loop, Report, loops_of};
 use crate::{Buffer, Device};
 
 pub use error::Error;
-pub use forward::{forward, forward_at};
+pub use forward::forward;
 pub use pullback::{Cotangent, pullback};
 
 /// Tables of the stage, uploaded once.

@@ -63,18 +63,8 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         self.reconstruct_observed(points, None, held, &mut |_| ControlFlow::Continue(()))
     }
 
-    /// [`Self::reconstruct`] with `given` outward normals: `(N, 3)` of any length but 0. Of `held`, the areas' radii are used.
-    pub fn reconstruct_given(
-        &self,
-        points: &Buffer<T>,
-        given: &Buffer<T>,
-        held: &RadiiAndSigns<T>,
-    ) -> Result<Reconstruction<T>, Error> {
-        let observer = &mut |_| ControlFlow::Continue(());
-        self.reconstruct_observed(points, Some(given), held, observer)
-    }
-
-    /// [`Self::reconstruct`] with or without given normals, and an observer.
+    /// [`Self::reconstruct`] with an observer and, if they are known, `given` outward normals: `(N, 3)` of any length but 0;
+    /// of `held` only the radii of areas are then used.
     ///
     /// # Errors
     /// As [`Error`] lists; [`Error::Interrupted`] where the observer breaks.

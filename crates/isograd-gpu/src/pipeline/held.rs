@@ -56,8 +56,8 @@ pub struct SampleAxes<T: Scalar> {
 
 impl<T: Scalar> RadiiAndSigns<T> {
     /// Finds all of it on the CPU. `method` is any but [`Method::Previous`], which [`Self::after`] takes the place
-    /// of. With [`Method::Given`] there are no axes to turn: it is what
-    /// [`reconstruct_given`](super::Reconstructor::reconstruct_given) holds.
+    /// of. With [`Method::Given`] there are no axes to turn: for
+    /// [`reconstruct_observed`](super::Reconstructor::reconstruct_observed) with given normals.
     ///
     /// # Errors
     /// Errors of the neighbors, the normals or the orientation; [`Error::Device`].

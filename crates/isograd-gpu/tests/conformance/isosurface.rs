@@ -3,7 +3,7 @@
 use cubecl::prelude::Runtime;
 use isograd::isosurface::{self as cpu, Report};
 use isograd::{Field, Grid, Mesh};
-use isograd_gpu::isosurface::{Error, Plan, Residual, Surface, forward, forward_at, pullback};
+use isograd_gpu::isosurface::{Error, Plan, Residual, Surface, forward, pullback};
 use isograd_gpu::{Device, Scalar};
 
 use crate::devices::{Numbers, tests};
@@ -69,7 +69,8 @@ fn made<R: Runtime, T: Scalar>(
 ) -> (Surface<T>, Residual<T>) {
     let plan = Plan::new(device).expect("a plan");
     let values = device.upload(chi.values()).expect("a field");
-    forward_at(device, &plan, &values, level, chi.grid()).expect("a surface")
+    let level = device.upload(&[level]).expect("a level");
+    forward(device, &plan, &values, &level, chi.grid()).expect("a surface")
 }
 
 fn on_cpu<T: Scalar>(chi: &Field<T>, level: T) -> (Mesh<T>, Report) {
@@ -253,7 +254,8 @@ fn what_has_no_surface_is_refused_in_the_words_of_the_cpu<R: Runtime>(device: &D
     let refused = |chi: &Field<f32>, level: f32| {
         let plan = Plan::new(device).expect("a plan");
         let values = device.upload(chi.values()).expect("a field");
-        let found = forward_at(device, &plan, &values, level, chi.grid());
+        let at = device.upload(&[level]).expect("a level");
+        let found = forward(device, &plan, &values, &at, chi.grid());
         let mut mesh = Mesh::default();
         let expected = cpu::forward(chi, level, &mut cpu::Scratch::default(), &mut mesh);
         let found = found.err().expect("refused").to_string();
