@@ -149,7 +149,17 @@ pub(crate) fn resize<T: Clone>(out: &mut Vec<T>, n: usize, value: T) {
     }
 }
 
-/// [`fill`] for large items, which are written once and need no default. Compiled once for each `T`.
+/// [`resize`] for items that are not numbers: all threads touch new memory first.
+pub(crate) fn resize_large<T: Clone + Send + Sync>(out: &mut Vec<T>, n: usize, value: T) {
+    if out.capacity() < n {
+        *out = Vec::new();
+        fill_large(out, n, &|_| value.clone());
+    } else {
+        out.resize(n, value);
+    }
+}
+
+/// [`fill`] for items that are large or not numbers, which are written once and need no default. Compiled once for each `T`.
 pub(crate) fn fill_large<T: Send>(out: &mut Vec<T>, n: usize, f: &(dyn Fn(usize) -> T + Sync)) {
     (0..n).into_par_iter().map(f).collect_into_vec(out);
 }

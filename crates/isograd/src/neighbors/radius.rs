@@ -155,8 +155,8 @@ impl<T: Real> Neighborhoods<T> {
 
     /// Writes counts and crowds in input order.
     fn spread_census<U: Sync>(&mut self, sorted: &[Found<T, U>]) {
-        self.count.resize(sorted.len(), 0);
-        self.crowd.resize(sorted.len(), T::zero());
+        parallel::resize(&mut self.count, sorted.len(), 0);
+        parallel::resize(&mut self.crowd, sorted.len(), T::zero());
         let chunks = self.count.chunks_mut(CHUNK);
         let chunks = chunks.zip(self.crowd.chunks_mut(CHUNK));
         let chunks = chunks.zip(self.position.chunks(CHUNK));
@@ -283,7 +283,7 @@ fn automatic_radius<T: Real>(out: &mut Neighborhoods<T>) -> T {
         ..
     } = out;
     let n = index.len();
-    squares.resize(n, T::zero());
+    parallel::resize(squares, n, T::zero());
     index.reaches_squared(AUTO_NEIGHBORS, squares);
     let found = rule::middle_half(squares, scratch);
     out.middle = found.map(|(middle, _)| middle);
@@ -298,7 +298,7 @@ fn grow<T: Real, U: Copy + Default + Send + Sync>(
 ) {
     let n = out.index.len();
     let (index, common, arch) = (&out.index, out.common_radius, pulp::Arch::new());
-    sorted.resize(n, Found::default());
+    parallel::resize_large(sorted, n, Found::default());
     index.for_each_cell(common, [], sorted, &|cell, candidates, sorted| {
         for (position, found) in cell.zip(sorted) {
             let point = index.point(position);
@@ -323,8 +323,7 @@ fn grow<T: Real, U: Copy + Default + Send + Sync>(
 }
 
 fn find_positions<T: Real>(out: &mut Neighborhoods<T>) {
-    out.position.clear();
-    out.position.resize(out.index.len(), 0);
+    parallel::resize(&mut out.position, out.index.len(), 0);
     for (position, &i) in (0u32..).zip(out.index.order()) {
         out.position[i as usize] = position;
     }

@@ -29,8 +29,8 @@ pub fn forward<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residual<T>)
 /// Axes in the neighborhoods as they are.
 fn find_in_own<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residual<T>) {
     let (arch, rule) = (Arch::new(), neighborhoods.rule);
-    out.sorted
-        .resize(neighborhoods.index.len(), Found::default());
+    let points = neighborhoods.index.len();
+    parallel::resize_large(&mut out.sorted, points, Found::default());
     neighborhoods.for_each_neighborhood(&mut out.sorted, &|_, center, radius, candidates| {
         Found::only(moments(arch, rule, center, radius, candidates))
     });
@@ -138,7 +138,7 @@ fn find_all_planes<T: Real>(neighborhoods: &Neighborhoods<T>, arch: Arch, out: &
     out.radius.clone_from(&neighborhoods.radius);
     out.count.clone_from(&neighborhoods.count);
     parallel::resize(&mut out.normals, n, [T::zero(); 3]);
-    out.planes.resize(n, Plane::default());
+    parallel::resize_large(&mut out.planes, n, Plane::default());
     let sorted = &out.sorted;
     let normals = out.normals.chunks_mut(CHUNK);
     let planes = out.planes.chunks_mut(CHUNK);

@@ -133,8 +133,7 @@ impl Auto {
             values.clear();
             parallel::resize(values, n, 0.0);
         }
-        light.clear();
-        light.resize(n, [1.0; 2]);
+        parallel::fill(light, n, |_| [1.0; 2]);
         for cluster in 0..self.clusters.bounds.len() {
             let (graph, members) = (&self.graph, self.clusters.members(cluster));
             let scales = self
@@ -156,7 +155,7 @@ impl Auto {
         }
         self.graph.part_slabs(slabs);
         let graph = &self.graph;
-        parallel::fill(sheets, n, |p| graph.second_sheet(p));
+        parallel::fill_large(sheets, n, &|p| graph.second_sheet(p));
         parallel::fill(between, n, |p| {
             layers::is_between(graph, place, p, sheets[p])
         });

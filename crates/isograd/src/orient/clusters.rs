@@ -4,7 +4,7 @@ use super::fill::Lattice;
 use super::graph::Graph;
 use super::regions::{join, root};
 use super::signs::Place;
-use crate::vector;
+use crate::{parallel, vector};
 
 /// Cells of the two grids over the median reach of the samples, and what their evidence weighs.
 const SCALES: [(f64, f32); 2] = [(0.8, 1.0), (1.6, 0.5)];
@@ -137,6 +137,7 @@ impl Clusters {
         self.link(graph);
         let mut parts: Vec<Bounds> = Vec::new();
         self.part.clear();
+        self.part.reserve(self.parent.len());
         for p in 0..self.parent.len() {
             let root = self.parent[p] as usize;
             // A root comes before all others of its part.
@@ -159,8 +160,7 @@ impl Clusters {
 
     fn link(&mut self, graph: &Graph) {
         let n = graph.near.len();
-        self.parent.clear();
-        self.parent.extend(0..n as u32);
+        parallel::fill(&mut self.parent, n, |p| p as u32);
         for p in 0..n {
             for (&q, &d) in graph.near[p].iter().zip(&graph.offset[p]).take(LINKED) {
                 let limit = LINK * graph.reach[p].max(graph.reach[q as usize]);

@@ -100,7 +100,7 @@ impl Patches {
         let probes: Vec<(u32, f64)> = members.iter().flat_map(|m| probes(m)).collect();
         let all = match probes.is_empty() {
             true => Tree::default(),
-            false => Tree::new(parallel::map(sign.len(), dipole)),
+            false => Tree::of_each(sign.len(), &dipole),
         };
         let mut patches = Self {
             slope: vec![0.0; probes.len()],

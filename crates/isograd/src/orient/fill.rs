@@ -7,10 +7,10 @@
 //! air, still has a darker and a brighter side.
 
 use super::disc;
-use super::regions::{self, Regions};
+use super::regions::{self, Regions, Walls};
 use super::sight::{self, RAYS, STEPS};
 use super::visibility::Visibility;
-use crate::parallel;
+use crate::parallel::{self, CHUNK};
 use crate::{simd, vector};
 
 /// Free cells on each side of a body.
@@ -115,7 +115,7 @@ impl Fill {
         members: usize,
         sample: impl Fn(usize) -> ([f64; 3], [f32; 3], f64) + Sync,
     ) {
-        parallel::fill(&mut self.discs, members, |m| {
+        parallel::fill_large(&mut self.discs, members, &|m| {
             let (point, axis, reach) = sample(m);
             Disc::new(lattice.place(point), axis, (reach / lattice.cell) as f32)
         });
@@ -163,19 +163,22 @@ impl Fill {
 
     /// Air or matter, for each region.
     fn classify_regions(&mut self, lattice: &Lattice) {
-        let mut walls = parallel::filter_map(self.discs.len(), |m| {
-            let disc = &self.discs[m];
+        let between = |disc: &Disc| {
             let front = self.first_free(lattice, disc.center, disc.axis)?;
             let back = self.first_free(lattice, disc.center, disc.axis.map(|a| -a))?;
-            (front.region != back.region).then_some((front.region, back.region))
+            let [a, b] = [front.region, back.region];
+            (a != b).then_some((a.min(b), a.max(b)))
+        };
+        let walls = parallel::map_each(self.discs.chunks(CHUNK), |_, discs| {
+            Walls::of(discs.iter().filter_map(between))
         });
-        regions::sides(self.regions.len, &mut walls, &mut self.sides);
+        regions::sides(self.regions.len, Walls::sum(walls), &mut self.sides);
     }
 
     /// The evidence of each disc: light on one side less light on the other, over a cone of directions.
     fn compare_sides(&mut self, lattice: &Lattice) {
         let mut all = std::mem::take(&mut self.evidence);
-        parallel::fill(&mut all, self.discs.len(), |m| {
+        parallel::fill_large(&mut all, self.discs.len(), &|m| {
             self.compare(lattice, &self.discs[m])
         });
         self.evidence = all;

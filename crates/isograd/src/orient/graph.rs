@@ -270,7 +270,8 @@ impl Graph {
             coupling::area(bound * farthest, same)
         });
         self.area = areas;
-        self.values.clone_from(&self.area);
+        let areas = &self.area;
+        parallel::fill(&mut self.values, areas.len(), |p| areas[p]);
         if !self.values.is_empty() {
             let median = median(&mut self.values);
             let areas = self.area.iter_mut();
@@ -318,8 +319,8 @@ impl Graph {
         parallel::for_each(&mut weights, |p, weights| {
             *weights = weight(&evidence[p], &self.coupling[p]);
         });
-        belief.clear();
-        belief.extend_from_slice(evidence);
+        parallel::resize(belief, evidence.len(), [0.0; K]);
+        parallel::for_each(belief, |p, belief| *belief = evidence[p]);
         parallel::resize(next, belief.len(), [0.0; K]);
         for _ in 0..ROUNDS {
             let before = &*belief;

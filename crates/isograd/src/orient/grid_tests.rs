@@ -1,6 +1,6 @@
 //! The grid's parts against plain versions.
 
-use super::regions::{Regions, sides};
+use super::regions::{Regions, Walls, sides};
 use super::shapes::Random;
 use super::visibility::Visibility;
 
@@ -103,15 +103,17 @@ fn regions_are_those_of_a_plain_flood() {
 fn air_and_matter_alternate_across_the_stronger_walls() {
     // Air 0, shell 1, its cavity 2, a ball in the cavity 3; region 4 touches nothing; a leaky few
     // samples see the cavity straight from outside.
-    let mut walls = [
+    let samples = [
         vec![(0, 1); 50],
-        vec![(2, 1); 30],
+        vec![(1, 2); 30],
         vec![(2, 3); 10],
         vec![(0, 2); 3],
     ]
     .concat();
+    let parts = samples.chunks(7);
+    let parts = parts.map(|part| Walls::of(part.iter().copied()));
     let mut found = Vec::new();
-    sides(5, &mut walls, &mut found);
+    sides(5, Walls::sum(parts.collect()), &mut found);
     assert_eq!(found, [1, -1, 1, -1, 0]);
 }
 
@@ -120,6 +122,6 @@ fn a_grid_without_a_free_cell_has_no_sides() {
     let mut regions = Regions::default();
     regions.find(&[1; 24], [2, 3, 4]);
     let mut found = vec![1];
-    sides(regions.len, &mut [], &mut found);
+    sides(regions.len, Walls::default(), &mut found);
     assert_eq!((regions.len, found.len()), (0, 0));
 }

@@ -1,5 +1,7 @@
 //! Connected regions of free cells, and which of them are outside.
 
+use std::collections::BTreeMap;
+
 /// Regions of cells that are free and joined through faces, held as runs along the rows of the grid.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Regions {
@@ -99,6 +101,14 @@ pub(super) fn root(parent: &mut [u32], mut a: u32) -> u32 {
     a
 }
 
+/// The root of `a`, which [`join`] may have left a few steps away.
+pub(super) fn settled_root(parent: &[u32], mut a: u32) -> u32 {
+    while parent[a as usize] != a {
+        a = parent[a as usize];
+    }
+    a
+}
+
 fn push_runs(row: &[u8], runs: &mut Vec<(u32, u32)>) {
     let mut z = 0;
     while z < row.len() {
@@ -112,26 +122,38 @@ fn push_runs(row: &[u8], runs: &mut Vec<(u32, u32)>) {
     }
 }
 
-/// A wall: its number of samples, and the regions on its two sides.
-type Wall = (usize, (u32, u32));
+/// Walls between two regions, the lower one first, and how many samples each has.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Walls(BTreeMap<(u32, u32), usize>);
+
+impl Walls {
+    /// The walls that samples lie in, from the pair of regions of each.
+    pub(super) fn of(samples: impl Iterator<Item = (u32, u32)>) -> Self {
+        let mut walls = Self::default();
+        samples.for_each(|wall| *walls.0.entry(wall).or_insert(0) += 1);
+        walls
+    }
+
+    /// The walls of all samples, from those of some each.
+    pub(super) fn sum(parts: Vec<Self>) -> Self {
+        let mut all = Self::default();
+        for (wall, samples) in parts.into_iter().flat_map(|part| part.0) {
+            *all.0.entry(wall).or_insert(0) += samples;
+        }
+        all
+    }
+}
 
 /// Classifies the `regions`: `sides[r]` is +1 for air, −1 for matter, 0 where no wall separates it.
 ///
-/// `walls` has a pair of regions for each sample between two regions. Region 0 is air. From region to region across the
-/// wall with the most samples, air and matter alternate: the cavity of a hollow body is air again, and a body inside
-/// the cavity is matter.
+/// Region 0 is air. From region to region across the wall with the most samples, air and matter alternate: the cavity of a
+/// hollow body is air again, and a body inside the cavity is matter.
 ///
 /// # Panics
 /// A wall names a region that does not exist.
-pub(super) fn sides(regions: usize, walls: &mut [(u32, u32)], sides: &mut Vec<i8>) {
-    walls
-        .iter_mut()
-        .for_each(|wall| *wall = (wall.0.min(wall.1), wall.0.max(wall.1)));
-    walls.sort_unstable();
-    let mut walls: Vec<Wall> = walls
-        .chunk_by(|a, b| a == b)
-        .map(|same| (same.len(), same[0]))
-        .collect();
+pub(super) fn sides(regions: usize, walls: Walls, sides: &mut Vec<i8>) {
+    let walls = walls.0.into_iter().map(|(wall, samples)| (samples, wall));
+    let mut walls: Vec<(usize, (u32, u32))> = walls.collect();
     sides.clear();
     sides.resize(regions, 0);
     let Some(open_air) = sides.first_mut() else {

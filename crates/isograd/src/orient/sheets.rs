@@ -45,7 +45,7 @@ impl Sheets {
     /// Finds, confirms and extends the sheets. `axes` `(N, 3)` are those of whole neighborhoods.
     pub(super) fn find(&mut self, near: Near<'_>, axes: &[[f32; 3]]) {
         let arch = pulp::Arch::new();
-        self.sheets.resize(axes.len(), Sheet::default());
+        parallel::resize_large(&mut self.sheets, axes.len(), Sheet::default());
         let chunks = self.sheets.chunks_mut(CHUNK);
         let chunks = chunks.zip(near.offset.chunks(CHUNK).zip(axes.chunks(CHUNK)));
         parallel::each(chunks, |_, (sheets, (offset, axes))| {
@@ -75,7 +75,7 @@ impl Sheets {
 
     fn update(&mut self, next: impl Fn(&[Sheet], usize) -> Sheet + Sync) {
         let sheets = &self.sheets;
-        parallel::fill(&mut self.next, sheets.len(), |p| next(sheets, p));
+        parallel::fill_large(&mut self.next, sheets.len(), &|p| next(sheets, p));
         std::mem::swap(&mut self.sheets, &mut self.next);
     }
 }

@@ -21,14 +21,19 @@ pub(super) mod tree;
 const PROBES: usize = 2048;
 const FEWEST_PROBES: usize = 4;
 
-/// `(probes, domains)` the winding number that each domain gives at each of the `probes`.
-fn numbers(graph: &Graph, place: &impl Place, domains: &Domains<'_>, probes: &[u32]) -> Vec<f64> {
-    let trees = parallel::map_each(domains.members(), |_, members| {
-        let dipole = |k: usize| {
+/// `(probes, domains)` the winding number that each domain, with these `members` and signs of all axes, gives at each of the
+/// `probes`.
+fn numbers(
+    graph: &Graph,
+    place: &impl Place,
+    (members, sign): (&[Vec<u32>], &[f32]),
+    probes: &[u32],
+) -> Vec<f64> {
+    let trees = parallel::map_each(members, |_, members| {
+        Tree::of_each(members.len(), &|k| {
             let p = members[k] as usize;
-            dipole(graph, place, p, domains.sign[p])
-        };
-        Tree::new(parallel::map(members.len(), dipole))
+            dipole(graph, place, p, sign[p])
+        })
     });
     let arch = pulp::Arch::new();
     let at_probe = |k: usize| -> Vec<f64> {
@@ -56,7 +61,7 @@ impl Misfit {
         let members = domains.members();
         let in_one = members.iter().map(Vec::len).sum();
         let (probes, weights) = probes(&members, in_one);
-        let windings = numbers(graph, place, domains, &probes);
+        let windings = numbers(graph, place, (&members, domains.sign), &probes);
         let count = domains.count;
         let weighted = || weights.iter().zip(windings.chunks_exact(count.max(1)));
         let mut pull = vec![0.0; count];

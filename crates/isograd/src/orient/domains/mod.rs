@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 use super::graph::Graph;
 use super::signs::{Domains, Place};
 use super::winding::Misfit;
-use crate::{parallel, vector};
+use crate::parallel::{self, CHUNK};
+use crate::vector;
 
 mod segments;
 mod ties;
@@ -53,13 +54,10 @@ struct SignedUnionFind {
 
 impl SignedUnionFind {
     fn reset(&mut self, belief: &[f32]) {
-        self.parent.clear();
-        self.parent.extend(0..belief.len() as u32);
-        self.relative.clear();
-        self.relative.resize(belief.len(), 1.0);
-        self.has_belief.clear();
-        self.has_belief
-            .extend(belief.iter().map(|b| b.abs() >= NEGLIGIBLE));
+        let n = belief.len();
+        parallel::fill(&mut self.parent, n, |p| p as u32);
+        parallel::fill(&mut self.relative, n, |_| 1.0);
+        parallel::fill(&mut self.has_belief, n, |p| belief[p].abs() >= NEGLIGIBLE);
     }
 
     /// Whether two points are seen to be of one domain already, without a look for its root.
@@ -74,6 +72,16 @@ impl SignedUnionFind {
             let up = self.parent[p as usize] as usize;
             self.relative[p as usize] *= self.relative[up];
             self.parent[p as usize] = self.parent[up];
+            sign *= self.relative[p as usize];
+            p = self.parent[p as usize];
+        }
+        (p, sign)
+    }
+
+    /// Like [`root`](Self::root), after all joins.
+    fn settled_root(&self, mut p: u32) -> (u32, f32) {
+        let mut sign = 1.0;
+        while self.parent[p as usize] != p {
             sign *= self.relative[p as usize];
             p = self.parent[p as usize];
         }
@@ -152,16 +160,20 @@ impl DomainSigns {
 
     /// Points that the evidence has not reached follow their strongest couplings, strongest first.
     fn join_undecided(&mut self, graph: &Graph, belief: &[f32]) {
-        self.undecided.clear();
-        for p in 0..belief.len() {
-            for (&q, &coupling) in graph.near[p].iter().zip(&graph.coupling[p]) {
-                let both_decided =
-                    belief[p].abs() >= NEGLIGIBLE && belief[q as usize].abs() >= NEGLIGIBLE;
-                if !both_decided && coupling.abs() >= STRONG {
-                    self.undecided.push((coupling, p as u32, q));
-                }
-            }
-        }
+        let is_decided = |p: usize| belief[p].abs() >= NEGLIGIBLE;
+        let strong = |p: usize| {
+            let ties = graph.near[p].iter().zip(&graph.coupling[p]);
+            ties.filter_map(move |(&q, &coupling)| {
+                let undecided = !(is_decided(p) && is_decided(q as usize));
+                (undecided && coupling.abs() >= STRONG).then_some((coupling, p as u32, q))
+            })
+        };
+        let starts = (0..belief.len()).step_by(CHUNK);
+        let found = parallel::map_each(starts, |_, first| {
+            let points = first..belief.len().min(first + CHUNK);
+            points.flat_map(strong).collect::<Vec<_>>()
+        });
+        self.undecided = found.concat();
         self.undecided.sort_unstable_by(|a, b| {
             let stronger = b.0.abs().total_cmp(&a.0.abs());
             stronger.then((a.1, a.2).cmp(&(b.1, b.2)))
@@ -177,14 +189,10 @@ impl DomainSigns {
 
     /// Numbers the domains and takes each point's sign relative to the root of its domain.
     fn number_domains(&mut self) -> usize {
-        let (domains, sign) = (&mut self.domains, &mut self.sign);
-        sign.clear();
-        let points = domains.parent.len() as u32;
-        number(&mut self.domain, points, |p| {
-            let (root, relative) = domains.root(p);
-            sign.push(relative);
-            root
-        })
+        let (domains, points) = (&self.domains, self.domains.parent.len());
+        let root = |p: usize| domains.settled_root(p as u32);
+        parallel::fill(&mut self.sign, points, |p| root(p).1);
+        number(&mut self.domain, points, |p| root(p).0)
     }
 
     /// Sums of couplings between domains, and of evidence for each of them (the tie to node `domains`).
@@ -320,18 +328,13 @@ pub(super) fn misfit(graph: &Graph, place: &impl Place, sign: &[f32]) -> f64 {
     Misfit::new(graph, place, &whole).total()
 }
 
-/// Numbers sets of points 0, 1, … in `domain`, from the root of each point, and returns how many there are.
-fn number(domain: &mut Vec<u32>, points: u32, mut root: impl FnMut(u32) -> u32) -> usize {
-    let mut count = 0;
-    domain.clear();
-    for p in 0..points {
-        // A root comes before all others of its set.
-        let root = root(p);
-        domain.push(match root == p {
-            true => count,
-            false => domain[root as usize],
-        });
-        count += u32::from(root == p);
-    }
-    count as usize
+/// Numbers sets of points 0, 1, … in `domain`, in the order of their roots, from the root of each point, and returns how many
+/// there are.
+fn number(domain: &mut Vec<u32>, points: usize, root: impl Fn(usize) -> u32 + Sync) -> usize {
+    let roots = parallel::filter_map(points, |p| (root(p) == p as u32).then_some(p as u32));
+    parallel::fill(domain, points, |p| {
+        let own = root(p);
+        roots.partition_point(|&other| other < own) as u32
+    });
+    roots.len()
 }

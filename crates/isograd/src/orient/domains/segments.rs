@@ -6,7 +6,7 @@
 //! the winding number decide between them as between domains: first large segments, then smaller ones. Signs change
 //! only if that is clearly better by the sum of all three.
 
-use super::super::regions::root;
+use super::super::regions::{root, settled_root};
 use super::{DomainSigns, Graph, Place, STRONG, Ties, number};
 use crate::parallel::{self, CHUNK};
 
@@ -86,7 +86,7 @@ impl DomainSigns {
                 size[low] += size[high];
             }
         }
-        number(&mut self.domain, n as u32, |p| root(&mut parent, p))
+        number(&mut self.domain, n, |p| settled_root(&parent, p as u32))
     }
 
     /// Samples and neighbors of strong couplings that the signs agree with, for some samples after the other, and for each

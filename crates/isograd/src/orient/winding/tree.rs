@@ -73,6 +73,16 @@ impl Tree {
         Self::of(&mut dipoles, MANY)
     }
 
+    /// The tree of `count` samples.
+    pub(in crate::orient) fn of_each(
+        count: usize,
+        dipole: &(dyn Fn(usize) -> Dipole + Sync),
+    ) -> Self {
+        let mut dipoles = Vec::new();
+        parallel::fill_large(&mut dipoles, count, dipole);
+        Self::new(dipoles)
+    }
+
     /// [`Self::new`]; the halves of more than `many` samples are built side by side.
     fn of(dipoles: &mut [Dipole], many: usize) -> Self {
         let size = Size::of(dipoles.len());
