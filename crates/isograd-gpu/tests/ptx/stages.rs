@@ -313,4 +313,6 @@ fn screened<T: Scalar>(device: &Device<Recorder>, samples: Samples<'_, T>) {
     poisson::screened::forward(device, &equation, &chi).unwrap();
     answer(&[two, two, &[]]);
     poisson::screened::pullback(device, &equation, &level, &chi, &bars).unwrap();
+    answer(&[two]);
+    poisson::screened::smoothing_pullback(device, &equation, &level, 0.8, &chi).unwrap();
 }

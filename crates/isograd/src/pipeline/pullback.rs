@@ -208,19 +208,7 @@ impl<T: Real> Reconstruction<T> {
             bars.cells_mut(),
             samples,
         );
-        if let (true, Bars::Dense(field)) = (self.options.screening > 0.0, &mut bars) {
-            let equation = self.screened_equation(sorted);
-            let scratch = &mut scratch.screened;
-            let level = residuals.screened.as_ref();
-            let level = level.unwrap_or(&residuals.iso_value);
-            screened::pullback(&equation, level, field.values_mut(), scratch, samples)?;
-            if self.options.smoothing_follows() {
-                let width = residuals.smoothing;
-                let plain_bar = field.values();
-                smoothing_bar +=
-                    screened::smoothing_pullback(&equation, level, width, plain_bar, scratch)?;
-            }
-        }
+        smoothing_bar += self.pull_screening(sorted, &mut bars, &mut scratch.screened, samples)?;
         let smoothing = residuals.smoothing;
         if self.options.smoothing_follows() {
             smoothing_bar += self.smoothing_bar(&bars, &scratch.level);
@@ -266,6 +254,30 @@ impl<T: Real> Reconstruction<T> {
                 isosurface::pullback_on(self.chi(), self.iso_value, mesh, vertices, chi_bar)
             }
         }
+    }
+
+    /// From the screened solution to the plain one, and the part of the smoothing's cotangent that
+    /// [`smoothing_bar`](Self::smoothing_bar) leaves out.
+    fn pull_screening(
+        &self,
+        sorted: SortedSamples<'_, T>,
+        bars: &mut Bars<T>,
+        scratch: &mut screened::Scratch<T>,
+        samples: &mut SampleCotangent<T>,
+    ) -> Result<f64, PullbackError> {
+        let (true, Bars::Dense(field)) = (self.options.screening > 0.0, bars) else {
+            return Ok(0.0);
+        };
+        let (equation, residuals) = (self.screened_equation(sorted), &self.residuals);
+        let level = residuals.screened.as_ref();
+        let level = level.unwrap_or(&residuals.iso_value);
+        screened::pullback(&equation, level, field.values_mut(), scratch, samples)?;
+        if !self.options.smoothing_follows() {
+            return Ok(0.0);
+        }
+        let (width, plain_bar) = (residuals.smoothing, field.values());
+        let found = screened::smoothing_pullback(&equation, level, width, plain_bar, scratch)?;
+        Ok(found)
     }
 
     /// The cotangent of the smoothing for that of the indicator before anything was taken off it.

@@ -242,7 +242,7 @@ impl Direction {
 
 #[test]
 fn all_results_are_pulled_back_to_all_inputs() {
-    // So wide that no radius grows round a vertex: those are held constant.
+    // One with which no sample enters or leaves a neighborhood over the steps.
     let radius = Radius::Fixed(0.18);
     let estimated = Options::default().radius(radius);
     let given = estimated.clone().orient(Method::Given);
