@@ -238,12 +238,16 @@ pub(crate) fn first(n: usize, is_so: impl Fn(usize) -> bool + Sync) -> Option<us
     of_ranges(n, piece(n), &of).into_iter().flatten().next()
 }
 
-/// The `f(i)` that are there, in order.
-pub(crate) fn filter_map<R: Clone + Send>(
+/// The items of all `f(i)`, which may be options, in order.
+pub(crate) fn flat_map<R: Clone + Send, I: IntoIterator<Item = R>>(
     n: usize,
-    f: impl Fn(usize) -> Option<R> + Sync,
+    f: impl Fn(usize) -> I + Sync,
 ) -> Vec<R> {
-    let of = |items: Range<usize>| items.filter_map(&f).collect::<Vec<R>>();
+    let of = |items: Range<usize>| {
+        let mut found = Vec::new();
+        items.for_each(|i| found.extend(f(i)));
+        found
+    };
     of_ranges(n, piece(n), &of).concat()
 }
 

@@ -315,16 +315,19 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             let part = screened::smoothing_pullback(device, &equation, level, cells, chi_bar)?;
             add(device, &part, &bar)?;
         }
-        let spacing = zeros(device, 1)?;
-        let (out, share) = match self.options.area_weights {
-            true => (&bars.areas, 0.5 * cells / (mean * count as f64)),
-            false => (&spacing, cells),
+        let spacing = match self.options.area_weights {
+            true => None,
+            false => Some(zeros(device, 1)?),
+        };
+        let (out, share) = match &spacing {
+            None => (&bars.areas, 0.5 * cells / (mean * count as f64)),
+            Some(spacing) => (spacing, cells),
         };
         launch!(device, out.len() => share_smoothing<T>(
             bar, out, bars.grid, T::of(by_level), T::of(share),
             T::of(cells / self.grid.spacing().f64()),
         ));
-        Ok((!self.options.area_weights).then_some(spacing))
+        Ok(spacing)
     }
 }
 

@@ -167,7 +167,7 @@ pub(super) fn morton_order<T: Real>(
     points: &[[T; 3]],
     is_wanted: &(dyn Fn(usize) -> bool + Sync),
 ) -> Vec<(u64, u32)> {
-    let mut order = parallel::filter_map(points.len(), |i| {
+    let mut order = parallel::flat_map(points.len(), |i| {
         let code = || morton_code(bvh.to_morton(to_f64(points[i])));
         is_wanted(i).then(|| (code(), i as u32))
     });

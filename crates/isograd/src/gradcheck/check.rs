@@ -176,7 +176,7 @@ impl<'a> Check<'a> {
             let corners = mesh.faces()[closest[cell] as usize].map(|v| mesh.vertices()[v as usize]);
             closest_point(grid.center(grid.cell(cell)), corners).point
         };
-        parallel::filter_map(grid.cells(), |cell| {
+        parallel::flat_map(grid.cells(), |cell| {
             let (a, b) = (plus.1[cell], minus.1[cell]);
             let jumps = a != b
                 && a != NO_TRIANGLE

@@ -106,7 +106,7 @@ fn middle_pairs<T: Real>(neighborhoods: &Neighborhoods<T>, bar: f64) -> Vec<(u32
     let Some([least, largest]) = neighborhoods.middle else {
         return Vec::new();
     };
-    let middle = parallel::filter_map(reach.len(), |position| {
+    let middle = parallel::flat_map(reach.len(), |position| {
         (least <= reach[position] && reach[position] <= largest).then_some(position)
     });
     // Two samples may each be the other's 24th: of equal distances at either end a part may be in the middle half.

@@ -88,7 +88,7 @@ fn positions<T: Real>(
     is_wanted: impl Fn(usize) -> bool + Sync,
 ) -> Vec<u32> {
     let order = neighborhoods.index.order();
-    parallel::filter_map(order.len(), |position| {
+    parallel::flat_map(order.len(), |position| {
         is_wanted(order[position] as usize).then_some(position as u32)
     })
 }

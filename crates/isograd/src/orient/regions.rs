@@ -130,7 +130,7 @@ impl Walls {
     /// The walls that samples lie in, from the pair of regions of each.
     pub(super) fn of(samples: impl Iterator<Item = (u32, u32)>) -> Self {
         let mut walls = Self::default();
-        samples.for_each(|wall| *walls.0.entry(wall).or_insert(0) += 1);
+        samples.for_each(|wall| walls.add(wall, 1));
         walls
     }
 
@@ -138,9 +138,13 @@ impl Walls {
     pub(super) fn sum(parts: Vec<Self>) -> Self {
         let mut all = Self::default();
         for (wall, samples) in parts.into_iter().flat_map(|part| part.0) {
-            *all.0.entry(wall).or_insert(0) += samples;
+            all.add(wall, samples);
         }
         all
+    }
+
+    fn add(&mut self, wall: (u32, u32), samples: usize) {
+        *self.0.entry(wall).or_insert(0) += samples;
     }
 }
 

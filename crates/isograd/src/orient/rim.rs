@@ -19,6 +19,7 @@ const RIM_NEIGHBORS: usize = 3;
 /// Neighborhoods of fewer samples are widened to about this many: few directions leave out wide sectors by chance, and at a
 /// rim, where half of the disc is empty, few neighbors are at the rim themselves.
 const RIM_COUNT: u32 = 24;
+
 /// The octants of a plane, counter-clockwise, each by the signs of its two coordinates and which of them is larger.
 const AROUND: [u32; 8] = [0b011, 0b111, 0b110, 0b010, 0b000, 0b100, 0b101, 0b001];
 

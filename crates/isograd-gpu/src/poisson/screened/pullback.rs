@@ -67,7 +67,7 @@ pub fn pullback<R: Runtime, T: Scalar>(
 /// leaves them; `level` is the residual of the iso-value of `χ`. Waits for the device.
 ///
 /// # Errors
-/// Those of the device, and of lengths.
+/// [`Error::Device`]: an array of another length, or a failure of the device.
 pub fn smoothing_pullback<R: Runtime, T: Scalar>(
     device: &Device<R>,
     equation: &Equation<'_, T>,

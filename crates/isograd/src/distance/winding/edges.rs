@@ -18,7 +18,7 @@ pub(in crate::distance) fn is_closed<T: Real>(mesh: &Mesh<T>) -> bool {
 /// Whether each edge is balanced, if `name` gives the name of a vertex.
 fn is_balanced<T: Real>(mesh: &Mesh<T>, name: impl Fn(u32) -> u32 + Sync) -> bool {
     let faces = mesh.faces();
-    let mut uses = parallel::filter_map(3 * faces.len(), |side| {
+    let mut uses = parallel::flat_map(3 * faces.len(), |side| {
         let (face, k) = (faces[side / 3], side % 3);
         let [p, q] = [face[k], face[(k + 1) % 3]].map(&name);
         (p != q).then_some((p.min(q), p.max(q), p < q))

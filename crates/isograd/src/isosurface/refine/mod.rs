@@ -114,7 +114,7 @@ fn crossed<T: Real>(chi: &Field<T>, level: T) -> Vec<[usize; 3]> {
         }
         (both == 3).then_some([x, y, z])
     };
-    parallel::filter_map(sides.len(), crossed)
+    parallel::flat_map(sides.len(), crossed)
 }
 
 /// The cells of the indicator of a block's halo, by place there and place in memory, reflected at the walls.

@@ -6,8 +6,7 @@ use std::collections::BTreeMap;
 use super::graph::Graph;
 use super::signs::{Domains, Place};
 use super::winding::Misfit;
-use crate::parallel::{self, CHUNK};
-use crate::vector;
+use crate::{parallel, vector};
 
 mod segments;
 mod ties;
@@ -38,8 +37,6 @@ pub(super) struct DomainSigns {
     domains: SignedUnionFind,
     /// The domain of each point.
     domain: Vec<u32>,
-    /// Strong couplings of points without belief.
-    undecided: Vec<(f32, u32, u32)>,
 }
 
 /// Union-find in which every point knows its sign relative to its root.
@@ -168,17 +165,12 @@ impl DomainSigns {
                 (undecided && coupling.abs() >= STRONG).then_some((coupling, p as u32, q))
             })
         };
-        let starts = (0..belief.len()).step_by(CHUNK);
-        let found = parallel::map_each(starts, |_, first| {
-            let points = first..belief.len().min(first + CHUNK);
-            points.flat_map(strong).collect::<Vec<_>>()
-        });
-        self.undecided = found.concat();
-        self.undecided.sort_unstable_by(|a, b| {
+        let mut undecided = parallel::flat_map(belief.len(), strong);
+        undecided.sort_unstable_by(|a, b| {
             let stronger = b.0.abs().total_cmp(&a.0.abs());
             stronger.then((a.1, a.2).cmp(&(b.1, b.2)))
         });
-        for &(coupling, p, q) in &self.undecided {
+        for (coupling, p, q) in undecided {
             let (a, b) = (self.domains.root(p), self.domains.root(q));
             // Points without belief must not join domains with strong evidence of their own.
             if !(self.domains.has_belief[a.0 as usize] && self.domains.has_belief[b.0 as usize]) {
@@ -331,10 +323,11 @@ pub(super) fn misfit(graph: &Graph, place: &impl Place, sign: &[f32]) -> f64 {
 /// Numbers sets of points 0, 1, … in `domain`, in the order of their roots, from the root of each point, and returns how many
 /// there are.
 fn number(domain: &mut Vec<u32>, points: usize, root: impl Fn(usize) -> u32 + Sync) -> usize {
-    let roots = parallel::filter_map(points, |p| (root(p) == p as u32).then_some(p as u32));
-    parallel::fill(domain, points, |p| {
-        let own = root(p);
-        roots.partition_point(|&other| other < own) as u32
+    parallel::fill(domain, points, root);
+    let root = &*domain;
+    let roots = parallel::flat_map(points, |p| (root[p] == p as u32).then_some(p as u32));
+    parallel::for_each(domain, |_, domain| {
+        *domain = roots.partition_point(|root| root < domain) as u32;
     });
     roots.len()
 }
