@@ -13,6 +13,8 @@ def context(data: dict) -> dict:
         "tables": {cells: means(data, cells, methods) for cells in counts},
         "tails": {cells: tails(data, cells, methods) for cells in counts},
         "ratios": ratios(data, counts, methods),
+        "noise_tables": {noise: noise_table(data, noise) for noise in noises(data)},
+        "noise_ratios": noise_ratios(data),
     }
 
 
@@ -34,6 +36,35 @@ def tails(data: dict, cells: int, methods: list[str]) -> str:
         for row in rows_of(data, cells)
     ]
     return table(["shape"], methods, rows)
+
+
+def noises(data: dict) -> list[float]:
+    return sorted({row["noise"] for row in data["noisy"]})
+
+
+def noise_table(data: dict, noise: float) -> str:
+    """Mean distances in both directions, and the first quantile."""
+    rows = [row for row in data["noisy"] if row["noise"] == noise]
+    methods = list(rows[0]["methods"])
+
+    def cell(of: dict) -> str:
+        return " / ".join(map(number, of["means"])) + ", " + number(of["quantiles"][0])
+
+    return table(["shape"], methods, [[row["shape"], *(cell(row["methods"][m]) for m in methods)] for row in rows])
+
+
+def noise_ratios(data: dict) -> str:
+    """Ratio of our mean distances to those of each peer, mean over the shapes, in both directions."""
+    peers = [name for name in data["noisy"][0]["methods"] if name != "default"]
+    rows = []
+    for noise in noises(data):
+        found = [row["methods"] for row in data["noisy"] if row["noise"] == noise]
+        row = [f"{100 * noise:g} %"]
+        for peer in peers:
+            both = [[of["default"]["means"][k] / of[peer]["means"][k] for of in found] for k in (0, 1)]
+            row.append(" / ".join(number(sum(ratios) / len(ratios)) for ratios in both))
+        rows.append(row)
+    return table(["noise"], peers, rows)
 
 
 def ratios(data: dict, counts: list[int], methods: list[str]) -> str:

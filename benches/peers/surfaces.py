@@ -1,6 +1,7 @@
 """Surfaces of real clouds against their true meshes, isograd beside PoissonRecon: `cargo xtask surfaces`.
 
-isograd gets the points alone; PoissonRecon, in Open3D, gets the true normals. Both have the same cell size."""
+isograd gets the points alone; PoissonRecon, in Open3D, gets the true normals. Both have the same cell size. Some of the samples are
+also moved by noise; there PoissonRecon gets the normals of isograd as well."""
 
 import argparse
 import json
@@ -32,6 +33,10 @@ METHODS = {
 }
 SAMPLES = 200_000
 QUANTILES = [0.99, 0.999]
+# Clouds with noise: share of the longest side, samples, cells.
+NOISE = [0.0025, 0.005, 0.01]
+NOISY_SAMPLES = 30_000
+NOISY_CELLS = 128
 
 
 def main() -> None:
@@ -48,10 +53,39 @@ def main() -> None:
             row["methods"]["PoissonRecon"] = compared(poisson_recon(cloud, cell), truth, cell)
             print(shape, cells, {k: [f"{x:.4f}" for x in v["means"]] for k, v in row["methods"].items()}, flush=True)
             rows.append(row)
+    noisy = [row for shape in options.shapes for row in noisy_rows(options, shape)]
     data = {"machine": report.machine(), "samples": SAMPLES, "quantiles": QUANTILES, "rows": rows}
+    data |= {"noisy": noisy, "noisy_samples": NOISY_SAMPLES, "noisy_cells": NOISY_CELLS}
     options.json.parent.mkdir(parents=True, exist_ok=True)
     options.json.write_text(json.dumps(data, indent=1) + "\n")
     print(f"wrote {options.json}")
+
+
+def noisy_rows(options, shape: str) -> list[dict]:
+    truth = o3d.io.read_triangle_mesh(str(options.data / f"{shape}.mesh.ply"))
+    clean = o3d.io.read_point_cloud(str(options.data / f"{shape}.points.ply"))
+    size = max(clean.get_max_bound() - clean.get_min_bound())
+    rows = []
+    for noise in NOISE:
+        random = np.random.default_rng(11)
+        some = random.permutation(len(clean.points))[:NOISY_SAMPLES]
+        cloud = clean.select_by_index(some)
+        moves = noise * size * random.standard_normal((len(some), 3))
+        cloud.points = o3d.utility.Vector3dVector(np.asarray(cloud.points) + moves)
+        with tempfile.TemporaryDirectory() as folder:
+            path, oriented = Path(folder) / "cloud.ply", Path(folder) / "oriented.ply"
+            o3d.io.write_point_cloud(str(path), cloud)
+            mesh, cell = isograd(options.program, path, NOISY_CELLS, [])
+            command = [options.program, "orient", path, "-o", oriented, "--quiet"]
+            subprocess.run(list(map(str, command)), check=True, stderr=subprocess.DEVNULL)
+            methods = {
+                "default": compared(mesh, truth, cell),
+                "PoissonRecon": compared(poisson_recon(path, cell), truth, cell),
+                "PoissonRecon, our normals": compared(poisson_recon(oriented, cell), truth, cell),
+            }
+        print(shape, noise, {k: [f"{x:.4f}" for x in v["means"]] for k, v in methods.items()}, flush=True)
+        rows.append({"shape": shape, "noise": noise, "methods": methods})
+    return rows
 
 
 def isograd(program: Path, cloud: Path, cells: int, arguments_of: list[str]):

@@ -81,6 +81,15 @@ impl<T: Scalar> Setting<T> {
         }
     }
 
+    /// With samples moved by up to a cell along each axis.
+    fn scattered(mut self) -> Self {
+        let mut numbers = Numbers(5);
+        for x in self.cloud.points.as_flattened_mut() {
+            *x = T::of(x.f64() + 0.1 * numbers.signed());
+        }
+        self
+    }
+
     /// The same in double precision.
     fn exactly(&self) -> Setting<f64> {
         let vectors = |of: &[[T; 3]]| of.iter().map(|v| v.map(|x| x.f64())).collect();
@@ -191,13 +200,16 @@ fn for_each_setting<T: Scalar>(mut check: impl FnMut(Setting<T>)) {
             };
             println!("{} {count} {crowd} {options:?}", T::NAME);
             check(Setting::new(count, crowd, options));
+            if crowd == 0 {
+                check(Setting::new(count, crowd, options).scattered());
+            }
         }
     }
 }
 
 fn values_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
     let tolerance = tolerance::<T>();
-    let mut passes = 0;
+    let (mut passes, mut common) = (0, 0);
     for_each_setting::<T>(|setting| {
         let expected = setting.run_on_cpu();
         let found = setting.run(device);
@@ -208,6 +220,12 @@ fn values_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
         for (gain, expected) in gains.iter().zip(&of_cpu) {
             assert!((gain - expected).abs() < tolerance, "{gain} {expected}");
         }
+        let [gain, of_cpu] = [
+            found.residual.coarse_gain(),
+            expected.residual.coarse_gain(),
+        ];
+        assert!((gain - of_cpu).abs() < tolerance, "{gain} {of_cpu}");
+        common += usize::from(gain > 0.0);
         passes = gains.len().max(passes);
         let chi = device.download(&found.chi).unwrap();
         // Not the field: that is larger than what is taken off it.
@@ -217,6 +235,7 @@ fn values_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
         assert!(chi == again, "other bits the second time");
     });
     assert_eq!(passes, 3);
+    assert!(common > 0, "no samples that are followed in common");
 }
 
 fn pullbacks_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {

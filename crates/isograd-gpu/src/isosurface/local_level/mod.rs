@@ -6,7 +6,7 @@
 //! `D` and `M = D e` are fields that each cell gathers from the samples, which are sorted by cell; `e` is their
 //! quotient where it is read. Sums over samples and cells are in the number type of the field, by a fixed tree. Those
 //! that `λ` is made of, five a pass, come back to the host, where `λ` is found in double precision by the same
-//! lines as on the CPU.
+//! lines as on the CPU. The coarse pass of samples that scatter finds its means on the CPU.
 //!
 //! # Memory
 //! Two fields besides `χ` as it was and as it is, let go at the end. The pullback has three, and `χ` as it was.
@@ -15,7 +15,8 @@
 //! The samples in the form that is worked with; and of each pass its sums, and of each sample `s_i` and `u_i`.
 //!
 //! # Pullback
-//! As on the CPU, pass by pass backwards: samples → cells → samples. Of each pass one sum comes back, for `λ̄`.
+//! As on the CPU, pass by pass backwards: samples → cells → samples. Of each pass one sum comes back, for `λ̄`; of the coarse
+//! one the cotangents of all samples.
 //!
 //! # Bad samples
 //! Those that the splat leaves out are left out here.
@@ -24,6 +25,7 @@
 //! As on the CPU.
 
 mod cells;
+mod coarse;
 mod forward;
 mod near;
 mod plate;
@@ -50,6 +52,9 @@ pub struct Residual<T> {
     /// `(N, 8)` samples in sorted order: see `sample`.
     samples: Buffer<T>,
     passes: Vec<Pass<T>>,
+    common: Option<coarse::Common<T>>,
+    /// `(N, 2)` `s_i` and `u_i` before the first pass.
+    first: Buffer<T>,
 }
 
 /// One pass.
@@ -65,8 +70,15 @@ struct Pass<T> {
 }
 
 impl<T> Residual<T> {
-    /// `λ` of each pass that was made; none where the samples were not followed.
+    /// `λ` of each pass but the coarse one; none where the samples were not followed one by one.
     pub fn gains(&self) -> impl Iterator<Item = f64> + '_ {
         self.passes.iter().map(|pass| pass.gain)
+    }
+
+    /// `γ λ` of the coarse pass; 0 if there was none.
+    pub fn coarse_gain(&self) -> f64 {
+        self.common
+            .as_ref()
+            .map_or(0.0, |common| common.coarse.gain())
     }
 }

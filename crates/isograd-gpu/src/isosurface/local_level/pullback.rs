@@ -5,6 +5,7 @@ use cubecl::prelude::*;
 use isograd::isosurface::local_level::{STEEPEST, Step, Sums};
 
 use super::cells::{FORM, Others, Taken, Tilt, pull_means, put_means_back};
+use super::coarse::Common;
 use super::near::Near;
 use super::plate;
 use super::pull_samples::{
@@ -58,14 +59,14 @@ pub fn pullback<R: Runtime, T: Scalar>(
     check_field("the cotangent of the indicator", chi_bar, grid)?;
     out.check(count)?;
     let values: Buffer<T> = zeros(device, count)?;
-    let Some(first) = residual.passes.first() else {
+    if residual.passes.is_empty() && residual.common.is_none() {
         return Ok(Cotangents {
             chi: chi.clone(),
             values,
             level: zeros(device, 1)?,
             smoothing: 0.0,
         });
-    };
+    }
     let near = Near {
         device,
         grid,
@@ -79,12 +80,20 @@ pub fn pullback<R: Runtime, T: Scalar>(
         sums: near.field()?,
         node_bars: near.field()?,
         chi: chi.clone(),
+        is_own: false,
     };
-    let mut flattened_bar = 0.0;
-    for (k, pass) in residual.passes.iter().rev().enumerate() {
-        flattened_bar = pulled.pull_pass(&near, pass, chi_bar, flattened_bar, k == 0)?;
+    let mut of_common = 0.0;
+    if let Some(common) = &residual.common {
+        pulled.pull_given(&near, common, chi_bar)?;
+        let bars = &mut pulled.bars;
+        of_common = near.pull_common(samples, residual.area_weights, common, bars)?;
     }
-    let smoothing = pulled.pull_trust(&near, &first.state, residual)?;
+    let mut flattened_bar = 0.0;
+    for (k, pass) in residual.passes.iter().enumerate().rev() {
+        let of_gain = if k == 0 { of_common } else { 0.0 };
+        flattened_bar = pulled.pull_pass(&near, pass, chi_bar, [of_gain, flattened_bar])?;
+    }
+    let smoothing = pulled.pull_trust(&near, &residual.first, residual)?;
     near.spread::<Tilt>(&pulled.forms, Before::Kept, chi_bar)?;
     let level = pulled.add(&near, residual.area_weights, &values, out)?;
     Ok(Cotangents {
@@ -107,28 +116,27 @@ struct Pulled<T> {
     sums: Buffer<T>,
     /// `M̄`.
     node_bars: Buffer<T>,
-    /// `χ` before the passes that were pulled.
+    /// `χ` before the passes that were pulled, and whether it is an array of its own.
     chi: Buffer<T>,
+    is_own: bool,
 }
 
 impl<T: Scalar> Pulled<T> {
-    /// One pass backwards. Takes and returns the cotangent of the share of the slope that is gone.
+    /// One pass backwards. Takes and returns the cotangent of the share of the slope that is gone; `of_gain` is that of `λ` through
+    /// the coarse pass.
     fn pull_pass<R: Runtime>(
         &mut self,
         near: &Near<'_, R, T>,
         pass: &Pass<T>,
         chi_bar: &Buffer<T>,
-        flattened_bar: f64,
-        first: bool,
+        [of_gain, flattened_bar]: [f64; 2],
     ) -> Result<f64, Error> {
         near.sums(&pass.state, &self.sums)?;
-        let (seen, gain_bar) = self.see_again(near, pass, chi_bar, first)?;
+        let (seen, gain_bar) = self.see_again(near, &pass.state, pass.gain, chi_bar)?;
+        let gain_bar = of_gain + gain_bar;
         let (bars, before_bar) = pass.sums.pullback(pass.flattened, gain_bar, flattened_bar);
-        self.pull_seen(near, pass, &seen, bars);
-        near.spread::<Tilt>(&self.forms, Before::Replaced, &self.node_bars)?;
-        launch!(near.device, near.grid.cells(), BLOCK => pull_means<T>(
-            self.areas, chi_bar, self.node_bars, self.sums, T::of(pass.gain),
-        ));
+        self.pull_seen(near, &pass.state, pass.gain, &seen, bars);
+        self.pull_cell_means(near, pass.gain, chi_bar)?;
         near.spread::<Others>(&self.forms, Before::Kept, &self.node_bars)?;
         near.spread::<Taken>(&self.forms, Before::Kept, &self.sums)?;
         launch!(near.device, near.count(), BLOCK => pull_cells<T>(
@@ -138,30 +146,65 @@ impl<T: Scalar> Pulled<T> {
         Ok(before_bar)
     }
 
+    /// The coarse pass backwards, from cells to the means that samples were given. `bars` are 0 before, and then those of samples
+    /// that are all trusted.
+    fn pull_given<R: Runtime>(
+        &mut self,
+        near: &Near<'_, R, T>,
+        common: &Common<T>,
+        chi_bar: &Buffer<T>,
+    ) -> Result<(), Error> {
+        near.sums(&common.given, &self.sums)?;
+        let (seen, _) = self.see_again(near, &common.given, 1.0, chi_bar)?;
+        self.pull_seen(near, &common.given, 1.0, &seen, Sums::default());
+        self.pull_cell_means(near, 1.0, chi_bar)?;
+        let samples = near.trusting()?;
+        launch!(near.device, near.count(), BLOCK => pull_cells<T>(
+            near.order.keys, samples, self.node_bars, self.sums, common.given, self.bars,
+            near.count() as u32, near.grid,
+        ));
+        Ok(())
+    }
+
+    /// `M̄` and `D̄` at the cells, but for the samples left out.
+    fn pull_cell_means<R: Runtime>(
+        &self,
+        near: &Near<'_, R, T>,
+        gain: f64,
+        chi_bar: &Buffer<T>,
+    ) -> Result<(), Error> {
+        near.spread::<Tilt>(&self.forms, Before::Replaced, &self.node_bars)?;
+        launch!(near.device, near.grid.cells(), BLOCK => pull_means<T>(
+            self.areas, chi_bar, self.node_bars, self.sums, T::of(gain),
+        ));
+        Ok(())
+    }
+
     /// `(N, 3)` results of the pass at the samples, and `λ̄` but for the share of the slope. `χ` becomes that before
     /// the pass.
     fn see_again<R: Runtime>(
         &mut self,
         near: &Near<'_, R, T>,
-        pass: &Pass<T>,
+        state: &Buffer<T>,
+        gain: f64,
         chi_bar: &Buffer<T>,
-        first: bool,
     ) -> Result<(Buffer<T>, f64), Error> {
         let device = near.device;
         let seen: Buffer<T> = device.empty(SEEN * near.count())?;
         let partial: Buffer<T> = device.empty(near.shares() + near.grid.cells().div_ceil(BLOCK))?;
         launch!(device, near.count(), BLOCK => see_means_again<T>(
-            near.pass(&self.areas, &self.sums), pass.state, self.bars, seen, partial, near.grid,
+            near.pass(&self.areas, &self.sums), state, self.bars, seen, partial, near.grid,
         ));
         // No array may be bound twice if one of the two is written.
+        let first = !self.is_own;
         let (from, out) = match first {
             true => (&self.chi, near.field()?),
             false => (&self.areas, self.chi.clone()),
         };
         launch!(device, near.grid.cells(), BLOCK => put_means_back<T>(
-            from, self.areas, self.sums, chi_bar, out, partial, T::of(pass.gain), first,
+            from, self.areas, self.sums, chi_bar, out, partial, T::of(gain), first,
         ));
-        self.chi = out;
+        (self.chi, self.is_own) = (out, true);
         let gain_bar = device.download(&sum(device, &partial)?)?[0];
         Ok((seen, isograd::Real::f64(gain_bar)))
     }
@@ -169,12 +212,13 @@ impl<T: Scalar> Pulled<T> {
     fn pull_seen<R: Runtime>(
         &self,
         near: &Near<'_, R, T>,
-        pass: &Pass<T>,
+        state: &Buffer<T>,
+        gain: f64,
         seen: &Buffer<T>,
         bars: Sums,
     ) {
         let of_gain = GainBarsLaunch::new(
-            T::of(pass.gain),
+            T::of(gain),
             T::of(bars.rise),
             T::of(bars.slope),
             T::of(bars.agreement),
@@ -182,7 +226,7 @@ impl<T: Scalar> Pulled<T> {
             T::of(bars.prediction),
         );
         launch!(near.device, near.count(), BLOCK => pull_seen_means<T>(
-            near.pass(&self.areas, &self.sums), seen, pass.state, self.bars, self.forms,
+            near.pass(&self.areas, &self.sums), seen, state, self.bars, self.forms,
             Ready::new(of_gain), near.grid,
         ));
     }

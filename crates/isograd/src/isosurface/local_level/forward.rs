@@ -1,5 +1,6 @@
 //! The forward map: passes of weighted means over the samples near each cell, until they explain no more.
 
+use super::coarse;
 use super::layer::{Layer, NODES};
 use super::means::{CellMean, GridSamples, Reading};
 use super::{PASSES, Pass, Residual};
@@ -21,6 +22,7 @@ pub struct Scratch<T> {
     remaining: Vec<T>,
     /// `(N,)` the pass at the samples.
     readings: Vec<Reading<T>>,
+    coarse: coarse::Scratch<T>,
 }
 
 /// Options of the stage.
@@ -85,6 +87,7 @@ pub(crate) fn forward_on<T: Real>(
         }
         done += 1;
     }
+    residual.coarse = scratch.run_coarse(&near, samples, residual, done);
     residual.passes.truncate(done);
     let layer = &scratch.layer;
     layer.zip_rows(&scratch.correction, &mut chi, |e, chi| {
@@ -108,6 +111,26 @@ impl<T: Real> Scratch<T> {
         let c = T::of(level.value);
         let values = &level.at_samples;
         parallel::fill(&mut self.remaining, values.len(), |i| values[i].value - c);
+    }
+
+    /// The [coarse] pass, after `done` others.
+    fn run_coarse(
+        &mut self,
+        near: &GridSamples<'_, T>,
+        sorted: SortedSamples<'_, T>,
+        residual: &mut Residual<T>,
+        done: usize,
+    ) -> Option<coarse::Coarse<T>> {
+        let first_gain = residual.passes[0].gain;
+        let (remaining, trust) = (&self.remaining, &residual.trust);
+        let offsets = parallel::map(trust.len(), |i| trust[i] * remaining[i]);
+        let mut found = (self.coarse).run(near, sorted, first_gain, offsets)?;
+        if done == 0 {
+            found.pass.slopes = std::mem::take(&mut residual.passes[0].slopes);
+        }
+        near.average(&self.layer, &self.coarse.given, &mut self.means);
+        near.accumulate(&self.means, T::one(), &mut self.correction);
+        Some(found)
     }
 
     /// One pass, after the pass `before`. Returns the share of the slope removed so far. If the gain is 0, nothing is

@@ -1,6 +1,5 @@
 //! The pullback of the means: from the readings at the samples to the cells, and from the cells to the samples.
 
-use super::Pass;
 use super::layer::{Layer, NODES, Overlap};
 use super::means::{CellMean, GridSamples, Reading, means_of};
 use super::pullback::{PassScratch, SampleBars};
@@ -57,8 +56,14 @@ impl<T: Real> GridSamples<'_, T> {
         })
     }
 
-    /// Writes `M̄` and `D̄` at the cells of the layer; `total` is `Ē` there.
-    pub(super) fn pull_means(&self, state: &mut PassScratch<T>, pass: &Pass<T>, total: &[T]) {
+    /// Writes `M̄` and `D̄` at the cells of the layer, where `total` is `Ē`, for a pass with this gain and these `(N,)` offsets.
+    pub(super) fn pull_means(
+        &self,
+        state: &mut PassScratch<T>,
+        gain: T,
+        offsets: &[T],
+        total: &[T],
+    ) {
         let PassScratch {
             layer,
             means,
@@ -77,11 +82,11 @@ impl<T: Real> GridSamples<'_, T> {
                     // ē
                     let mut mean_bars = [T::zero(); NODES];
                     for (bar, &total) in mean_bars.iter_mut().zip(total) {
-                        *bar = T::of(pass.gain) * total;
+                        *bar = gain * total;
                     }
                     bars.fill(CellBars::default());
                     for i in layer.samples(block) {
-                        let sample = self.pass_sample(i, pass.offsets[i], reading_bars[i]);
+                        let sample = self.pass_sample(i, offsets[i], reading_bars[i]);
                         if let Some(sample) = sample {
                             let corner = layer.corner(block);
                             sample.spread_reading(corner, &mut mean_bars);

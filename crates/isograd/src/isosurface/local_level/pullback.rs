@@ -1,5 +1,6 @@
 //! The pullback: the passes in reverse, then trust and slopes.
 
+use super::coarse;
 use super::gain::Sums;
 use super::layer::{EDGE, Layer, NODES};
 use super::means::{CellMean, GridSamples, Reading};
@@ -22,6 +23,7 @@ pub struct PullbackScratch<T> {
     /// `(N, 3)` cotangents of slopes and areas from those of trust and shifts.
     trust: Vec<[f64; 3]>,
     pass: PassScratch<T>,
+    coarse: coarse::PullbackScratch<T>,
 }
 
 /// State of a pass in the layer and at the samples, and its cotangents.
@@ -33,7 +35,7 @@ pub(super) struct PassScratch<T> {
     /// `M̄` and `D̄` there.
     pub(super) mean_bars: Vec<CellBars<T>>,
     /// `(N,)` `m`, `w`, `p` at the samples.
-    readings: Vec<Reading<T>>,
+    pub(super) readings: Vec<Reading<T>>,
     /// `(N,)` their cotangents.
     pub(super) reading_bars: Vec<Reading<T>>,
 }
@@ -96,9 +98,11 @@ pub(crate) fn pullback_on<T: Real>(
     let grid = chi.grid();
     let near = GridSamples::new(grid, samples.samples, residual.area, residual.interpolation);
     scratch.start(grid, samples, chi_bar.cells());
+    let of_coarse = scratch.pull_coarse(&near, samples, residual);
     let mut flattened_bar = 0.0;
-    for pass in residual.passes.iter().rev() {
-        flattened_bar = scratch.pull_pass(&near, pass, &residual.trust, flattened_bar);
+    for (k, pass) in residual.passes.iter().enumerate().rev() {
+        let gain_bar = if k == 0 { of_coarse } else { 0.0 };
+        flattened_bar = scratch.pull_pass(&near, pass, &residual.trust, [gain_bar, flattened_bar]);
     }
     bars.smoothing = scratch.pull_trust(&near, residual);
     scratch.pull_slopes(&near, chi);
@@ -118,6 +122,18 @@ pub(crate) fn pullback_on<T: Real>(
     near.add(found, out);
     let [sum] = parallel::sum_array(found.len(), |i| [found[i].value.f64()]);
     bars.level = -sum;
+}
+
+impl<T: Real> SampleBars<T> {
+    /// Adds the cotangent of the offset `s = ω r`.
+    #[inline(always)]
+    pub(super) fn add_offset(&mut self, s_bar: T, s: T, trust: T) {
+        self.value += trust * s_bar;
+        // Where ω is 0, its slope is 0.
+        if trust > T::zero() {
+            self.trust += s_bar * s / trust;
+        }
+    }
 }
 
 impl<T: Real> PullbackScratch<T> {
@@ -140,13 +156,46 @@ impl<T: Real> PullbackScratch<T> {
         });
     }
 
-    /// Reverses one pass. Takes and returns the cotangent of the share of the slope removed, after and before it.
+    /// Reverses the [coarse] pass. Returns the cotangent of the gain of the first pass.
+    fn pull_coarse(
+        &mut self,
+        near: &GridSamples<'_, T>,
+        sorted: SortedSamples<'_, T>,
+        residual: &Residual<T>,
+    ) -> f64 {
+        let Some(coarse) = &residual.coarse else {
+            return 0.0;
+        };
+        let Self {
+            total,
+            corrections,
+            samples,
+            pass,
+            coarse: scratch,
+            ..
+        } = self;
+        if !scratch.average(near, sorted, coarse) {
+            return 0.0;
+        }
+        scratch.pull_given(near, pass, total, corrections, samples);
+        let gain_bar = scratch.pull(near, coarse);
+        let (found, offsets, trust) = (&scratch.samples, &coarse.pass.offsets, &residual.trust);
+        parallel::for_each(samples, |i, bars| {
+            bars.place = vector::add(bars.place, found[i].place);
+            bars.area += found[i].area;
+            bars.add_offset(found[i].value, offsets[i], trust[i]);
+        });
+        gain_bar
+    }
+
+    /// Reverses one pass. Takes and returns the cotangent of the share of the slope removed, after and before it;
+    /// `of_gain` is that of `λ` through the coarse pass.
     fn pull_pass(
         &mut self,
         near: &GridSamples<'_, T>,
         pass: &Pass<T>,
         trust: &[T],
-        flattened_bar: f64,
+        [of_gain, flattened_bar]: [f64; 2],
     ) -> f64 {
         let PassScratch {
             layer,
@@ -157,10 +206,10 @@ impl<T: Real> PullbackScratch<T> {
         near.average(layer, &pass.offsets, means);
         near.read(layer, means, &pass.offsets, readings);
         near.accumulate(means, T::of(pass.gain), &mut self.corrections);
-        let gain_bar = self.gain_bar();
+        let gain_bar = of_gain + self.gain_bar();
         let (sums_bar, before_bar) = pass.sums.pullback(pass.flattened, gain_bar, flattened_bar);
         self.pull_sums(near, pass, sums_bar);
-        near.pull_means(&mut self.pass, pass, &self.total);
+        near.pull_means(&mut self.pass, T::of(pass.gain), &pass.offsets, &self.total);
         let state = &self.pass;
         near.for_each(
             &mut self.samples,
@@ -169,11 +218,7 @@ impl<T: Real> PullbackScratch<T> {
                 let (p, s) = (state.readings[i].prediction, pass.offsets[i]);
                 let of_sums = T::of(sums_bar.agreement) * p + T::of(2.0 * sums_bar.offset) * s;
                 let s_bar = near.area(i) * of_sums + near.pull_sample(state, i, s, bars);
-                bars.value += trust[i] * s_bar;
-                // Where ω is 0, its slope is 0.
-                if trust[i] > T::zero() {
-                    bars.trust += s_bar * s / trust[i];
-                }
+                bars.add_offset(s_bar, s, trust[i]);
             },
         );
         before_bar
@@ -223,7 +268,7 @@ impl<T: Real> PullbackScratch<T> {
 
     /// From trust and shifts to slopes and areas. Returns the cotangent of the smoothing.
     fn pull_trust(&mut self, near: &GridSamples<'_, T>, residual: &Residual<T>) -> f64 {
-        if residual.passes.is_empty() {
+        if residual.passes.is_empty() && residual.coarse.is_none() {
             return 0.0;
         }
         let samples = &self.samples;

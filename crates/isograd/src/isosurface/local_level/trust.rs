@@ -72,7 +72,7 @@ impl<T: Real> GridSamples<'_, T> {
         trust_bars: impl Fn(usize) -> [f64; 2] + Sync,
         bars: &mut Vec<[f64; 3]>,
     ) -> f64 {
-        let (step, slopes) = (residual.step, &residual.passes[0].slopes);
+        let (step, slopes) = (residual.step, residual.first_slopes());
         parallel::fill(bars, slopes.len(), |i| {
             let [trust_bar, shift_bar] = trust_bars(i);
             step.pullback(rising(slopes[i]), trust_bar, shift_bar)

@@ -42,7 +42,7 @@ impl Setting<f64> {
     /// Cotangents of all inputs for the cotangent `w` of the result, times the rates.
     fn pulled(&self, area: bool, thin: bool, w: &[f64], rates: &Rates) -> f64 {
         let (chi, level, residual) = self.run(area, thin);
-        assert!(!residual.passes.is_empty());
+        assert!(residual.all_passes().next().is_some());
         let mut out = SampleCotangent::zeros(self.points.len());
         let (mut bars, mut chi_bar) = (Cotangent::default(), w.to_vec());
         let samples = SortedSamples {
@@ -74,20 +74,34 @@ impl Setting<f64> {
 #[test]
 fn pullback_is_the_derivative_in_all_inputs() {
     use Interpolation::{Linear, Spline};
-    for (area, thin, noise, interpolation) in [
-        (true, true, 0.0, Linear),
-        (true, false, 0.1, Linear),
-        (false, false, 0.0, Linear),
-        (true, true, 0.0, Spline),
+    for (n, noise, area, thin, interpolation) in [
+        (900, 0.0, true, true, Linear),
+        (900, 0.1, true, false, Linear),
+        (900, 0.0, false, false, Linear),
+        (900, 0.0, true, true, Spline),
+        // Samples that are followed in common.
+        (900, 0.7, true, true, Linear),
+        (900, 1.6, true, false, Spline),
+        (900, 2.0, true, true, Spline),
+        (150, 2.0, true, true, Spline),
+        (150, 1.5, true, true, Linear),
+        (60, 2.0, false, true, Linear),
     ] {
-        let mut setting = Setting::<f64>::new(900, noise);
+        let scatter = noise > 0.5;
+        let mut setting = Setting::<f64>::new(n, noise);
         setting.interpolation = interpolation;
         // As flat along some normals as on thin parts.
         turn(&mut setting.normals);
         let mut random = Random::new(4);
         let cells = setting.chi.values().len();
         let w = numbers(cells, &mut random);
-        let rates = Rates::new(900, cells, &mut random);
+        let rates = Rates::new(n, cells, &mut random);
+        let coarse = setting.run(area, thin).2.coarse;
+        println!(
+            "coarse: {:?}",
+            coarse.as_ref().map(|c| (c.share, c.pass.gain))
+        );
+        assert_eq!(coarse.is_some(), scatter, "{n} {noise}");
         let pulled = setting.pulled(area, thin, &w, &rates);
         // No sample may cross a plane through cell centers, where slopes jump.
         assert_adjoint("local iso-value", pulled, 1e-7, |s| {
