@@ -209,7 +209,7 @@ fn for_each_setting<T: Scalar>(mut check: impl FnMut(Setting<T>)) {
 
 fn values_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
     let tolerance = tolerance::<T>();
-    let (mut passes, mut common) = (0, 0);
+    let (mut passes, mut coarse) = (0, 0);
     for_each_setting::<T>(|setting| {
         let expected = setting.run_on_cpu();
         let found = setting.run(device);
@@ -225,7 +225,7 @@ fn values_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
             expected.residual.coarse_gain(),
         ];
         assert!((gain - of_cpu).abs() < tolerance, "{gain} {of_cpu}");
-        common += usize::from(gain > 0.0);
+        coarse += usize::from(gain > 0.0);
         passes = gains.len().max(passes);
         let chi = device.download(&found.chi).unwrap();
         // Not the field: that is larger than what is taken off it.
@@ -235,7 +235,7 @@ fn values_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
         assert!(chi == again, "other bits the second time");
     });
     assert_eq!(passes, 3);
-    assert!(common > 0, "no samples that are followed in common");
+    assert!(coarse > 0, "no samples that are followed in common");
 }
 
 fn pullbacks_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {

@@ -11,7 +11,8 @@ use crate::{Buffer, Device, Error, Scalar};
 
 /// Residual of the coarse pass.
 #[derive(Clone, Debug)]
-pub(super) struct Common<T> {
+pub(super) struct CoarsePass<T> {
+    /// What the CPU keeps.
     pub coarse: Coarse<T>,
     /// `(N, 2)` in sorted order: the means that samples were given, and 0.
     pub given: Buffer<T>,
@@ -63,13 +64,13 @@ impl<T: Scalar> OnHost<T> {
 
 impl<R: Runtime, T: Scalar> Near<'_, R, T> {
     /// The means that the samples are given, whose state before the pass is `state`; `None` if there is nothing to follow.
-    pub(super) fn find_common(
+    pub(super) fn find_coarse(
         &self,
         samples: Samples<'_, T>,
         area_weights: bool,
         first_gain: f64,
         state: &Buffer<T>,
-    ) -> Result<Option<Common<T>>, Error> {
+    ) -> Result<Option<CoarsePass<T>>, Error> {
         let host = OnHost::new(self.device, samples, &self.order.places)?;
         let state = self.device.download(state)?;
         let offsets = host.to_input(|k| state[STATE * k]);
@@ -80,7 +81,7 @@ impl<R: Runtime, T: Scalar> Near<'_, R, T> {
         let given = host.places.iter().map(|&i| given[i as usize]);
         let given: Vec<T> = given.flat_map(|given| [given, T::zero()]).collect();
         let given = self.device.upload(&given)?;
-        Ok(Some(Common { coarse, given }))
+        Ok(Some(CoarsePass { coarse, given }))
     }
 
     /// The samples as if all were trusted: so that the cotangents of their values are those of the means that they were given.
@@ -94,11 +95,11 @@ impl<R: Runtime, T: Scalar> Near<'_, R, T> {
 
     /// From the `(N, 10)` cotangents `bars` that [`Self::trusting`] samples got to those of the samples. Returns the cotangent of
     /// the gain of the first pass.
-    pub(super) fn pull_common(
+    pub(super) fn pull_coarse(
         &self,
         samples: Samples<'_, T>,
         area_weights: bool,
-        Common { coarse, .. }: &Common<T>,
+        CoarsePass { coarse, .. }: &CoarsePass<T>,
         bars: &mut Buffer<T>,
     ) -> Result<f64, Error> {
         let host = OnHost::new(self.device, samples, &self.order.places)?;

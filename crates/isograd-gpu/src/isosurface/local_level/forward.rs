@@ -1,7 +1,8 @@
 //! From the indicator to the one whose level is the mean at every sample that is followed.
 
 use cubecl::prelude::*;
-use isograd::isosurface::local_level::{Options, PASSES, Sums, coarse};
+use isograd::isosurface::local_level::coarse::is_needed;
+use isograd::isosurface::local_level::{Options, PASSES, Sums};
 
 use super::cells::take_means;
 use super::near::Near;
@@ -70,17 +71,17 @@ pub fn forward<R: Runtime, T: Scalar>(
         });
         flattened = after;
     }
-    if passes.len() == PASSES {
-        let before = passes.last().map(|pass| &pass.state);
-        state = near.weigh(&now, before, &seen, gain, state)?;
-    }
     let first_gain = passes.first().map_or(0.0, |pass| pass.gain);
-    let mut common = None;
-    if coarse::is_needed(first_gain) {
-        common = near.find_common(samples, options.area, first_gain, &state)?;
+    let mut coarse = None;
+    if is_needed(first_gain) {
+        if passes.len() == PASSES {
+            let before = passes.last().map(|pass| &pass.state);
+            state = near.weigh(&now, before, &seen, gain, state)?;
+        }
+        coarse = near.find_coarse(samples, options.area, first_gain, &state)?;
     }
-    if let Some(common) = &common {
-        near.sums(&common.given, &sums)?;
+    if let Some(coarse) = &coarse {
+        near.sums(&coarse.given, &sums)?;
         out = near.take(&out, &areas, &sums, 1.0, passes.is_empty())?;
     }
     let residual = Residual {
@@ -90,7 +91,7 @@ pub fn forward<R: Runtime, T: Scalar>(
         samples: packed,
         first: (passes.first()).map_or_else(|| state.clone(), |pass| pass.state.clone()),
         passes,
-        common,
+        coarse,
     };
     Ok((out, residual))
 }

@@ -52,7 +52,7 @@ pub struct Residual<T> {
     /// `(N, 8)` samples in sorted order: see `sample`.
     samples: Buffer<T>,
     passes: Vec<Pass<T>>,
-    common: Option<coarse::Common<T>>,
+    coarse: Option<coarse::CoarsePass<T>>,
     /// `(N, 2)` `s_i` and `u_i` before the first pass.
     first: Buffer<T>,
 }
@@ -77,8 +77,7 @@ impl<T> Residual<T> {
 
     /// `γ λ` of the coarse pass; 0 if there was none.
     pub fn coarse_gain(&self) -> f64 {
-        self.common
-            .as_ref()
-            .map_or(0.0, |common| common.coarse.gain())
+        let pass = self.coarse.as_ref();
+        pass.map_or(0.0, |pass| pass.coarse.gain())
     }
 }

@@ -5,7 +5,6 @@ use cubecl::prelude::*;
 use isograd::isosurface::local_level::{STEEPEST, Step, Sums};
 
 use super::cells::{FORM, Others, Taken, Tilt, pull_means, put_means_back};
-use super::coarse::Common;
 use super::near::Near;
 use super::plate;
 use super::pull_samples::{
@@ -59,7 +58,7 @@ pub fn pullback<R: Runtime, T: Scalar>(
     check_field("the cotangent of the indicator", chi_bar, grid)?;
     out.check(count)?;
     let values: Buffer<T> = zeros(device, count)?;
-    if residual.passes.is_empty() && residual.common.is_none() {
+    if residual.passes.is_empty() && residual.coarse.is_none() {
         return Ok(Cotangents {
             chi: chi.clone(),
             values,
@@ -82,15 +81,15 @@ pub fn pullback<R: Runtime, T: Scalar>(
         chi: chi.clone(),
         is_own: false,
     };
-    let mut of_common = 0.0;
-    if let Some(common) = &residual.common {
-        pulled.pull_given(&near, common, chi_bar)?;
+    let mut of_coarse = 0.0;
+    if let Some(coarse) = &residual.coarse {
+        pulled.pull_given(&near, &coarse.given, chi_bar)?;
         let bars = &mut pulled.bars;
-        of_common = near.pull_common(samples, residual.area_weights, common, bars)?;
+        of_coarse = near.pull_coarse(samples, residual.area_weights, coarse, bars)?;
     }
     let mut flattened_bar = 0.0;
     for (k, pass) in residual.passes.iter().enumerate().rev() {
-        let of_gain = if k == 0 { of_common } else { 0.0 };
+        let of_gain = if k == 0 { of_coarse } else { 0.0 };
         flattened_bar = pulled.pull_pass(&near, pass, chi_bar, [of_gain, flattened_bar])?;
     }
     let smoothing = pulled.pull_trust(&near, &residual.first, residual)?;
@@ -151,16 +150,16 @@ impl<T: Scalar> Pulled<T> {
     fn pull_given<R: Runtime>(
         &mut self,
         near: &Near<'_, R, T>,
-        common: &Common<T>,
+        given: &Buffer<T>,
         chi_bar: &Buffer<T>,
     ) -> Result<(), Error> {
-        near.sums(&common.given, &self.sums)?;
-        let (seen, _) = self.see_again(near, &common.given, 1.0, chi_bar)?;
-        self.pull_seen(near, &common.given, 1.0, &seen, Sums::default());
+        near.sums(given, &self.sums)?;
+        let (seen, _) = self.see_again(near, given, 1.0, chi_bar)?;
+        self.pull_seen(near, given, 1.0, &seen, Sums::default());
         self.pull_cell_means(near, 1.0, chi_bar)?;
         let samples = near.trusting()?;
         launch!(near.device, near.count(), BLOCK => pull_cells<T>(
-            near.order.keys, samples, self.node_bars, self.sums, common.given, self.bars,
+            near.order.keys, samples, self.node_bars, self.sums, given, self.bars,
             near.count() as u32, near.grid,
         ));
         Ok(())

@@ -41,8 +41,8 @@
 //! the face of a plate of one cell would be.
 //!
 //! # Residual
-//! `ω_i`; of each pass `s_i`, `u_i`, `λ` and the sums that determine it; of the coarse one also `γ`. The pullback computes the sums over cells
-//! again, and from them the `χ` before the passes.
+//! `ω_i`; of each pass `s_i`, `u_i`, `λ` and the sums that determine it; of the coarse one also `γ`. The pullback computes the
+//! sums over cells again, and from them the `χ` before the passes.
 //!
 //! # Pullback
 //! Let `χ̄` be the cotangent of the result, `T_o(x)` the trilinear weights, `Ē = −χ̄`, `M_o = D_o e_o`. The passes run
@@ -56,8 +56,9 @@
 //! x̂̄ += m̄ ∇Te + p̄ Σ_o v_o ∇T_o + w̄ ∇(n·∇e) + â Σ_o ∇B_o B̄_o
 //! n̄ += w̄ ∇e          â̄ += … + Σ_o B_o B̄_o          r̄ += ω s̄          ω̄ += r s̄
 //! ```
-//! where dots stand for the terms of the sums. The coarse pass uses the same lines on both grids, with `s̄' = Σ_o â B_o Ē_o/D_o`,
-//! `m̄ = γ λ' s̄'`, and `λ̄ −= 2 λ' Σ s̄' e'(x)` of the first pass where `γ` falls. At the end `r̄_i` is the cotangent of `χ(x_i)` and of `δ_i`, and
+//! where dots stand for the terms of the sums. The coarse pass uses these lines on both grids, with
+//! `s̄' = Σ_o â B_o Ē_o/D_o`, `m̄ = γ λ' s̄'`, and `λ̄ −= 2 λ' Σ s̄' e'(x)` of the first pass where `γ` falls. At the end
+//! `r̄_i` is the cotangent of `χ(x_i)` and of `δ_i`, and
 //! `c̄ −= Σ r̄_i`; `ω̄` and `δ̄` become parts of `ū` and, through `U`, of `â̄` (`trust`); from `ū` follow
 //! `n̄ += ū ∇χ`, `x̂̄ += ū ∇(n·∇χ)` and `χ̄_o += Σ_i ū_i n_i·∇B_o`. The cotangent of the input `χ` is that of the
 //! result plus this term, plus the term that [`iso_value::pullback`](super::iso_value::pullback) adds for `r̄`. `σ̄`
