@@ -21,6 +21,7 @@ mod selection;
 mod selection_tests;
 mod sparse;
 mod stages;
+mod stray;
 mod surface;
 mod text;
 mod thickened;

@@ -12,6 +12,8 @@ use crate::orient::rim;
 use crate::report::{Report, TOLERATED_SHARE, Warning};
 use crate::{Field, Real, distance, parallel, vector};
 
+use super::stray::stray;
+
 /// Samples further apart than this many cells of the surface leave holes between the supports of their splats.
 const SPARSE_CELLS: f64 = 1.25;
 /// Depth below a sample at which its own side must still be the nearest, in cells.
@@ -136,6 +138,7 @@ impl Report {
             warnings.extend(doubtful_signs(self.doubt, self.doubtful_regions.first()));
         }
         warnings.extend(guarded(self.guarded, points.len()));
+        warnings.extend(stray(points, neighborhoods));
     }
 }
 

@@ -23,6 +23,13 @@ pub enum Warning {
         /// Number of such samples.
         samples: usize,
     },
+    /// Samples lie apart from the surface, and from one another, but not so far that they are left out.
+    Stray {
+        /// Number of such samples.
+        samples: usize,
+        /// Share of the area of the surface that they are taken to stand for, from 0 to 1.
+        share: f64,
+    },
     /// Parts of the body are thinner than three cells.
     Thin {
         /// Share of the samples that lie on such parts, from 0 to 1.
@@ -90,7 +97,8 @@ pub enum Warning {
 
 impl Warning {
     /// Codes of all warnings.
-    pub const CODES: [&str; 12] = [
+    pub const CODES: [&str; 13] = [
+        "stray",
         "missed",
         "open",
         "inside-out",
@@ -109,6 +117,7 @@ impl Warning {
     pub fn code(&self) -> &'static str {
         match self {
             Self::Outliers { .. } => "outliers",
+            Self::Stray { .. } => "stray",
             Self::Thin { .. } => "thin",
             Self::Sparse { .. } => "sparse",
             Self::Open { .. } => "open",
@@ -127,7 +136,7 @@ impl Warning {
     pub fn severity(&self) -> Verdict {
         let is_bad = match self {
             Self::Open { .. } | Self::TouchesWall | Self::InsideOut { .. } => true,
-            Self::Missed { far, .. } => *far > TOLERATED_SHARE,
+            Self::Missed { far: share, .. } | Self::Stray { share, .. } => *share > TOLERATED_SHARE,
             _ => false,
         };
         if is_bad { Verdict::Bad } else { Verdict::Check }
@@ -138,6 +147,9 @@ impl Warning {
         match self {
             Self::Outliers { .. } => {
                 "outliers=\"keep\" (--outliers keep) if they are part of the shape"
+            }
+            Self::Stray { .. } => {
+                "the cloud without them: clean(points, statistical=(16, 2)) (isograd clean --statistical 16,2)"
             }
             Self::Thin { .. } if level != Level::Thin => {
                 "level=\"thin\" (--level thin), which keeps them whole, or smaller cells of the surface (surface, --surface)"
@@ -189,6 +201,11 @@ impl fmt::Display for Warning {
             Self::Outliers { samples } => write!(
                 f,
                 "{samples} samples were left out as outliers: they are isolated and further from the others than these extend"
+            ),
+            Self::Stray { samples, share } => write!(
+                f,
+                "{samples} samples lie apart from the surface and from one another; they stand for {} of its area",
+                percent(*share)
             ),
             Self::Thin { share } => write!(
                 f,
@@ -314,6 +331,10 @@ mod tests {
     fn every_warning_has_a_code_a_text_and_a_remedy_of_its_own() {
         let doubt = Doubt::count(10, &[(0, Reason::Thin)]);
         let all = [
+            Warning::Stray {
+                samples: 7,
+                share: 0.1,
+            },
             Warning::Missed {
                 share: 0.1,
                 far: 0.0,

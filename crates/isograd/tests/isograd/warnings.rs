@@ -1,5 +1,6 @@
 //! Every warning on a cloud that deserves it, and none on one that does not.
 
+use isograd::clean;
 use isograd::isosurface::Level;
 use isograd::orient::Method;
 use isograd::orient::doubt::Reason;
@@ -52,6 +53,37 @@ fn a_sound_cloud_has_no_warning() {
         assert_eq!(report.verdict(), Some(Verdict::Good));
         assert_eq!(report.conclusion(), "good");
     }
+}
+
+#[test]
+fn samples_in_mid_air_are_named_and_those_of_a_sparse_part_are_not() {
+    let mut random = Uniform::new(8);
+    let mut body = sphere(10_000, -1.0, [0.0; 3], 1.0);
+    let in_mid_air: Vec<[f64; 3]> = (0..400)
+        .map(|_| std::array::from_fn(|_| 4.0 * random.next() - 2.0))
+        .collect();
+    let cloud = [&body[..], &in_mid_air].concat();
+    let with = report(cloud.clone(), 48);
+    assert_eq!(codes(&with).first(), Some(&"stray"), "{with:?}");
+    assert_eq!(with.verdict(), Some(Verdict::Bad));
+    let statistical = Some(clean::Statistical {
+        neighbors: 16,
+        ratio: 2.0,
+    });
+    let options = clean::Options {
+        statistical,
+        ..clean::Options::default()
+    };
+    let cleaned = (0..2).fold(cloud, |cloud, _| {
+        let kept = clean::clean(&cloud, &options).expect("options").kept;
+        kept.iter().map(|&i| cloud[i as usize]).collect()
+    });
+    let without = report(cleaned, 48);
+    assert!(!codes(&without).contains(&"stray"), "{without:?}");
+    // One half of the sphere has a hundredth of the samples of the other.
+    body.retain(|p| p[2] > 0.0 || random.next() < 0.01);
+    let sparse = report(body, 48);
+    assert!(!codes(&sparse).contains(&"stray"), "{sparse:?}");
 }
 
 #[test]
