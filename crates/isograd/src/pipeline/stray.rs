@@ -4,10 +4,10 @@
 //! much room round each; but there they lie in a plane and are near to one another, and outliers fill a volume or have only the
 //! surface near them.
 
-use crate::element::{eigen, plane};
+use crate::element::eigen;
 use crate::neighbors::Neighborhoods;
 use crate::report::{TOLERATED_SHARE, Warning};
-use crate::{Real, parallel, vector};
+use crate::{Real, parallel, splat, vector};
 
 /// Radius of a neighborhood, in the distance between samples, from which a sample lies apart; usual are 2.8.
 const APART: f64 = 5.5;
@@ -35,10 +35,7 @@ pub(super) fn stray<T: Real>(
         return None;
     }
     let [of_apart, all] = parallel::sum_array(points.len(), |i| {
-        if neighborhoods.isolated[i] {
-            return [0.0; 2];
-        }
-        let area = plane::area(T::PI(), radius[i], neighborhoods.crowd[i]).f64();
+        let area = splat::area::at(neighborhoods, i).f64();
         [if is_apart(i) { area } else { 0.0 }, area]
     });
     let (samples, share) = (apart.len(), of_apart / all);

@@ -35,16 +35,22 @@ use crate::{Real, parallel, vector};
 /// They add up to the area of the surface where the sampling is even; for random samples the sum is
 /// lower, by about `3/count` of it, for each sample counts itself.
 pub fn forward<T: Real>(neighborhoods: &Neighborhoods<T>, areas: &mut Vec<T>) {
+    let count = neighborhoods.radius.len();
+    parallel::fill(areas, count, |i| at(neighborhoods, i));
+}
+
+/// The area of sample `i`.
+pub(crate) fn at<T: Real>(neighborhoods: &Neighborhoods<T>, i: usize) -> T {
     let Neighborhoods {
         radius,
         crowd,
         isolated,
         ..
     } = neighborhoods;
-    parallel::fill(areas, radius.len(), |i| match isolated[i] {
+    match isolated[i] {
         true => T::zero(),
         false => plane::area(T::PI(), radius[i], crowd[i]),
-    });
+    }
 }
 
 /// Mean of the positive areas, and their number.

@@ -12,7 +12,7 @@ use crate::{Buffer, Device, Error, Scalar};
 /// Residual of the coarse pass.
 #[derive(Clone, Debug)]
 pub(super) struct CoarsePass<T> {
-    /// What the CPU keeps.
+    /// Residual of the part on the CPU.
     pub coarse: Coarse<T>,
     /// `(N, 2)` in sorted order: the means that samples were given, and 0.
     pub given: Buffer<T>,

@@ -5,7 +5,6 @@
 //! those means are followed as offsets are.
 
 use super::Pass;
-use super::gain::Sums;
 use super::layer::Layer;
 use super::means::{CellMean, GridSamples, Reading};
 use super::pullback::{PassScratch, SampleBars};
@@ -26,9 +25,11 @@ const MARGIN: usize = 2;
 /// The gain `λ` of the first pass up to which the coarse pass counts in full, and from which it is left out.
 const SCATTERED: [f64; 2] = [0.25, 0.75];
 
-/// What the pullback of the coarse pass needs.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// Residual of the coarse pass.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Coarse<T> {
+    /// The coarse grid.
+    grid: Grid<T>,
     /// `γ`.
     pub(super) share: f64,
     /// On the coarse grid. Its slopes are those before the first pass, if there was none.
@@ -88,7 +89,7 @@ pub fn forward<T: Real>(
         samples,
         order: &order,
     };
-    let found = scratch.run(&near, sorted, first_gain, offsets)?;
+    let found = scratch.run(&near, sorted, first_gain, || offsets)?;
     Some((found, scratch.given))
 }
 
@@ -107,9 +108,7 @@ pub fn pullback<T: Real>(
         order: &order,
     };
     scratch.given_bar = given_bar;
-    if !scratch.average(&near, sorted, coarse) {
-        return Cotangent::default();
-    }
+    scratch.average(&near, sorted, coarse);
     let gain = scratch.pull(&near, coarse);
     let found = &scratch.samples;
     Cotangent {
@@ -158,35 +157,26 @@ fn coarse_grid<T: Real>(grid: &Grid<T>) -> Option<Grid<T>> {
     Grid::new(lower, spacing, shape).ok()
 }
 
-/// The sums that determine the gain on the coarse grid. Its cells are too large to measure how much is flattened.
-fn sums<T: Real>(near: &GridSamples<'_, T>, readings: &[Reading<T>], offsets: &[T]) -> Sums {
-    let [agreement, offset, prediction] = parallel::sum_array(readings.len(), |i| {
-        let (a, s) = (near.area(i).f64(), offsets[i].f64());
-        let p = readings[i].prediction.f64();
-        [a * s * p, a * s * s, a * p * p]
-    });
-    Sums::new([0.0, 1.0, agreement, offset, prediction])
-}
-
 impl<T: Real> Scratch<T> {
-    /// Finds the mean that each sample is given; nothing if there is nothing to follow.
+    /// Finds the mean that each sample is given; nothing if there is nothing to follow. `offsets` are asked for only if needed.
     pub(super) fn run(
         &mut self,
         near: &GridSamples<'_, T>,
         sorted: SortedSamples<'_, T>,
         first_gain: f64,
-        offsets: Vec<T>,
+        offsets: impl FnOnce() -> Vec<T>,
     ) -> Option<Coarse<T>> {
         let share = share(first_gain);
         if share == 0.0 {
             return None;
         }
-        let grid = &coarse_grid(near.grid)?;
-        let coarse = GridSamples { grid, ..*near };
-        self.layer.build(grid, sorted);
+        let (grid, offsets) = (coarse_grid(near.grid)?, offsets());
+        let coarse = near.on(&grid);
+        self.layer.build(&grid, sorted);
         coarse.average(&self.layer, &offsets, &mut self.means);
         coarse.read(&self.layer, &self.means, &offsets, &mut self.readings);
-        let sums = sums(&coarse, &self.readings, &offsets);
+        // Its cells are too large to measure how much of the slope is removed.
+        let sums = coarse.sums(&self.readings, &offsets, |_| T::zero());
         let [gain, _] = sums.gain(0.0);
         if gain == 0.0 {
             return None;
@@ -197,7 +187,7 @@ impl<T: Real> Scratch<T> {
             offsets,
             ..Pass::default()
         };
-        let found = Coarse { share, pass };
+        let found = Coarse { grid, share, pass };
         let (factor, readings) = (T::of(found.gain()), &self.readings);
         parallel::fill(&mut self.given, readings.len(), |i| {
             factor * readings[i].mean
@@ -207,18 +197,15 @@ impl<T: Real> Scratch<T> {
 }
 
 impl<T: Real> PullbackScratch<T> {
-    /// Finds the means again. Whether there is a coarse grid.
+    /// Finds the means again.
     pub(super) fn average(
         &mut self,
         near: &GridSamples<'_, T>,
         sorted: SortedSamples<'_, T>,
         coarse: &Coarse<T>,
-    ) -> bool {
-        let Some(grid) = &coarse_grid(near.grid) else {
-            return false;
-        };
-        let (factor, pass) = (T::of(coarse.gain()), &coarse.pass);
-        let coarse = GridSamples { grid, ..*near };
+    ) {
+        let Coarse { grid, pass, .. } = coarse;
+        let (factor, near) = (T::of(coarse.gain()), near.on(grid));
         let PassScratch {
             layer,
             means,
@@ -226,12 +213,11 @@ impl<T: Real> PullbackScratch<T> {
             ..
         } = &mut self.state;
         layer.build(grid, sorted);
-        coarse.average(layer, &pass.offsets, means);
-        coarse.read(layer, means, &pass.offsets, readings);
+        near.average(layer, &pass.offsets, means);
+        near.read(layer, means, &pass.offsets, readings);
         parallel::fill(&mut self.given, readings.len(), |i| {
             factor * readings[i].mean
         });
-        true
     }
 
     /// Reverses the pass on the grid of the indicator: from its cotangents to those of the means that samples were given, and to
@@ -262,16 +248,13 @@ impl<T: Real> PullbackScratch<T> {
 
     /// Reverses the pass on the coarse grid. Returns the cotangent of the gain of the first pass.
     pub(super) fn pull(&mut self, near: &GridSamples<'_, T>, coarse: &Coarse<T>) -> f64 {
-        let Some(grid) = &coarse_grid(near.grid) else {
-            return 0.0;
-        };
         let (given_bar, readings) = (&self.given_bar, &self.state.readings);
         let [factor_bar] = parallel::sum_array(readings.len(), |i| {
             [given_bar[i].f64() * readings[i].mean.f64()]
         });
-        let on_coarse = GridSamples { grid, ..*near };
-        self.pull_readings(&on_coarse, coarse, factor_bar);
-        self.pull_samples(&on_coarse, &coarse.pass);
+        let near = near.on(&coarse.grid);
+        self.pull_readings(&near, coarse, factor_bar);
+        self.pull_samples(&near, &coarse.pass);
         let [from, to] = SCATTERED;
         match 0.0 < coarse.share && coarse.share < 1.0 {
             true => -coarse.pass.gain * factor_bar / (to - from),
@@ -280,16 +263,12 @@ impl<T: Real> PullbackScratch<T> {
     }
 
     /// To the readings, and through the sums to offsets and areas.
-    fn pull_readings(
-        &mut self,
-        near: &GridSamples<'_, T>,
-        Coarse { share, pass }: &Coarse<T>,
-        factor_bar: f64,
-    ) {
-        let (bars, _) = pass.sums.pullback(0.0, share * factor_bar, 0.0);
+    fn pull_readings(&mut self, near: &GridSamples<'_, T>, coarse: &Coarse<T>, factor_bar: f64) {
+        let pass = &coarse.pass;
+        let (bars, _) = (pass.sums).pullback(0.0, coarse.share * factor_bar, 0.0);
         let [agreement, offset, prediction] =
             [bars.agreement, bars.offset, bars.prediction].map(T::of);
-        let (factor, two) = (T::of(share * pass.gain), T::of(2.0));
+        let (factor, two) = (T::of(coarse.gain()), T::of(2.0));
         let (given_bar, readings) = (&self.given_bar, &self.state.readings);
         let at = |i: usize| (near.area(i), pass.offsets[i], readings[i].prediction);
         parallel::fill(&mut self.state.reading_bars, readings.len(), |i| {

@@ -123,7 +123,7 @@ impl<T: Real> Scratch<T> {
     ) -> Option<coarse::Coarse<T>> {
         let first_gain = residual.passes[0].gain;
         let (remaining, trust) = (&self.remaining, &residual.trust);
-        let offsets = parallel::map(trust.len(), |i| trust[i] * remaining[i]);
+        let offsets = || parallel::map(trust.len(), |i| trust[i] * remaining[i]);
         let mut found = (self.coarse).run(near, sorted, first_gain, offsets)?;
         if done == 0 {
             found.pass.slopes = std::mem::take(&mut residual.passes[0].slopes);
@@ -155,7 +155,8 @@ impl<T: Real> Scratch<T> {
         }
         near.average(&self.layer, &pass.offsets, &mut self.means);
         near.read(&self.layer, &self.means, &pass.offsets, &mut self.readings);
-        pass.sums = near.sums(&self.readings, pass);
+        let (offsets, slopes) = (&pass.offsets, &pass.slopes);
+        pass.sums = near.sums(&self.readings, offsets, |i| slopes[i]);
         let [gain, flattened] = pass.sums.gain(flattened);
         pass.gain = gain;
         if gain != 0.0 {

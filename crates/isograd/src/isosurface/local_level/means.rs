@@ -2,7 +2,6 @@
 
 use pulp::Arch;
 
-use super::Pass;
 use super::gain::Sums;
 use super::layer::{Layer, NODES, Overlap};
 use super::stencil::Stencil;
@@ -185,14 +184,20 @@ impl<'a, T: Real> GridSamples<'a, T> {
         }
     }
 
-    /// The sums that determine the gain of a pass.
-    pub(super) fn sums(&self, readings: &[Reading<T>], pass: &Pass<T>) -> Sums {
+    /// The samples on another grid.
+    pub(super) fn on<'b>(&'b self, grid: &'b Grid<T>) -> GridSamples<'b, T> {
+        GridSamples { grid, ..*self }
+    }
+
+    /// The sums that determine the gain of a pass, from its `(N,)` offsets and the slopes `u`.
+    pub(super) fn sums(
+        &self,
+        readings: &[Reading<T>],
+        offsets: &[T],
+        slope: impl Fn(usize) -> T + Sync,
+    ) -> Sums {
         Sums::new(parallel::sum_array(readings.len(), |i| {
-            let (a, s, u) = (
-                self.area(i).f64(),
-                pass.offsets[i].f64(),
-                pass.slopes[i].f64(),
-            );
+            let (a, s, u) = (self.area(i).f64(), offsets[i].f64(), slope(i).f64());
             let (w, p) = (readings[i].slope.f64(), readings[i].prediction.f64());
             [a * w * u, a * u * u, a * s * p, a * s * s, a * p * p]
         }))

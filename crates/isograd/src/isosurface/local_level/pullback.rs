@@ -174,9 +174,7 @@ impl<T: Real> PullbackScratch<T> {
             coarse: scratch,
             ..
         } = self;
-        if !scratch.average(near, sorted, coarse) {
-            return 0.0;
-        }
+        scratch.average(near, sorted, coarse);
         scratch.pull_given(near, pass, total, corrections, samples);
         let gain_bar = scratch.pull(near, coarse);
         let (found, offsets, trust) = (&scratch.samples, &coarse.pass.offsets, &residual.trust);
