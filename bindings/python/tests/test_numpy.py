@@ -268,18 +268,19 @@ def test_bad_points_are_refused_with_a_reason(points, error, text):
 
 
 def test_outliers_are_left_out_and_have_no_gradient():
-    points = np.insert(SPHERE, 7, (500.0, 0.0, 3.0), axis=0)
+    left_out = [7, 30]
+    points = np.insert(np.insert(SPHERE, 7, (500.0, 0.0, 3.0), axis=0), 30, (0, 0, 0), axis=0)
     grid = isograd.Grid.fit(points, 32)
     assert grid == GRID
     result = isograd.reconstruct(points, grid)
     expected = isograd.reconstruct(SPHERE, GRID)
-    assert list(result.outliers) == [7] and result.report["outliers"] == {"count": 1, "indices": [7]}
-    assert "1 samples were left out" in result.warnings[0]
+    assert list(result.outliers) == left_out and result.report["outliers"] == {"count": 2, "indices": left_out}
+    assert "2 samples were left out" in result.warnings[0]
     assert bits(result.sdf) == bits(expected.sdf)
-    assert not result.normals[7].any() and result.confidence[7] == 0
+    assert not result.normals[left_out].any() and not result.confidence[left_out].any()
     gradient = result.pullback(sdf=result.sdf).points
-    assert not gradient[7].any()
-    assert bits(np.delete(gradient, 7, axis=0)) == bits(expected.pullback(sdf=expected.sdf).points)
+    assert not gradient[left_out].any()
+    assert bits(np.delete(gradient, left_out, axis=0)) == bits(expected.pullback(sdf=expected.sdf).points)
     kept = isograd.Grid.fit(points, 32, outliers="keep")
     assert kept.spacing > 100 * grid.spacing
     with pytest.raises(ValueError, match="point 7"):

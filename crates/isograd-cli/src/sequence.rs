@@ -53,7 +53,8 @@ fn corners(batch: &mut Batch) -> Result<Vec<[f64; 3]>, Error> {
         });
         match read {
             Ok(cloud) => {
-                let (_, used) = args.grid.outliers.apply(&cloud);
+                let used = args.grid.outliers.select(cloud.points());
+                let used = used.cloud(&cloud);
                 corners.extend(used.bounds().into_iter().flat_map(<[_; 2]>::from));
             }
             // It is printed when the frame is reached.

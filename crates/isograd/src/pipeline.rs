@@ -162,21 +162,21 @@ impl<T: Pipeline> Reconstructor<T> {
         self.is_whole = false;
         let cells = self.result.sdf.values().len();
         memory::check_points::<T>(cloud.len(), self.result.points.capacity(), cells)?;
-        let used = self.result.select(cloud, held);
-        let all = cloud;
-        let cloud = used.as_ref().unwrap_or(cloud);
-        self.result.start(cloud);
+        let mut used = self.result.select(cloud, held);
         for stage in Stage::ALL {
             if observer(stage).is_break() {
                 return Err(Error::Interrupted(stage));
             }
             let start = Instant::now();
-            let done = T::run(self, stage, cloud, held);
+            let done = match stage {
+                Stage::Normals => self.find_used(cloud, &mut used, held),
+                stage => T::run(self, stage, used.as_ref().unwrap_or(cloud), held),
+            };
             done.map_err(|error| self.result.selection.locate(error))?;
             let seconds = start.elapsed().as_secs_f64();
             self.result.report.seconds.set(stage, seconds);
         }
-        self.result.expand(all);
+        self.result.expand(cloud);
         self.is_whole = held.is_none();
         Ok(&self.result)
     }

@@ -63,8 +63,7 @@ class Grid:
             resolution: cells on the longest side; 128 unless ``spacing`` is given.
             spacing: cell size, in the unit of the points, instead of a resolution.
             padding: distance to every wall, as a fraction of the longest side (at least 4 cells).
-            outliers: whether isolated samples that are further from the others than these extend count; see
-                :class:`Outliers`.
+            outliers: whether samples that are far from all others, or in mid-air, count; see :class:`Outliers`.
 
         Raises:
             ValueError: no valid grid results, or both ``resolution`` and ``spacing`` are given.

@@ -87,7 +87,7 @@ class Walls(str, Enum):
 
 
 class Outliers(str, Enum):
-    """Use of outliers: isolated samples that are further from the others than these extend.
+    """Use of outliers: samples that are far from all others, or in mid-air.
 
     Attributes:
         IGNORE: left out, with a warning. Their gradients are 0.
@@ -131,7 +131,7 @@ class Options:
             4 times the typical distance between samples, ``"off"`` for none. φ is not changed by it.
         sheet: thickness of a membrane or sail, in the unit of the points, or ``"off"``: φ is the unsigned distance to the
             trimmed surface less half of it, and the mesh is the closed shell. ``trim`` is ``"auto"`` unless it is given.
-        outliers: use of isolated samples that are further from the others than these extend; see :class:`Outliers`.
+        outliers: use of samples that are far from all others, or in mid-air; see :class:`Outliers`.
         band: distance from the surface up to which φ is computed, in the unit of the points, or ``"full"``.
         checks: whether to measure the result and to check whether it can be trusted.
 

@@ -39,8 +39,7 @@ pub struct GridArgs {
     /// Its cells.
     #[command(flatten)]
     pub cells: CellArgs,
-    /// Use of outliers, isolated samples that are further from the others than these extend: ignore (left out, with a
-    /// warning) or keep
+    /// Use of outliers, samples that are far from all others or in mid-air: ignore (left out, with a warning) or keep
     #[arg(
         long,
         value_name = "ignore|keep",

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use isograd::isosurface::trim::Trim;
-use isograd::neighbors::Radius;
+use isograd::neighbors::{self, Radius};
 use isograd::orient::Method;
 use isograd::poisson::Walls;
 use isograd::sheet::Sheet;
 use isograd::{
-    Backend, Grid, Options, PointCloud, Report, RestoreError, Seconds, Solve, Stage,
-    SurfaceResolution,
+    Backend, Grid, Options, Outliers, PointCloud, Report, RestoreError, Seconds, Selection, Solve,
+    Stage, SurfaceResolution,
 };
 
 use super::work::{CallStart, Work};
@@ -26,8 +26,8 @@ pub struct Plan<T: Number> {
     name: String,
     grid: Grid<T>,
     options: Options,
-    /// Start of the next call, with [`Method::Previous`].
-    before: Option<CallStart<T>>,
+    /// With [`Method::Previous`], the start of the next call, and the strays among the samples that are not far from all others.
+    before: Option<(CallStart<T>, Vec<u32>)>,
 }
 
 impl<T: Number> Plan<T> {
@@ -96,35 +96,59 @@ impl<T: Number> Plan<T> {
         if observer(Stage::Normals).is_break() {
             return Err(Error::Interrupted(Stage::Normals));
         }
-        let (selection, used) = self.options.outliers.apply(cloud);
-        let mut result = self.reconstruct_used(&used, observer)?;
+        let far = self.options.outliers.select(cloud.points());
+        if let Some(result) = self.follow(cloud, &far, observer)? {
+            return Ok(result);
+        }
+        let method = self.options.orient;
+        let (mut selection, mut strays) = (far, Vec::new());
+        let mut used = selection.cloud(cloud);
+        let mut points = self.device.upload(used.points())?;
+        let mut begun = self.find(&used, &points, method, observer)?;
+        if begun.has_apart && self.options.outliers == Outliers::Ignore {
+            strays = neighbors::strays(used.points()).map_err(isograd::Error::from)?;
+        }
+        if !strays.is_empty() {
+            selection.leave_out(&strays);
+            used = selection.cloud(cloud);
+            points = self.device.upload(used.points())?;
+            let again = &mut |_| ControlFlow::Continue(());
+            begun = self.find(&used, &points, method, again)?;
+        }
+        let given = used.normals().filter(|_| method == Method::Given);
+        let (mut result, held) = self.run(&points, given, begun, observer)?;
+        if method == Method::Previous {
+            self.before = Some((next(held, &result)?, strays));
+        }
         result.set_selection(selection);
         Ok(result)
     }
 
-    /// Runs all stages on the samples that are used.
-    fn reconstruct_used(
+    /// All stages with radii, signs and strays of the call before, where that was of as many samples and few of their axes have
+    /// turned far. `far` are the samples that are far from all others.
+    fn follow(
         &mut self,
         cloud: &PointCloud<T>,
+        far: &Selection,
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
-    ) -> Result<Reconstruction<T>, Error> {
-        let points = self.device.upload(cloud.points())?;
-        let before = self.before.take();
-        if let Some(before) = before.filter(|before| before.report.points == cloud.len()) {
-            let (result, held) = self.run(&points, None, before, observer)?;
-            if turned::are_few(result.turned()?, cloud.len()) {
-                self.before = Some(next(held, &result)?);
-                return Ok(result);
-            }
+    ) -> Result<Option<Reconstruction<T>>, Error> {
+        let Some((before, strays)) = self.before.take() else {
+            return Ok(None);
+        };
+        let samples = before.report.points;
+        if samples + strays.len() + far.left_out().len() != cloud.len() {
+            return Ok(None);
         }
-        let method = self.options.orient;
-        let begun = self.find(cloud, &points, method, observer)?;
-        let given = cloud.normals().filter(|_| method == Method::Given);
-        let (result, held) = self.run(&points, given, begun, observer)?;
-        if method == Method::Previous {
-            self.before = Some(next(held, &result)?);
+        let mut selection = far.clone();
+        selection.leave_out(&strays);
+        let points = self.device.upload(selection.cloud(cloud).points())?;
+        let (mut result, held) = self.run(&points, None, before, observer)?;
+        if !turned::are_few(result.turned()?, samples) {
+            return Ok(None);
         }
-        Ok(result)
+        self.before = Some((next(held, &result)?, strays));
+        result.set_selection(selection);
+        Ok(Some(result))
     }
 
     /// The result again that a plan with the same grid and options made of `cloud`, with these normals: as
@@ -144,7 +168,13 @@ impl<T: Number> Plan<T> {
                 expected: cloud.len(),
             }));
         }
-        let (selection, used) = self.options.outliers.apply(cloud);
+        let mut selection = self.options.outliers.select(cloud.points());
+        // Those of samples that were left out are 0.
+        if (selection.gather(normals, 1)).contains(&[T::default(); 3]) {
+            let used = selection.cloud(cloud);
+            selection.leave_out(&neighbors::strays(used.points()).map_err(isograd::Error::from)?);
+        }
+        let used = selection.cloud(cloud);
         let mut result = self.restore_used(&used, selection.gather(normals, 1))?;
         result.set_selection(selection);
         Ok(result)
@@ -249,6 +279,7 @@ fn next<T: Number>(
         held: result.hold_after(held)?,
         axes: None,
         report,
+        has_apart: false,
     })
 }
 

@@ -97,6 +97,8 @@ pub struct CallStart<T: Scalar> {
     pub axes: Option<SampleAxes<T>>,
     /// Part of the report about the samples.
     pub report: Report,
+    /// Whether some of them lie apart, as [strays](isograd::neighbors::Neighborhoods::strays) do.
+    pub has_apart: bool,
 }
 
 /// Cotangents of radii, times these.
@@ -220,6 +222,7 @@ impl<R: SharedMemory, T: Scalar> Work<T> for Reconstructor<R, T> {
             method,
             guarded,
             flipped,
+            has_apart,
         } = search;
         if guarded == cloud.len() {
             let points = cloud.len();
@@ -234,7 +237,12 @@ impl<R: SharedMemory, T: Scalar> Work<T> for Reconstructor<R, T> {
             guarded,
             ..Report::default()
         };
-        Ok(CallStart { held, axes, report })
+        Ok(CallStart {
+            held,
+            axes,
+            report,
+            has_apart,
+        })
     }
 
     fn reconstruct(

@@ -46,6 +46,8 @@ pub struct Radii<T> {
     pub common: T,
     /// Typical distance between neighboring samples, as [`isograd::neighbors::Neighborhoods::spacing`] has it.
     pub spacing: T,
+    /// Whether some of the samples lie apart, as [strays](isograd::neighbors::Neighborhoods::strays) do.
+    pub has_apart: bool,
     /// The points, sorted, with these radii.
     pub neighborhoods: Neighborhoods<T>,
 }
@@ -79,7 +81,7 @@ pub fn forward<R: Runtime, T: Scalar>(
     let bounds = bounds(device, points)?;
     rule::check_extent(n, bounds)?;
     let sorted = sort_points(device, points, &zeros(device, n)?)?;
-    let automatic = automatic(device, &sorted, bounds)?;
+    let (automatic, has_apart) = automatic(device, &sorted, bounds)?;
     let common = rule::common(radius, automatic)?;
     let each = grow(device, &sorted, common)?;
     Ok(Radii {
@@ -87,6 +89,7 @@ pub fn forward<R: Runtime, T: Scalar>(
         each,
         common,
         spacing: rule::spacing(automatic, n),
+        has_apart,
     })
 }
 
@@ -130,16 +133,20 @@ pub(crate) fn bounds<R: Runtime, T: Scalar>(
     Ok([[ends[0], ends[1], ends[2]], [ends[3], ends[4], ends[5]]])
 }
 
+/// The automatic radius, and whether samples lie apart by it.
 fn automatic<R: Runtime, T: Scalar>(
     device: &Device<R>,
     neighborhoods: &Neighborhoods<T>,
     bounds: [[T; 3]; 2],
-) -> Result<T, crate::Error> {
+) -> Result<(T, bool), crate::Error> {
     let n = neighborhoods.len();
     let points = &neighborhoods.points;
     let squares = reaches(device, neighborhoods, points, AUTO_NEIGHBORS.min(n))?;
-    let found = rule::middle_half(&device.download(&squares)?, &mut Vec::new());
-    Ok(rule::automatic(found.map(|(_, mean)| mean), n, bounds))
+    let squares = device.download(&squares)?;
+    let mean = rule::middle_half(&squares, &mut Vec::new()).map(|(_, mean)| mean);
+    let automatic = rule::automatic(mean, n, bounds);
+    let is_apart = |&square: &T| rule::is_apart(square, automatic);
+    Ok((automatic, mean.is_some() && squares.iter().any(is_apart)))
 }
 
 /// The common radius, or what reaches the 8th sample with a margin, in input order.

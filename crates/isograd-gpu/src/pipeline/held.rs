@@ -46,6 +46,8 @@ pub(crate) struct SearchResult<T: Scalar> {
     pub guarded: usize,
     /// Axes whose sign was changed.
     pub flipped: usize,
+    /// See [`Radii::has_apart`](radius::Radii::has_apart).
+    pub has_apart: bool,
 }
 
 /// The axes of a cloud's samples, and the neighborhoods that they were found in.
@@ -94,6 +96,7 @@ impl<T: Scalar> RadiiAndSigns<T> {
             method: found.method.name(),
             guarded: plan.axes().guarded(),
             flipped: found.flipped,
+            has_apart: plan.neighborhoods().has_apart(),
         })
     }
 
@@ -168,6 +171,7 @@ impl<T: Scalar> RadiiAndSigns<T> {
             method: method.name(),
             guarded,
             flipped,
+            has_apart: found.has_apart,
         })
     }
 
@@ -193,6 +197,7 @@ impl<T: Scalar> RadiiAndSigns<T> {
             method: "given",
             guarded: 0,
             flipped: 0,
+            has_apart: found.has_apart,
         })
     }
 

@@ -2,11 +2,11 @@
 
 use isograd::distance::extend;
 use isograd::neighbors::Radius;
-use isograd::orient::Method;
+use isograd::orient::{Method, ParityOptions};
 use isograd::poisson::Walls;
 use isograd::{
-    Attribute, Backend, Cotangent, ExtensionCotangent, Grid, Options, PointCloud, PullbackError,
-    Real, Reconstructor, Resolution, Solve, Stage, SurfaceResolution,
+    Attribute, Backend, Cotangent, ExtensionCotangent, Grid, Options, Outliers, PointCloud,
+    PullbackError, Real, Reconstructor, Resolution, Solve, Stage, SurfaceResolution,
 };
 use isograd_gpu::host::{Choice, Error, Number, Plan, choose};
 use isograd_shapes::Sampling;
@@ -115,22 +115,43 @@ fn outliers_are_left_out_as_on_the_cpu<T: Number>(backend: Backend) {
     let grid = grid(&clean);
     let mut points = clean.points().to_vec();
     points.insert(5, [real(90.0), real(0.0), real(-3.0)]);
+    // Not far, but in mid-air.
+    points.insert(9, [real(0.0); 3]);
     let spoilt = PointCloud::new(points).unwrap();
-    let mut plan = Plan::new(backend, grid, options()).unwrap();
-    let expected = plan.reconstruct(&clean).unwrap();
-    let found = plan.reconstruct(&spoilt).unwrap();
-    assert_eq!(found.outliers(), [5]);
-    assert_eq!(found.points(), 2001);
-    assert_eq!(found.report().unwrap().outliers, [5]);
-    assert_eq!(found.sdf().unwrap(), expected.sdf().unwrap());
-    let mut normals = found.normals().unwrap().to_vec();
-    assert_eq!(normals.remove(5), [real::<T>(0.0); 3]);
-    assert_eq!(normals, expected.normals().unwrap());
-    let bar = vec![real::<T>(1.0); grid.cells()];
-    let cotangent = only(|of| of.sdf = Some(&bar));
-    let mut pulled = found.pullback(&cotangent).unwrap();
-    assert_eq!(pulled.points.remove(5), [real::<T>(0.0); 3]);
-    assert_eq!(pulled, expected.pullback(&cotangent).unwrap());
+    for method in [
+        Method::Auto,
+        Method::Parity(ParityOptions::default()),
+        Method::Previous,
+    ] {
+        // The second time with the radii and the signs of the first, where these are the method.
+        let all = |cloud: &PointCloud<T>| {
+            let mut plan = Plan::new(backend, grid, options().orient(method)).unwrap();
+            let first = plan.reconstruct(cloud).unwrap();
+            let second = plan.reconstruct(cloud).unwrap();
+            let restored = plan.restore(cloud, first.normals().unwrap()).unwrap();
+            [first, second, restored]
+        };
+        for (found, expected) in all(&spoilt).into_iter().zip(all(&clean)) {
+            assert_eq!(found.outliers(), [5, 9]);
+            assert_eq!(found.points(), 2002);
+            assert_eq!(found.report().unwrap().outliers, [5, 9]);
+            assert_eq!(found.sdf().unwrap(), expected.sdf().unwrap());
+            let mut normals = found.normals().unwrap().to_vec();
+            assert_eq!(normals.remove(9), [real::<T>(0.0); 3]);
+            assert_eq!(normals.remove(5), [real::<T>(0.0); 3]);
+            assert_eq!(normals, expected.normals().unwrap());
+            let bar = vec![real::<T>(1.0); grid.cells()];
+            let cotangent = only(|of| of.sdf = Some(&bar));
+            let mut pulled = found.pullback(&cotangent).unwrap();
+            assert_eq!(pulled.points.remove(9), [real::<T>(0.0); 3]);
+            assert_eq!(pulled.points.remove(5), [real::<T>(0.0); 3]);
+            assert_eq!(pulled, expected.pullback(&cotangent).unwrap());
+        }
+    }
+    // All of them kept, one lies outside.
+    let keep = options().outliers(Outliers::Keep);
+    let mut plan = Plan::new(backend, grid, keep).unwrap();
+    assert!(plan.reconstruct(&spoilt).is_err());
 }
 
 fn all_that_is_asked_for_is_what_the_cpu_gives<T: Number>(backend: Backend) {

@@ -31,7 +31,8 @@ impl<T: Real> Grid<T> {
         padding: T,
         outliers: Outliers,
     ) -> Result<Self, GridError> {
-        Self::fit_used(cloud, resolution, padding, &outliers.select(cloud.points()))
+        let selection = outliers.select_for_box(cloud.points());
+        Self::fit_used(cloud, resolution, padding, &selection)
     }
 
     /// The grid round the samples that are used.
@@ -116,7 +117,7 @@ impl<T: Real> Grid<T> {
                 points,
             });
         }
-        let selection = outliers.select(cloud.points());
+        let selection = outliers.select_for_box(cloud.points());
         let shape = Self::fit_used(cloud, resolution, padding, &selection)?.shape();
         let Some(ends) = ends(cloud.points(), selection.left_out()) else {
             return Err(GridError::NoExtent { points });

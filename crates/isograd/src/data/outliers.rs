@@ -1,24 +1,32 @@
-//! Outliers: few, isolated samples far from all others.
+//! Outliers: few, isolated samples far from all others, and [strays][Neighborhoods::strays] nearer to them.
 //!
-//! Distances are along the axis where they are largest. The samples that are kept are the smallest set that
+//! The former are found here. Distances are along the axis where they are largest. The samples that are kept are the smallest set that
 //!
 //! - holds the bulk: the box that all but `m` samples at either end of each axis lie in, widened by its longest side;
 //! - with the longest side `s` of its bounding box, holds every sample within `s` of that box, and every sample with three
 //!   others within `s`: four samples can bound a volume.
 //!
-//! All others are outliers, unless they are more than `m = min(N/100, √N)`: then there are none. So a body, a second one
+//! All others are far, unless they are more than `m = min(N/100, √N)`: then there are none. So a body, a second one
 //! far away, a ground plane and a thin tail are kept: each of their samples has neighbors, or continues what is kept.
 //! The result is independent of the order, position and scale of the points. `O(N)` operations.
+//!
+//! Strays show in the neighborhoods, which a reconstruction finds anyway; a grid that is fitted asks for them where few samples
+//! reach far.
+//!
+//! [Neighborhoods::strays]: crate::neighbors::Neighborhoods::strays
 
 use std::borrow::Cow;
 
 use super::cloud::{PointCloud, Sensors, bounds};
-use crate::{Real, vector};
+use crate::{Real, neighbors, parallel, vector};
 
 /// This many other samples nearby make a sample part of a body.
 const NEIGHBORS: usize = 3;
 
-/// Use of outliers: isolated samples that are further from the others than these extend.
+/// Share of the longest side of a box in which few samples at one end may be strays that enlarge it.
+const END: f64 = 0.05;
+
+/// Use of outliers: samples that are far from all others, or in mid-air.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Outliers {
     /// Left out of the fitted grid and of the reconstruction, with a warning. Their gradients are 0.
@@ -29,7 +37,7 @@ pub enum Outliers {
 }
 
 impl Outliers {
-    /// The samples to use.
+    /// The samples that are not far from all others.
     pub fn select<T: Real>(self, points: &[[T; 3]]) -> Selection {
         Selection {
             samples: points.len(),
@@ -40,11 +48,19 @@ impl Outliers {
         }
     }
 
-    /// The samples of a cloud to use, and the cloud of these.
-    pub fn apply<T: Real>(self, cloud: &PointCloud<T>) -> (Selection, Cow<'_, PointCloud<T>>) {
-        let selection = self.select(cloud.points());
-        let used = selection.used(cloud);
-        (selection, used.map_or(Cow::Borrowed(cloud), Cow::Owned))
+    /// The samples for the box of a grid: without strays, where these enlarge it.
+    pub(super) fn select_for_box<T: Real>(self, points: &[[T; 3]]) -> Selection {
+        let mut selection = self.select(points);
+        if self == Self::Ignore {
+            let used = match selection.is_all() {
+                true => Cow::Borrowed(points),
+                false => Cow::Owned(selection.gather(points, 1)),
+            };
+            if few_reach_far(&used) {
+                selection.leave_out(&neighbors::strays(&used).unwrap_or_default());
+            }
+        }
+        selection
     }
 }
 
@@ -69,6 +85,20 @@ impl Selection {
     /// Whether all samples are used.
     pub fn is_all(&self) -> bool {
         self.left_out.is_empty()
+    }
+
+    /// Leaves out more samples, given by their numbers, ascending, among those that were used.
+    pub fn leave_out(&mut self, used: &[u32]) {
+        let mut before = 0;
+        let more = used.iter().map(|&k| {
+            while (self.left_out.get(before)).is_some_and(|&i| i <= k + before as u32) {
+                before += 1;
+            }
+            k + before as u32
+        });
+        let more: Vec<u32> = more.collect();
+        self.left_out.extend(more);
+        self.left_out.sort_unstable();
     }
 
     /// Rows of `width` entries of the samples that are used, from those of all.
@@ -96,6 +126,11 @@ impl Selection {
         }
         all.extend_from_slice(&kept[start..]);
         all
+    }
+
+    /// The cloud of the samples that are used, without attributes, or the whole cloud.
+    pub fn cloud<'a, T: Real>(&self, cloud: &'a PointCloud<T>) -> Cow<'a, PointCloud<T>> {
+        self.used(cloud).map_or(Cow::Borrowed(cloud), Cow::Owned)
     }
 
     /// The cloud of the samples that are used, without attributes; `None` if it is the whole cloud.
@@ -150,7 +185,7 @@ struct Candidate {
 
 /// Indices of the outliers, ascending.
 fn find<T: Real>(points: &[[T; 3]]) -> Vec<u32> {
-    let most = (points.len() / 100).min(points.len().isqrt());
+    let most = most(points);
     if most == 0 || reaches_both_ends(points, most) {
         return Vec::new();
     }
@@ -189,6 +224,34 @@ fn find<T: Real>(points: &[[T; 3]]) -> Vec<u32> {
         return Vec::new();
     }
     candidates.iter().map(|c| c.index).collect()
+}
+
+/// Most samples that are far.
+fn most<T>(points: &[[T; 3]]) -> usize {
+    (points.len() / 100).min(points.len().isqrt())
+}
+
+/// Whether as few samples as may be far lie at an end of the box.
+fn few_reach_far<T: Real>(points: &[[T; 3]]) -> bool {
+    let Some((low, high)) = bounds(points) else {
+        return false;
+    };
+    let whole = Box {
+        low: vector::to_f64(low),
+        high: vector::to_f64(high),
+    };
+    let end = END * whole.longest();
+    let counts: [f64; 6] = parallel::sum_array(points.len(), |i| {
+        std::array::from_fn(|k| {
+            let (axis, x) = (k / 2, points[i][k / 2].f64());
+            let is_at_end = match k % 2 {
+                0 => x <= whole.low[axis] + end,
+                _ => x >= whole.high[axis] - end,
+            };
+            f64::from(u8::from(is_at_end))
+        })
+    });
+    counts.iter().any(|&count| count <= most(points) as f64)
 }
 
 /// Whether more than `most` samples lie in the first and in the last quarter of the longest axis. Then there are no

@@ -32,6 +32,9 @@ mod order_tests;
 mod radius;
 mod radius_pullback;
 pub mod rule;
+mod strays;
+#[cfg(test)]
+mod strays_tests;
 #[cfg(test)]
 pub(crate) mod tests;
 
@@ -42,3 +45,4 @@ pub(crate) use census::Census;
 pub use radius::{Error, Neighborhoods, Radii, Radius, forward, with_radii};
 pub(crate) use radius::{Found, forward_with, hold};
 pub use radius_pullback::{RadiiCotangent, pullback};
+pub use strays::strays;

@@ -226,10 +226,7 @@ pub(crate) fn forward_with<T: Real, U: Copy + Default + Send + Sync>(
     sorted: &mut Vec<Found<T, U>>,
     sum: &(impl Fn([T; 3], T, &Candidates<T>) -> U + Sync),
 ) -> Result<(), Error> {
-    check(points)?;
-    out.index.rebuild(points);
-    check_extent(&out.index)?;
-    out.automatic = automatic_radius(out);
+    find_automatic(points, out)?;
     out.spacing = rule::spacing(out.automatic, points.len());
     out.rule = radius;
     out.common_radius = rule::common(radius, out.automatic)?;
@@ -272,6 +269,18 @@ fn check<T: Real>(points: &[[T; 3]]) -> Result<(), Error> {
 
 fn check_extent<T: Real>(index: &CellIndex<T>) -> Result<(), Error> {
     rule::check_extent(index.len(), index.bounds().into())
+}
+
+/// Index, distances to the 24th sample, and automatic radius.
+pub(super) fn find_automatic<T: Real>(
+    points: &[[T; 3]],
+    out: &mut Neighborhoods<T>,
+) -> Result<(), Error> {
+    check(points)?;
+    out.index.rebuild(points);
+    check_extent(&out.index)?;
+    out.automatic = automatic_radius(out);
+    Ok(())
 }
 
 /// By the distances to the 24th sample, which stay in `out`.

@@ -22,6 +22,9 @@ pub const AUTO_NEIGHBORS: usize = 24;
 /// others, and rounding would tell their neighborhoods apart.
 pub const AUTO_MARGIN: f64 = 1.001;
 
+/// Distance to the 24th sample from which one lies apart, in automatic radii.
+const APART: f64 = 2.0;
+
 /// Share of its radius over which the weight of a neighbor in a normal falls to 0.
 const RIM: f64 = 0.2;
 
@@ -67,6 +70,12 @@ pub fn middle_half<T: Real>(squares: &[T], scratch: &mut Vec<T>) -> Option<([T; 
     middle.par_sort_unstable_by(order);
     let sum: f64 = middle.iter().map(|square| square.f64().sqrt()).sum();
     Some(([least, largest], T::of(sum / middle.len() as f64)))
+}
+
+/// Whether a sample lies apart, whose 24th nearest is at the root of `square`: see [`strays`](super::Neighborhoods::strays).
+pub fn is_apart<T: Real>(square: T, automatic: T) -> bool {
+    let least = T::of(APART) * automatic;
+    square > least * least
 }
 
 /// Typical distance between neighboring samples; see [`Neighborhoods::spacing`](super::Neighborhoods::spacing).

@@ -138,7 +138,7 @@ impl Report {
             warnings.extend(doubtful_signs(self.doubt, self.doubtful_regions.first()));
         }
         warnings.extend(guarded(self.guarded, points.len()));
-        warnings.extend(stray(points, neighborhoods));
+        warnings.extend(stray(neighborhoods));
     }
 }
 

@@ -73,16 +73,12 @@ impl<T: Pipeline> Reconstructor<T> {
             return Ok(());
         }
         self.is_whole = false;
-        let used = self.result.select(cloud, None);
-        let all = cloud;
-        let cloud = used.as_ref().unwrap_or(cloud);
-        self.result.start(cloud);
+        let mut used = self.result.select(cloud, None);
+        self.find_used(cloud, &mut used, None)?;
         let normals = self.result.selection.gather(saved.normals, 1);
         let orientation = &mut self.result.orientation;
-        orientation.normals.clear();
         orientation.confidence.clear();
         orientation.normals = normals;
-        self.normals(cloud, None)?;
         self.splat(None)?;
         // The pullback needs residuals of the indicator before the local iso-value was subtracted.
         self.solve()?;
@@ -99,7 +95,7 @@ impl<T: Pipeline> Reconstructor<T> {
         {
             return Err(RestoreError::Face { faces });
         }
-        self.result.expand(all);
+        self.result.expand(cloud);
         self.is_whole = true;
         Ok(())
     }

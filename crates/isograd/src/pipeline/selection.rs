@@ -1,8 +1,10 @@
 //! Outliers at the border of the pipeline: stages get the samples that are used, callers see all of them.
 
-use super::{CloudCotangent, Cotangent, Error, ExtensionCotangent, Reconstruction};
-use crate::data::{Attribute, PointCloud, Selection};
-use crate::report::Warning;
+use super::{
+    CloudCotangent, Cotangent, Error, ExtensionCotangent, Pipeline, Reconstruction, Reconstructor,
+};
+use crate::data::{Attribute, Outliers, PointCloud, Selection};
+use crate::report::{Stage, Warning};
 use crate::{Real, splat};
 
 /// Results for all samples of a cloud, where some were left out: for these the normal, the confidence, the area and the
@@ -78,6 +80,33 @@ impl Selection {
             }
         }
         error
+    }
+}
+
+impl<T: Pipeline> Reconstructor<T> {
+    /// Neighborhoods and axes of the samples that are used, and once more without [stray](crate::neighbors::Neighborhoods::strays)
+    /// ones, which show in the neighborhoods. `used` is the cloud of the samples that are used, where some are left out.
+    pub(super) fn find_used(
+        &mut self,
+        cloud: &PointCloud<T>,
+        used: &mut Option<PointCloud<T>>,
+        held: Option<&Reconstruction<T>>,
+    ) -> Result<(), Error> {
+        let first = used.as_ref().unwrap_or(cloud);
+        self.result.start(first);
+        T::run(self, Stage::Normals, first, held)?;
+        if held.is_some() || self.result.options.outliers == Outliers::Keep {
+            return Ok(());
+        }
+        let strays = self.result.residuals.neighborhoods.strays();
+        if strays.is_empty() {
+            return Ok(());
+        }
+        self.result.selection.leave_out(&strays);
+        *used = self.result.selection.used(cloud);
+        let left = used.as_ref().unwrap_or(cloud);
+        self.result.start(left);
+        T::run(self, Stage::Normals, left, None)
     }
 }
 

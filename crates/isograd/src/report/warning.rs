@@ -18,7 +18,7 @@ const SMALLEST_REASON: usize = 10;
 #[serde(untagged)]
 #[non_exhaustive]
 pub enum Warning {
-    /// Samples were left out: they are isolated, and further from the others than these extend.
+    /// Samples were left out: they are far from all others, or in mid-air.
     Outliers {
         /// Number of such samples.
         samples: usize,
@@ -200,7 +200,7 @@ impl fmt::Display for Warning {
         match self {
             Self::Outliers { samples } => write!(
                 f,
-                "{samples} samples were left out as outliers: they are isolated and further from the others than these extend"
+                "{samples} samples were left out as outliers: they are far from all others, or in mid-air"
             ),
             Self::Stray { samples, share } => write!(
                 f,

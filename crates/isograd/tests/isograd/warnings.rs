@@ -5,8 +5,8 @@ use isograd::isosurface::Level;
 use isograd::orient::Method;
 use isograd::orient::doubt::Reason;
 use isograd::{
-    Error, Grid, Options, PointCloud, Reconstructor, Report, Resolution, SurfaceResolution,
-    Verdict, Warning,
+    Error, Grid, Options, Outliers, PointCloud, Reconstructor, Report, Resolution,
+    SurfaceResolution, Verdict, Warning,
 };
 
 use crate::common::{TORUS, Uniform};
@@ -17,7 +17,8 @@ fn report(points: Vec<[f64; 3]>, cells: usize) -> Report {
 }
 
 fn report_with(cloud: &PointCloud<f64>, cells: usize, options: Options) -> Report {
-    let grid = Grid::fit(cloud, Resolution::Cells(cells), 0.1).expect("fits");
+    let resolution = Resolution::Cells(cells);
+    let grid = Grid::fit_with(cloud, resolution, 0.1, options.outliers).expect("fits");
     let mut plan = Reconstructor::new(grid, options).expect("valid options");
     plan.reconstruct(cloud)
         .expect("reconstructs")
@@ -63,9 +64,14 @@ fn samples_in_mid_air_are_named_and_those_of_a_sparse_part_are_not() {
         .map(|_| std::array::from_fn(|_| 4.0 * random.next() - 2.0))
         .collect();
     let cloud = [&body[..], &in_mid_air].concat();
-    let with = report(cloud.clone(), 48);
+    let kept = PointCloud::new(cloud.clone()).expect("finite points");
+    let with = report_with(&kept, 48, Options::default().outliers(Outliers::Keep));
     assert_eq!(codes(&with).first(), Some(&"stray"), "{with:?}");
     assert_eq!(with.verdict(), Some(Verdict::Bad));
+    // By default they are left out, but for those near the surface.
+    let default = report(cloud.clone(), 48);
+    assert_eq!(codes(&default), ["outliers"]);
+    assert!(default.outliers.len() > 300 && default.outliers[0] >= 10_000);
     let statistical = Some(clean::Statistical {
         neighbors: 16,
         ratio: 2.0,

@@ -1,0 +1,239 @@
+//! Stray samples, as those of a scan in mid-air: they lie apart from the surface and, where they are near to one another, fill
+//! a volume.
+//!
+//! A sample lies apart if its 24th nearest is more than twice the automatic radius away. It is off the surface if the nearest 10
+//! fill a volume, or if it is among the 24 nearest of few of its own. Samples of a sparse part of a surface lie apart too, but most
+//! of them in a plane, and each is near to its neighbors; and a sparse part goes on in a dense one. So whole groups are told, of
+//! samples apart that are among each other's 24 nearest, directly or by way of others. A group is stray if
+//!
+//! - half of it is off the surface,
+//! - samples that do not lie apart are few among its neighbors, and
+//! - half of all samples that are at least half as far apart as it are off: parts of a sparse surface that are hardly thicker than
+//!   its samples are apart fill a volume too, but then the rest of that surface does not.
+//!
+//! Strays in a sheet, and more than a tenth of the cloud, are not told from a surface.
+
+use super::radius::{Error, Neighborhoods, find_automatic};
+use super::rule::{self, AUTO_NEIGHBORS};
+use crate::element::eigen;
+use crate::{Real, parallel, vector};
+
+/// Neighbors of a sample, besides itself.
+const OTHERS: usize = AUTO_NEIGHBORS - 1;
+/// A sample is off the surface if it is among the nearest of less than this share of its neighbors.
+const LEAST_MUTUAL_SHARE: f64 = 0.125;
+/// Samples, the nearest and itself, that show whether those round it fill a volume. More would also be of the other side of a
+/// part that is three samples thick.
+const CLOSE: usize = 10;
+/// Quotients `λ₁/λ₂` and `λ₁/λ₃` of their covariance from which they do: below the first they lie in a plane, below the second on
+/// a line. Three in four of uniform random points of a volume have larger ones.
+const FILLED: [f64; 2] = [0.3, 0.1];
+/// Share of the neighbors of a group that may be samples of the surface which have it among theirs.
+const MOST_CONNECTED: f64 = 0.05;
+/// Distance between samples, in that of a group, from which others are compared with it.
+const AS_COARSE: f64 = 0.5;
+/// Largest share of a cloud that is stray.
+const MOST: f64 = 0.1;
+
+/// A sample that lies apart.
+#[derive(Clone, Default)]
+pub(crate) struct Apart<T> {
+    /// Its position in sorted order.
+    position: u32,
+    /// Its input index.
+    pub(crate) index: u32,
+    /// Whether it is off the surface.
+    pub(crate) is_off: bool,
+    /// Square of the distance to its 24th nearest.
+    reach: T,
+    /// Neighbors that do not lie apart, and have it among theirs.
+    connected: u32,
+    /// Positions of those that lie apart, and have it among theirs.
+    mutual: Vec<u32>,
+}
+
+/// A group of samples apart, each among the nearest of others.
+struct Group<T> {
+    members: usize,
+    off: usize,
+    connected: u32,
+    /// Median of the squares.
+    reach: T,
+}
+
+/// [`Neighborhoods::strays`] of `(N, 3)` points whose neighborhoods are on another device.
+///
+/// # Errors
+/// As [`forward`](super::forward).
+pub fn strays<T: Real>(points: &[[T; 3]]) -> Result<Vec<u32>, Error> {
+    let mut found = Neighborhoods::default();
+    find_automatic(points, &mut found)?;
+    Ok(found.strays())
+}
+
+impl<T: Real> Neighborhoods<T> {
+    /// Whether there are samples that lie apart, as all strays do.
+    pub fn has_apart(&self) -> bool {
+        self.middle.is_some()
+            && parallel::first(self.reach.len(), |position| self.is_apart(position)).is_some()
+    }
+
+    fn is_apart(&self, position: usize) -> bool {
+        rule::is_apart(self.reach[position], self.automatic)
+    }
+
+    /// Indices of the samples that lie apart from the surface and from one another, ascending. Independent of the order, position
+    /// and scale of the points. None with radii that were found elsewhere.
+    pub fn strays(&self) -> Vec<u32> {
+        let apart = self.apart();
+        let group = groups(&apart);
+        let mut members: Vec<Vec<usize>> = vec![Vec::new(); apart.len()];
+        for (k, &group) in group.iter().enumerate() {
+            members[group as usize].push(k);
+        }
+        let off_beyond = OffBeyond::new(&apart);
+        let mut strays = Vec::new();
+        for members in members.iter().filter(|members| !members.is_empty()) {
+            let group = Group::of(members, &apart);
+            if group.is_stray() && off_beyond.most_are(T::of(AS_COARSE * AS_COARSE) * group.reach) {
+                strays.extend(members.iter().map(|&k| apart[k].index));
+            }
+        }
+        if strays.len() as f64 > MOST * self.reach.len() as f64 {
+            return Vec::new();
+        }
+        strays.sort_unstable();
+        strays
+    }
+
+    /// The samples that lie apart, in sorted order.
+    pub(crate) fn apart(&self) -> Vec<Apart<T>> {
+        if self.middle.is_none() {
+            return Vec::new();
+        }
+        parallel::flat_map(self.reach.len(), |position| {
+            (self.is_apart(position)).then(|| self.look_round(position))
+        })
+    }
+
+    /// What the nearest of a sample say of it.
+    fn look_round(&self, position: usize) -> Apart<T> {
+        let mut nearest = Vec::with_capacity(AUTO_NEIGHBORS);
+        let center = self.index.point(position);
+        (self.index).nearest_positions(center, AUTO_NEIGHBORS, &mut nearest);
+        let mut apart = Apart {
+            position: position as u32,
+            index: self.index.order()[position],
+            reach: self.reach[position],
+            ..Apart::default()
+        };
+        for &(other, square) in &nearest {
+            let at = other as usize;
+            if at == position || square > self.reach[at] {
+                continue;
+            }
+            match self.is_apart(at) {
+                true => apart.mutual.push(other),
+                false => apart.connected += 1,
+            }
+        }
+        let mutual = f64::from(apart.connected) + apart.mutual.len() as f64;
+        let offset = |&(other, _): &(u32, T)| {
+            vector::to_f64(vector::sub(self.index.point(other as usize), center))
+        };
+        let close: Vec<[f64; 3]> = nearest.iter().take(CLOSE).map(offset).collect();
+        apart.is_off = mutual < LEAST_MUTUAL_SHARE * OTHERS as f64 || fill_a_volume(&close);
+        apart
+    }
+}
+
+impl<T: Real> Group<T> {
+    fn of(members: &[usize], apart: &[Apart<T>]) -> Self {
+        let mut reaches: Vec<T> = members.iter().map(|&k| apart[k].reach).collect();
+        let middle = reaches.len() / 2;
+        let order = |a: &T, b: &T| a.f64().total_cmp(&b.f64());
+        Self {
+            members: members.len(),
+            off: members.iter().filter(|&&k| apart[k].is_off).count(),
+            connected: members.iter().map(|&k| apart[k].connected).sum(),
+            reach: *reaches.select_nth_unstable_by(middle, order).1,
+        }
+    }
+
+    fn is_stray(&self) -> bool {
+        let neighbors = (OTHERS * self.members) as f64;
+        2 * self.off >= self.members && f64::from(self.connected) < MOST_CONNECTED * neighbors
+    }
+}
+
+/// How many of the samples are off the surface, of those that are farthest apart.
+struct OffBeyond<T> {
+    /// Squares of the distances to the 24th nearest, the largest first.
+    reaches: Vec<T>,
+    /// Number of samples off the surface up to each, itself included.
+    off: Vec<usize>,
+}
+
+impl<T: Real> OffBeyond<T> {
+    fn new(apart: &[Apart<T>]) -> Self {
+        let mut sorted: Vec<(T, bool)> = apart.iter().map(|a| (a.reach, a.is_off)).collect();
+        sorted.sort_unstable_by(|a, b| b.0.f64().total_cmp(&a.0.f64()));
+        let mut count = 0;
+        let off = sorted.iter().map(|&(_, is_off)| {
+            count += usize::from(is_off);
+            count
+        });
+        Self {
+            off: off.collect(),
+            reaches: sorted.into_iter().map(|(reach, _)| reach).collect(),
+        }
+    }
+
+    /// Whether half of the samples with such squares or larger ones are off.
+    fn most_are(&self, least: T) -> bool {
+        match self.reaches.partition_point(|&reach| reach >= least) {
+            0 => false,
+            samples => 2 * self.off[samples - 1] >= samples,
+        }
+    }
+}
+
+/// The group of each sample: the number of one of its members.
+fn groups<T>(apart: &[Apart<T>]) -> Vec<u32> {
+    let mut parent: Vec<u32> = (0..apart.len() as u32).collect();
+    fn root(parent: &mut [u32], mut k: u32) -> u32 {
+        while parent[k as usize] != k {
+            parent[k as usize] = parent[parent[k as usize] as usize];
+            k = parent[k as usize];
+        }
+        k
+    }
+    for (k, sample) in (0u32..).zip(apart) {
+        for position in &sample.mutual {
+            if let Ok(other) = apart.binary_search_by_key(position, |other| other.position) {
+                let [a, b] = [k, other as u32].map(|k| root(&mut parent, k));
+                parent[a.max(b) as usize] = a.min(b);
+            }
+        }
+    }
+    (0..apart.len() as u32)
+        .map(|k| root(&mut parent, k))
+        .collect()
+}
+
+/// Whether places, given by their offsets from one of them, fill a volume rather than lie in a plane or on a line.
+fn fill_a_volume(offsets: &[[f64; 3]]) -> bool {
+    let per_sample = 1.0 / offsets.len() as f64;
+    let sum = offsets.iter().fold([0.0; 3], |sum, &d| vector::add(sum, d));
+    let mean = vector::scale(sum, per_sample);
+    let mut covariance = [0.0; 6];
+    for &offset in offsets {
+        let [x, y, z] = vector::sub(offset, mean);
+        let products = [x * x, x * y, x * z, y * y, y * z, z * z];
+        for (sum, product) in covariance.iter_mut().zip(products) {
+            *sum += product;
+        }
+    }
+    let [first, second, third]: [f64; 3] = eigen::eigen(covariance.into()).values.into();
+    first > FILLED[0] * second && first > FILLED[1] * third
+}
