@@ -15,6 +15,9 @@ def context(data: dict) -> dict:
         "ratios": ratios(data, counts, methods),
         "noise_tables": {noise: noise_table(data, noise) for noise in noises(data)},
         "noise_ratios": noise_ratios(data),
+        "outlier_shapes": len({row["shape"] for row in data["with_outliers"]}),
+        "outlier_table": outlier_table(data),
+        "outlier_counts": outlier_counts(data),
     }
 
 
@@ -65,6 +68,41 @@ def noise_ratios(data: dict) -> str:
             row.append(" / ".join(number(sum(ratios) / len(ratios)) for ratios in both))
         rows.append(row)
     return table(["noise"], peers, rows)
+
+
+def by_share(data: dict) -> dict[float, dict[str, dict]]:
+    """Methods of each shape, by the share of outliers."""
+    found: dict[float, dict[str, dict]] = {}
+    for row in data["with_outliers"]:
+        found.setdefault(row["share"], {})[row["shape"]] = row["methods"]
+    return found
+
+
+def outlier_table(data: dict) -> str:
+    """Our mean distances in both directions."""
+    found = by_share(data)
+    names = [f"{100 * share:g} %" for share in found]
+    rows = [
+        [shape, *(" / ".join(map(number, of[shape]["default"]["means"])) for of in found.values())] for shape in found[0.0]
+    ]
+    return table(["shape"], names, rows)
+
+
+def outlier_counts(data: dict) -> str:
+    """Of how many shapes the mean distances are at most twice those without outliers, by method."""
+    found = by_share(data)
+    clean = found.pop(0.0)
+
+    def is_whole(of: dict, shape: str, method: str) -> bool:
+        pairs = zip(of[shape][method]["means"], clean[shape][method]["means"])
+        return all(after <= 2 * before for after, before in pairs)
+
+    methods = list(next(iter(clean.values())))
+    rows = [
+        [f"{100 * share:g} %", *(sum(is_whole(of, shape, method) for shape in of) for method in methods)]
+        for share, of in found.items()
+    ]
+    return table(["outliers"], methods, rows)
 
 
 def ratios(data: dict, counts: list[int], methods: list[str]) -> str:

@@ -1,7 +1,7 @@
 """Surfaces of real clouds against their true meshes, isograd beside PoissonRecon: `cargo xtask surfaces`.
 
 isograd gets the points alone; PoissonRecon, in Open3D, gets the true normals. Both have the same cell size. Some of the samples are
-also moved by noise; there PoissonRecon gets the normals of isograd as well."""
+also moved by noise, or have random points of a box among them; there PoissonRecon gets the normals of isograd."""
 
 import argparse
 import json
@@ -33,8 +33,11 @@ METHODS = {
 }
 SAMPLES = 200_000
 QUANTILES = [0.99, 0.999]
-# Clouds with noise: share of the longest side, samples, cells.
+# Clouds with noise, a share of the longest side, and with outliers, a share of the samples: samples, cells.
 NOISE = [0.0025, 0.005, 0.01]
+OUTLIERS = [0.0, 0.001, 0.01, 0.05]
+# Size of the box that the outliers are in, in that of the cloud.
+BOX = 1.6
 NOISY_SAMPLES = 30_000
 NOISY_CELLS = 128
 
@@ -54,38 +57,81 @@ def main() -> None:
             print(shape, cells, {k: [f"{x:.4f}" for x in v["means"]] for k, v in row["methods"].items()}, flush=True)
             rows.append(row)
     noisy = [row for shape in options.shapes for row in noisy_rows(options, shape)]
+    spoilt = [row for shape in options.shapes for row in rows_with_outliers(options, shape)]
     data = {"machine": report.machine(), "samples": SAMPLES, "quantiles": QUANTILES, "rows": rows}
     data |= {"noisy": noisy, "noisy_samples": NOISY_SAMPLES, "noisy_cells": NOISY_CELLS}
+    data |= {"with_outliers": spoilt, "outlier_box": BOX}
     options.json.parent.mkdir(parents=True, exist_ok=True)
     options.json.write_text(json.dumps(data, indent=1) + "\n")
     print(f"wrote {options.json}")
 
 
 def noisy_rows(options, shape: str) -> list[dict]:
-    truth = o3d.io.read_triangle_mesh(str(options.data / f"{shape}.mesh.ply"))
-    clean = o3d.io.read_point_cloud(str(options.data / f"{shape}.points.ply"))
-    size = max(clean.get_max_bound() - clean.get_min_bound())
     rows = []
     for noise in NOISE:
-        random = np.random.default_rng(11)
-        some = random.permutation(len(clean.points))[:NOISY_SAMPLES]
-        cloud = clean.select_by_index(some)
-        moves = noise * size * random.standard_normal((len(some), 3))
-        cloud.points = o3d.utility.Vector3dVector(np.asarray(cloud.points) + moves)
+        truth, cloud, random = some_samples(options, shape)
+        size = max(cloud.get_max_bound() - cloud.get_min_bound())
+        points = np.asarray(cloud.points)
+        cloud.points = o3d.utility.Vector3dVector(points + noise * size * random.standard_normal(points.shape))
         with tempfile.TemporaryDirectory() as folder:
-            path, oriented = Path(folder) / "cloud.ply", Path(folder) / "oriented.ply"
-            o3d.io.write_point_cloud(str(path), cloud)
+            path = write(cloud, folder)
             mesh, cell = isograd(options.program, path, NOISY_CELLS, [])
-            command = [options.program, "orient", path, "-o", oriented, "--quiet"]
-            subprocess.run(list(map(str, command)), check=True, stderr=subprocess.DEVNULL)
             methods = {
                 "default": compared(mesh, truth, cell),
                 "PoissonRecon": compared(poisson_recon(path, cell), truth, cell),
-                "PoissonRecon, our normals": compared(poisson_recon(oriented, cell), truth, cell),
+                "PoissonRecon, our normals": compared(poisson_recon(oriented(options.program, path), cell), truth, cell),
             }
         print(shape, noise, {k: [f"{x:.4f}" for x in v["means"]] for k, v in methods.items()}, flush=True)
         rows.append({"shape": shape, "noise": noise, "methods": methods})
     return rows
+
+
+def rows_with_outliers(options, shape: str) -> list[dict]:
+    rows = []
+    for share in OUTLIERS:
+        truth, cloud, random = some_samples(options, shape)
+        low, high = cloud.get_min_bound(), cloud.get_max_bound()
+        outliers = BOX * (high - low) * (random.random((round(share * NOISY_SAMPLES), 3)) - 0.5)
+        points = np.concatenate([np.asarray(cloud.points), (low + high) / 2 + outliers])
+        cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+        with tempfile.TemporaryDirectory() as folder:
+            path = write(cloud, folder)
+            mesh, cell = isograd(options.program, path, NOISY_CELLS, [])
+            kept, _ = isograd(options.program, path, NOISY_CELLS, ["--outliers", "keep"])
+            methods = {
+                "default": compared(mesh, truth, cell),
+                "kept": compared(kept, truth, cell),
+                "PoissonRecon": compared(poisson_recon(oriented(options.program, path), cell), truth, cell),
+            }
+            # Open3D counts the sample itself.
+            cleaned, _ = cloud.remove_statistical_outlier(17, 2.0)
+            path = oriented(options.program, write(cleaned, folder))
+            methods["PoissonRecon, cleaned"] = compared(poisson_recon(path, cell), truth, cell)
+        print(shape, share, {k: [f"{x:.4f}" for x in v["means"]] for k, v in methods.items()}, flush=True)
+        rows.append({"shape": shape, "share": share, "methods": methods})
+    return rows
+
+
+def some_samples(options, shape: str):
+    """The true mesh, random samples of the cloud, and a source of random numbers."""
+    truth = o3d.io.read_triangle_mesh(str(options.data / f"{shape}.mesh.ply"))
+    cloud = o3d.io.read_point_cloud(str(options.data / f"{shape}.points.ply"))
+    random = np.random.default_rng(11)
+    return truth, cloud.select_by_index(random.permutation(len(cloud.points))[:NOISY_SAMPLES]), random
+
+
+def write(cloud, folder: str) -> Path:
+    path = Path(folder) / "cloud.ply"
+    o3d.io.write_point_cloud(str(path), cloud)
+    return path
+
+
+def oriented(program: Path, cloud: Path) -> Path:
+    """The cloud with the normals that isograd finds."""
+    path = cloud.with_name("oriented.ply")
+    command = [program, "orient", cloud, "-o", path, "--quiet"]
+    subprocess.run(list(map(str, command)), check=True, stderr=subprocess.DEVNULL)
+    return path
 
 
 def isograd(program: Path, cloud: Path, cells: int, arguments_of: list[str]):

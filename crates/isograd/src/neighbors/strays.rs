@@ -6,7 +6,7 @@
 //! of them in a plane, and each is near to its neighbors; and a sparse part goes on in a dense one. So whole groups are told, of
 //! samples apart that are among each other's 24 nearest, directly or by way of others. A group is stray if
 //!
-//! - half of it is off the surface,
+//! - half of it is off the surface, or it is smaller than a neighborhood,
 //! - samples that do not lie apart are few among its neighbors, and
 //! - half of all samples that are at least half as far apart as it are off: parts of a sparse surface that are hardly thicker than
 //!   its samples are apart fill a volume too, but then the rest of that surface does not.
@@ -162,7 +162,8 @@ impl<T: Real> Group<T> {
 
     fn is_stray(&self) -> bool {
         let neighbors = (OTHERS * self.members) as f64;
-        2 * self.off >= self.members && f64::from(self.connected) < MOST_CONNECTED * neighbors
+        let is_off = 2 * self.off >= self.members || self.members < AUTO_NEIGHBORS;
+        is_off && f64::from(self.connected) < MOST_CONNECTED * neighbors
     }
 }
 

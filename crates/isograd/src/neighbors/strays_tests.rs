@@ -86,7 +86,7 @@ fn by_all_pairs(points: &[[f64; 3]]) -> Vec<u32> {
         reaches.sort_by(f64::total_cmp);
         let least = 0.5 * reaches[reaches.len() / 2];
         let as_coarse = apart.iter().copied().filter(|&i| reach[i] >= least);
-        if half_are_off(&group)
+        if (half_are_off(&group) || group.len() < NEAREST)
             && (connected as f64) < 0.05 * 23.0 * group.len() as f64
             && half_are_off(&as_coarse.collect::<Vec<_>>())
         {
