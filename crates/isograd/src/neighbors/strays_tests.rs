@@ -232,7 +232,7 @@ fn more_than_a_tenth_and_radii_from_elsewhere_give_none() {
     let same = vec![[1.0; 3]; 40];
     assert!(strays(&same).is_err());
     let lattice: Vec<[f64; 3]> = (0..1000)
-        .map(|k| [k % 10, k / 10 % 10, k / 100].map(|x| Real::of_usize(x)))
+        .map(|k| [k % 10, k / 10 % 10, k / 100].map(Real::of_usize))
         .collect();
     assert_eq!(strays(&lattice), Ok(Vec::new()));
 }

@@ -2,7 +2,7 @@
 
 use super::pair::{add_pair, displacement};
 use super::{Inputs, Sums};
-use crate::vector::{add, of_f64, scale, to_f64};
+use crate::vector::{add, dot, of_f64, scale, to_f64};
 use crate::{Real, parallel};
 
 /// Results of the stage.
@@ -18,12 +18,16 @@ pub(crate) struct Thickened<T> {
 pub(crate) fn forward<T: Real>(inputs: Inputs<'_, T>, out: &mut Thickened<T>) {
     let Thickened { points, sums } = out;
     let old = inputs.samples.points;
+    let is_thin = near_others(inputs);
     parallel::fill(sums, old.len(), |i| {
         let own = inputs.sample(i);
         let mut sums = Sums {
             own: own.area,
             ..Sums::default()
         };
+        if !is_thin[i] {
+            return sums;
+        }
         inputs.for_each_near(i, |j| {
             add_pair(&own, &inputs.sample(j), inputs.width, &mut sums);
         });
@@ -37,4 +41,15 @@ pub(crate) fn forward<T: Real>(inputs: Inputs<'_, T>, out: &mut Thickened<T>) {
         let normal = to_f64(inputs.samples.normals[i]);
         of_f64(add(to_f64(old[i]), scale(normal, away)))
     });
+}
+
+/// `(N,)` whether a sample has others of the opposite face within reach, in whose pairs alone a thickness shows.
+pub(super) fn near_others<T: Real>(inputs: Inputs<'_, T>) -> Vec<bool> {
+    let normals = inputs.samples.normals;
+    let [x, y, z] = [0, 1, 2].map(|a| inputs.sorted(|i| normals[i][a]));
+    // Those of no weight do not matter.
+    let limit = T::of(-0.499);
+    inputs.any_near([&x, &y, &z], &|position, other| {
+        dot([x[position], y[position], z[position]], other) < limit
+    })
 }

@@ -48,10 +48,10 @@ mod tests;
 pub(crate) use forward::{Thickened, forward};
 pub(crate) use pullback::pullback;
 
-use crate::Real;
-use crate::neighbors::CellIndex;
+use crate::neighbors::{Candidates, CellIndex, LANES};
 use crate::splat::Samples;
 use crate::vector::{dot, to_f64};
+use crate::{Real, parallel, simd};
 
 /// Radius within which the other face is sought, in widths.
 const REACH: f64 = 2.5;
@@ -110,6 +110,44 @@ impl<T: Real> Inputs<'_, T> {
         }
     }
 
+    /// `(N,)` whether any sample within reach of each has such values, `test(position of the sample, values)`; positions and
+    /// `values` are in sorted order. Much faster than to visit them.
+    fn any_near<const M: usize>(
+        &self,
+        values: [&[T]; M],
+        test: &(impl Fn(usize, [T; M]) -> bool + Sync),
+    ) -> Vec<bool> {
+        let (reach, arch) = (T::of(REACH * self.width), pulp::Arch::new());
+        let mut found = vec![false; self.index.len()];
+        self.index
+            .for_each_cell(reach, values, &mut found, &|cell, candidates, found| {
+                for (position, found) in cell.zip(found) {
+                    let point = self.index.point(position);
+                    *found = simd::vectorized!(
+                        arch,
+                        any_of(
+                            candidates,
+                            point,
+                            reach,
+                            #[inline(always)]
+                            |values| test(position, values),
+                        )
+                    );
+                }
+            });
+        let mut in_order = vec![false; found.len()];
+        for (&i, found) in self.index.order().iter().zip(found) {
+            in_order[i as usize] = found;
+        }
+        in_order
+    }
+
+    /// Values of all samples, in sorted order.
+    fn sorted(&self, value: impl Fn(usize) -> T + Sync) -> Vec<T> {
+        let order = self.index.order();
+        parallel::map(order.len(), |position| value(order[position] as usize))
+    }
+
     /// Calls `visit` for the other samples within reach of sample `i` whose normals are within 60° of its own, or of the
     /// opposite one.
     fn for_each_near(&self, i: usize, mut visit: impl FnMut(usize)) {
@@ -124,4 +162,27 @@ impl<T: Real> Inputs<'_, T> {
             }
         });
     }
+}
+
+/// Whether any candidate within a radius has such values.
+#[inline(always)]
+fn any_of<T: Real, const M: usize>(
+    candidates: &Candidates<T, M>,
+    point: [T; 3],
+    radius: T,
+    test: impl Fn([T; M]) -> bool,
+) -> bool {
+    let mut any = [false; LANES];
+    candidates.for_each_lanes(
+        radius,
+        #[inline(always)]
+        |lanes| {
+            for (l, any) in any.iter_mut().enumerate() {
+                let [x, y, z] = [0, 1, 2].map(|a| lanes.point[a][l] - point[a]);
+                let is_near = x * x + y * y + z * z <= lanes.limit[l];
+                *any |= is_near & test(lanes.values.map(|values| values[l]));
+            }
+        },
+    );
+    any.contains(&true)
 }

@@ -29,7 +29,13 @@ pub(crate) fn pullback<T: Real>(
         pull_sums(&sums[i], width, least, bar_along(i))
     });
     let (of_sums, of_least): (Vec<Sums>, Vec<f64>) = of_sums.into_iter().unzip();
-    let shares = parallel::map(sums.len(), |i| gather(inputs, &of_sums, i));
+    let none = Sums::default();
+    let moved = inputs.sorted(|i| T::of(f64::from(u8::from(of_sums[i] != none))));
+    let is_near = inputs.any_near([&moved], &|_, [moved]| moved > T::zero());
+    let shares = parallel::map(sums.len(), |i| match is_near[i] {
+        true => gather(inputs, &of_sums, i),
+        false => Share::default(),
+    });
     let bar = |i: usize| to_f64(moved_bar[i]);
     parallel::for_each(&mut out.points, |i, point| {
         *point = of_f64(add(to_f64(*point), add(bar(i), shares[i].point)));
@@ -49,7 +55,7 @@ pub(crate) fn pullback<T: Real>(
     [by_length / width, least_bar]
 }
 
-/// Sum over the pairs of sample `i`, and those of which it is the second.
+/// Sum over the pairs of sample `i`, and those of which it is the second: nothing unless one of them is moved.
 fn gather<T: Real>(inputs: Inputs<'_, T>, of_sums: &[Sums], i: usize) -> Share {
     let (own, mut share) = (inputs.sample(i), Share::default());
     let none = Sums::default();

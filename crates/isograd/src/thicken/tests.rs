@@ -7,6 +7,15 @@ type Cloud = (Vec<[f64; 3]>, Vec<[f64; 3]>, Vec<f64>);
 
 /// Samples of both faces of a disk of radius 1 that is `thickness` thick, and bent a little.
 fn plate(count: usize, thickness: f64, seed: u64) -> Cloud {
+    disk(count, |_| thickness, seed)
+}
+
+/// The same, thinner than the widths of the tests on one side and much thicker on the other.
+fn wedge(count: usize, seed: u64) -> Cloud {
+    disk(count, |x| 0.3 + 0.3 * x, seed)
+}
+
+fn disk(count: usize, thickness: impl Fn(f64) -> f64, seed: u64) -> Cloud {
     let mut random = Random::new(seed);
     let (mut points, mut normals) = (Vec::new(), Vec::new());
     while points.len() < count {
@@ -18,7 +27,7 @@ fn plate(count: usize, thickness: f64, seed: u64) -> Cloud {
         let up = [-0.4 * x, 0.2 * y, 1.0];
         let up = scale(up, 1.0 / norm(up));
         let middle = [x, y, 0.2 * x * x - 0.1 * y * y];
-        points.push(add(middle, scale(up, side * thickness)));
+        points.push(add(middle, scale(up, side * thickness(x))));
         normals.push(scale(up, 2.0 * side));
     }
     let areas = (0..count).map(|_| 4.0 * (0.5 + random.uniform()) / count as f64);
@@ -100,12 +109,23 @@ fn oracle((points, normals, areas): &Cloud, l: f64) -> Vec<[f64; 3]> {
 
 #[test]
 fn points_are_those_of_all_pairs() {
-    for (seed, thickness) in [(1, 0.0), (2, 0.03), (3, 0.09), (4, 0.14), (5, 0.3)] {
-        let cloud = plate(700, thickness, seed);
+    let plates = [(1, 0.0), (2, 0.03), (3, 0.09), (4, 0.14), (5, 0.3)];
+    let plates = plates.map(|(seed, thickness)| (thickness, plate(700, thickness, seed)));
+    for (thickness, cloud) in plates.into_iter().chain([(0.6, wedge(900, 6))]) {
         let (fast, slow) = (thickened(&cloud, 0.1), oracle(&cloud, 0.1));
         for (fast, slow) in fast.points.iter().zip(&slow) {
             assert!(norm(sub(*fast, *slow)) < 1e-13, "{thickness}");
         }
+    }
+}
+
+#[test]
+fn only_samples_near_the_other_face_are_looked_at() {
+    let cloud = wedge(4000, 13);
+    let near = with(&cloud, 0.1, T, forward::near_others);
+    // Within 2.5 widths of 0.1.
+    for (x, is_near) in cloud.0.iter().map(|p| p[0]).zip(near) {
+        assert!(is_near == (x < -0.3) || x.abs() < 0.3, "{x}");
     }
 }
 
@@ -156,8 +176,10 @@ fn dot_all(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
 
 #[test]
 fn cotangents_are_the_transpose_of_differences() {
-    for (seed, thickness) in [(7, 0.0), (8, 0.02), (9, 0.07), (10, 0.11), (11, 0.15)] {
-        let (cloud, width, n) = (plate(400, thickness, seed), 0.1, 400);
+    let plates = [(7, 0.0), (8, 0.02), (9, 0.07), (10, 0.11), (11, 0.15)];
+    let plates = plates.map(|(seed, thickness)| (seed, thickness, plate(400, thickness, seed)));
+    for (seed, thickness, cloud) in plates.into_iter().chain([(12, 0.6, wedge(400, 12))]) {
+        let (width, n) = (0.1, 400);
         let mut random = Random::new(seed + 100);
         let [dx, dn, da, bar] = [0; 4].map(|_| random_vectors(n, &mut random));
         let loss = |e: f64| {
