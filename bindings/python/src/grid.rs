@@ -4,6 +4,7 @@ use isograd::{Grid, Outliers, PointCloud, Resolution};
 use pyo3::prelude::*;
 
 use crate::arrays::{self, Number};
+use crate::background;
 use crate::errors::value;
 
 /// Lower corner, spacing and shape.
@@ -42,6 +43,7 @@ pub fn fit_grid(
     padding: f64,
     outliers: &str,
 ) -> PyResult<Parts> {
+    let py = points.py();
     let points = arrays::widened(points, "points")?;
     let resolution = match (spacing, resolution) {
         (Some(h), _) => Resolution::Spacing(h),
@@ -53,6 +55,7 @@ pub fn fit_grid(
     };
     let cloud = PointCloud::new(points).map_err(value)?;
     let outliers: Outliers = outliers.parse().map_err(value)?;
-    let grid = Grid::fit_with(&cloud, resolution, padding, outliers).map_err(value)?;
+    let fit = move |_: &_| Grid::fit_with(&cloud, resolution, padding, outliers);
+    let grid = background::run(py, fit)?.map_err(value)?;
     Ok((grid.lower(), grid.spacing(), grid.shape()))
 }

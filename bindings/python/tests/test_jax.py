@@ -272,8 +272,8 @@ def test_types_and_options_are_refused_at_once():
 def test_values_are_refused_with_the_text_of_the_core(by, monkeypatch):
     monkeypatch.setenv("ISOGRAD_JAX_CALLBACK", by)
     points, normals = torus(dtype=np.float32)
-    nan, far, huge = points.copy(), points.copy(), points.copy()
-    nan[3, 1], far[5] = np.nan, 3
+    nan, far, huge = points.copy(), points + 3, points.copy()
+    nan[3, 1] = np.nan
     huge[:] = 3e38
     on_a_line = np.linspace(-1, 1, 30, dtype=np.float32)[:, None] * np.float32([1, 0, 0])
     settings = _settings.encode(GRID, isograd.Options(checks=False))
