@@ -18,7 +18,7 @@
 use std::borrow::Cow;
 
 use super::cloud::{PointCloud, Sensors, bounds};
-use crate::{Real, neighbors, parallel, vector};
+use crate::{Real, neighbors, vector};
 
 /// This many other samples nearby make a sample part of a body.
 const NEIGHBORS: usize = 3;
@@ -241,17 +241,17 @@ fn few_reach_far<T: Real>(points: &[[T; 3]]) -> bool {
         high: vector::to_f64(high),
     };
     let end = END * whole.longest();
-    let counts: [f64; 6] = parallel::sum_array(points.len(), |i| {
-        std::array::from_fn(|k| {
-            let (axis, x) = (k / 2, points[i][k / 2].f64());
-            let is_at_end = match k % 2 {
+    let mut counts = [0; 6];
+    for point in points {
+        for (k, count) in counts.iter_mut().enumerate() {
+            let (axis, x) = (k / 2, point[k / 2].f64());
+            *count += usize::from(match k % 2 {
                 0 => x <= whole.low[axis] + end,
                 _ => x >= whole.high[axis] - end,
-            };
-            f64::from(u8::from(is_at_end))
-        })
-    });
-    counts.iter().any(|&count| count <= most(points) as f64)
+            });
+        }
+    }
+    counts.iter().any(|&count| count <= most(points))
 }
 
 /// Whether more than `most` samples lie in the first and in the last quarter of the longest axis. Then there are no
