@@ -106,10 +106,9 @@ impl<T: Number> Plan<T> {
         let mut points = self.device.upload(used.points())?;
         let mut begun = self.find(&used, &points, method, observer)?;
         if begun.has_apart && self.options.outliers == Outliers::Ignore {
-            strays = neighbors::strays(used.points()).map_err(isograd::Error::from)?;
+            strays = leave_out_strays(&used, &mut selection)?;
         }
         if !strays.is_empty() {
-            selection.leave_out(&strays);
             used = selection.cloud(cloud);
             points = self.device.upload(used.points())?;
             let again = &mut |_| ControlFlow::Continue(());
@@ -171,8 +170,7 @@ impl<T: Number> Plan<T> {
         let mut selection = self.options.outliers.select(cloud.points());
         // Those of samples that were left out are 0.
         if (selection.gather(normals, 1)).contains(&[T::default(); 3]) {
-            let used = selection.cloud(cloud);
-            selection.leave_out(&neighbors::strays(used.points()).map_err(isograd::Error::from)?);
+            leave_out_strays(&selection.cloud(cloud), &mut selection)?;
         }
         let used = selection.cloud(cloud);
         let mut result = self.restore_used(&used, selection.gather(normals, 1))?;
@@ -262,6 +260,16 @@ impl<T: Number> Plan<T> {
         clock.note(&mut begun.report, Stage::Orient);
         Ok(begun)
     }
+}
+
+/// Leaves the strays of the samples that are used out, and returns their numbers among these.
+fn leave_out_strays<T: Number>(
+    used: &PointCloud<T>,
+    selection: &mut Selection,
+) -> Result<Vec<u32>, Error> {
+    let strays = neighbors::strays(used.points()).map_err(isograd::Error::from)?;
+    selection.leave_out(&strays);
+    Ok(strays)
 }
 
 /// Start of the call after the one that made `result`.

@@ -50,11 +50,7 @@ impl<T: Real> Grid<T> {
         let none = GridError::NoExtent {
             points: cloud.len(),
         };
-        let used = match selection.is_all() {
-            true => cloud.bounds(),
-            false => bounds(&selection.gather(cloud.points(), 1)),
-        };
-        let Some((low, high)) = used else {
+        let Some((low, high)) = bounds(&selection.points(cloud.points())) else {
             return Err(none);
         };
         let extent: [f64; 3] = std::array::from_fn(|a| high[a].f64() - low[a].f64());

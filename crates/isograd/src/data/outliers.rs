@@ -52,10 +52,7 @@ impl Outliers {
     pub(super) fn select_for_box<T: Real>(self, points: &[[T; 3]]) -> Selection {
         let mut selection = self.select(points);
         if self == Self::Ignore {
-            let used = match selection.is_all() {
-                true => Cow::Borrowed(points),
-                false => Cow::Owned(selection.gather(points, 1)),
-            };
+            let used = selection.points(points);
             if few_reach_far(&used) {
                 selection.leave_out(&neighbors::strays(&used).unwrap_or_default());
             }
@@ -126,6 +123,14 @@ impl Selection {
         }
         all.extend_from_slice(&kept[start..]);
         all
+    }
+
+    /// The points that are used.
+    pub(super) fn points<'a, T: Real>(&self, all: &'a [[T; 3]]) -> Cow<'a, [[T; 3]]> {
+        match self.is_all() {
+            true => Cow::Borrowed(all),
+            false => Cow::Owned(self.gather(all, 1)),
+        }
     }
 
     /// The cloud of the samples that are used, without attributes, or the whole cloud.

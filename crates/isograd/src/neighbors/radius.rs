@@ -11,8 +11,8 @@ use crate::parallel::{self, CHUNK};
 use crate::{Real, vector};
 pub use given::{Radii, with_radii};
 
-/// Share of a neighborhood whose own radius must reach back to the sample, or the sample is isolated.
-const SMALLEST_MUTUAL_SHARE: f64 = 0.125;
+/// Share of a neighborhood whose own must reach back to the sample, or the sample is isolated.
+pub(super) const SMALLEST_MUTUAL_SHARE: f64 = 0.125;
 
 /// How large a neighborhood is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

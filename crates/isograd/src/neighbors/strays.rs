@@ -13,15 +13,13 @@
 //!
 //! Strays in a sheet, and more than a tenth of the cloud, are not told from a surface.
 
-use super::radius::{Error, Neighborhoods, find_automatic};
+use super::radius::{Error, Neighborhoods, SMALLEST_MUTUAL_SHARE, find_automatic};
 use super::rule::{self, AUTO_NEIGHBORS};
 use crate::element::eigen;
 use crate::{Real, parallel, vector};
 
 /// Neighbors of a sample, besides itself.
 const OTHERS: usize = AUTO_NEIGHBORS - 1;
-/// A sample is off the surface if it is among the nearest of less than this share of its neighbors.
-const LEAST_MUTUAL_SHARE: f64 = 0.125;
 /// Samples, the nearest and itself, that show whether those round it fill a volume. More would also be of the other side of a
 /// part that is three samples thick.
 const CLOSE: usize = 10;
@@ -116,7 +114,7 @@ impl<T: Real> Neighborhoods<T> {
         })
     }
 
-    /// What the nearest of a sample say of it.
+    /// Classifies a sample by its 24 nearest.
     fn look_round(&self, position: usize) -> Apart<T> {
         let mut nearest = Vec::with_capacity(AUTO_NEIGHBORS);
         let center = self.index.point(position);
@@ -142,7 +140,7 @@ impl<T: Real> Neighborhoods<T> {
             vector::to_f64(vector::sub(self.index.point(other as usize), center))
         };
         let close: Vec<[f64; 3]> = nearest.iter().take(CLOSE).map(offset).collect();
-        apart.is_off = mutual < LEAST_MUTUAL_SHARE * OTHERS as f64 || fill_a_volume(&close);
+        apart.is_off = mutual < SMALLEST_MUTUAL_SHARE * OTHERS as f64 || fill_a_volume(&close);
         apart
     }
 }

@@ -10,7 +10,7 @@ fn plate(count: usize, thickness: f64, seed: u64) -> Cloud {
     disk(count, |_| thickness, seed)
 }
 
-/// The same, thinner than the widths of the tests on one side and much thicker on the other.
+/// A disk that is thinner than the widths of the tests on one side, and much thicker on the other.
 fn wedge(count: usize, seed: u64) -> Cloud {
     disk(count, |x| 0.3 + 0.3 * x, seed)
 }
