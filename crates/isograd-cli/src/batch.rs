@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use isograd::Verdict;
+use isograd_io::Geometry;
 
 use crate::args;
 use crate::error::Error;
@@ -30,7 +31,7 @@ pub fn run(args: &args::Reconstruct, clouds: &[Cloud]) -> Result<(), Error> {
     };
     match args.sequence {
         true => sequence::run(&mut batch),
-        false => batch.go(&mut |job, progress| job.alone(progress)),
+        false => batch.go(&mut |job, geometry, progress| job.alone(geometry, progress)),
     }
 }
 
@@ -66,7 +67,8 @@ pub struct Batch<'a> {
 }
 
 /// Reconstructs a cloud that was read, and returns the verdict.
-pub type Reconstruct<'a> = dyn FnMut(&Job, &mut Progress) -> Result<Option<Verdict>, Error> + 'a;
+pub type Reconstruct<'a> =
+    dyn FnMut(&Job, Geometry, &mut Progress) -> Result<Option<Verdict>, Error> + 'a;
 
 impl Batch<'_> {
     /// Whether the outputs of cloud `k` exist, and so it is to be skipped.
@@ -89,7 +91,7 @@ impl Batch<'_> {
             let progress = &mut self.progress;
             progress.begin_cloud(k, self.clouds.len(), PARTS, name);
             let job = Job::read(self.args, &cloud.path, &self.outputs[k], progress);
-            match job.and_then(|job| reconstruct(&job, progress)) {
+            match job.and_then(|(job, geometry)| reconstruct(&job, geometry, progress)) {
                 Ok(verdict) => tally.add(verdict),
                 Err(error) if error.is_of_program() => return Err(error),
                 Err(error) => {

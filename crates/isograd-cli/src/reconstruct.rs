@@ -42,7 +42,8 @@ pub fn run(args: &args::Reconstruct) -> Result<(), Error> {
         ));
         return Ok(());
     }
-    let verdict = Job::read(args, &cloud, &outputs, &mut progress)?.alone(&mut progress)?;
+    let (job, geometry) = Job::read(args, &cloud, &outputs, &mut progress)?;
+    let verdict = job.alone(geometry, &mut progress)?;
     match verdict {
         Some(Verdict::Bad) if args.strict => Err(Error::Bad {
             file: file_name(&cloud),
@@ -136,20 +137,21 @@ pub struct Job<'a> {
     /// The file.
     pub cloud: &'a Path,
     outputs: &'a Outputs,
-    geometry: Geometry,
+    /// Number of points.
+    pub points: usize,
     start: Instant,
     read_seconds: f64,
     normals: Normals,
 }
 
 impl<'a> Job<'a> {
-    /// Reads a cloud.
+    /// Reads a cloud. What was read is not part of the job, so that its memory is free while the stages run.
     pub fn read(
         args: &'a args::Reconstruct,
         cloud: &'a Path,
         outputs: &'a Outputs,
         progress: &mut Progress,
-    ) -> Result<Self, Error> {
+    ) -> Result<(Self, Geometry), Error> {
         let start = Instant::now();
         progress.step("read");
         // Neither the field nor the pictures have attributes.
@@ -170,7 +172,7 @@ impl<'a> Job<'a> {
             start,
             read_seconds: start.elapsed().as_secs_f64(),
             normals: Normals::of(&geometry, &args.method.normals),
-            geometry,
+            points: geometry.points.len(),
         };
         if job.normals == Normals::Unused {
             let of = match args.sample {
@@ -182,43 +184,45 @@ impl<'a> Job<'a> {
             );
             progress.note("normals", &text);
         }
-        Ok(job)
+        Ok((job, geometry))
     }
 
-    /// Number of points.
-    pub fn points(&self) -> usize {
-        self.geometry.points.len()
-    }
-
-    /// Reconstructs the cloud on a grid of its own.
-    pub fn alone(&self, progress: &mut Progress) -> Result<Option<Verdict>, Error> {
-        let cloud = PointCloud::new(self.geometry.points.clone());
+    /// Reconstructs the cloud that was read on a grid of its own.
+    pub fn alone(
+        &self,
+        geometry: Geometry,
+        progress: &mut Progress,
+    ) -> Result<Option<Verdict>, Error> {
+        let cloud = PointCloud::new(geometry.points.clone());
         let grid = self.grid(&cloud.map_err(Error::input(self.cloud))?)?;
         match rounding(self.args, &grid) {
             Some(note) => {
                 progress.warn(&note);
-                self.alone_in::<f64>(Some(&note), progress)
+                self.alone_in::<f64>(geometry, Some(&note), progress)
             }
-            None if self.args.precision == Precision::F64 => self.alone_in::<f64>(None, progress),
-            None => self.alone_in::<f32>(None, progress),
+            None if self.args.precision == Precision::F64 => {
+                self.alone_in::<f64>(geometry, None, progress)
+            }
+            None => self.alone_in::<f32>(geometry, None, progress),
         }
     }
 
     fn alone_in<T: Number>(
         &self,
+        geometry: Geometry,
         note: Option<&str>,
         progress: &mut Progress,
     ) -> Result<Option<Verdict>, Error> {
-        let cloud = self.cloud::<T>()?;
+        let cloud = self.cloud::<T>(geometry)?;
         let grid = self.grid(&cloud)?;
         let orient = self.args.method.normals.method();
         let mut plan = plan(self.args, self.cloud, grid, orient, progress)?;
         self.with_plan(&mut plan, &cloud, &grid, note, progress)
     }
 
-    /// The cloud, with the sensors of the command line.
-    pub fn cloud<T: Real>(&self) -> Result<PointCloud<T>, Error> {
-        let cloud = self.geometry.cloud();
+    /// The cloud that was read, with the sensors of the command line.
+    pub fn cloud<T: Real>(&self, geometry: Geometry) -> Result<PointCloud<T>, Error> {
+        let cloud = geometry.cloud();
         let cloud = cloud.and_then(|cloud| self.args.method.normals.with_sensors(cloud));
         cloud.map_err(Error::input(self.cloud))
     }

@@ -3,7 +3,7 @@
 use isograd::orient::Method;
 use isograd::{Grid, Outliers, PointCloud, Real, Verdict};
 use isograd_backend::{Number, Plan};
-use isograd_io::Attributes;
+use isograd_io::{Attributes, Geometry};
 
 use crate::args::{self, Precision};
 use crate::batch::Batch;
@@ -17,7 +17,7 @@ use crate::reconstruct::{self, Job};
 /// As [`batch::run`](crate::batch::run), and where no frame can be read for the grid of all.
 pub fn run(batch: &mut Batch) -> Result<(), Error> {
     if (0..batch.clouds.len()).all(|k| batch.is_skipped(k)) {
-        return batch.go(&mut |job, progress| job.alone(progress));
+        return batch.go(&mut |job, geometry, progress| job.alone(geometry, progress));
     }
     let args = batch.args;
     let corners = corners(batch)?;
@@ -105,15 +105,20 @@ impl<T: Number> Sequence<T> {
     }
 
     fn go(mut self, batch: &mut Batch) -> Result<(), Error> {
-        batch.go(&mut |job, progress| self.step(job, progress))
+        batch.go(&mut |job, geometry, progress| self.step(job, geometry, progress))
     }
 
-    fn step(&mut self, job: &Job, progress: &mut Progress) -> Result<Option<Verdict>, Error> {
+    fn step(
+        &mut self,
+        job: &Job,
+        geometry: Geometry,
+        progress: &mut Progress,
+    ) -> Result<Option<Verdict>, Error> {
         self.check_points(job)?;
         let note = self.note.as_deref();
-        let cloud = job.cloud()?;
+        let cloud = job.cloud(geometry)?;
         let verdict = job.with_plan(&mut self.plan, &cloud, &self.grid, note, progress)?;
-        let first = || (job.points(), file_name(job.cloud));
+        let first = || (job.points, file_name(job.cloud));
         self.first.get_or_insert_with(first);
         Ok(verdict)
     }
@@ -121,10 +126,10 @@ impl<T: Number> Sequence<T> {
     /// Refuses another number of points than that of the first frame, if sides are carried over.
     fn check_points(&self, job: &Job) -> Result<(), Error> {
         match &self.first {
-            Some((points, first)) if self.orient == Method::Previous && *points != job.points() => {
+            Some((points, first)) if self.orient == Method::Previous && *points != job.points => {
                 Err(Error::input(job.cloud)(format!(
                     "it has {} points, and {first} has {points}; sides of normals are carried over between as many points in the same order; give --orient auto to find them in each frame",
-                    job.points()
+                    job.points
                 )))
             }
             _ => Ok(()),

@@ -32,7 +32,7 @@
 //! - Gradient: [`Reconstruction::pullback`] is the transpose of the derivative of the whole pipeline, and finite for every
 //!   input. [`gradcheck`] compares it with finite differences.
 //! - Determinism: the same input gives the same bits on any number of threads.
-//! - Memory: a second call of a plan with as many points allocates nothing of the size of a field.
+//! - Memory: a second call of a plan with as many points, up to a million, allocates nothing of the size of a field.
 //!
 //! # What is not
 //! - Signs are estimated. Where samples are sparse, noisy or the surface is open they may be wrong: see
@@ -69,6 +69,7 @@ pub mod distance;
 pub(crate) mod gather;
 pub mod gradcheck;
 pub mod isosurface;
+mod large;
 pub mod neighbors;
 pub mod normals;
 pub mod orient;

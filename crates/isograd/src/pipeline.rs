@@ -35,6 +35,7 @@ use std::time::Instant;
 use crate::data::blocks::BlockField;
 use crate::data::{Field, Grid, Mesh, PointCloud, Selection};
 use crate::isosurface::measure;
+use crate::large::is_large;
 use crate::report::Report;
 pub(crate) use crate::report::Stage;
 use crate::thicken::Thickened;
@@ -55,8 +56,8 @@ pub use text::ParseOptionError;
 
 /// A plan for one grid and one set of options: Fourier tables and scratch buffers, reused by every call.
 ///
-/// A second [`reconstruct`](Self::reconstruct) with as many points allocates nothing of the size of a
-/// field.
+/// A second [`reconstruct`](Self::reconstruct) with as many points allocates nothing of the size of a field, unless there
+/// are more than a million: then only results are kept.
 pub struct Reconstructor<T: Real> {
     scratch: Scratch<T>,
     result: Reconstruction<T>,
@@ -75,6 +76,23 @@ struct Scratch<T: Real> {
     isosurface: isosurface::Scratch,
     measure: measure::Scratch,
     distance: distance::Scratch<T>,
+}
+
+impl<T: Real> Scratch<T> {
+    /// Frees all that the stages after `stage` do not read.
+    fn free(&mut self, stage: Stage) {
+        let Self {
+            mut orient,
+            mut distance,
+            ..
+        } = std::mem::take(self);
+        orient.free();
+        self.orient = orient;
+        if stage == Stage::Distance {
+            distance.free_all_but_tree();
+            self.distance = distance;
+        }
+    }
 }
 
 impl<T: Pipeline> Reconstructor<T> {
@@ -161,7 +179,7 @@ impl<T: Pipeline> Reconstructor<T> {
     ) -> Result<&Reconstruction<T>, Error> {
         self.is_whole = false;
         let cells = self.result.sdf.values().len();
-        memory::check_points::<T>(cloud.len(), self.result.points.capacity(), cells)?;
+        memory::check_points::<T>(cloud.len(), self.result.points.len(), cells)?;
         let mut used = self.result.select(cloud, held);
         for stage in Stage::ALL {
             if observer(stage).is_break() {
@@ -173,6 +191,9 @@ impl<T: Pipeline> Reconstructor<T> {
                 stage => T::run(self, stage, used.as_ref().unwrap_or(cloud), held),
             };
             done.map_err(|error| self.result.selection.locate(error))?;
+            if is_large(self.result.points.len()) {
+                self.scratch.free(stage);
+            }
             let seconds = start.elapsed().as_secs_f64();
             self.result.report.seconds.set(stage, seconds);
         }
@@ -196,9 +217,9 @@ pub struct Reconstruction<T: Real> {
     selection: Selection,
     /// Results for all samples, where some were left out: all others are for those that are used.
     all: Option<Box<selection::AllSamples<T>>>,
-    points: Vec<[T; 3]>,
+    points: Arc<Vec<[T; 3]>>,
     /// Normals of the cloud, with [`orient::Method::Given`].
-    given: Vec<[T; 3]>,
+    given: Arc<Vec<[T; 3]>>,
     sdf: Field<T>,
     /// With a sparse solve, that of the coarsest cells.
     indicator: Field<T>,
@@ -243,8 +264,8 @@ impl<T: Pipeline> Reconstruction<T> {
             selection: Selection::default(),
             all: None,
             refined: None,
-            points: Vec::new(),
-            given: Vec::new(),
+            points: Arc::default(),
+            given: Arc::default(),
             sdf: Field::zeros(grid),
             indicator: Field::zeros(grid),
             sparse: None,
@@ -264,12 +285,11 @@ impl<T: Pipeline> Reconstruction<T> {
 impl<T: Real> Reconstruction<T> {
     /// Takes the samples of a cloud, for the stages to come.
     fn start(&mut self, cloud: &PointCloud<T>) {
-        self.points.clear();
-        self.points.extend_from_slice(cloud.points());
-        self.given.clear();
-        if let (orient::Method::Given, Some(normals)) = (self.options.orient, cloud.normals()) {
-            self.given.extend_from_slice(normals);
-        }
+        self.points = cloud.shared_points();
+        self.given = match self.options.orient {
+            orient::Method::Given => cloud.shared_normals(),
+            _ => Arc::default(),
+        };
         self.report = Report {
             points: self.selection.samples(),
             outliers: self.selection.left_out().to_vec(),

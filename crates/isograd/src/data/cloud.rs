@@ -1,5 +1,7 @@
 //! Samples of a surface.
 
+use std::sync::Arc;
+
 use crate::{Real, vector};
 
 /// A named value per sample, with a fixed number of components (a surface velocity has 3).
@@ -32,11 +34,12 @@ impl<T> Sensors<T> {
     }
 }
 
-/// Samples of a surface: `(N, 3)` points, and, where known, normals, sensors and attributes.
+/// Samples of a surface: `(N, 3)` points, and, where known, normals, sensors and attributes. Its reconstructions share
+/// points and normals with it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointCloud<T> {
-    points: Vec<[T; 3]>,
-    normals: Option<Vec<[T; 3]>>,
+    points: Arc<Vec<[T; 3]>>,
+    normals: Option<Arc<Vec<[T; 3]>>>,
     sensors: Option<Sensors<T>>,
     attributes: Vec<Attribute<T>>,
 }
@@ -127,7 +130,7 @@ impl<T: Real> PointCloud<T> {
             return Err(PointCloudError::NotFinite { index, x, y, z });
         }
         Ok(Self {
-            points,
+            points: Arc::new(points),
             normals: None,
             sensors: None,
             attributes: Vec::new(),
@@ -141,8 +144,8 @@ impl<T: Real> PointCloud<T> {
         sensors: Option<Sensors<T>>,
     ) -> Self {
         Self {
-            points,
-            normals,
+            points: Arc::new(points),
+            normals: normals.map(Arc::new),
             sensors,
             attributes: Vec::new(),
         }
@@ -163,7 +166,7 @@ impl<T: Real> PointCloud<T> {
         if let Some(index) = normals.iter().position(|&n| !vector::is_finite(n)) {
             return Err(PointCloudError::NormalNotFinite { index });
         }
-        self.normals = Some(normals);
+        self.normals = Some(Arc::new(normals));
         Ok(self)
     }
 
@@ -216,7 +219,17 @@ impl<T: Real> PointCloud<T> {
 
     /// `(N, 3)` normals, where the cloud has them.
     pub fn normals(&self) -> Option<&[[T; 3]]> {
-        self.normals.as_deref()
+        self.normals.as_ref().map(|normals| normals.as_slice())
+    }
+
+    /// `(N, 3)` points, without a copy.
+    pub(crate) fn shared_points(&self) -> Arc<Vec<[T; 3]>> {
+        self.points.clone()
+    }
+
+    /// `(N, 3)` normals, without a copy; empty where the cloud has none.
+    pub(crate) fn shared_normals(&self) -> Arc<Vec<[T; 3]>> {
+        self.normals.clone().unwrap_or_default()
     }
 
     /// Where the points were seen from, where that is known.

@@ -159,6 +159,10 @@ impl<T: Real> CellIndex<T> {
         [needed, size_of_val(self.entries.as_slice())]
     }
 
+    pub(super) fn free_scratch(&mut self) {
+        self.entries = Vec::new();
+    }
+
     /// Sorts `points` (finite; fewer than 2³²) into cells: `O(N log N)` whatever their distribution.
     pub fn new(points: &[[T; 3]]) -> Self {
         let mut index = Self::default();

@@ -139,6 +139,11 @@ impl<T: Real> Neighborhoods<T> {
         [tree + needed, work + size_of_val(self.sorted.as_slice())]
     }
 
+    pub(crate) fn free_scratch(&mut self) {
+        self.sorted = Vec::new();
+        self.index.free_scratch();
+    }
+
     /// Typical distance between neighboring samples, in the unit of the points: the side of the square
     /// that one sample has to itself on the surface, in the middle, `√(π/24)` of the automatic radius.
     pub fn spacing(&self) -> T {

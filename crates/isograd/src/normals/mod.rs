@@ -115,6 +115,10 @@ impl<T> Residual<T> {
         self.planes.iter().filter(|plane| plane.guarded).count()
     }
 
+    pub(crate) fn free_scratch(&mut self) {
+        self.sorted = Vec::new();
+    }
+
     /// Bytes of what the pullback needs, and of work space.
     pub(crate) fn bytes(&self) -> [usize; 2] {
         let needed = size_of_val(self.normals.as_slice())

@@ -8,6 +8,7 @@ use super::graph::{Graph, SecondSheet};
 use super::layers::{self, Surroundings};
 use super::signs::{Interpretation, Place, Signs, Verdict};
 use super::sites::Sites;
+use crate::large::is_large;
 use crate::neighbors::Neighborhoods;
 use crate::vector;
 use crate::{Real, parallel};
@@ -87,7 +88,15 @@ impl Auto {
         };
         self.graph.build(axes, neighborhoods, &sites);
         self.clusters.find(&self.graph, |p| place.user(p));
+        self.find_second_sheets();
+        let is_large = is_large(neighborhoods.index.len());
+        if is_large {
+            self.graph.free_offsets();
+        }
         self.collect(&place);
+        if is_large {
+            self.fill = Fill::default();
+        }
         let of_sensors = &mut self.evidence.views;
         of_sensors.clear();
         if let Some(views) = views {
@@ -118,7 +127,12 @@ impl Auto {
         order.map(|(p, &i)| (i as usize, self.signs.verdict(p), self.graph.parallel[p]))
     }
 
-    /// Collects the evidence of the fills and of the sheets.
+    fn find_second_sheets(&mut self) {
+        let (graph, sheets) = (&self.graph, &mut self.evidence.sheets);
+        parallel::fill_large(sheets, graph.near.len(), &|p| graph.second_sheet(p));
+    }
+
+    /// Collects the evidence of the fills, and of third sheets beside the second ones.
     fn collect(&mut self, place: &impl Surroundings) {
         let n = self.graph.near.len();
         let Evidence {
@@ -155,7 +169,6 @@ impl Auto {
         }
         self.graph.part_slabs(slabs);
         let graph = &self.graph;
-        parallel::fill_large(sheets, n, &|p| graph.second_sheet(p));
         parallel::fill(between, n, |p| {
             layers::is_between(graph, place, p, sheets[p])
         });

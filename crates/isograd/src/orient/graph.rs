@@ -85,6 +85,12 @@ impl Graph {
         self.measure_areas();
     }
 
+    /// Frees the offsets and what they were for. [`Self::second_sheet`] and the parts of the graph must have been found.
+    pub(super) fn free_offsets(&mut self) {
+        self.offset = Vec::new();
+        self.sheets = Sheets::default();
+    }
+
     fn take_axes<T: Real>(
         &mut self,
         axes: &Axes<'_, T>,

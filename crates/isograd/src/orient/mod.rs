@@ -138,6 +138,16 @@ pub struct Scratch {
     views: Vec<f32>,
 }
 
+impl Scratch {
+    /// Frees all but what a later call of [`Method::Previous`] follows.
+    pub(crate) fn free(&mut self) {
+        *self = Self {
+            previous: std::mem::take(&mut self.previous),
+            ..Self::default()
+        };
+    }
+}
+
 /// The axes of a cloud, in input order.
 #[derive(Clone, Copy, Debug)]
 pub struct Axes<'a, T> {
@@ -286,6 +296,7 @@ fn take_given<T: Real>(
     given: Option<&[[T; 3]]>,
     out: &mut Orientation<T>,
 ) -> Result<(), Error> {
+    out.normals.reserve_exact(points.len());
     for normal in units(points, given)? {
         out.normals.push(normal?);
     }

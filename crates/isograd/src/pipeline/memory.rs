@@ -8,6 +8,7 @@ use std::fmt;
 use super::sparse::Sparse;
 use super::{Error, Reconstruction};
 use crate::data::blocks::Blocks;
+use crate::large::is_large;
 use crate::{Grid, Real};
 
 /// Largest number of values held at once for each cell: φ, χ, the closest triangles, and the scratch buffers of the
@@ -15,11 +16,11 @@ use crate::{Grid, Real};
 const CELL_VALUES: f64 = 4.5;
 /// Those of them that a plan holds from the beginning: φ and χ.
 const FIRST_CELL_VALUES: f64 = 2.0;
-/// Bytes held at once for each sample, as measured there: search trees, neighborhoods, fitted planes and evidence for
-/// signs; the first part does not depend on the number type.
-const POINT_BYTES: f64 = 500.0;
-/// The second part, in values.
-const POINT_VALUES: f64 = 75.0;
+/// What is held at once for each sample, as measured there: search trees, neighborhoods, fitted planes and evidence for
+/// signs. In bytes that do not depend on the number type, and in values.
+const OF_POINT: [f64; 2] = [500.0, 75.0];
+/// The same for a [large](is_large) cloud, for which no scratch memory is kept.
+const OF_POINT_OF_LARGE: [f64; 2] = [400.0, 40.0];
 
 /// Largest number of values held at once for each cell in a block of a sparse solve: right-hand side and indicator of all
 /// octaves, and what the local iso-value needs.
@@ -145,7 +146,11 @@ pub(super) fn check_points<T: Real>(points: usize, held: usize, cells: usize) ->
     }
     let value = size_of::<T>() as f64;
     let cells = if held == 0 { cells as f64 } else { 0.0 };
-    let needed = (points - held) as f64 * (POINT_BYTES + POINT_VALUES * value)
+    let [bytes, values] = match is_large(points) {
+        true => OF_POINT_OF_LARGE,
+        false => OF_POINT,
+    };
+    let needed = (points - held) as f64 * (bytes + values * value)
         + cells * (CELL_VALUES - FIRST_CELL_VALUES) * value;
     Ok(check(MemoryUse::Points(points), needed, free)?)
 }

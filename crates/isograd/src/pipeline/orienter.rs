@@ -8,6 +8,7 @@ use super::stages::find_axes;
 use super::{Error, Pipeline, Residuals};
 use crate::Real;
 use crate::data::PointCloud;
+use crate::large::is_large;
 use crate::neighbors::{Neighborhoods, Radius};
 use crate::normals;
 use crate::orient::{self, Method, Orientation};
@@ -119,6 +120,9 @@ impl<T: Pipeline> Orienter<T> {
             &mut self.scratch,
             orientation,
         )?;
+        if is_large(cloud.len()) {
+            self.scratch.free();
+        }
         report.orientation = orientation.method.name();
         report.flipped = orientation.flipped;
         let start = done(report, Stage::Orient, start);

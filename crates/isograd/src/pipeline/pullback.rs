@@ -11,6 +11,7 @@ use crate::data::blocks::BlockField;
 use crate::data::cells::CellsMut;
 use crate::distance::extend;
 use crate::isosurface::{Level, local_level};
+use crate::large::is_large;
 use crate::neighbors::RadiiCotangent;
 use crate::orient::Method;
 use crate::poisson::screened;
@@ -39,7 +40,8 @@ impl<T: Pipeline> Reconstruction<T> {
     }
 
     /// Like [`pullback`](Self::pullback), writing into `out`. The scratch buffers stay with the reconstruction, or with
-    /// the plan that holds it: a second call allocates nothing of the size of a field.
+    /// the plan that holds it, unless there are more than a million samples: a second call allocates nothing of the size of a
+    /// field.
     ///
     /// # Errors
     /// As [`pullback`](Self::pullback); `out` is then not to be used.
@@ -56,7 +58,7 @@ impl<T: Pipeline> Reconstruction<T> {
         };
         let mut scratch = buffers().take().unwrap_or_default();
         let done = T::pull(self, cotangent, &mut scratch, out);
-        *buffers() = Some(scratch);
+        *buffers() = (!is_large(self.points.len())).then_some(scratch);
         done
     }
 }
@@ -92,6 +94,9 @@ impl<T: Real> Reconstruction<T> {
             let of_surface = vector::sub(scratch.samples.grid.lower, of_sdf);
             scratch.samples.grid.spacing *= ratio;
             scratch.samples.grid.spacing += vector::dot(of_surface, self.surface_offset());
+        }
+        if is_large(self.points.len()) {
+            scratch.free_indicator();
         }
         self.pull_samples(scratch, out);
         out.grid = GridCotangent {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::surface::{CELLS_PER_SPACING, HALVED_PER_SPACING};
 use super::{Error, Reconstruction, Reconstructor, Residuals, Solve, check_memory};
 use crate::data::{Field, Grid, PointCloud};
+use crate::large::is_large;
 use crate::neighbors::{Neighborhoods, Radius};
 use crate::report::{Report, Stage};
 use crate::sheet::Sheet;
@@ -226,6 +227,10 @@ pub(super) fn find_axes<T: Real>(
         _ if is_given => out.clear(),
         Some(_) => normals::forward(neighborhoods, out),
         None => {}
+    }
+    if is_large(points.len()) {
+        neighborhoods.free_scratch();
+        out.free_scratch();
     }
     report.radius = neighborhoods.common_radius.f64();
     report.sample_spacing = neighborhoods.spacing().f64();

@@ -5,7 +5,7 @@ use super::{Inputs, Sums};
 use crate::vector::{add, dot, of_f64, scale, to_f64};
 use crate::{Real, parallel};
 
-/// Results of the stage.
+/// Results of the stage; empty where no sample is moved, nor would be by a small change of the cloud.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Thickened<T> {
     /// `(N, 3)` `x'`.
@@ -33,8 +33,13 @@ pub(crate) fn forward<T: Real>(inputs: Inputs<'_, T>, out: &mut Thickened<T>) {
         });
         sums
     });
+    let away = |i: usize| displacement(&sums[i], inputs.width, inputs.least);
+    if parallel::first(old.len(), |i| away(i) != 0.0).is_none() {
+        *out = Thickened::default();
+        return;
+    }
     parallel::fill(points, old.len(), |i| {
-        let away = displacement(&sums[i], inputs.width, inputs.least);
+        let away = away(i);
         if away == 0.0 {
             return old[i];
         }

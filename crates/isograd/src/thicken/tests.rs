@@ -65,6 +65,10 @@ fn thickened(cloud: &Cloud, width: f64) -> Thickened<f64> {
 fn thickened_to(cloud: &Cloud, width: f64, least: f64) -> Thickened<f64> {
     let mut out = Thickened::default();
     with(cloud, width, least, |inputs| forward(inputs, &mut out));
+    assert_eq!(out.points.len(), out.sums.len());
+    if out.points.is_empty() {
+        out.points.clone_from(&cloud.0);
+    }
     out
 }
 

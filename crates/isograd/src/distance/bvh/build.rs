@@ -35,17 +35,16 @@ impl Bvh {
             0.0
         };
         self.sort(mesh);
-        let order = &self.keys;
-        parallel::fill_large(&mut self.frames, order.len(), &|i| {
-            Frame::new(corners(mesh, order[i].1))
+        let order = &self.faces;
+        parallel::fill_large(&mut self.frames, order.len(), &|place| {
+            Frame::new(corners(mesh, order[place]))
         });
         self.build_levels(mesh);
         Ok(())
     }
 
     fn sort<T: Real>(&mut self, mesh: &Mesh<T>) {
-        let mut keys = std::mem::take(&mut self.keys);
-        parallel::fill(&mut keys, mesh.faces().len(), |face| {
+        let mut keys = parallel::map(mesh.faces().len(), |face| {
             let face = face as u32;
             let [a, b, c] = corners(mesh, face);
             let centroid = scale(add(add(a, b), c), 1.0 / 3.0);
@@ -53,7 +52,7 @@ impl Bvh {
         });
         // The keys differ in the face, so an unstable sort has one result.
         keys.par_sort_unstable();
-        self.keys = keys;
+        parallel::fill(&mut self.faces, keys.len(), |place| keys[place].1);
     }
 
     /// A point in cells of the Morton curve over the box of the mesh.
@@ -62,19 +61,19 @@ impl Bvh {
     }
 
     fn build_levels<T: Real>(&mut self, mesh: &Mesh<T>) {
-        let keys = &self.keys;
+        let order = &self.faces;
         let leaf_box = |leaf: usize| {
-            let faces = &keys[leaf * LEAF..keys.len().min((leaf + 1) * LEAF)];
-            faces.iter().fold(EMPTY_BOX, |bounds, &(_, face)| {
+            let faces = &order[leaf * LEAF..order.len().min((leaf + 1) * LEAF)];
+            faces.iter().fold(EMPTY_BOX, |bounds, &face| {
                 corners(mesh, face).into_iter().fold(bounds, including)
             })
         };
-        let depth = depth(keys.len());
+        let depth = depth(order.len());
         self.levels.resize_with(depth, Vec::new);
         for level in 0..depth {
             let (below, rest) = self.levels.split_at_mut(level);
             match below.last() {
-                None => fill_level(&mut rest[0], keys.len().div_ceil(LEAF), leaf_box),
+                None => fill_level(&mut rest[0], order.len().div_ceil(LEAF), leaf_box),
                 Some(below) => fill_level(&mut rest[0], below.len(), |node| below[node].bounds()),
             }
         }

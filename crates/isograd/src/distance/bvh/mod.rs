@@ -52,8 +52,8 @@ pub(super) type Stack = Vec<Waiting>;
 /// Bounding volume hierarchy; see the head of this file.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Bvh {
-    /// Morton code and face, sorted.
-    keys: Vec<(u64, u32)>,
+    /// The faces along the Morton curve.
+    faces: Vec<u32>,
     frames: Vec<Frame>,
     /// From the nodes above the leaves up to the root.
     levels: Vec<Vec<Node>>,
@@ -81,18 +81,18 @@ impl Bvh {
     /// The face of the mesh at a place of the sorted order.
     #[inline(always)]
     pub(super) fn face(&self, place: u32) -> u32 {
-        self.keys[place as usize].1
+        self.faces[place as usize]
     }
 
     #[cfg(test)]
     pub(super) fn capacity(&self) -> usize {
         let nodes: usize = self.levels.iter().map(Vec::capacity).sum();
-        self.keys.capacity() + self.frames.capacity() + nodes
+        self.faces.capacity() + self.frames.capacity() + nodes
     }
 
     /// Number of triangles.
     pub(super) fn len(&self) -> usize {
-        self.keys.len()
+        self.faces.len()
     }
 
     /// Cells of the Morton curve per unit of length; 0 for a mesh without extent.

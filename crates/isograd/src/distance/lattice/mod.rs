@@ -86,7 +86,15 @@ impl<T: Real> Scratch<T> {
     }
 }
 
-impl<T> Scratch<T> {
+impl<T: Real> Scratch<T> {
+    /// Frees all that was for one grid.
+    pub(crate) fn free_all_but_tree(&mut self) {
+        *self = Self {
+            bvh: std::mem::take(&mut self.bvh),
+            ..Self::default()
+        };
+    }
+
     /// Capacity of all buffers, in entries.
     #[cfg(test)]
     pub(super) fn capacity(&self) -> usize {

@@ -65,6 +65,15 @@ impl<T: Real> PullbackScratch<T> {
         fill(&mut self.vertices, None, vertices, [T::zero(); 3]);
     }
 
+    /// Frees what only the stages after the samples need.
+    pub(super) fn free_indicator(&mut self) {
+        self.field = None;
+        self.poisson = poisson::Scratch::default();
+        self.level = local_level::PullbackScratch::default();
+        self.level_bars = local_level::Cotangent::default();
+        self.splat = splat::PullbackScratch::default();
+    }
+
     /// A field on the grid of `chi` with the given values, or zeros, in the memory of the last one.
     pub(super) fn take_field(&mut self, chi: &Field<T>, given: Option<&[T]>) -> Field<T> {
         let last = self.field.take().filter(|field| field.grid() == chi.grid());
