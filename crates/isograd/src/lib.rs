@@ -87,6 +87,7 @@ pub mod splat;
 mod testing;
 mod thicken;
 pub(crate) mod trilinear;
+mod union_find;
 
 use isograd_element::{self as element, vector};
 

@@ -16,7 +16,7 @@
 use super::radius::{Error, Neighborhoods, SMALLEST_MUTUAL_SHARE, find_automatic};
 use super::rule::{self, AUTO_NEIGHBORS};
 use crate::element::eigen;
-use crate::{Real, parallel, vector};
+use crate::{Real, parallel, union_find, vector};
 
 /// Neighbors of a sample, besides itself.
 const OTHERS: usize = AUTO_NEIGHBORS - 1;
@@ -198,26 +198,15 @@ impl<T: Real> OffBeyond<T> {
 }
 
 /// The group of each sample: the number of one of its members.
-fn groups<T>(apart: &[Apart<T>]) -> Vec<u32> {
-    let mut parent: Vec<u32> = (0..apart.len() as u32).collect();
-    fn root(parent: &mut [u32], mut k: u32) -> u32 {
-        while parent[k as usize] != k {
-            parent[k as usize] = parent[parent[k as usize] as usize];
-            k = parent[k as usize];
-        }
-        k
-    }
-    for (k, sample) in (0u32..).zip(apart) {
-        for position in &sample.mutual {
-            if let Ok(other) = apart.binary_search_by_key(position, |other| other.position) {
-                let [a, b] = [k, other as u32].map(|k| root(&mut parent, k));
-                parent[a.max(b) as usize] = a.min(b);
-            }
-        }
-    }
-    (0..apart.len() as u32)
-        .map(|k| root(&mut parent, k))
-        .collect()
+fn groups<T: Sync>(apart: &[Apart<T>]) -> Vec<u32> {
+    let mut group = Vec::new();
+    union_find::find(&mut group, apart.len(), |k| {
+        apart[k].mutual.iter().filter_map(|position| {
+            let found = apart.binary_search_by_key(position, |other| other.position);
+            found.ok().map(|other| other as u32)
+        })
+    });
+    group
 }
 
 /// Whether places, given by their offsets from one of them, fill a volume rather than lie in a plane or on a line.

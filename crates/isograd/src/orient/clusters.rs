@@ -2,9 +2,8 @@
 
 use super::fill::Lattice;
 use super::graph::Graph;
-use super::regions::{join, root};
 use super::signs::Place;
-use crate::{parallel, vector};
+use crate::{union_find, vector};
 
 /// Cells of the two grids over the median reach of the samples, and what their evidence weighs.
 const SCALES: [(f64, f32); 2] = [(0.8, 1.0), (1.6, 0.5)];
@@ -160,21 +159,18 @@ impl Clusters {
 
     fn link(&mut self, graph: &Graph) {
         let n = graph.near.len();
-        parallel::fill(&mut self.parent, n, |p| p as u32);
-        for p in 0..n {
-            for (&q, &d) in graph.near[p].iter().zip(&graph.offset[p]).take(LINKED) {
+        union_find::find(&mut self.parent, n, |p| {
+            let near = graph.near[p].iter().zip(&graph.offset[p]).take(LINKED);
+            let linked = near.filter(move |&(&q, &d)| {
                 let limit = LINK * graph.reach[p].max(graph.reach[q as usize]);
-                if vector::norm(d) <= limit {
-                    join(&mut self.parent, p as u32, q);
-                }
-            }
-        }
+                vector::norm(d) <= limit
+            });
+            linked.map(|(&q, _)| q)
+        });
         self.size.clear();
         self.size.resize(n, 0);
-        for p in 0..n as u32 {
-            let r = root(&mut self.parent, p);
-            self.parent[p as usize] = r;
-            self.size[r as usize] += 1;
+        for &root in &self.parent {
+            self.size[root as usize] += 1;
         }
     }
 

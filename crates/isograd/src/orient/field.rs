@@ -15,12 +15,11 @@
 //! normal consistency" (2024), who move the normals of all samples.
 
 use super::domains::STRONG;
-use super::graph::Graph;
-use super::regions;
+use super::graph::{Graph, NEIGHBORS};
 use super::signs::{Domains, Place};
 use super::winding::tree::Tree;
 use super::winding::{dipole, spread_evenly};
-use crate::{parallel, simd, vector};
+use crate::{parallel, simd, union_find, vector};
 
 /// A sample of a patch has less confidence than this, and all of them in the mean less than that.
 const SURE: f32 = 0.9;
@@ -218,22 +217,22 @@ fn probes(members: &[u32]) -> impl Iterator<Item = (u32, f64)> + '_ {
 /// Neighbors that face the same way and are not sure, joined.
 fn join(graph: &Graph, confidence: &[f32], sign: &[f32]) -> Vec<Vec<u32>> {
     let is_unsure = |p: usize| confidence[p] < SURE;
-    let unsure = || (0..sign.len()).filter(|&p| is_unsure(p));
-    let mut parent: Vec<u32> = (0..sign.len() as u32).collect();
-    for p in unsure() {
-        for (&near, &coupling) in graph.near[p].iter().zip(&graph.coupling[p]) {
-            let q = near as usize;
-            let signs = sign[p] * sign[q];
-            let cosine = signs * vector::dot(graph.axis[p], graph.axis[q]);
-            if is_unsure(q) && signs * coupling > STRONG && cosine > SMOOTH {
-                regions::join(&mut parent, p as u32, near);
-            }
-        }
-    }
+    let is_joined = |p: usize, slot: usize| {
+        let q = graph.near[p][slot] as usize;
+        let signs = sign[p] * sign[q];
+        let cosine = signs * vector::dot(graph.axis[p], graph.axis[q]);
+        is_unsure(q) && signs * graph.coupling[p][slot] > STRONG && cosine > SMOOTH
+    };
+    let mut parent = Vec::new();
+    union_find::find(&mut parent, sign.len(), |p| {
+        let slots = if is_unsure(p) { 0..NEIGHBORS } else { 0..0 };
+        let joined = slots.filter(move |&slot| is_joined(p, slot));
+        joined.map(move |slot| graph.near[p][slot])
+    });
     let (mut domain, mut count) = (vec![Domains::NONE; sign.len()], 0);
-    for p in unsure() {
+    for p in (0..sign.len()).filter(|&p| is_unsure(p)) {
         // A root comes before all others of its set.
-        let root = regions::root(&mut parent, p as u32) as usize;
+        let root = parent[p] as usize;
         domain[p] = if root == p { count } else { domain[root] };
         count += u32::from(root == p);
     }

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::union_find::join;
+
 /// Regions of cells that are free and joined through faces, held as runs along the rows of the grid.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Regions {
@@ -81,32 +83,6 @@ impl Regions {
             };
         }
     }
-}
-
-/// Joins the sets of `a` and `b`; the lower root stays.
-pub(super) fn join(parent: &mut [u32], a: u32, b: u32) {
-    // Most pairs share a parent: they are joined already.
-    if parent[a as usize] != parent[b as usize] {
-        let (a, b) = (root(parent, a), root(parent, b));
-        parent[a.max(b) as usize] = a.min(b);
-    }
-}
-
-/// The root of `a`, with the path to it halved.
-pub(super) fn root(parent: &mut [u32], mut a: u32) -> u32 {
-    while parent[a as usize] != a {
-        parent[a as usize] = parent[parent[a as usize] as usize];
-        a = parent[a as usize];
-    }
-    a
-}
-
-/// The root of `a`, which [`join`] may have left a few steps away.
-pub(super) fn settled_root(parent: &[u32], mut a: u32) -> u32 {
-    while parent[a as usize] != a {
-        a = parent[a as usize];
-    }
-    a
 }
 
 fn push_runs(row: &[u8], runs: &mut Vec<(u32, u32)>) {

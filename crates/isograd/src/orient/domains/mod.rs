@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use super::graph::Graph;
 use super::signs::{Domains, Place};
 use super::winding::Misfit;
-use crate::{parallel, vector};
+use crate::{parallel, union_find, vector};
 
 mod segments;
 mod ties;
@@ -50,18 +50,6 @@ struct SignedUnionFind {
 }
 
 impl SignedUnionFind {
-    fn reset(&mut self, belief: &[f32]) {
-        let n = belief.len();
-        parallel::fill(&mut self.parent, n, |p| p as u32);
-        parallel::fill(&mut self.relative, n, |_| 1.0);
-        parallel::fill(&mut self.has_belief, n, |p| belief[p].abs() >= NEGLIGIBLE);
-    }
-
-    /// Whether two points are seen to be of one domain already, without a look for its root.
-    fn share_parent(&self, p: usize, q: usize) -> bool {
-        self.parent[p] == self.parent[q]
-    }
-
     /// Root of `p`, and the sign of `p` relative to it.
     fn root(&mut self, mut p: u32) -> (u32, f32) {
         let mut sign = 1.0;
@@ -110,7 +98,6 @@ impl DomainSigns {
         winding: f64,
         place: &impl Place,
     ) {
-        self.domains.reset(belief);
         self.join_agreeing(graph, belief);
         self.join_undecided(graph, belief);
         let domains = self.number_domains();
@@ -141,18 +128,24 @@ impl DomainSigns {
     }
 
     fn join_agreeing(&mut self, graph: &Graph, belief: &[f32]) {
-        for p in 0..belief.len() {
-            for (&q, &coupling) in graph.near[p].iter().zip(&graph.coupling[p]) {
-                let (mine, other) = (belief[p], belief[q as usize]);
-                let both_decided = mine.abs() >= NEGLIGIBLE && other.abs() >= NEGLIGIBLE;
-                let product = mine.signum() * other.signum();
-                let agree = both_decided && coupling * product >= STRONG;
-                if agree && !self.domains.share_parent(p, q as usize) {
-                    let (a, b) = (self.domains.root(p as u32), self.domains.root(q));
-                    self.domains.join(a, b, product);
-                }
-            }
-        }
+        let product = |p: usize, q: u32| belief[p].signum() * belief[q as usize].signum();
+        let parent = &mut self.domains.parent;
+        union_find::find(parent, belief.len(), |p| {
+            let ties = graph.near[p].iter().zip(&graph.coupling[p]);
+            let agreeing = ties.filter(move |&(&q, &coupling)| {
+                let least = belief[p].abs().min(belief[q as usize].abs());
+                least >= NEGLIGIBLE && coupling * product(p, q) >= STRONG
+            });
+            agreeing.map(|(&q, _)| q)
+        });
+        // All signs are those of the beliefs.
+        let SignedUnionFind {
+            parent,
+            relative,
+            has_belief,
+        } = &mut self.domains;
+        parallel::fill(relative, belief.len(), |p| product(p, parent[p]));
+        parallel::fill(has_belief, belief.len(), |p| belief[p].abs() >= NEGLIGIBLE);
     }
 
     /// Points that the evidence has not reached follow their strongest couplings, strongest first.
@@ -198,16 +191,19 @@ impl DomainSigns {
             }
         };
         let mut own = vec![0.0; domains];
-        for p in 0..evidence.len() {
-            let a = self.domain[p];
-            own[a as usize] += self.sign[p] * evidence[p] * evidence[p].abs();
-            for (&q, &coupling) in graph.near[p].iter().zip(&graph.coupling[p]) {
-                tie(
-                    a,
-                    self.domain[q as usize],
-                    coupling * self.sign[p] * self.sign[q as usize],
-                );
-            }
+        for (p, &domain) in self.domain.iter().enumerate() {
+            own[domain as usize] += self.sign[p] * evidence[p] * evidence[p].abs();
+        }
+        let between = parallel::flat_map(self.domain.len(), |p| {
+            let ties = graph.near[p].iter().zip(&graph.coupling[p]);
+            ties.filter_map(move |(&q, &coupling)| {
+                let (a, b) = (self.domain[p], self.domain[q as usize]);
+                let weight = coupling * self.sign[p] * self.sign[q as usize];
+                (a != b).then_some((a, b, weight))
+            })
+        });
+        for (a, b, weight) in between {
+            tie(a, b, weight);
         }
         for (a, &own) in (0u32..).zip(&own) {
             tie(a, ground, own);

@@ -6,9 +6,9 @@
 //! the winding number decide between them as between domains: first large segments, then smaller ones. Signs change
 //! only if that is clearly better by the sum of all three.
 
-use super::super::regions::{root, settled_root};
 use super::{DomainSigns, Graph, Place, STRONG, Ties, number};
 use crate::parallel::{self, CHUNK};
+use crate::union_find::{root, settle};
 
 /// A segment holds at most one sample in so many, first and then.
 const SHARES: [usize; 3] = [50, 200, 500];
@@ -86,7 +86,8 @@ impl DomainSigns {
                 size[low] += size[high];
             }
         }
-        number(&mut self.domain, n, |p| settled_root(&parent, p as u32))
+        settle(&mut parent);
+        number(&mut self.domain, n, |p| parent[p])
     }
 
     /// Samples and neighbors of strong couplings that the signs agree with, for some samples after the other, and for each

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::{Doubt, Reason};
 use crate::data::bounds;
 use crate::neighbors::Neighborhoods;
-use crate::orient::regions::{join, root};
+use crate::union_find::{join, root};
 use crate::{Real, vector};
 
 /// Fewest samples of a region.
