@@ -1,7 +1,8 @@
 //! Clouds so large that memory matters more than the time to take it.
 
 /// Samples up to which scratch memory is kept, for the next stage or the next call. Where none is kept, large clouds need
-/// half of the memory; taking it again costs about a twentieth of the time of a second call, and none of the first.
+/// two thirds of the memory, and half of it with the pullback; taking it again costs about a twentieth of the time of a second
+/// call, and none of the first.
 ///
 /// Unit tests have clouds on both sides of a smaller number.
 const MOST: usize = if cfg!(test) { 3000 } else { 1 << 20 };

@@ -20,7 +20,7 @@ const FIRST_CELL_VALUES: f64 = 2.0;
 /// signs. In bytes that do not depend on the number type, and in values.
 const OF_POINT: [f64; 2] = [500.0, 75.0];
 /// The same for a [large](is_large) cloud, for which no scratch memory is kept.
-const OF_POINT_OF_LARGE: [f64; 2] = [400.0, 40.0];
+const OF_POINT_OF_LARGE: [f64; 2] = [420.0, 40.0];
 
 /// Largest number of values held at once for each cell in a block of a sparse solve: right-hand side and indicator of all
 /// octaves, and what the local iso-value needs.
