@@ -5,8 +5,8 @@ use crate::parallel;
 /// Items in a piece, whose joins to each other are made in parallel to those of other pieces.
 const PIECE: usize = if cfg!(test) { 50 } else { 1 << 15 };
 
-/// Makes `parent` hold the root of each of `n` items; `joined(item)` names some of those that it is joined to, all of them
-/// together with what the others name.
+/// Makes `parent` hold the root of each of `n` items. `joined(item)` names items that it is joined to; of each pair at least one
+/// names the other.
 pub(crate) fn find<I: IntoIterator<Item = u32>>(
     parent: &mut Vec<u32>,
     n: usize,
