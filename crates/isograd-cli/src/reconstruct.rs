@@ -145,7 +145,7 @@ pub struct Job<'a> {
 }
 
 impl<'a> Job<'a> {
-    /// Reads a cloud. What was read is not part of the job, so that its memory is free while the stages run.
+    /// Reads a cloud. The geometry comes apart from the job, so that its memory is free while the stages run.
     pub fn read(
         args: &'a args::Reconstruct,
         cloud: &'a Path,

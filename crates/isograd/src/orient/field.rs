@@ -15,7 +15,7 @@
 //! normal consistency" (2024), who move the normals of all samples.
 
 use super::domains::STRONG;
-use super::graph::{Graph, NEIGHBORS};
+use super::graph::Graph;
 use super::signs::{Domains, Place};
 use super::winding::tree::Tree;
 use super::winding::{dipole, spread_evenly};
@@ -217,17 +217,19 @@ fn probes(members: &[u32]) -> impl Iterator<Item = (u32, f64)> + '_ {
 /// Neighbors that face the same way and are not sure, joined.
 fn join(graph: &Graph, confidence: &[f32], sign: &[f32]) -> Vec<Vec<u32>> {
     let is_unsure = |p: usize| confidence[p] < SURE;
-    let is_joined = |p: usize, slot: usize| {
-        let q = graph.near[p][slot] as usize;
+    let face_the_same_way = |p: usize, q: usize, coupling: f32| {
         let signs = sign[p] * sign[q];
         let cosine = signs * vector::dot(graph.axis[p], graph.axis[q]);
-        is_unsure(q) && signs * graph.coupling[p][slot] > STRONG && cosine > SMOOTH
+        signs * coupling > STRONG && cosine > SMOOTH
     };
     let mut parent = Vec::new();
     union_find::find(&mut parent, sign.len(), |p| {
-        let slots = if is_unsure(p) { 0..NEIGHBORS } else { 0..0 };
-        let joined = slots.filter(move |&slot| is_joined(p, slot));
-        joined.map(move |slot| graph.near[p][slot])
+        let ties = graph.near[p].iter().zip(&graph.coupling[p]);
+        let joined = ties.filter(move |&(&near, &coupling)| {
+            let q = near as usize;
+            is_unsure(p) && is_unsure(q) && face_the_same_way(p, q, coupling)
+        });
+        joined.map(|(&q, _)| q)
     });
     let (mut domain, mut count) = (vec![Domains::NONE; sign.len()], 0);
     for p in (0..sign.len()).filter(|&p| is_unsure(p)) {

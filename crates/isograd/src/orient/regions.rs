@@ -59,14 +59,10 @@ impl Regions {
         while i < i_end && j < j_end {
             let (first, second) = (self.runs[i as usize], self.runs[j as usize]);
             if first.0 < second.1 && second.0 < first.1 {
-                self.join(i, j);
+                join(&mut self.region, i, j);
             }
             if first.1 < second.1 { i += 1 } else { j += 1 }
         }
-    }
-
-    fn join(&mut self, a: u32, b: u32) {
-        join(&mut self.region, a, b);
     }
 
     /// Turns roots into numbers 0, 1, 2, … in the order of their first run.

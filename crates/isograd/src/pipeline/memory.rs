@@ -16,10 +16,10 @@ use crate::{Grid, Real};
 const CELL_VALUES: f64 = 4.5;
 /// Those of them that a plan holds from the beginning: φ and χ.
 const FIRST_CELL_VALUES: f64 = 2.0;
-/// What is held at once for each sample, as measured there: search trees, neighborhoods, fitted planes and evidence for
-/// signs. In bytes that do not depend on the number type, and in values.
+/// Memory held at once for each sample, as measured there, for search trees, neighborhoods, fitted planes and evidence for
+/// signs: bytes that do not depend on the number type, and values.
 const OF_POINT: [f64; 2] = [500.0, 75.0];
-/// The same for a [large](is_large) cloud, for which no scratch memory is kept.
+/// [`OF_POINT`] of a [large](is_large) cloud, for which no scratch memory is kept.
 const OF_POINT_OF_LARGE: [f64; 2] = [420.0, 40.0];
 
 /// Largest number of values held at once for each cell in a block of a sparse solve: right-hand side and indicator of all

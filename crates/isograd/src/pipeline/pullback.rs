@@ -39,9 +39,8 @@ impl<T: Pipeline> Reconstruction<T> {
         Ok(out)
     }
 
-    /// Like [`pullback`](Self::pullback), writing into `out`. The scratch buffers stay with the reconstruction, or with
-    /// the plan that holds it, unless there are more than a million samples: a second call allocates nothing of the size of a
-    /// field.
+    /// Like [`pullback`](Self::pullback), writing into `out`. The scratch buffers of up to a million samples stay with
+    /// the reconstruction, or with the plan that holds it: a second call then allocates nothing of the size of a field.
     ///
     /// # Errors
     /// As [`pullback`](Self::pullback); `out` is then not to be used.

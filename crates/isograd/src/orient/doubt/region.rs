@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::{Doubt, Reason};
 use crate::data::bounds;
 use crate::neighbors::Neighborhoods;
-use crate::union_find::{join, root};
+use crate::union_find;
 use crate::{Real, vector};
 
 /// Fewest samples of a region.
@@ -43,18 +43,19 @@ pub fn regions<T: Real>(
     reasons: &[(u32, Reason)],
     neighborhoods: &Neighborhoods<T>,
 ) -> Vec<Region> {
-    let mut parent: Vec<u32> = (0..reasons.len() as u32).collect();
-    for (a, &(i, _)) in (0..).zip(reasons) {
-        let (center, radius) = (points[i as usize], neighborhoods.radius[i as usize]);
+    let mut root = Vec::new();
+    union_find::find(&mut root, reasons.len(), |a| {
+        let (i, mut near) = (reasons[a].0 as usize, Vec::new());
+        let (center, radius) = (points[i], neighborhoods.radius[i]);
         neighborhoods.index.for_each_within(center, radius, |j, _| {
-            if let Ok(b) = reasons.binary_search_by_key(&(j as u32), |r| r.0) {
-                join(&mut parent, a, b as u32);
-            }
+            let found = reasons.binary_search_by_key(&(j as u32), |r| r.0);
+            near.extend(found.ok().map(|b| b as u32));
         });
-    }
+        near
+    });
     let mut members = vec![Vec::new(); reasons.len()];
-    for (a, &reason) in (0..).zip(reasons) {
-        members[root(&mut parent, a) as usize].push(reason);
+    for (&root, &reason) in root.iter().zip(reasons) {
+        members[root as usize].push(reason);
     }
     members.retain(|members| members.len() >= FEWEST);
     // Equally large ones stay in the order of their first samples.

@@ -65,7 +65,7 @@ impl<T: Real> PullbackScratch<T> {
         fill(&mut self.vertices, None, vertices, [T::zero(); 3]);
     }
 
-    /// Frees what only the stages after the samples need.
+    /// Frees the scratch buffers of the stages that follow normals and areas.
     pub(super) fn free_indicator(&mut self) {
         self.field = None;
         self.poisson = poisson::Scratch::default();
