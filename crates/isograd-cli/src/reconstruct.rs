@@ -97,7 +97,8 @@ pub fn plan<T: Number>(
         grid.shape(),
         grid.spacing()
     ));
-    let options = args.method.options(args.grid.outliers).orient(orient);
+    let options = args.method.options(args.grid.outliers);
+    let options = options.orient(orient).residuals(false);
     let plan = Plan::new(args.backend, grid, options)
         .map_err(|error| backend::plan_error(args.backend, error, cloud))?;
     progress.detail(&format!("on {}", plan.name()));

@@ -13,6 +13,8 @@ mod options;
 mod orienter;
 mod pullback;
 mod query;
+#[cfg(test)]
+mod residuals_tests;
 mod restore;
 mod scaling;
 mod sdf;
@@ -191,8 +193,13 @@ impl<T: Pipeline> Reconstructor<T> {
                 stage => T::run(self, stage, used.as_ref().unwrap_or(cloud), held),
             };
             done.map_err(|error| self.result.selection.locate(error))?;
+            if stage == Stage::Orient {
+                // The result has its points, and later stages read nothing else of it.
+                used = None;
+            }
             if is_large(self.result.points.len()) {
                 self.scratch.free(stage);
+                self.result.free_residuals(stage);
             }
             let seconds = start.elapsed().as_secs_f64();
             self.result.report.seconds.set(stage, seconds);
@@ -298,6 +305,29 @@ impl<T: Real> Reconstruction<T> {
         };
     }
 
+    /// Frees the residuals that no stage after `stage` reads, if they are not to be kept.
+    fn free_residuals(&mut self, stage: Stage) {
+        if self.options.residuals {
+            return;
+        }
+        match stage {
+            Stage::Orient => {
+                self.given = Arc::default();
+                self.residuals.normals = normals::Residual::default();
+            }
+            Stage::Poisson => {
+                let residuals = std::mem::take(&mut self.residuals);
+                self.residuals = Residuals {
+                    neighborhoods: residuals.neighborhoods,
+                    smoothing: residuals.smoothing,
+                    is_refined: residuals.is_refined,
+                    ..Residuals::default()
+                };
+            }
+            _ => {}
+        }
+    }
+
     /// Typical distance between samples: the root of the mean area where samples have areas.
     fn sample_spacing(&self) -> f64 {
         match self.options.area {
@@ -350,7 +380,7 @@ impl<T: Real> Reconstruction<T> {
     }
 
     /// For each cell, in C order, the face of [`closest_mesh`](Self::closest_mesh) closest to its center;
-    /// [`NO_TRIANGLE`](distance::NO_TRIANGLE) outside the band.
+    /// [`NO_TRIANGLE`](distance::NO_TRIANGLE) outside the band. Empty [without residuals](Options::residuals).
     pub fn closest(&self) -> &[u32] {
         &self.closest
     }

@@ -3,7 +3,9 @@
 use pulp::{Arch, Simd, WithSimd};
 use rayon::slice::ParallelSliceMut;
 
-use super::bvh::{Bvh, LANES, NOWHERE, NearestTriangles, Points, Stack, corners, morton_code};
+use super::bvh::{
+    Bvh, LANES, NOWHERE, NearestTriangles, Points, Stack, Triangles, corners, morton_code,
+};
 use super::lattice::NO_TRIANGLE;
 use super::pseudonormals::Pseudonormals;
 use super::triangle::{Closest, closest_point};
@@ -14,6 +16,9 @@ use crate::{Field, Mesh, Real, parallel};
 
 /// Packets of points per task: a fixed number, so that the result does not depend on the threads.
 pub(super) const PACKETS_PER_TASK: usize = 16;
+
+/// Points, neighbors in space, after which frames of a large mesh are freed.
+pub(super) const PART: usize = 1 << 20;
 
 /// Share by which a limit of a search exceeds the distance meant, so that rounding changes nothing.
 const MARGIN: f64 = 1.001;
@@ -132,6 +137,7 @@ impl<T: Real> Hit<T> {
 /// Place in the tree of the triangle closest to each point, of those that are nearer than the square root of `limit(i)`.
 /// The points are taken in packets of neighbors along a Morton curve.
 pub(super) fn nearest_triangles<T: Real>(
+    mesh: &Mesh<T>,
     bvh: &Bvh,
     points: &[[T; 3]],
     limit: &(dyn Fn(usize) -> f64 + Sync),
@@ -143,17 +149,20 @@ pub(super) fn nearest_triangles<T: Real>(
     let order = morton_order(bvh, points, &is_near);
     let arch = Arch::new();
     let mut sorted = vec![NOWHERE; order.len()];
-    let tasks = sorted.chunks_mut(PACKETS_PER_TASK * LANES);
-    let tasks = tasks.zip(order.chunks(PACKETS_PER_TASK * LANES));
-    parallel::each(tasks, |_, (found, order)| {
-        arch.dispatch(Packets {
-            bvh,
-            points,
-            order,
-            limit,
-            found,
+    for (found, order) in sorted.chunks_mut(PART).zip(order.chunks(PART)) {
+        let triangles = Triangles::new(mesh, bvh);
+        let tasks = found.chunks_mut(PACKETS_PER_TASK * LANES);
+        let tasks = tasks.zip(order.chunks(PACKETS_PER_TASK * LANES));
+        parallel::each(tasks, |_, (found, order)| {
+            arch.dispatch(Packets {
+                triangles: &triangles,
+                points,
+                order,
+                limit,
+                found,
+            });
         });
-    });
+    }
     let mut nearest = vec![NOWHERE; points.len()];
     for (&(_, index), place) in order.iter().zip(sorted) {
         nearest[index as usize] = place;
@@ -195,7 +204,7 @@ impl<T: Real> Surface<'_, T> {
             Some(false) => (MARGIN * within).powi(2),
             _ => f64::INFINITY,
         };
-        let nearest = nearest_triangles(self.bvh, points, &limit);
+        let nearest = nearest_triangles(self.mesh, self.bvh, points, &limit);
         let mut hits = Vec::new();
         parallel::fill_large(&mut hits, points.len(), &|i| {
             if nearest[i] == NOWHERE && limit(i) < f64::INFINITY {
@@ -297,7 +306,7 @@ pub(super) fn packet<T: Real>(points: &[[T; 3]; LANES]) -> Points {
 
 /// Finds the closest triangles of some packets of points.
 struct Packets<'a, T> {
-    bvh: &'a Bvh,
+    triangles: &'a Triangles<'a, T>,
     points: &'a [[T; 3]],
     /// Morton code and index of each point.
     order: &'a [(u64, u32)],
@@ -321,7 +330,7 @@ impl<T: Real> WithSimd for Packets<'_, T> {
                 squared: index.map(self.limit),
                 ..NearestTriangles::NOTHING
             };
-            self.bvh.nearest(&packet, &mut nearest, &mut stack);
+            self.triangles.nearest(&packet, &mut nearest, &mut stack);
             found.copy_from_slice(&nearest.triangle[..found.len()]);
         }
     }

@@ -2,11 +2,11 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::bvh::{Bvh, LANES, NOWHERE, NearestTriangles, Stack};
+use super::bvh::{Bvh, LANES, NOWHERE, NearestTriangles, Stack, Triangles};
 use super::lattice::NO_TRIANGLE;
 use super::pseudonormals::Pseudonormals;
 use super::query::{
-    PACKETS_PER_TASK, Surface, far_if_nan, morton_order, nearest_triangles, packet,
+    PACKETS_PER_TASK, PART, Surface, far_if_nan, morton_order, nearest_triangles, packet,
 };
 use super::{Error, Scratch};
 use crate::vector::{dot, norm, scale, sub, to_f64};
@@ -58,15 +58,21 @@ pub(crate) fn count<T: Real>(
         pseudonormals: &Pseudonormals::new(mesh),
     };
     let arch = Arch::new();
-    let tasks = order.chunks(PACKETS_PER_TASK * LANES);
-    let counts = parallel::map_each(tasks, |_, order| {
-        arch.dispatch(Task {
-            surface: &surface,
-            samples,
-            order,
-        })
-    });
-    Ok(counts.into_iter().fold(Counts::default(), Counts::add))
+    let mut counts = Counts::default();
+    for order in order.chunks(PART) {
+        let triangles = Triangles::new(mesh, bvh);
+        let tasks = order.chunks(PACKETS_PER_TASK * LANES);
+        let found = parallel::map_each(tasks, |_, order| {
+            arch.dispatch(Task {
+                triangles: &triangles,
+                surface: &surface,
+                samples,
+                order,
+            })
+        });
+        counts = found.into_iter().fold(counts, Counts::add);
+    }
+    Ok(counts)
 }
 
 impl<T: Real> Samples<'_, T> {
@@ -119,7 +125,7 @@ pub(crate) fn nearest_faces<T: Real>(
 ) -> Result<Vec<u32>, Error> {
     let mut own = Bvh::default();
     let bvh = tree_of(mesh, built, &mut own)?;
-    let mut faces = nearest_triangles(bvh, points, &|_| f64::INFINITY);
+    let mut faces = nearest_triangles(mesh, bvh, points, &|_| f64::INFINITY);
     parallel::for_each(&mut faces, |_, place| {
         *place = match *place {
             NOWHERE => NO_TRIANGLE,
@@ -131,6 +137,7 @@ pub(crate) fn nearest_faces<T: Real>(
 
 /// Counts some samples that are close to each other.
 struct Task<'a, T> {
+    triangles: &'a Triangles<'a, T>,
     surface: &'a Surface<'a, T>,
     samples: Samples<'a, T>,
     /// Morton code and index of each sample.
@@ -185,11 +192,11 @@ impl<T: Real> Task<'_, T> {
             squared: bounds,
             ..NearestTriangles::NOTHING
         };
-        self.surface.bvh.nearest(&packet, &mut found, stack);
+        self.triangles.nearest(&packet, &mut found, stack);
         // Bounds that rounding at huge coordinates made too small.
         if found.triangle.contains(&NOWHERE) && bounds != [f64::INFINITY; LANES] {
             found = NearestTriangles::NOTHING;
-            self.surface.bvh.nearest(&packet, &mut found, stack);
+            self.triangles.nearest(&packet, &mut found, stack);
         }
         found.triangle
     }

@@ -89,6 +89,9 @@ pub enum PullbackError {
         "a cotangent of the indicator was given, and the solve was sparse; use the option solve = dense, or cotangents of other results"
     )]
     SparseIndicator,
+    /// The residuals were not kept.
+    #[error("the reconstruction was made with the option residuals = false; set it to true")]
+    NoResiduals,
     /// An extended attribute.
     #[error(transparent)]
     Extension(#[from] extend::Error),

@@ -66,6 +66,9 @@ options! {
     sdf: bool = true,
     /// Whether to measure the result and to check whether it can be trusted.
     checks: bool = true,
+    /// Whether the CPU keeps what the pullback needs, and the closest faces, which an [extension](crate::Reconstruction::extend)
+    /// needs too. Without, clouds of more than a million points need less memory.
+    residuals: bool = true,
 }
 
 impl Options {

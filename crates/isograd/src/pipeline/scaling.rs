@@ -56,6 +56,9 @@ impl<T: Real> Reconstruction<T> {
         scratch: &mut PullbackScratch<T>,
         out: &mut CloudCotangent<T>,
     ) -> Result<(), PullbackError> {
+        if !self.options.residuals {
+            return Err(PullbackError::NoResiduals);
+        }
         if self.sparse.is_some() && cotangent.indicator.is_some() {
             return Err(PullbackError::SparseIndicator);
         }

@@ -59,13 +59,18 @@ impl<T: Real> Reconstructor<T> {
         if !options.sdf && open.is_none() {
             sdf.values_mut().fill(T::zero());
             closest.clear();
-            closest.resize(sdf.values().len(), distance::NO_TRIANGLE);
+            if options.residuals {
+                closest.resize(sdf.values().len(), distance::NO_TRIANGLE);
+            }
             return Ok(());
         }
         if let (Some(open), Some(thickness)) = (open, options.sheet.thickness()) {
             let scratch = &mut self.scratch.distance;
             let sheet = open.trimmed();
             sheet::forward(sheet, thickness, options.band, scratch, sdf, closest)?;
+            if !options.residuals {
+                closest.clear();
+            }
             return Ok(());
         }
         distance::lattice::forward_on(
@@ -75,7 +80,7 @@ impl<T: Real> Reconstructor<T> {
             options.band,
             &mut self.scratch.distance,
             sdf,
-            closest,
+            options.residuals.then_some(closest),
         )?;
         Ok(())
     }

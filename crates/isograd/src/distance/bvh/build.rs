@@ -5,7 +5,7 @@ use rayon::slice::ParallelSliceMut;
 use super::node::{EMPTY_BOX, Node, including, joined};
 use super::{Bvh, LEAF, WIDTH};
 use crate::distance::Error;
-use crate::distance::triangle::Frame;
+use crate::large::is_large;
 use crate::parallel;
 use crate::vector::{add, scale, sub, to_f64};
 use crate::{Mesh, Real};
@@ -35,10 +35,13 @@ impl Bvh {
             0.0
         };
         self.sort(mesh);
-        let order = &self.faces;
-        parallel::fill_large(&mut self.frames, order.len(), &|place| {
-            Frame::new(corners(mesh, order[place]))
-        });
+        let mut frames = std::mem::take(&mut self.frames);
+        if !is_large(self.len()) {
+            parallel::fill_large(&mut frames, self.len(), &|place| {
+                self.frame_of(mesh, place as u32)
+            });
+            self.frames = frames;
+        }
         self.build_levels(mesh);
         Ok(())
     }

@@ -6,12 +6,13 @@
 
 mod build;
 mod node;
+mod triangles;
 
-use super::lanes;
 use super::triangle::Frame;
 pub(super) use build::{corners, morton_code};
 use node::Node;
 pub(super) use node::Region;
+pub(super) use triangles::Triangles;
 
 /// Triangles in a leaf.
 pub(super) const LEAF: usize = 4;
@@ -54,6 +55,7 @@ pub(super) type Stack = Vec<Waiting>;
 pub(super) struct Bvh {
     /// The faces along the Morton curve.
     faces: Vec<u32>,
+    /// Their frames; none of a large mesh, see [`Triangles`].
     frames: Vec<Frame>,
     /// From the nodes above the leaves up to the root.
     levels: Vec<Vec<Node>>,
@@ -65,17 +67,11 @@ pub(super) struct Bvh {
 }
 
 impl Bvh {
-    /// The triangle at a place of the sorted order.
-    #[inline(always)]
-    pub(super) fn frame(&self, place: u32) -> &Frame {
-        &self.frames[place as usize]
-    }
-
     /// Places of the triangles of a leaf.
     #[inline(always)]
     pub(super) fn leaf(&self, leaf: u32) -> std::ops::Range<u32> {
         let first = leaf * LEAF as u32;
-        first..(self.frames.len() as u32).min(first + LEAF as u32)
+        first..(self.len() as u32).min(first + LEAF as u32)
     }
 
     /// The face of the mesh at a place of the sorted order.
@@ -105,64 +101,6 @@ impl Bvh {
         self.magnitude
     }
 
-    /// Updates `found` with the nearest triangles of the whole tree. Nodes are visited nearest first.
-    #[inline(always)]
-    pub(super) fn nearest(&self, points: &Points, found: &mut NearestTriangles, stack: &mut Stack) {
-        stack.clear();
-        stack.push((self.levels.len() as u32, 0, 0.0));
-        while let Some((level, index, least)) = stack.pop() {
-            if !(least < lanes::largest(&found.squared)) {
-                continue;
-            }
-            if level == 0 {
-                self.nearest_in_leaf(points, index, found);
-                continue;
-            }
-            let node = &self.levels[level as usize - 1][index as usize];
-            let top = stack.len();
-            for slot in 0..WIDTH {
-                let distances = node.distances(slot, points);
-                if (0..LANES).any(|l| distances[l] < found.squared[l]) {
-                    let child = index * WIDTH as u32 + slot as u32;
-                    stack.push((level - 1, child, lanes::least(&distances)));
-                }
-            }
-            sort_descending(&mut stack[top..]);
-        }
-    }
-
-    /// Place of the triangle closest to one point, if its squared distance is below `within`.
-    #[inline(always)]
-    pub(super) fn nearest_to(&self, q: [f64; 3], within: f64, stack: &mut Stack) -> Option<u32> {
-        let mut best = (within, None);
-        stack.clear();
-        stack.push((self.levels.len() as u32, 0, 0.0));
-        while let Some((level, index, least)) = stack.pop() {
-            if !(least < best.0) {
-                continue;
-            }
-            if level == 0 {
-                for place in self.leaf(index) {
-                    let [squared] = self.frame(place).distances(&q.map(|x| [x]));
-                    if squared < best.0 {
-                        best = (squared, Some(place));
-                    }
-                }
-                continue;
-            }
-            let squared = self.levels[level as usize - 1][index as usize].distances_from(q);
-            let top = stack.len();
-            for slot in 0..WIDTH {
-                if squared[slot] < best.0 {
-                    let child = index * WIDTH as u32 + slot as u32;
-                    stack.push((level - 1, child, squared[slot]));
-                }
-            }
-            sort_descending(&mut stack[top..]);
-        }
-        best.1
-    }
-
     /// Whether the box of some leaf is closer to a point than the square root of `within`.
     pub(super) fn has_box_within(&self, q: [f64; 3], within: f64) -> bool {
         self.has_box_below(self.levels.len() - 1, 0, q, within)
@@ -174,13 +112,6 @@ impl Bvh {
             squared[slot] < within
                 && (level == 0 || self.has_box_below(level - 1, index * WIDTH + slot, q, within))
         })
-    }
-
-    #[inline(always)]
-    fn nearest_in_leaf(&self, points: &Points, leaf: u32, found: &mut NearestTriangles) {
-        for place in self.leaf(leaf) {
-            found.try_triangle(self.frame(place), place, points);
-        }
     }
 
     /// Appends the leaves that may contain the closest triangle of some point of the box `region`.

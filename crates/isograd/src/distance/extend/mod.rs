@@ -230,7 +230,7 @@ pub enum Error {
     },
     /// The closest faces do not match the grid.
     #[error(
-        "{entries} closest faces for a grid of {cells} cells; take both from the same call of the distance stage"
+        "{entries} closest faces for a grid of {cells} cells; take both from the same call of the distance stage, of a reconstruction with residuals"
     )]
     Closest {
         /// Number of closest faces.

@@ -44,7 +44,7 @@ impl<T: Real> Task<'_, T> {
         let sites = (!lists.sites.is_empty()).then(|| self.closest_sites(local, lists, &centers));
         let large = (!lists.large.is_empty()).then(|| {
             self.arch.dispatch(kernels::ClosestListed {
-                bvh: self.bvh,
+                triangles: self.triangles,
                 list: lists.large,
                 points: &centers,
             })
@@ -53,7 +53,8 @@ impl<T: Real> Task<'_, T> {
             let center = children[l].1?.center;
             let site =
                 sites.map(|sites| self.sites.position(local.sites[sites[l] as usize].number));
-            let on_large = large.map(|found| self.bvh.frame(found.triangle[l]).nearest(center));
+            let on_large =
+                large.map(|found| self.triangles.frame(found.triangle[l]).nearest(center));
             closest_of([site, on_large], center)
         })
     }
@@ -107,9 +108,9 @@ impl<T: Real> Task<'_, T> {
             let away = norm(sub(q, foot));
             bound[l] = away * (away * (1.0 + 1e-12) + self.rounding());
         }
-        let (bvh, corners, bound) = (self.bvh, &corners, &bound);
+        let (triangles, corners, bound) = (self.triangles, &corners, &bound);
         self.arch.dispatch(kernels::CullLarge {
-            bvh,
+            triangles,
             list,
             corners,
             bound,

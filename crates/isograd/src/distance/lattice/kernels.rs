@@ -6,15 +6,16 @@ use pulp::{Simd, WithSimd};
 use super::block::Cells;
 use super::packet::{BlockCandidates, Packet};
 use super::workspace::Candidates;
-use crate::distance::bvh::{Bvh, LANES, NearestTriangles, Points, Region, Stack};
+use crate::Real;
+use crate::distance::bvh::{Bvh, LANES, NearestTriangles, Points, Region, Stack, Triangles};
 
 /// Margin of culling for the relative error of squares in single precision, a dozen times that error.
 pub(super) const MARGIN: f64 = 2e-5;
 
 /// Appends to the list of a child the large triangles that may be closest to one of its points: those closer than
 /// the foot to a corner of its box.
-pub(super) struct CullLarge<'a> {
-    pub bvh: &'a Bvh,
+pub(super) struct CullLarge<'a, T> {
+    pub triangles: &'a Triangles<'a, T>,
     pub list: &'a [u32],
     pub corners: &'a Points,
     /// Squared distances from the corners to the foot, plus a bound of rounding.
@@ -22,14 +23,14 @@ pub(super) struct CullLarge<'a> {
     pub kept: &'a mut Vec<u32>,
 }
 
-impl WithSimd for CullLarge<'_> {
+impl<T: Real> WithSimd for CullLarge<'_, T> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         for &place in self.list {
             let mut found = NearestTriangles::NOTHING;
-            found.try_triangle(self.bvh.frame(place), place, self.corners);
+            found.try_triangle(self.triangles.frame(place), place, self.corners);
             if (0..LANES).any(|l| !(found.squared[l] > self.bound[l])) {
                 self.kept.push(place);
             }
@@ -38,20 +39,20 @@ impl WithSimd for CullLarge<'_> {
 }
 
 /// The closest of the listed triangles to each point.
-pub(super) struct ClosestListed<'a> {
-    pub bvh: &'a Bvh,
+pub(super) struct ClosestListed<'a, T> {
+    pub triangles: &'a Triangles<'a, T>,
     pub list: &'a [u32],
     pub points: &'a Points,
 }
 
-impl WithSimd for ClosestListed<'_> {
+impl<T: Real> WithSimd for ClosestListed<'_, T> {
     type Output = NearestTriangles;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> NearestTriangles {
         let mut found = NearestTriangles::NOTHING;
         for &place in self.list {
-            found.try_triangle(self.bvh.frame(place), place, self.points);
+            found.try_triangle(self.triangles.frame(place), place, self.points);
         }
         found
     }
@@ -75,8 +76,8 @@ impl WithSimd for Gather<'_> {
 }
 
 /// Finds the closest triangles of the cells of packet `index` of a block.
-pub(super) struct Closest<'a> {
-    pub search: &'a BlockCandidates<'a>,
+pub(super) struct Closest<'a, T> {
+    pub search: &'a BlockCandidates<'a, T>,
     pub cells: &'a Cells,
     pub index: usize,
     /// Origin of the packet's frame.
@@ -87,7 +88,7 @@ pub(super) struct Closest<'a> {
     pub found: &'a mut [NearestTriangles; 2],
 }
 
-impl WithSimd for Closest<'_> {
+impl<T: Real> WithSimd for Closest<'_, T> {
     type Output = Packet;
 
     #[inline(always)]

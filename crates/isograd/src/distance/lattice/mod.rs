@@ -20,7 +20,7 @@ mod workspace;
 use pulp::Arch;
 
 use super::Error;
-use super::bvh::Bvh;
+use super::bvh::{Bvh, Triangles};
 use super::pseudonormals::Pseudonormals;
 use crate::data::cells::Cells;
 use crate::parallel::{self, Pool};
@@ -124,10 +124,10 @@ pub fn forward<T: Real>(
     phi: &mut Field<T>,
     closest: &mut Vec<u32>,
 ) -> Result<(), Error> {
-    forward_on(mesh, chi.into(), c, band, scratch, phi, closest)
+    forward_on(mesh, chi.into(), c, band, scratch, phi, Some(closest))
 }
 
-/// Like [`forward`], for an indicator that is dense or in blocks.
+/// Like [`forward`], for an indicator that is dense or in blocks, and with or without closest faces.
 pub(crate) fn forward_on<T: Real>(
     mesh: &Mesh<T>,
     chi: Cells<'_, T>,
@@ -135,7 +135,7 @@ pub(crate) fn forward_on<T: Real>(
     band: Band,
     scratch: &mut Scratch<T>,
     phi: &mut Field<T>,
-    closest: &mut Vec<u32>,
+    closest: Option<&mut Vec<u32>>,
 ) -> Result<(), Error> {
     let grid = *phi.grid();
     let width = band.width()?;
@@ -149,19 +149,27 @@ pub(crate) fn forward_on<T: Real>(
     scratch.prepare(mesh, &grid)?;
     let pseudonormals = std::mem::take(&mut scratch.pseudonormals);
     let sides = Sides::new(mesh, chi, c, &grid, pseudonormals);
-    for_each_wave(mesh, reach, scratch, phi, closest, |wave, phi, closest| {
-        let inside = |i: usize, face: u32| sides.is_inside(wave.first + i, face);
-        match chi.is_whole() {
-            true => wave.write(spread::each(inside), phi, closest),
-            false => wave.write(spread::along(inside, h), phi, closest),
-        }
-        if reach > width {
-            clamp(T::of(width), phi, closest);
-        }
-    });
+    for_each_wave(
+        mesh,
+        reach,
+        scratch,
+        phi,
+        closest,
+        |wave, phi, mut closest| {
+            let inside = |i: usize, face: u32| sides.is_inside(wave.first + i, face);
+            let faces = closest.as_deref_mut();
+            match chi.is_whole() {
+                true => wave.write(spread::each(inside), phi, faces),
+                false => wave.write(spread::along(inside, h), phi, faces),
+            }
+            if reach > width {
+                clamp(T::of(width), phi, closest);
+            }
+        },
+    );
     scratch.pseudonormals = sides.into_pseudonormals();
     if fills {
-        spread::fill(grid.shape(), phi.values_mut(), closest);
+        spread::fill(grid.shape(), T::of(width), phi.values_mut());
     }
     Ok(())
 }
@@ -180,16 +188,17 @@ fn for_each_wave<T: Real>(
     reach: f64,
     scratch: &mut Scratch<T>,
     phi: &mut Field<T>,
-    closest: &mut Vec<u32>,
-    write: impl Fn(&Wave<'_, T>, &mut [T], &mut [u32]),
+    mut closest: Option<&mut Vec<u32>>,
+    write: impl Fn(&Wave<'_, T>, &mut [T], Option<&mut [u32]>),
 ) {
     let grid = *phi.grid();
-    closest.resize(grid.cells(), NO_TRIANGLE);
+    if let Some(closest) = &mut closest {
+        closest.resize(grid.cells(), NO_TRIANGLE);
+    }
     let plane = grid.strides()[0];
     let planes_per_wave = wave_planes(grid.shape());
     let waves = phi.values_mut().chunks_mut(planes_per_wave * plane);
-    let waves = waves.zip(closest.chunks_mut(planes_per_wave * plane));
-    for (wave, (phi, closest)) in waves.enumerate() {
+    for (wave, phi) in waves.enumerate() {
         let planes = wave * planes_per_wave..wave * planes_per_wave + phi.len() / plane;
         let first = planes.start * plane;
         solve_wave(&grid, mesh, planes, reach, scratch);
@@ -198,16 +207,23 @@ fn for_each_wave<T: Real>(
             scratch,
             first,
         };
-        write(&wave, phi, closest);
+        let closest = closest.as_mut();
+        write(
+            &wave,
+            phi,
+            closest.map(|closest| &mut closest[first..first + phi.len()]),
+        );
     }
 }
 
 /// Limits φ to a band; cells beyond it have no closest face.
-fn clamp<T: Real>(width: T, phi: &mut [T], closest: &mut [u32]) {
-    for (phi, closest) in phi.iter_mut().zip(closest) {
+fn clamp<T: Real>(width: T, phi: &mut [T], mut closest: Option<&mut [u32]>) {
+    for (i, phi) in phi.iter_mut().enumerate() {
         if phi.abs() > width {
             *phi = phi.signum() * width;
-            *closest = NO_TRIANGLE;
+            if let Some(closest) = &mut closest {
+                closest[i] = NO_TRIANGLE;
+            }
         }
     }
 }
@@ -232,16 +248,15 @@ fn solve_wave<T: Real>(
     let blocks = planes.len().div_ceil(BLOCK) * across[0] * across[1];
     scratch.distance.resize(blocks * CELLS, T::zero());
     scratch.closest.resize(blocks * CELLS, NO_TRIANGLE);
-    let bvh = &scratch.bvh;
+    let triangles = Triangles::new(mesh, &scratch.bvh);
     let sites = &scratch.sites;
     let task = Task {
         grid,
-        mesh,
-        bvh,
+        triangles: &triangles,
         sites,
         width,
         near: (NEAR * sites.longest_edge()).powi(2),
-        magnitude: magnitude(grid).max(bvh.magnitude()),
+        magnitude: magnitude(grid).max(scratch.bvh.magnitude()),
         arch: Arch::new(),
     };
     let results = scratch.distance.chunks_mut(CELLS);
@@ -277,13 +292,21 @@ impl<T: Real> Wave<'_, T> {
         &self,
         sign: impl Fn(usize, &mut [T], &[u32]) + Sync,
         phi: &mut [T],
-        closest: &mut [u32],
+        closest: Option<&mut [u32]>,
     ) {
         let scratch = self.scratch;
         let [_, ny, nz] = self.grid.shape();
         let across = [ny.div_ceil(BLOCK), nz.div_ceil(BLOCK)];
-        let rows = phi.chunks_mut(nz).zip(closest.chunks_mut(nz));
-        parallel::each(rows, |row, (phi, closest)| {
+        let closest: Vec<_> = match closest {
+            Some(closest) => closest.chunks_mut(nz).map(Some).collect(),
+            None => phi.chunks(nz).map(|_| None).collect(),
+        };
+        let rows = phi.chunks_mut(nz).zip(closest);
+        parallel::map_each_with(Vec::new, rows, |own, row, (phi, closest)| {
+            let closest = closest.unwrap_or_else(|| {
+                own.resize(nz, NO_TRIANGLE);
+                own
+            });
             let (i, j) = (row / ny, row % ny);
             let first_block = (i / BLOCK * across[0] + j / BLOCK) * across[1];
             let runs = phi.chunks_mut(BLOCK).zip(closest.chunks_mut(BLOCK));

@@ -78,7 +78,8 @@ pub(in crate::distance) fn fill<T: Real>(
     let width = band.width()?;
     let grid = *phi.grid();
     scratch.prepare(mesh, &grid)?;
-    for_each_wave(mesh, width, scratch, phi, closest, |wave, phi, closest| {
+    let faces = Some(closest);
+    for_each_wave(mesh, width, scratch, phi, faces, |wave, phi, closest| {
         wave.write(|_, _, _| (), phi, closest);
     });
     let sign = match is_closed(mesh) {

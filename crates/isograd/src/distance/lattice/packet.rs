@@ -8,7 +8,8 @@ use super::block::Cells;
 use super::site_list::Site;
 use super::sites::Sites;
 use super::workspace::Candidates;
-use crate::distance::bvh::{Bvh, LANES, NearestTriangles, Points};
+use crate::Real;
+use crate::distance::bvh::{LANES, NearestTriangles, Points, Triangles};
 use crate::simd::multiply_add;
 
 /// Cells of a packet, in halves of [`LANES`].
@@ -62,8 +63,8 @@ pub(super) fn offset(lane: usize) -> [usize; 3] {
 }
 
 /// Candidate lists and constants that the packets of a block share.
-pub(super) struct BlockCandidates<'a> {
-    pub bvh: &'a Bvh,
+pub(super) struct BlockCandidates<'a, T> {
+    pub triangles: &'a Triangles<'a, T>,
     pub sites: &'a Sites,
     /// All sites of the block of side 16.
     pub all: &'a [Site],
@@ -79,7 +80,7 @@ pub(super) struct BlockCandidates<'a> {
     pub width: f32,
 }
 
-impl BlockCandidates<'_> {
+impl<T: Real> BlockCandidates<'_, T> {
     /// The closest triangle to each cell.
     #[inline(always)]
     pub(super) fn closest<S: Simd>(
@@ -93,7 +94,7 @@ impl BlockCandidates<'_> {
             self.try_all(self.large, &packet.points[half], &mut found[half]);
         }
         let mut best = self.bounds(found);
-        measured.clear(self.bvh.len());
+        measured.clear(self.triangles.bvh.len());
         if !self.listed.is_empty() {
             self.filter::<S>(packet, seeds, &mut best, measured);
         }
@@ -110,7 +111,7 @@ impl BlockCandidates<'_> {
         // In registers: in memory, what one triangle stores for some points would hold up the load of the next.
         let mut nearest = *found;
         for &place in places {
-            nearest.try_triangle(self.bvh.frame(place), place, points);
+            nearest.try_triangle(self.triangles.frame(place), place, points);
         }
         *found = nearest;
     }

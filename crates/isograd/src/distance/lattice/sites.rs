@@ -2,6 +2,7 @@
 
 use super::facet::Facet;
 use crate::distance::bvh::{Bvh, LEAF};
+use crate::large::is_large;
 use crate::vector::to_f64;
 use crate::{Mesh, Real, parallel};
 
@@ -18,6 +19,8 @@ pub(super) struct Sites {
     position: Vec<[f64; 3]>,
     /// The largest slack of the triangles of each site.
     slack: Vec<f64>,
+    /// The slack of each triangle, in the order of the tree.
+    slacks: Vec<f64>,
     /// Where the triangles of each site begin in `stars`.
     starts: Vec<u32>,
     /// The small triangles of each.
@@ -31,20 +34,36 @@ pub(super) struct Sites {
     of_vertex: Vec<u32>,
 }
 
-/// A small triangle of the star of a vertex.
+/// A small triangle of the star of a vertex: four times its place in the tree, and which of its corners the vertex is.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Spoke {
-    /// Its place in the tree.
-    pub place: u32,
-    /// Which of its corners the vertex is.
-    pub corner: u32,
+pub(super) struct Spoke(u32);
+
+impl Spoke {
+    /// Places that it can hold.
+    const PLACES: usize = 1 << 30;
+
+    /// The triangle's place in the tree.
+    #[inline(always)]
+    pub(super) fn place(self) -> u32 {
+        self.0 >> 2
+    }
+
+    /// The corner that is the vertex.
+    #[inline(always)]
+    pub(super) fn corner(self) -> u32 {
+        self.0 & 3
+    }
 }
 
-/// Beyond this many cells squares leave the range of single precision: then all triangles count as large.
+/// Beyond this many cells squares leave the range of single precision: then all triangles count as large, as they do where
+/// there are more than a [`Spoke`] can tell apart.
 const FAR: f64 = 1e15;
 
 /// The site of a vertex that only large triangles have.
 const NONE: u32 = u32::MAX;
+
+/// Triangles measured in one piece.
+const PIECE: usize = 4096;
 
 impl Sites {
     /// For a lattice of cell size `spacing`; `magnitude` is the largest absolute coordinate.
@@ -55,40 +74,51 @@ impl Sites {
         spacing: f64,
         magnitude: f64,
     ) {
-        let limit = if magnitude < FAR * spacing {
+        let limit = if magnitude < FAR * spacing && bvh.len() <= Spoke::PLACES {
             LARGE * spacing * spacing
         } else {
             f64::NEG_INFINITY
         };
+        self.measure(mesh, bvh, limit);
         let mut facets = std::mem::take(&mut self.facets);
         parallel::join(
             || {
                 parallel::fill_large(&mut facets, bvh.len(), &|place| {
                     let place = place as u32;
-                    Facet::new(bvh.frame(place), bvh.face(place), 1.0 / spacing)
+                    Facet::new(&bvh.frame_of(mesh, place), bvh.face(place), 1.0 / spacing)
                 });
             },
             || {
-                self.measure(bvh, limit);
                 self.number(mesh, bvh);
                 self.collect_stars(mesh, bvh);
             },
         );
         self.facets = facets;
+        if is_large(bvh.len()) {
+            self.slacks = Vec::new();
+        }
         if !self.large.contains(&true) {
             self.large.clear();
         }
     }
 
     /// Finds the longest edge, and the triangles whose slack is not within `limit`.
-    fn measure(&mut self, bvh: &Bvh, limit: f64) {
-        self.longest_edge = 0.0;
+    fn measure<T: Real>(&mut self, mesh: &Mesh<T>, bvh: &Bvh, limit: f64) {
+        parallel::resize(&mut self.slacks, bvh.len(), 0.0);
+        let pieces = self.slacks.chunks_mut(PIECE);
+        let longest = parallel::map_each(pieces, |k, slacks| {
+            let mut longest = 0.0_f64;
+            for (place, slack) in (k * PIECE..).zip(slacks) {
+                let frame = bvh.frame_of(mesh, place as u32);
+                *slack = frame.slack();
+                longest = longest.max(frame.longest_edge());
+            }
+            longest
+        });
+        self.longest_edge = longest.into_iter().fold(0.0, f64::max);
+        let is_large = |slack: &f64| !(*slack <= limit);
         self.large.clear();
-        for place in 0..bvh.len() as u32 {
-            let frame = bvh.frame(place);
-            self.longest_edge = self.longest_edge.max(frame.longest_edge());
-            self.large.push(!(frame.slack() <= limit));
-        }
+        self.large.extend(self.slacks.iter().map(is_large));
     }
 
     fn number<T: Real>(&mut self, mesh: &Mesh<T>, bvh: &Bvh) {
@@ -97,6 +127,8 @@ impl Sites {
         self.leaves.clear();
         self.position.clear();
         self.slack.clear();
+        self.position.reserve_exact(mesh.vertices().len());
+        self.slack.reserve_exact(mesh.vertices().len());
         for place in 0..bvh.len() {
             if place % LEAF == 0 {
                 self.leaves.push(self.position.len() as u32);
@@ -104,7 +136,7 @@ impl Sites {
             if self.large[place] {
                 continue;
             }
-            let slack = bvh.frame(place as u32).slack();
+            let slack = self.slacks[place];
             for vertex in mesh.faces()[bvh.face(place as u32) as usize] {
                 let site = &mut self.of_vertex[vertex as usize];
                 if *site == NONE {
@@ -146,10 +178,8 @@ impl Sites {
         for place in (0..bvh.len()).rev().filter(small) {
             for (corner, site) in sites(place).into_iter().enumerate() {
                 self.starts[site] -= 1;
-                self.stars[self.starts[site] as usize] = Spoke {
-                    place: place as u32,
-                    corner: corner as u32,
-                };
+                let spoke = Spoke((place << 2 | corner) as u32);
+                self.stars[self.starts[site] as usize] = spoke;
             }
         }
     }
@@ -158,6 +188,7 @@ impl Sites {
     pub(super) fn capacity(&self) -> usize {
         self.leaves.capacity()
             + self.position.capacity()
+            + self.slacks.capacity()
             + self.starts.capacity()
             + self.stars.capacity()
             + self.facets.capacity()

@@ -43,9 +43,10 @@ pub(super) fn along<T: Real>(
 }
 
 /// Gives rows beyond the band, which must be wider than the distance between neighbors, the signs of the rows beside them.
-pub(super) fn fill<T: Real>([_, ny, nz]: [usize; 3], phi: &mut [T], closest: &[u32]) {
-    let planes = phi.chunks_mut(ny * nz).zip(closest.chunks(ny * nz));
-    let known = parallel::map_each(planes, |_, (phi, closest)| fill_plane(nz, phi, closest));
+/// They are positive, and as far from the surface as the band is wide; a row that ends just there has the sign of those beside it.
+pub(super) fn fill<T: Real>([_, ny, nz]: [usize; 3], width: T, phi: &mut [T]) {
+    let planes = phi.chunks_mut(ny * nz);
+    let known = parallel::map_each(planes, |_, phi| fill_plane(nz, width, phi));
     carry(&known, |from, to| {
         let sign = phi[from * ny * nz] < T::zero();
         let plane = &mut phi[to * ny * nz..(to + 1) * ny * nz];
@@ -54,9 +55,9 @@ pub(super) fn fill<T: Real>([_, ny, nz]: [usize; 3], phi: &mut [T], closest: &[u
 }
 
 /// Fills the rows of a plane. Returns whether any of them reaches into the band.
-fn fill_plane<T: Real>(nz: usize, phi: &mut [T], closest: &[u32]) -> bool {
-    let in_band = |row: &[u32]| row.iter().any(|&face| face != NO_TRIANGLE);
-    let known: Vec<bool> = closest.chunks_exact(nz).map(in_band).collect();
+fn fill_plane<T: Real>(nz: usize, width: T, phi: &mut [T]) -> bool {
+    let in_band = |row: &[T]| row.iter().any(|&phi| phi != width);
+    let known: Vec<bool> = phi.chunks_exact(nz).map(in_band).collect();
     carry(&known, |from, to| {
         let sign = phi[from * nz] < T::zero();
         let row = &mut phi[to * nz..(to + 1) * nz];

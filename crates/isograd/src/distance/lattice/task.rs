@@ -13,11 +13,11 @@ use super::packet::{self, BlockCandidates, CELLS, Packet};
 use super::site_list::Site;
 use super::sites::{LARGE, Sites};
 use super::workspace::{Candidates, ChildCandidates, Lists, Workspace};
-use crate::distance::bvh::{Bvh, LANES, NOWHERE, NearestTriangles, Region, Stack};
+use crate::distance::bvh::{LANES, NOWHERE, NearestTriangles, Region, Stack, Triangles};
 use crate::distance::triangle;
 use crate::simd::vectorized;
 use crate::vector::{scale, sub, to_f64};
-use crate::{Grid, Mesh, Real};
+use crate::{Grid, Real};
 
 /// Where a distance is below this share of a triangle's longest edge, it is measured from the nearest corner.
 pub(super) const NEAR: f64 = 0.1;
@@ -25,8 +25,7 @@ pub(super) const NEAR: f64 = 0.1;
 /// Inputs and constants of all blocks.
 pub(super) struct Task<'a, T> {
     pub grid: &'a Grid<T>,
-    pub mesh: &'a Mesh<T>,
-    pub bvh: &'a Bvh,
+    pub triangles: &'a Triangles<'a, T>,
     pub sites: &'a Sites,
     /// Width of the band, in the user's unit.
     pub width: f64,
@@ -105,9 +104,10 @@ impl<T: Real> Task<'_, T> {
         let reach = self.reach(extent.radius);
         let place = vectorized!(
             self.arch,
-            self.bvh.nearest_to(extent.center, reach * reach, stack)
+            self.triangles
+                .nearest_to(extent.center, reach * reach, stack)
         )?;
-        Some(self.bvh.frame(place).nearest(extent.center))
+        Some(self.triangles.frame(place).nearest(extent.center))
     }
 
     /// Lists the sites and large triangles that may be closest to some cell of a block.
@@ -128,7 +128,7 @@ impl<T: Real> Task<'_, T> {
             self.rounding(),
         );
         leaves.clear();
-        let (bvh, region) = (self.bvh, &region);
+        let (bvh, region) = (self.triangles.bvh, &region);
         self.arch.dispatch(kernels::Gather {
             bvh,
             region,
@@ -200,7 +200,7 @@ impl<T: Real> Task<'_, T> {
         let per_cell = 1.0 / self.grid.spacing().f64();
         let width = self.width * per_cell;
         let search = BlockCandidates {
-            bvh: self.bvh,
+            triangles: self.triangles,
             sites: self.sites,
             all: local.sites,
             listed: lists.sites,
@@ -262,11 +262,11 @@ impl<T: Real> Task<'_, T> {
     }
 
     fn measure(&self, q: [f64; 3], place: u32, squared: f64) -> f64 {
-        let edge = NEAR * self.bvh.frame(place).longest_edge();
+        let edge = NEAR * self.triangles.frame(place).longest_edge();
         if squared >= edge * edge {
             return squared.sqrt();
         }
         let face = self.sites.facets()[place as usize].face;
-        triangle::closest_point(q, self.mesh.corners(face as usize).map(to_f64)).distance
+        triangle::closest_point(q, self.triangles.mesh.corners(face as usize).map(to_f64)).distance
     }
 }

@@ -140,11 +140,12 @@ impl Candidates {
         let candidates = &mut self.candidates[self.length..most];
         let mut seen = self.seen.open();
         let mut length = 0;
-        for &Spoke { place, corner } in star {
+        for spoke in star {
+            let place = spoke.place();
             // Written in any case, kept if new: about half are, and a branch would be mispredicted.
             candidates[length] = Candidate {
                 place,
-                corner,
+                corner: spoke.corner(),
                 from,
             };
             length += usize::from(seen.insert(place));

@@ -188,9 +188,9 @@ fn face_does_not_depend_on_what_single_precision_leaves_over() {
         let points = grid.center_f64(grid.cell(index)).map(|x| [x; LANES]);
         let (mut found, mut backwards) = (NearestTriangles::NOTHING, NearestTriangles::NOTHING);
         for place in 0..bvh.len() as u32 {
-            found.try_triangle(bvh.frame(place), place, &points);
+            found.try_triangle(&bvh.frame_of(&mesh, place), place, &points);
             let place = bvh.len() as u32 - 1 - place;
-            backwards.try_triangle(bvh.frame(place), place, &points);
+            backwards.try_triangle(&bvh.frame_of(&mesh, place), place, &points);
         }
         assert_eq!(found.triangle, backwards.triangle);
         assert_eq!(bvh.face(found.triangle[0]), closest[index], "cell {index}");

@@ -52,6 +52,9 @@ fn distance_is_that_of_all_triangles_tried() {
         }
     }
     assert_exact(torus::<f64>(40, 15), &points(500, 1.1, 9), 1e-12);
+    // Large: frames are made as they are needed.
+    assert_exact(torus::<f64>(60, 31), &points(300, 1.1, 10), 1e-12);
+    assert_exact(soup::<f32>(3300, 5), &points(100, 2.0, 11), 1e-6);
 }
 
 #[test]

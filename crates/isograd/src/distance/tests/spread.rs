@@ -62,7 +62,16 @@ fn solve(mesh: &Mesh<f64>, chi: Cells<'_, f64>) -> (Vec<f64>, Vec<u32>) {
     let grid = Grid::new([0.0; 3], 2.0, FINE.map(|n| n / 2)).expect("valid");
     let (mut phi, mut closest) = (Field::zeros(grid), Vec::new());
     let (band, mut scratch) = (Band::Within(2.0 * BAND), Scratch::default());
-    forward_on(mesh, chi, 0.0, band, &mut scratch, &mut phi, &mut closest).expect("a mesh");
+    forward_on(
+        mesh,
+        chi,
+        0.0,
+        band,
+        &mut scratch,
+        &mut phi,
+        Some(&mut closest),
+    )
+    .expect("a mesh");
     (phi.values().to_vec(), closest)
 }
 
