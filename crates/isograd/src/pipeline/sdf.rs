@@ -56,21 +56,20 @@ impl<T: Real> Reconstructor<T> {
             closest,
             ..
         } = &mut self.result;
+        let closest = options.residuals.then_some(closest);
         if !options.sdf && open.is_none() {
             sdf.values_mut().fill(T::zero());
-            closest.clear();
-            if options.residuals {
+            if let Some(closest) = closest {
+                closest.clear();
                 closest.resize(sdf.values().len(), distance::NO_TRIANGLE);
             }
             return Ok(());
         }
         if let (Some(open), Some(thickness)) = (open, options.sheet.thickness()) {
             let scratch = &mut self.scratch.distance;
-            let sheet = open.trimmed();
+            let (sheet, mut unused) = (open.trimmed(), Vec::new());
+            let closest = closest.unwrap_or(&mut unused);
             sheet::forward(sheet, thickness, options.band, scratch, sdf, closest)?;
-            if !options.residuals {
-                closest.clear();
-            }
             return Ok(());
         }
         distance::lattice::forward_on(
@@ -80,7 +79,7 @@ impl<T: Real> Reconstructor<T> {
             options.band,
             &mut self.scratch.distance,
             sdf,
-            options.residuals.then_some(closest),
+            closest,
         )?;
         Ok(())
     }

@@ -116,9 +116,9 @@ impl Sites {
             longest
         });
         self.longest_edge = longest.into_iter().fold(0.0, f64::max);
-        let is_large = |slack: &f64| !(*slack <= limit);
+        let exceeds_limit = |slack: &f64| !(*slack <= limit);
         self.large.clear();
-        self.large.extend(self.slacks.iter().map(is_large));
+        self.large.extend(self.slacks.iter().map(exceeds_limit));
     }
 
     fn number<T: Real>(&mut self, mesh: &Mesh<T>, bvh: &Bvh) {
