@@ -1,5 +1,6 @@
 //! The stages in order: a plan ([`Reconstructor`]) and what it makes ([`Reconstruction`]).
 
+mod buffers;
 mod checks;
 mod concrete;
 mod cotangent;
@@ -36,13 +37,12 @@ use std::time::Instant;
 
 use crate::data::blocks::BlockField;
 use crate::data::{Field, Grid, Mesh, PointCloud, Selection};
-use crate::isosurface::measure;
 use crate::large::is_large;
 use crate::report::Report;
 pub(crate) use crate::report::Stage;
-use crate::thicken::Thickened;
-use crate::{Real, distance, isosurface, neighbors, normals, orient, poisson, splat};
+use crate::{Real, orient, poisson, splat};
 
+use buffers::{Residuals, Scratch};
 pub use concrete::Pipeline;
 pub use cotangent::{CloudCotangent, Cotangent, ExtensionCotangent, PullbackError};
 pub use memory::{
@@ -65,36 +65,6 @@ pub struct Reconstructor<T: Real> {
     result: Reconstruction<T>,
     /// Whether the result is that of its cloud alone, and of all stages.
     is_whole: bool,
-}
-
-/// Scratch buffers of the stages, reused between calls.
-#[derive(Default)]
-struct Scratch<T: Real> {
-    orient: orient::Scratch,
-    splat: splat::Scratch,
-    poisson: poisson::Scratch<T>,
-    screened: poisson::screened::Scratch<T>,
-    level: isosurface::local_level::Scratch<T>,
-    isosurface: isosurface::Scratch,
-    measure: measure::Scratch,
-    distance: distance::Scratch<T>,
-}
-
-impl<T: Real> Scratch<T> {
-    /// Frees all that the stages after `stage` do not read.
-    fn free(&mut self, stage: Stage) {
-        let Self {
-            mut orient,
-            mut distance,
-            ..
-        } = std::mem::take(self);
-        orient.free();
-        self.orient = orient;
-        if stage == Stage::Distance {
-            distance.free_all_but_tree();
-            self.distance = distance;
-        }
-    }
 }
 
 impl<T: Pipeline> Reconstructor<T> {
@@ -245,24 +215,6 @@ pub struct Reconstruction<T: Real> {
     pullback: pullback::Workspace<T>,
 }
 
-/// Residuals of the stages, beside the results themselves.
-#[derive(Clone, Default)]
-struct Residuals<T> {
-    neighborhoods: neighbors::Neighborhoods<T>,
-    normals: normals::Residual<T>,
-    splat: splat::Residual,
-    /// `σ` of the smoothing, in cells.
-    smoothing: f64,
-    /// Whether the surface is that of the indicator on cells half as large.
-    is_refined: bool,
-    iso_value: isosurface::iso_value::Residual<T>,
-    /// Trilinear values of the indicator at the samples, of a screened equation whose surface is refined: `iso_value`
-    /// then holds those of the spline.
-    screened: Option<isosurface::iso_value::Residual<T>>,
-    local_level: isosurface::local_level::Residual<T>,
-    thickened: Thickened<T>,
-}
-
 impl<T: Pipeline> Reconstruction<T> {
     fn empty(grid: Grid<T>, options: Options) -> Self {
         Self {
@@ -305,29 +257,6 @@ impl<T: Real> Reconstruction<T> {
         };
     }
 
-    /// Frees the residuals that no stage after `stage` reads, if they are not to be kept.
-    fn free_residuals(&mut self, stage: Stage) {
-        if self.options.residuals {
-            return;
-        }
-        match stage {
-            Stage::Orient => {
-                self.given = Arc::default();
-                self.residuals.normals = normals::Residual::default();
-            }
-            Stage::Poisson => {
-                let residuals = std::mem::take(&mut self.residuals);
-                self.residuals = Residuals {
-                    neighborhoods: residuals.neighborhoods,
-                    smoothing: residuals.smoothing,
-                    is_refined: residuals.is_refined,
-                    ..Residuals::default()
-                };
-            }
-            _ => {}
-        }
-    }
-
     /// Typical distance between samples: the root of the mean area where samples have areas.
     fn sample_spacing(&self) -> f64 {
         match self.options.area {
@@ -354,7 +283,7 @@ impl<T: Real> Reconstruction<T> {
     }
 
     /// The indicator χ at every cell center of [the surface's grid](SurfaceResolution): below the iso-value inside, above it outside, what the
-    /// [local iso-value](isosurface::local_level) takes off included. It has no unit; without area weights also no
+    /// [local iso-value](crate::isosurface::local_level) takes off included. It has no unit; without area weights also no
     /// scale. With a [sparse](Solve) solve, it is the far part of χ on the coarsest cells: those near the surface are
     /// not given.
     pub fn indicator(&self) -> &Field<T> {
@@ -380,7 +309,7 @@ impl<T: Real> Reconstruction<T> {
     }
 
     /// For each cell, in C order, the face of [`closest_mesh`](Self::closest_mesh) closest to its center;
-    /// [`NO_TRIANGLE`](distance::NO_TRIANGLE) outside the band. Empty [without residuals](Options::residuals).
+    /// [`NO_TRIANGLE`](crate::distance::NO_TRIANGLE) outside the band. Empty [without residuals](Options::residuals).
     pub fn closest(&self) -> &[u32] {
         &self.closest
     }
