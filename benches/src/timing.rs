@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use isograd::{CloudCotangent, Cotangent, Pipeline, PointCloud, Reconstructor, Seconds, Stage};
-use peak_alloc::PeakAlloc;
+use isograd_cli::ALLOCATOR;
 
 use crate::output::Outcome;
 use crate::statistics::median;
@@ -14,8 +14,7 @@ pub struct Passes {
     forward: Vec<f64>,
     backward: Vec<f64>,
     stages: Vec<Seconds>,
-    /// Bytes in use at the peak of the first forward pass, and of that and its pullback. Zero if the program does not
-    /// count its memory.
+    /// Bytes in use at the peak of the first forward pass, and of that and its pullback.
     pub peak_bytes: [usize; 2],
     /// Bytes that the first pullback takes at its peak, and the last one, beyond those in use when it starts.
     pub pullback_bytes: [usize; 2],
@@ -31,7 +30,7 @@ impl Passes {
         cloud: &PointCloud<T>,
         repeats: usize,
     ) -> Outcome<Self> {
-        let memory = PeakAlloc;
+        let memory = &ALLOCATOR;
         let mut out = CloudCotangent::default();
         let mut passes = Self::default();
         memory.reset_peak_usage();

@@ -5,10 +5,6 @@ use isograd_benches::gradients::ratios::Choice;
 use isograd_benches::gradients::{Results, Study};
 use isograd_benches::sampling::{Body, Draw};
 use isograd_benches::scaling::{Cells, Problem};
-use peak_alloc::PeakAlloc;
-
-#[global_allocator]
-static ALLOCATOR: PeakAlloc = PeakAlloc;
 
 #[test]
 fn small_studies_meet_their_targets_and_count_memory() {

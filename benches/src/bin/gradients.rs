@@ -5,10 +5,6 @@ use std::process::ExitCode;
 
 use isograd_benches::gradients::Study;
 use isograd_benches::output::run;
-use peak_alloc::PeakAlloc;
-
-#[global_allocator]
-static ALLOCATOR: PeakAlloc = PeakAlloc;
 
 fn main() -> ExitCode {
     run("gradients", || Study::full().run()?.json())

@@ -5,10 +5,6 @@ use std::process::ExitCode;
 
 use isograd_benches::output::run;
 use isograd_benches::scaling;
-use peak_alloc::PeakAlloc;
-
-#[global_allocator]
-static ALLOCATOR: PeakAlloc = PeakAlloc;
 
 fn main() -> ExitCode {
     run("scaling", scaling::run)

@@ -40,14 +40,14 @@ use isograd_io::printable;
 
 use args::{Cli, Command};
 use error::Error;
-use memory::Allocator;
 use streams::to_stderr;
 
+pub use memory::Allocator;
 pub use surface::{Error as SurfaceError, Omitted, write as write_surface};
 
 /// Counts allocated bytes for the peak memory in reports.
 #[global_allocator]
-static ALLOCATOR: Allocator = Allocator;
+pub static ALLOCATOR: Allocator = Allocator;
 
 /// Runs a command line, the first argument of which is the name of the program, and returns the exit status.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {

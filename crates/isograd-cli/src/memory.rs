@@ -1,16 +1,15 @@
 //! Allocation: the peak of the allocated memory, and the end of the program when none is left.
 //!
 //! Without this, a failed allocation aborts the program with SIGABRT and leaves its temporary files. `unsafe` is what
-//! [`GlobalAlloc`] asks for; every call goes to [`PeakAlloc`] unchanged.
+//! [`GlobalAlloc`] asks for; every call goes to [`System`] unchanged: zeroed memory is that of the kernel, not touched
+//! before it is used, and large blocks grow in place.
 #![allow(unsafe_code)]
 
-use std::alloc::{GlobalAlloc, Layout};
+use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::io::{Cursor, Write};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
-
-use peak_alloc::PeakAlloc;
 
 /// Exit status when no memory is left.
 const STATUS: i32 = 1;
@@ -18,6 +17,9 @@ const STATUS: i32 = 1;
 /// The allocator of the program.
 pub struct Allocator;
 
+/// Bytes that are allocated now, and the most that were.
+static USED: AtomicUsize = AtomicUsize::new(0);
+static PEAK: AtomicUsize = AtomicUsize::new(0);
 /// Whether the process runs a command. Not so in Python, which may survive a failed allocation.
 static RUNS: AtomicBool = AtomicBool::new(false);
 /// Whether a thread ends the program.
@@ -34,31 +36,58 @@ impl Allocator {
         RUNS.store(true, Ordering::Relaxed);
     }
 
+    /// Bytes that are allocated now.
+    pub fn current_usage(&self) -> usize {
+        USED.load(Ordering::Relaxed)
+    }
+
     /// Peak of the allocated memory, in bytes.
     pub fn peak_usage(&self) -> usize {
-        PeakAlloc.peak_usage()
+        PEAK.load(Ordering::Relaxed)
+    }
+
+    /// Lets the peak begin anew.
+    pub fn reset_peak_usage(&self) {
+        PEAK.store(self.current_usage(), Ordering::Relaxed);
     }
 }
 
-// SAFETY: memory comes from `PeakAlloc` and goes back to it with the layout it was allocated with; a null pointer is
+// SAFETY: memory comes from `System` and goes back to it with the layout it was allocated with; a null pointer is
 // returned as it is, or not at all.
 unsafe impl GlobalAlloc for Allocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: the caller's promises are those of the inner function, here and below.
-        checked(unsafe { PeakAlloc.alloc(layout) }, layout.size())
+        taken(unsafe { System.alloc(layout) }, layout.size())
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        checked(unsafe { PeakAlloc.alloc_zeroed(layout) }, layout.size())
+        taken(unsafe { System.alloc_zeroed(layout) }, layout.size())
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        unsafe { PeakAlloc.dealloc(pointer, layout) }
+        unsafe { System.dealloc(pointer, layout) }
+        USED.fetch_sub(layout.size(), Ordering::Relaxed);
     }
 
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        checked(unsafe { PeakAlloc.realloc(pointer, layout, size) }, size)
+        let moved = taken(unsafe { System.realloc(pointer, layout, size) }, size);
+        if !moved.is_null() {
+            USED.fetch_sub(layout.size(), Ordering::Relaxed);
+        }
+        moved
     }
+}
+
+/// Counts an allocation.
+fn taken(pointer: *mut u8, bytes: usize) -> *mut u8 {
+    if checked(pointer, bytes).is_null() {
+        return pointer;
+    }
+    let used = USED.fetch_add(bytes, Ordering::Relaxed) + bytes;
+    if used > PEAK.load(Ordering::Relaxed) {
+        PEAK.fetch_max(used, Ordering::Relaxed);
+    }
+    pointer
 }
 
 fn checked(pointer: *mut u8, bytes: usize) -> *mut u8 {

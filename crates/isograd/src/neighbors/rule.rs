@@ -54,6 +54,7 @@ pub fn automatic<T: Real>(mean: Option<T>, points: usize, bounds: [[T; 3]; 2]) -
 /// between them; nothing where none is positive. Zeros are of points on which 24 samples lie.
 pub fn middle_half<T: Real>(squares: &[T], scratch: &mut Vec<T>) -> Option<([T; 2], T)> {
     scratch.clear();
+    scratch.reserve_exact(squares.len());
     scratch.extend(squares.iter().filter(|&&square| square > T::zero()));
     let (n, quarter) = (scratch.len(), scratch.len() / 4);
     if n == 0 {

@@ -96,6 +96,7 @@ impl Sites {
         self.facets = facets;
         if is_large(bvh.len()) {
             self.slacks = Vec::new();
+            self.of_vertex = Vec::new();
         }
         if !self.large.contains(&true) {
             self.large.clear();
