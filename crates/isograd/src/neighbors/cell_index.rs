@@ -9,7 +9,7 @@ use crate::{Real, parallel};
 pub(super) const CELL: usize = 16;
 
 /// Subtrees of fewer points than this are built and walked by one thread.
-pub(super) const TASK: usize = 2048;
+pub(super) const TASK: usize = 256;
 
 /// Points sorted into the cells of a balanced k-d tree, for exact radius and nearest queries.
 ///
@@ -22,7 +22,8 @@ pub(super) const TASK: usize = 2048;
 /// multiplied, so a cloud far from the origin loses nothing.
 #[derive(Clone, Debug, Default)]
 pub struct CellIndex<T> {
-    /// Coordinates in sorted order, an array for each axis.
+    /// Coordinates in sorted order, an array for each axis, and [`CELL`] numbers more, so that as many may be read from
+    /// any point on.
     coordinates: [Vec<T>; 3],
     /// Sorted position → input index.
     order: Vec<u32>,
@@ -59,6 +60,12 @@ pub(super) struct Place {
 }
 
 impl Place {
+    /// The sorted positions.
+    #[inline(always)]
+    pub(super) fn positions(self) -> Range<usize> {
+        self.start..self.end
+    }
+
     /// The two halves of the subtree.
     #[inline(always)]
     pub(super) fn children(self) -> [Self; 2] {
@@ -190,7 +197,9 @@ impl<T: Real> CellIndex<T> {
             .extend(self.entries.iter().map(|entry| entry.index));
         for (a, coordinates) in self.coordinates.iter_mut().enumerate() {
             coordinates.clear();
+            coordinates.reserve_exact(points.len() + CELL);
             coordinates.extend(self.entries.iter().map(|entry| entry.point[a]));
+            coordinates.extend([T::zero(); CELL]);
         }
     }
 
@@ -201,7 +210,7 @@ impl<T: Real> CellIndex<T> {
         out.extend(0..self.len() as u32);
         self.walk(&mut |_| true, &mut |cell| {
             let point = |position: &u32| self.point(*position as usize);
-            out[cell].sort_by(|a, b| compare_points(point(a), point(b)));
+            out[cell.positions()].sort_by(|a, b| compare_points(point(a), point(b)));
         });
     }
 
@@ -252,14 +261,36 @@ impl<T: Real> CellIndex<T> {
         self.walk(
             &mut |node| node.distance_squared(query) <= limit,
             &mut |cell| {
-                for position in cell {
-                    let d2 = distance_squared(self.point(position), query);
-                    if d2 <= limit {
-                        visit(self.order[position] as usize, d2);
-                    }
-                }
+                self.scan(cell, query, limit, &mut |position, d2| {
+                    visit(self.order[position] as usize, d2);
+                });
             },
         );
+    }
+
+    /// Calls `visit(sorted position, distance²)` for every point of a cell within the distance whose square is `limit`.
+    #[inline(always)]
+    pub(super) fn scan(
+        &self,
+        cell: Place,
+        query: [T; 3],
+        limit: T,
+        visit: &mut impl FnMut(usize, T),
+    ) {
+        let [x, y, z] = self.coordinates_of(cell.start..cell.start + CELL);
+        let (mut squares, mut within) = ([T::zero(); CELL], 0u32);
+        for l in 0..CELL {
+            squares[l] = distance_squared([x[l], y[l], z[l]], query);
+        }
+        for l in 0..CELL {
+            within |= u32::from(squares[l] <= limit) << l;
+        }
+        within &= (1 << (cell.end - cell.start)) - 1;
+        while within != 0 {
+            let l = within.trailing_zeros() as usize;
+            visit(cell.start + l, squares[l]);
+            within &= within - 1;
+        }
     }
 
     /// Whether any point is within `radius` of `query`, or at it.
@@ -274,7 +305,7 @@ impl<T: Real> CellIndex<T> {
         self.walk(
             &mut |node| count.get() < most && node.distance_squared(query) <= limit,
             &mut |cell| {
-                let points = cell.map(|position| self.point(position));
+                let points = cell.positions().map(|position| self.point(position));
                 let within = points.filter(|&point| distance_squared(point, query) <= limit);
                 count.set(count.get() + within.count());
             },
@@ -291,12 +322,12 @@ impl<T: Real> CellIndex<T> {
         }
     }
 
-    /// Calls `visit` with the sorted positions of every cell that `enter` does not rule out, in order.
+    /// Calls `visit` with every cell that `enter` does not rule out, in order.
     #[inline(always)]
     pub(super) fn walk(
         &self,
         enter: &mut impl FnMut(&Node<T>) -> bool,
-        visit: &mut impl FnMut(Range<usize>),
+        visit: &mut impl FnMut(Place),
     ) {
         if self.is_empty() {
             return;
@@ -311,7 +342,7 @@ impl<T: Real> CellIndex<T> {
                 continue;
             }
             if at.levels == 0 {
-                visit(at.start..at.end);
+                visit(at);
                 continue;
             }
             let [left, right] = at.children();

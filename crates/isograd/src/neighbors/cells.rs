@@ -30,7 +30,7 @@ impl<T: Real> CellIndex<T> {
             let leaf =
                 |at: Place, near: &[Place], candidates: &mut Candidates<T, M>, out: &mut [U]| {
                     simd::vectorized!(arch, self.collect(at, near, values, limit, candidates));
-                    fill(at.start..at.end, candidates, out);
+                    fill(at.positions(), candidates, out);
                 };
             self.for_each_leaf(limit, out, &leaf);
         }
@@ -49,7 +49,7 @@ impl<T: Real> CellIndex<T> {
         let corners = self.nodes[at.node].corners();
         candidates.clear();
         for place in near {
-            let cell = place.start..place.end;
+            let cell = place.positions();
             let points = self.coordinates_of(cell.clone());
             let values = values.map(
                 #[inline(always)]
@@ -89,6 +89,7 @@ impl<T: Real> CellIndex<T> {
         self.walk(
             &mut |node| node.distance_squared(point) <= limit,
             &mut |cell| {
+                let cell = cell.positions();
                 let points = self.coordinates_of(cell.clone());
                 let values = search.values.map(|values| &values[cell.clone()]);
                 out.extend_near(points, values, [point; 2], limit);

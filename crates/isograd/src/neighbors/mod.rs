@@ -25,6 +25,7 @@ mod cell_index;
 mod cells;
 mod census;
 mod gather;
+mod near_cells;
 mod nearest;
 mod nearest_of_all;
 #[cfg(test)]
@@ -42,6 +43,7 @@ pub(crate) use candidates::{Candidates, LANES, Lanes, sum_lanes};
 pub use cell_index::CellIndex;
 pub(crate) use cells::Search;
 pub(crate) use census::Census;
+pub(crate) use near_cells::NearCells;
 pub use radius::{Error, Neighborhoods, Radii, Radius, forward, with_radii};
 pub(crate) use radius::{Found, forward_with, hold};
 pub use radius_pullback::{RadiiCotangent, pullback};

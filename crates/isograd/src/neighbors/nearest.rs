@@ -28,7 +28,7 @@ impl<T: Real> CellIndex<T> {
 
     fn nearest_below(&self, at: Place, query: [T; 3], k: usize, out: &mut Vec<(u32, T)>) {
         if at.levels == 0 {
-            for position in at.start..at.end {
+            for position in at.positions() {
                 let d2 = distance_squared(self.point(position), query);
                 self.insert_nearest((position as u32, d2), k, out);
             }
@@ -113,7 +113,7 @@ impl<T: Real> CellIndex<T> {
         }
         let to = |position: usize| distance_squared(self.point(position), query);
         distances.clear();
-        distances.extend((at.start..at.end).map(to));
+        distances.extend(at.positions().map(to));
         let bound = smallest(distances, k);
         if bound == T::zero() {
             // However many points lie there, none is nearer.
@@ -122,7 +122,7 @@ impl<T: Real> CellIndex<T> {
         distances.clear();
         self.walk(
             &mut |node| node.distance_squared(query) <= bound,
-            &mut |cell| distances.extend(cell.map(to).filter(|&d2| d2 <= bound)),
+            &mut |cell| distances.extend(cell.positions().map(to).filter(|&d2| d2 <= bound)),
         );
         smallest(distances, k)
     }

@@ -4,7 +4,6 @@
 //! compared with each other, all with all: vector code, and faster than one search per point.
 
 use std::cell::Cell;
-use std::ops::Range;
 
 use super::candidates::LANES;
 use super::cell_index::{CellIndex, Place, distance_squared};
@@ -71,10 +70,10 @@ impl<T: Real> CellIndex<T> {
         let (limit, arch) = (radius * radius, pulp::Arch::new());
         self.for_each_leaf(limit, out, &|at, near, scratch: &mut Scratch<T>, out| {
             scratch.clear();
-            for cell in near {
-                self.gather(cell.start..cell.end, at, limit, scratch);
+            for &cell in near {
+                self.gather(cell, at, limit, scratch);
             }
-            for (&position, out) in by_place[at.start..at.end].iter().zip(out) {
+            for (&position, out) in by_place[at.positions()].iter().zip(out) {
                 let position = position as usize;
                 let is_found = simd::vectorized!(arch, {
                     let others = self.others(position, limit, scratch);
@@ -103,7 +102,7 @@ impl<T: Real> CellIndex<T> {
         // Each cell has a distance of its own, so no cells near its parent are passed down.
         let none = -T::one();
         self.for_each_leaf(none, out, &|at, _, scratch: &mut Scratch<T>, out| {
-            let positions = at.start..at.end;
+            let positions = at.positions();
             let middle = at.start + positions.len() / 2;
             let reach = search(middle, scratch).sqrt();
             let most = reach * T::of(REACHES);
@@ -146,11 +145,11 @@ impl<T: Real> CellIndex<T> {
 
     /// Adds the points of a cell within a distance of the box of `at`, whose square is `limit`, to those gathered, unless
     /// these are too many; returns whether all were added so far.
-    fn gather(&self, cell: Range<usize>, at: Place, limit: T, scratch: &mut Scratch<T>) -> bool {
-        scratch.are_all &= scratch.positions.len() + cell.len() <= MANY;
+    fn gather(&self, cell: Place, at: Place, limit: T, scratch: &mut Scratch<T>) -> bool {
+        scratch.are_all &= scratch.positions.len() + cell.positions().len() <= MANY;
         if scratch.are_all {
             let own = &self.nodes[at.node];
-            for position in cell {
+            for position in cell.positions() {
                 let point = self.point(position);
                 if own.distance_squared(point) <= limit {
                     scratch.positions.push(position as u32);

@@ -122,7 +122,7 @@ fn by_distance<T: Real>(points: &[[T; 3]], query: [T; 3]) -> Vec<(u32, T)> {
     all
 }
 
-fn queries<T: Real>(points: &[[T; 3]]) -> Vec<[T; 3]> {
+pub(super) fn queries<T: Real>(points: &[[T; 3]]) -> Vec<[T; 3]> {
     let some = points.iter().step_by(points.len().div_ceil(40)).copied();
     let beside = points.iter().step_by(97).map(|p| p.map(|x| x + T::of(0.1)));
     some.chain(beside)

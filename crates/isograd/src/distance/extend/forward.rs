@@ -6,10 +6,13 @@ use super::{Error, Extension, NO_TRIANGLE, Region, Residual, Samples, Surface};
 use crate::data::Attribute;
 use crate::distance::triangle;
 use crate::element::fit as element;
-use crate::neighbors::CellIndex;
+use crate::neighbors::{CellIndex, NearCells};
 use crate::parallel::{self, CHUNK};
 use crate::vector::{scale, sub, to_f64};
 use crate::{Grid, Mesh, Real};
+
+/// Vertices in one chunk of the loop over them: few enough that small surfaces keep all threads busy.
+const VERTICES: usize = 256;
 
 /// Cells in one chunk of a loop over the grid.
 const CELLS: usize = 1 << 16;
@@ -152,6 +155,7 @@ fn find_band<T: Real>(
 /// Scratch buffers of one thread.
 #[derive(Default)]
 struct Workspace<T> {
+    near: NearCells<T>,
     neighbors: Vec<Neighbor>,
     nearest: Vec<(u32, T)>,
 }
@@ -174,9 +178,9 @@ fn extend_to_vertices<T: Real>(
     let smallest_area = residual.smallest_area;
     residual.fits.resize(mesh.vertices().len(), Fit::default());
     values.resize(mesh.vertices().len() * components, T::zero());
-    let fits = residual.fits.chunks_mut(CHUNK);
-    let outputs = fits.zip(values.chunks_mut(CHUNK * components));
-    let chunks = mesh.vertices().chunks(CHUNK).zip(outputs);
+    let fits = residual.fits.chunks_mut(VERTICES);
+    let outputs = fits.zip(values.chunks_mut(VERTICES * components));
+    let chunks = mesh.vertices().chunks(VERTICES).zip(outputs);
     parallel::map_each_with(
         Workspace::default,
         chunks,
@@ -198,10 +202,14 @@ fn gather<T: Real>(
     vertex: [T; 3],
     workspace: &mut Workspace<T>,
 ) -> f64 {
-    let Workspace { neighbors, nearest } = workspace;
+    let Workspace {
+        near,
+        neighbors,
+        nearest,
+    } = workspace;
     let index = &samples.neighborhoods.index;
     let least = samples.radius;
-    let mut collect = |radius| collect(samples, smallest_area, vertex, radius, neighbors);
+    let mut collect = |radius| collect(samples, smallest_area, vertex, radius, near, neighbors);
     if collect(least) >= ENOUGH.min(index.len()) {
         return least.f64();
     }
@@ -217,6 +225,7 @@ pub(super) fn collect<T: Real>(
     smallest_area: f64,
     vertex: [T; 3],
     radius: T,
+    near: &mut NearCells<T>,
     neighbors: &mut Vec<Neighbor>,
 ) -> usize {
     let Samples {
@@ -224,12 +233,13 @@ pub(super) fn collect<T: Real>(
         areas,
         ..
     } = samples;
-    let (index, position) = (&neighborhoods.index, neighborhoods.position());
+    let index = &neighborhoods.index;
     let (y, reach) = (to_f64(vertex), radius.f64());
     neighbors.clear();
     let mut enough = 0;
-    index.for_each_within(vertex, radius, |j, _| {
-        let x = to_f64(index.point(position[j] as usize));
+    near.for_each_within(index, vertex, radius, |position, _| {
+        let j = index.order()[position] as usize;
+        let x = to_f64(index.point(position));
         let offset = scale(sub(x, y), 1.0 / reach);
         let squared = crate::vector::norm_squared(offset);
         enough += usize::from(squared <= 1.0 / (REACH * REACH));

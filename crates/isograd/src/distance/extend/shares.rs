@@ -11,14 +11,16 @@ use super::forward::collect;
 use super::pullback::Inputs;
 use crate::Real;
 use crate::gather::bounded;
+use crate::neighbors::NearCells;
 use crate::parallel::{self, CHUNK};
 use crate::vector::{dot, norm_squared, scale, sub};
 
 /// Scratch buffers of one thread.
 #[derive(Default)]
-pub(super) struct Workspace {
+pub(super) struct Workspace<T> {
     /// `ū_v` of the vertex at hand.
     pub bar: Vec<f64>,
+    near: NearCells<T>,
     neighbors: Vec<Neighbor>,
     /// `ū_v v_j` of each of them, then `q_j`.
     contracted: Vec<f64>,
@@ -41,7 +43,7 @@ pub(super) struct Shares {
 const FIXED: usize = 4;
 
 impl Shares {
-    pub(super) fn begin(&mut self, work: &mut Workspace) {
+    pub(super) fn begin<T>(&mut self, work: &mut Workspace<T>) {
         self.order.clear();
         self.sums.clear();
         self.least_radius = 0.0;
@@ -57,11 +59,12 @@ impl Shares {
         &mut self,
         inputs: &Inputs<'_, T>,
         vertex: usize,
-        work: &mut Workspace,
+        work: &mut Workspace<T>,
         guarded: &mut usize,
     ) -> [f64; 3] {
         let Workspace {
             bar,
+            near,
             neighbors,
             contracted,
             slots,
@@ -72,7 +75,7 @@ impl Shares {
         let (samples, smallest_area) = (inputs.samples, inputs.residual.smallest_area);
         let radius = inputs.residual.fits[vertex].radius;
         let at = inputs.surface.mesh.vertices()[vertex];
-        collect(samples, smallest_area, at, T::of(radius), neighbors);
+        collect(samples, smallest_area, at, T::of(radius), near, neighbors);
         contracted.clear();
         contracted.extend(neighbors.iter().map(|n| -> f64 {
             let values = &inputs.attribute.values[n.sample as usize * bar.len()..];
