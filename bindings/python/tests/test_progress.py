@@ -100,8 +100,7 @@ points = numpy.random.default_rng(1).normal(size=(1500, 3))
 points /= numpy.linalg.norm(points, axis=1, keepdims=True)
 result = isograd.reconstruct(points, resolution=20{argument})
 result.pullback(result.sdf)
-names = [open(f"/proc/self/task/{{task}}/comm").read() for task in os.listdir("/proc/self/task")]
-print(len(names) - 1)
+print(len(os.listdir("/proc/self/task")) - 1)
 """
     environment = {**os.environ, "RAYON_NUM_THREADS": "7", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment)
