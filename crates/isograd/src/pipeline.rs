@@ -150,8 +150,9 @@ impl<T: Pipeline> Reconstructor<T> {
         observer: &mut dyn FnMut(Stage) -> ControlFlow<()>,
     ) -> Result<&Reconstruction<T>, Error> {
         self.is_whole = false;
-        let cells = self.result.sdf.values().len();
-        memory::check_points::<T>(cloud.len(), self.result.points.len(), cells)?;
+        let (cells, options) = (self.result.sdf.values().len(), &self.result.options);
+        let is_lean = options.orient == orient::Method::Given && !options.residuals;
+        memory::check_points::<T>(cloud.len(), self.result.points.len(), cells, is_lean)?;
         let mut used = self.result.select(cloud, held);
         for stage in Stage::ALL {
             if observer(stage).is_break() {

@@ -14,13 +14,15 @@ use crate::{Grid, Real};
 /// Largest number of values held at once for each cell: φ, χ, the closest triangles, and the scratch buffers of the
 /// Fourier transform and of the distance. Measurements are on the scaling page.
 const CELL_VALUES: f64 = 4.5;
-/// Those of them that a plan holds from the beginning: φ and χ.
+/// Those of them that a plan has from the beginning: φ and χ. They take no memory of the machine before they are written.
 const FIRST_CELL_VALUES: f64 = 2.0;
 /// Memory held at once for each sample, as measured there, for search trees, neighborhoods, fitted planes and evidence for
 /// signs: bytes that do not depend on the number type, and values.
 const OF_POINT: [f64; 2] = [500.0, 75.0];
 /// [`OF_POINT`] of a [large](is_large) cloud, for which no scratch memory is kept.
 const OF_POINT_OF_LARGE: [f64; 2] = [420.0, 40.0];
+/// [`OF_POINT_OF_LARGE`] with given normals and without residuals.
+const OF_POINT_GIVEN: [f64; 2] = [10.0, 58.0];
 
 /// Largest number of values held at once for each cell in a block of a sparse solve: right-hand side and indicator of all
 /// octaves, and what the local iso-value needs.
@@ -121,7 +123,7 @@ impl fmt::Display for Amount {
 pub fn check_memory<T: Real>(grid: &Grid<T>) -> Result<(), Error> {
     let cells: f64 = grid.shape().iter().map(|&n| n as f64).product();
     let needed = cells * CELL_VALUES * size_of::<T>() as f64;
-    Ok(check(MemoryUse::Grid(grid.shape()), needed, free)?)
+    Ok(check(MemoryUse::Grid(grid.shape()), needed, 0.0, free)?)
 }
 
 /// Checks that the [distance of a mesh](crate::distance::lattice::forward_of_mesh) and the closest faces at every cell of `grid` fit into
@@ -132,27 +134,35 @@ pub fn check_memory<T: Real>(grid: &Grid<T>) -> Result<(), Error> {
 pub fn check_distance_memory<T: Real>(grid: &Grid<T>) -> Result<(), MemoryError> {
     let cells: f64 = grid.shape().iter().map(|&n| n as f64).product();
     let needed = cells * (size_of::<T>() + size_of::<u32>()) as f64;
-    check(MemoryUse::Grid(grid.shape()), needed, free)
+    check(MemoryUse::Grid(grid.shape()), needed, 0.0, free)
 }
 
 /// Checks that the stages get memory for `points` samples and, in the first call of a plan, for what else they need on
-/// its grid. From previous calls the plan holds memory for `held` samples.
+/// its grid. From previous calls the plan holds memory for `held` samples; `is_lean` says that their normals are given,
+/// and that no residuals are kept.
 ///
 /// # Errors
 /// [`Error::Memory`].
-pub(super) fn check_points<T: Real>(points: usize, held: usize, cells: usize) -> Result<(), Error> {
+pub(super) fn check_points<T: Real>(
+    points: usize,
+    held: usize,
+    cells: usize,
+    is_lean: bool,
+) -> Result<(), Error> {
     if points <= held {
         return Ok(());
     }
     let value = size_of::<T>() as f64;
     let cells = if held == 0 { cells as f64 } else { 0.0 };
     let [bytes, values] = match is_large(points) {
+        true if is_lean => OF_POINT_GIVEN,
         true => OF_POINT_OF_LARGE,
         false => OF_POINT,
     };
+    let untouched = cells * FIRST_CELL_VALUES * value;
     let needed = (points - held) as f64 * (bytes + values * value)
         + cells * (CELL_VALUES - FIRST_CELL_VALUES) * value;
-    Ok(check(MemoryUse::Points(points), needed, free)?)
+    Ok(check(MemoryUse::Points(points), needed, untouched, free)?)
 }
 
 /// Checks that a sparse solve in `blocks` of `grid` fits into the free memory; its coarsest cells are those of the grid, halved
@@ -172,21 +182,31 @@ pub(super) fn check_blocks<T: Real>(
         .product();
     let values = BLOCK_VALUES * blocks.nodes() as f64 + COARSE_VALUES * coarse;
     let needed = values * size_of::<T>() as f64 + blocks.bytes() as f64;
-    Ok(check(MemoryUse::Grid(grid.shape()), needed, free)?)
+    Ok(check(MemoryUse::Grid(grid.shape()), needed, 0.0, free)?)
 }
 
+/// `untouched` bytes are allocated and not written yet: limits of a process count them already, the machine and its
+/// control groups do not.
 fn check(
     purpose: MemoryUse,
     needed: f64,
+    untouched: f64,
     free: impl FnOnce() -> Option<AvailableMemory>,
 ) -> Result<(), MemoryError> {
-    match free() {
-        Some(available) if needed > available.bytes => Err(MemoryError {
+    let Some(available) = free() else {
+        return Ok(());
+    };
+    let needed = match available.limit {
+        MemoryLimit::Machine | MemoryLimit::ControlGroup => needed + untouched,
+        MemoryLimit::AddressSpace | MemoryLimit::Data => needed,
+    };
+    match needed > available.bytes {
+        true => Err(MemoryError {
             purpose,
             needed,
             available,
         }),
-        _ => Ok(()),
+        false => Ok(()),
     }
 }
 
@@ -279,9 +299,9 @@ mod tests {
                 bytes: 3.0 * MIB,
                 limit,
             };
-            let enough = check(purpose, 2.9 * MIB, || Some(available));
+            let enough = check(purpose, 2.9 * MIB, 0.0, || Some(available));
             assert_eq!(enough, Ok(()));
-            let error = check(purpose, 2.5 * GIB, || Some(available));
+            let error = check(purpose, 2.5 * GIB, 0.0, || Some(available));
             error.expect_err("too little").to_string()
         };
         assert_eq!(
@@ -292,17 +312,30 @@ mod tests {
             text(MemoryUse::Grid([2, 3, 4]), MemoryLimit::AddressSpace),
             "a grid of [2, 3, 4] cells needs about 2.5 GiB, and 3.0 MiB are free (below the limit of its address space, ulimit -v); use a lower resolution, a larger spacing or tighter bounds"
         );
-        assert_eq!(check(MemoryUse::Points(7), f64::MAX, || None), Ok(()));
+        assert_eq!(check(MemoryUse::Points(7), f64::MAX, 0.0, || None), Ok(()));
+    }
+
+    #[test]
+    fn what_is_not_written_yet_counts_where_the_limit_does_not_count_it() {
+        let needed = |limit| {
+            let available = AvailableMemory { bytes: 5.0, limit };
+            let found = check(MemoryUse::Points(7), 4.0, 2.0, || Some(available));
+            found.err().map(|error| error.needed)
+        };
+        assert_eq!(needed(MemoryLimit::Machine), Some(6.0));
+        assert_eq!(needed(MemoryLimit::ControlGroup), Some(6.0));
+        assert_eq!(needed(MemoryLimit::AddressSpace), None);
+        assert_eq!(needed(MemoryLimit::Data), None);
     }
 
     #[test]
     fn memory_that_a_plan_holds_is_not_asked_for_again() {
         let points = usize::MAX >> 11;
         if available_memory().is_some() {
-            check_points::<f32>(points, 0, 8).expect_err("more than any machine has");
-            check_points::<f32>(9, 0, points).expect_err("more than any machine has");
+            check_points::<f32>(points, 0, 8, false).expect_err("more than any machine has");
+            check_points::<f32>(9, 0, points, true).expect_err("more than any machine has");
         }
-        check_points::<f32>(points, points, points).expect("is there");
-        check_points::<f32>(points + 1, points, points).expect("little is missing");
+        check_points::<f32>(points, points, points, false).expect("is there");
+        check_points::<f32>(points + 1, points, points, true).expect("little is missing");
     }
 }

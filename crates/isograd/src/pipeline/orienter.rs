@@ -96,7 +96,7 @@ impl<T: Pipeline> Orienter<T> {
             points: cloud.len(),
             ..Report::default()
         };
-        check_points::<T>(cloud.len(), orientation.normals.capacity(), 0)?;
+        check_points::<T>(cloud.len(), orientation.normals.capacity(), 0, false)?;
         begin(Stage::Normals)?;
         let start = Instant::now();
         let is_given = self.method == Method::Given;
