@@ -17,8 +17,9 @@ const STATUS: i32 = 1;
 /// The allocator of the program.
 pub struct Allocator;
 
-/// Bytes that are allocated now, and the most that were.
+/// Bytes that are allocated now.
 static USED: AtomicUsize = AtomicUsize::new(0);
+/// The most bytes that were allocated at once.
 static PEAK: AtomicUsize = AtomicUsize::new(0);
 /// Whether the process runs a command. Not so in Python, which may survive a failed allocation.
 static RUNS: AtomicBool = AtomicBool::new(false);
@@ -78,21 +79,17 @@ unsafe impl GlobalAlloc for Allocator {
     }
 }
 
-/// Counts an allocation.
+/// Counts an allocation, or ends the program if it failed while a command runs.
 fn taken(pointer: *mut u8, bytes: usize) -> *mut u8 {
-    if checked(pointer, bytes).is_null() {
+    if pointer.is_null() {
+        if RUNS.load(Ordering::Relaxed) {
+            end(bytes);
+        }
         return pointer;
     }
     let used = USED.fetch_add(bytes, Ordering::Relaxed) + bytes;
     if used > PEAK.load(Ordering::Relaxed) {
         PEAK.fetch_max(used, Ordering::Relaxed);
-    }
-    pointer
-}
-
-fn checked(pointer: *mut u8, bytes: usize) -> *mut u8 {
-    if pointer.is_null() && RUNS.load(Ordering::Relaxed) {
-        end(bytes);
     }
     pointer
 }

@@ -305,9 +305,7 @@ impl<T: Real> CellIndex<T> {
         self.walk(
             &mut |node| count.get() < most && node.distance_squared(query) <= limit,
             &mut |cell| {
-                let points = cell.positions().map(|position| self.point(position));
-                let within = points.filter(|&point| distance_squared(point, query) <= limit);
-                count.set(count.get() + within.count());
+                self.scan(cell, query, limit, &mut |_, _| count.set(count.get() + 1));
             },
         );
         count.get().min(most)

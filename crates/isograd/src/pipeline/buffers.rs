@@ -1,4 +1,4 @@
-//! What the stages keep for one another beside the results, and when it is freed.
+//! Scratch buffers and residuals of the stages, and when they are freed.
 
 use std::sync::Arc;
 

@@ -14,7 +14,8 @@ use crate::{Grid, Real};
 /// Largest number of values held at once for each cell: φ, χ, the closest triangles, and the scratch buffers of the
 /// Fourier transform and of the distance. Measurements are on the scaling page.
 const CELL_VALUES: f64 = 4.5;
-/// Those of them that a plan has from the beginning: φ and χ. They take no memory of the machine before they are written.
+/// Values for each cell, of [`CELL_VALUES`], that a new plan allocates: φ and χ. They take no memory of the machine before
+/// they are written.
 const FIRST_CELL_VALUES: f64 = 2.0;
 /// Memory held at once for each sample, as measured there, for search trees, neighborhoods, fitted planes and evidence for
 /// signs: bytes that do not depend on the number type, and values.

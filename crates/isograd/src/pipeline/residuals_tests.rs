@@ -3,6 +3,7 @@
 use crate::data::{Attribute, PointCloud};
 use crate::distance::extend;
 use crate::distance::lattice::Band;
+use crate::neighbors::tests::even_sphere;
 use crate::orient::Method;
 use crate::{
     Cotangent, Grid, Options, PullbackError, Reconstruction, Reconstructor, Resolution, Solve,
@@ -11,12 +12,7 @@ use crate::{
 
 /// A sphere of so many samples that memory is freed between stages, and one sample far from it, which is left out.
 fn cloud() -> PointCloud<f64> {
-    let sample = |k: usize| {
-        let z = (2 * k + 1) as f64 / 3600.0 - 1.0;
-        let (turn, r) = (2.399_963_229_728_653 * k as f64, (1.0 - z * z).sqrt());
-        [r * turn.cos(), r * turn.sin(), z]
-    };
-    let mut points: Vec<_> = (0..3600).map(sample).collect();
+    let mut points = even_sphere(3600);
     points.insert(40, [30.0, 4.0, 0.0]);
     let attribute = Attribute {
         name: "x".into(),
