@@ -2,6 +2,7 @@
 
 use crate::data::PointCloud;
 use crate::isosurface::trim::Trim;
+use crate::neighbors::tests::even_sphere;
 use crate::orient::Method;
 use crate::sheet::Sheet;
 use crate::testing::noise;
@@ -9,12 +10,8 @@ use crate::{Cotangent, Error, Grid, Options, Reconstruction, Reconstructor, Save
 
 /// Samples of the unit sphere above `z = 0`, and their normals.
 fn half_sphere(count: usize) -> PointCloud<f64> {
-    let sample = |k: usize| {
-        let z = (2 * k + 1) as f64 / (2 * count) as f64;
-        let (turn, r) = (2.399_963_229_728_653 * k as f64, (1.0 - z * z).sqrt());
-        [r * turn.cos(), r * turn.sin(), z]
-    };
-    let points: Vec<_> = (0..count).map(sample).collect();
+    let mut points = even_sphere(2 * count);
+    points.retain(|p| p[2] > 0.0);
     let cloud = PointCloud::new(points.clone());
     cloud
         .and_then(|cloud| cloud.with_normals(points))

@@ -1,6 +1,7 @@
 //! A cloud with outliers gives the results of the cloud without them.
 
 use crate::data::{Attribute, PointCloud};
+use crate::neighbors::tests::even_sphere;
 use crate::orient::Method;
 use crate::{
     Cotangent, Error, ExtensionCotangent, Grid, Options, Outliers, Reconstruction, Reconstructor,
@@ -12,12 +13,7 @@ const LEFT_OUT: [usize; 5] = [0, 7, 200, 201, 604];
 
 /// A sphere, without and with outliers.
 fn points() -> [Vec<[f64; 3]>; 2] {
-    let sample = |k: usize| {
-        let z = (2 * k + 1) as f64 / 600.0 - 1.0;
-        let (turn, r) = (2.399_963_229_728_653 * k as f64, (1.0 - z * z).sqrt());
-        [r * turn.cos(), r * turn.sin(), z]
-    };
-    let clean: Vec<_> = (0..600).map(sample).collect();
+    let clean = even_sphere(600);
     let mut spoilt = clean.clone();
     let outliers = [
         [100.0, 3.0, 0.0],

@@ -1,18 +1,15 @@
 //! Walls of the grid and the surfaces of incomplete and half bodies.
 
 use crate::data::PointCloud;
+use crate::neighbors::tests::even_sphere;
 use crate::orient::Method;
 use crate::poisson::Walls;
 use crate::{Grid, Options, Reconstruction, Reconstructor, Resolution, Warning};
 
 /// Samples of the unit sphere with `z` below `highest`, and their normals.
 fn bowl(highest: f64) -> PointCloud<f64> {
-    let sample = |k: usize| {
-        let z = (2 * k + 1) as f64 / 4000.0 - 1.0;
-        let (turn, r) = (2.399_963_229_728_653 * k as f64, (1.0 - z * z).sqrt());
-        [r * turn.cos(), r * turn.sin(), z]
-    };
-    let points: Vec<_> = (0..4000).map(sample).filter(|p| p[2] < highest).collect();
+    let mut points = even_sphere(4000);
+    points.retain(|p| p[2] < highest);
     let cloud = PointCloud::new(points.clone());
     cloud
         .and_then(|cloud| cloud.with_normals(points))
