@@ -3,6 +3,7 @@
 use super::rows::{Order, Stencil};
 use super::*;
 use crate::data::Field;
+use crate::neighbors::tests::even_sphere;
 
 const EXACT: Options = Options { smoothing: 0 };
 
@@ -202,14 +203,7 @@ fn facets_a_cell_wide_do_not_spoil_the_curvature() {
     let grid = cube::<f64>(n);
     // Planes that touch a sphere, about one for each h² of it: inside, a distance as exact as ours.
     let count = (4.0 * std::f64::consts::PI * 0.36 / grid.spacing().powi(2)) as usize;
-    let planes: Vec<[f64; 3]> = (0..count)
-        .map(|i| {
-            let z = 1.0 - (2.0 * i as f64 + 1.0) / count as f64;
-            let (sin, cos) = (i as f64 * 2.399963229728653).sin_cos();
-            let r = (1.0 - z * z).sqrt();
-            [r * cos, r * sin, z]
-        })
-        .collect();
+    let planes = even_sphere(count);
     let phi = field(grid, |x| {
         planes
             .iter()

@@ -1,6 +1,7 @@
 //! The oracle stores `V` on the whole grid and applies the operators with their rows at the walls.
 
 use super::*;
+use crate::neighbors::tests::even_sphere;
 use crate::poisson;
 use crate::testing::noise;
 
@@ -325,18 +326,10 @@ fn bad_input_is_refused_with_its_index_and_leaves_the_field_alone() {
 fn indicator_of_a_sphere_rises_by_one_from_inside_to_outside() {
     let count = 20_000;
     let radius = 0.8;
-    // A spiral that is even in area.
-    let normals: Vec<[f64; 3]> = (0..count)
-        .map(|i| {
-            let z = 1.0 - (2 * i + 1) as f64 / f64::from(count);
-            let (sin, cos) = (f64::from(i) * 2.399_963_229_728_653).sin_cos();
-            let r = (1.0 - z * z).sqrt();
-            [r * cos, r * sin, z]
-        })
-        .collect();
+    let normals = even_sphere(count);
     let cloud = Cloud {
         points: normals.iter().map(|n| n.map(|v| radius * v)).collect(),
-        areas: vec![4.0 * std::f64::consts::PI * radius * radius / f64::from(count); normals.len()],
+        areas: vec![4.0 * std::f64::consts::PI * radius * radius / count as f64; count],
         normals,
     };
     let grid = Grid::new([-1.2; 3], 0.06, [40, 40, 40]).expect("valid");
