@@ -116,7 +116,7 @@ impl Auto {
     fn spread(&mut self) {
         let (graph, collected) = (&self.graph, &self.evidence);
         let both = [Interpretation::Careful, Interpretation::Bold];
-        let total = |p: usize| both.map(|of| collected.total(p, graph.side[p], of));
+        let total = |p: usize| both.map(|of| collected.total(p, graph, of));
         parallel::fill(&mut self.observed, graph.near.len(), total);
         graph.relax(&self.observed, &mut self.beliefs, &mut self.next);
     }
@@ -168,6 +168,8 @@ impl Auto {
             }
         }
         self.graph.part_slabs(slabs);
+        self.graph
+            .expose(|p| evidence::exposed(slabs[p], sheets[p].evidence));
         let graph = &self.graph;
         parallel::fill(between, n, |p| {
             layers::is_between(graph, place, p, sheets[p])
@@ -176,15 +178,16 @@ impl Auto {
 }
 
 impl Evidence {
-    /// Evidence of all kinds, from −1 to 1. `side` is the side of the sample in a layer of noise.
-    fn total(&self, p: usize, side: f32, interpretation: Interpretation) -> f32 {
+    /// Evidence of all kinds, from −1 to 1.
+    fn total(&self, p: usize, graph: &Graph, interpretation: Interpretation) -> f32 {
         let openness = match interpretation {
             Interpretation::Careful => self.openness(p),
             Interpretation::Bold => 1.0,
         };
         let view = self.views.get(p).copied().unwrap_or(0.0);
         let (filled, sheet, slab) = (self.filled[p], self.sheets[p].evidence, self.slabs[p]);
-        evidence::weighed(filled, sheet, openness, slab, side, view)
+        let found = evidence::weighed(filled, sheet, openness, slab, graph.side[p]);
+        evidence::with_view(evidence::left(graph.exposed[p]) * found, view)
     }
 
     /// In 0..1, the openness of the side that a second sheet behind the point makes the outer one.

@@ -24,6 +24,10 @@ const APART: f32 = 3.0;
 /// other.
 const INTERLEAVED: f32 = 0.3;
 
+/// Share up to which two sheets are, the less it is, steps beside each other instead, as rounded coordinates make them of
+/// a slanting face: their samples have one side.
+const STEPPED: f32 = 0.25;
+
 /// Cosines between the axes of two such sheets from which on their reflection is not full, and is as without sheets:
 /// 26 and 46 degrees.
 const FULL: f32 = 0.9;
@@ -98,7 +102,7 @@ pub(super) fn largest_height(scatter: f32) -> f32 {
 }
 
 /// How far the reflection of two samples of known sheets is full, in 0..1: near 1 for parallel sheets, and for all acute
-/// angles where the samples of the two sheets are mixed. Where one sheet bends slightly, they are not.
+/// angles where the samples of the two sheets are mixed. Where one sheet bends slightly, or has steps, they are not.
 #[inline(always)]
 fn facing(parallel: f32, interleaved: f32) -> f32 {
     if interleaved > INTERLEAVED {
@@ -106,7 +110,11 @@ fn facing(parallel: f32, interleaved: f32) -> f32 {
     } else {
         let second = parallel * parallel;
         let fourth = second * second;
-        fourth * fourth
+        let mut over = interleaved / STEPPED;
+        if over > 1.0 {
+            over = 1.0;
+        }
+        fourth * fourth * over
     }
 }
 

@@ -49,6 +49,9 @@ pub struct Graph {
     pub thickness: Vec<f32>,
     /// `(N,)` cosine between the axis that was given and [`Self::axis`]; not negative.
     pub parallel: Vec<f32>,
+    /// `(N,)` in 0..1, how far a sample lies on an open sheet, with air on both sides: there the winding number of the
+    /// samples is not that of a body.
+    pub exposed: Vec<f32>,
     pub(super) sheets: Sheets,
     /// Scratch for medians.
     pub(super) values: Vec<f32>,
@@ -76,6 +79,7 @@ impl Graph {
         sites: &Sites,
     ) {
         let n = neighborhoods.index.len();
+        parallel::fill(&mut self.exposed, n, |_| 0.0);
         self.take_axes(axes, neighborhoods, sites);
         parallel::resize(&mut self.near, n, [0; NEIGHBORS]);
         self.find_neighbors(neighborhoods, sites);
@@ -236,6 +240,16 @@ impl Graph {
                     *coupling = coupling::parted(*coupling, both, parallel, side[p], side[q]);
                 }
             }
+        });
+    }
+
+    /// Sets how far each sample is [exposed](Self::exposed); a sample of a layer that scatters is not, since light leaks
+    /// through such a layer.
+    pub(super) fn expose(&mut self, exposed: impl Fn(usize) -> f32 + Sync) {
+        let spread = &self.spread;
+        parallel::fill(&mut self.exposed, spread.len(), |p| match spread[p] > 0.0 {
+            true => 0.0,
+            false => exposed(p),
         });
     }
 

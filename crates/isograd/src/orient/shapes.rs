@@ -61,6 +61,7 @@ pub(super) fn graph((points, normals): &Sampled) -> Graph {
         area: vec![1.0; points.len()],
         spread: vec![0.0; points.len()],
         scatter: vec![0.0; points.len()],
+        exposed: vec![0.0; points.len()],
         near,
         axis,
         ..Graph::default()

@@ -168,7 +168,7 @@ impl Sheet {
 
 #[cfg(test)]
 mod tests {
-    use super::super::shapes::{Random, neighborhoods, oriented};
+    use super::super::shapes::{Random, cuboid, neighborhoods, oriented};
     use super::super::{Method, shapes::Sampled};
     use super::*;
     use crate::normals;
@@ -264,20 +264,42 @@ mod tests {
         assert!(two > 0.5 && bend < 0.2, "{two} {bend}");
     }
 
+    /// Number of samples whose normals point clearly the wrong way.
+    fn wrong_signs((points, normals): &Sampled) -> usize {
+        let near = neighborhoods(points);
+        let mut axes = normals::Residual::default();
+        normals::forward(&near, &mut axes);
+        let out = oriented(points, &axes.normals, &near, None, &Method::Auto).unwrap();
+        let cosines = out.normals.iter().zip(normals);
+        let cosines = cosines.map(|(&a, &b)| vector::dot(a, b));
+        cosines.filter(|&c| c < -0.5).count()
+    }
+
     #[test]
     fn signs_are_right_up_to_the_edge_of_a_wedge() {
         let (mut wrong, mut all) = (0, 0);
         for degrees in [2.0, 10.0, 25.0] {
-            let (points, normals) = wedge(6000, degrees, 7);
-            let near = neighborhoods(&points);
-            let mut axes = normals::Residual::default();
-            normals::forward(&near, &mut axes);
-            let out = oriented(&points, &axes.normals, &near, None, &Method::Auto).unwrap();
-            let cosines = out.normals.iter().zip(&normals);
-            let cosines = cosines.map(|(&a, &b)| vector::dot(a, b));
-            wrong += cosines.filter(|&c| c < -0.5).count();
-            all += points.len();
+            let wedge = wedge(6000, degrees, 7);
+            wrong += wrong_signs(&wedge);
+            all += wedge.0.len();
         }
         assert!(100 * wrong < all, "{wrong} of {all}");
+    }
+
+    /// A cube whose faces slant by a degree against the axes, with coordinates that are multiples of a step: each face
+    /// consists of steps. Samples are 0.035 apart.
+    #[test]
+    fn signs_are_right_on_slanting_faces_with_rounded_coordinates() {
+        let (sin, cos) = 1.0f64.to_radians().sin_cos();
+        let turn = |[x, y, z]: [f64; 3]| [x, cos * y - sin * z, sin * y + cos * z];
+        let turn = |[x, y, z]: [f64; 3]| turn([cos * x + sin * z, y, cos * z - sin * x]);
+        let (points, normals) = cuboid(20_000, [1.0; 3], 5);
+        let normals: Vec<[f64; 3]> = normals.into_iter().map(turn).collect();
+        for step in [0.001, 0.004, 0.006] {
+            let round = |x: f64| (x / step).round() * step;
+            let rounded = points.iter().map(|&x| turn(x).map(round)).collect();
+            let wrong = wrong_signs(&(rounded, normals.clone()));
+            assert!(wrong <= 20, "{step}: {wrong}");
+        }
     }
 }

@@ -145,24 +145,52 @@ fn open_surfaces_have_consistent_signs_and_are_not_sure_of_them() {
     }
 }
 
+/// Random samples of the height field `z = f(x, y)` over the unit square, from the height and its two slopes.
+fn height_field(n: usize, seed: u64, f: impl Fn(f64, f64) -> [f64; 3]) -> Sampled {
+    let mut random = Random(seed);
+    let sample = |_| {
+        let (x, y) = (random.unit(), random.unit());
+        let [z, dx, dy] = f(x, y);
+        ([x, y, z], vector::normalized([-dx, -dy, 1.0]).unwrap())
+    };
+    (0..n).map(sample).unzip()
+}
+
+fn wave(x: f64, y: f64) -> [f64; 3] {
+    let ((sin_x, cos_x), (sin_y, cos_y)) = ((12.0 * x).sin_cos(), (12.0 * y).sin_cos());
+    [
+        0.1 * sin_x * sin_y,
+        1.2 * cos_x * sin_y,
+        1.2 * sin_x * cos_y,
+    ]
+}
+
+/// Hills and valleys of several sizes; root mean square slope 1.
+fn terrain(x: f64, y: f64) -> [f64; 3] {
+    let waves = (1..=12).map(f64::from).map(|k| {
+        let (u, v) = (2.5 * k * (1.7 * k).cos(), 2.5 * k * (1.7 * k).sin());
+        let (sin, cos) = (u * x + v * y + 2.3 * k * k).sin_cos();
+        let amplitude = 0.4 / (2.5 * k);
+        [sin, u * cos, v * cos].map(|value| amplitude * value)
+    });
+    waves.fold([0.0; 3], add)
+}
+
 #[test]
 fn sheets_without_an_inside_are_consistent() {
-    let mut random = Random(99);
-    let wave = |x: f64, y: f64| {
-        let ((sin_x, cos_x), (sin_y, cos_y)) = ((12.0 * x).sin_cos(), (12.0 * y).sin_cos());
-        let normal = [-1.2 * cos_x * sin_y, -1.2 * sin_x * cos_y, 1.0];
-        (
-            [x, y, 0.1 * sin_x * sin_y],
-            vector::normalized(normal).unwrap(),
-        )
-    };
-    let wavy: Sampled = (0..20_000)
-        .map(|_| wave(random.unit(), random.unit()))
-        .unzip();
+    let wavy = height_field(20_000, 99, wave);
     let flat: Sampled = (0..10_000)
         .map(|i| ([(i % 100) as f64, (i / 100) as f64, 0.0], [0.0, 0.0, 1.0]))
         .unzip();
-    for (name, sampled) in [("wavy", wavy), ("flat", flat)] {
+    let mut sheets = vec![("wavy", wavy), ("flat", flat)];
+    sheets.extend([1, 2, 3].map(|seed| {
+        (
+            "other samples of the wavy one",
+            height_field(20_000, seed, wave),
+        )
+    }));
+    sheets.extend([5, 6].map(|seed| ("terrain", height_field(30_000, seed, terrain))));
+    for (name, sampled) in sheets {
         let outcome = orient(&sampled);
         let one_way = outcome.wrong == 0 || outcome.wrong == outcome.judged;
         assert!(one_way, "{name}: {} of {}", outcome.wrong, outcome.judged);

@@ -21,6 +21,10 @@ pub(super) mod tree;
 const PROBES: usize = 2048;
 const FEWEST_PROBES: usize = 4;
 
+/// Weight of a sample with air on both sides. The winding number of an open sheet is ½ nowhere: that of a bulge comes closer
+/// to it if the bulge is turned outward, whatever the sheet round it is.
+const EXPOSED: f64 = 0.1;
+
 /// `(probes, domains)` the winding number that each domain, with these `members` and signs of all axes, gives at each of the
 /// `probes`.
 fn numbers(
@@ -44,15 +48,16 @@ fn numbers(
     parallel::map(probes.len(), at_probe).concat()
 }
 
-/// Cost of signs: the sum over all samples of the squared distance of the winding number from ½, which is
-/// `Σ_ab gram[a][b] s_a s_b − Σ_a pull[a] s_a + samples/4`.
+/// Cost of signs: the sum over all samples, weighted less where they are [exposed](Graph::exposed), of the squared distance
+/// of the winding number from ½, which is
+/// `Σ_ab gram[a][b] s_a s_b − Σ_a pull[a] s_a` and a constant.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Misfit {
     /// `(domains · domains,)`, symmetric.
     pub gram: Vec<f64>,
     /// `(domains,)`.
     pub pull: Vec<f64>,
-    samples: usize,
+    constant: f64,
 }
 
 impl Misfit {
@@ -60,7 +65,10 @@ impl Misfit {
     pub(super) fn new(graph: &Graph, place: &impl Place, domains: &Domains<'_>) -> Self {
         let members = domains.members();
         let in_one = members.iter().map(Vec::len).sum();
-        let (probes, weights) = probes(&members, in_one);
+        let (probes, mut weights) = probes(&members, in_one);
+        for (weight, &p) in weights.iter_mut().zip(&probes) {
+            *weight *= 1.0 - (1.0 - EXPOSED) * f64::from(graph.exposed[p as usize]);
+        }
         let windings = numbers(graph, place, (&members, domains.sign), &probes);
         let count = domains.count;
         let weighted = || weights.iter().zip(windings.chunks_exact(count.max(1)));
@@ -93,13 +101,13 @@ impl Misfit {
         Self {
             gram,
             pull,
-            samples: in_one,
+            constant: 0.25 * weights.iter().sum::<f64>(),
         }
     }
 
     /// The cost with the signs as they are.
     pub(super) fn total(&self) -> f64 {
-        self.gram.iter().sum::<f64>() - self.pull.iter().sum::<f64>() + 0.25 * self.samples as f64
+        self.gram.iter().sum::<f64>() - self.pull.iter().sum::<f64>() + self.constant
     }
 }
 
@@ -156,6 +164,7 @@ mod tests {
             let graph = Graph {
                 axis: normals.iter().map(|&n| vector::of_f64(n)).collect(),
                 area: vec![1.0; points.len()],
+                exposed: vec![0.0; points.len()],
                 ..Graph::default()
             };
             Self { graph, points }
