@@ -38,8 +38,9 @@
 //! Doubtful signs have [reasons](doubt).
 //!
 //! An open surface has no outside: its signs agree with each other, and its hollow side counts as the
-//! inner one. A part without any evidence (a flat patch, a handful of points) points away from its
-//! centroid, with confidence 0.
+//! inner one. With open air on both sides, as terrain has, the neighbors count for more than light and winding
+//! number. A part without any evidence (a flat patch, a handful of points) points away from its centroid, with
+//! confidence 0.
 //!
 //! Known limits: where the wall of a hollow body is thinner than about a spacing, or a sharp edge is, its
 //! sheets can't be told apart beyond doubt, and a few per cent of the signs there are wrong. Noise throws
