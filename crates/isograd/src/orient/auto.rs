@@ -187,7 +187,7 @@ impl Evidence {
         let view = self.views.get(p).copied().unwrap_or(0.0);
         let (filled, sheet, slab) = (self.filled[p], self.sheets[p].evidence, self.slabs[p]);
         let found = evidence::weighed(filled, sheet, openness, slab, graph.side[p]);
-        evidence::with_view(evidence::left(graph.exposed[p]) * found, view)
+        evidence::with_view(evidence::kept(graph.exposed[p]) * found, view)
     }
 
     /// In 0..1, the openness of the side that a second sheet behind the point makes the outer one.

@@ -14,8 +14,8 @@ const SLIGHT: f32 = 0.05;
 const DIM: f32 = 0.25;
 const OPEN: f32 = 0.4;
 
-/// What is left of the evidence of a sample with open air on both sides.
-const LEFT: f32 = 0.3;
+/// Share of its evidence that a sample with open air on both sides keeps.
+const KEPT: f32 = 0.3;
 
 /// Evidence of a second sheet from which on a sample lies on a thin body, whose other side is lit from behind.
 const THIN: f32 = 0.25;
@@ -47,10 +47,10 @@ pub(super) fn exposed(darker: f32, sheet: f32) -> f32 {
     lit * (1.0 - sheet.abs() / THIN).max(0.0)
 }
 
-/// What is left of the evidence of a sample that is so far [`exposed`]: which of two sides in the open air is brighter
-/// tells valleys from hills, not the outside of a body from its inside.
-pub(super) fn left(exposed: f32) -> f32 {
-    1.0 - (1.0 - LEFT) * exposed
+/// Share of its evidence that a sample keeps which is so far [`exposed`]: the brighter of two sides in the open air tells
+/// valleys from hills, not the outside of a body from its inside.
+pub(super) fn kept(exposed: f32) -> f32 {
+    1.0 - (1.0 - KEPT) * exposed
 }
 
 /// Evidence of a sample: that of the fills, of a second `sheet` (weighted by how `open` the side is that it makes the

@@ -50,7 +50,7 @@ pub struct Graph {
     /// `(N,)` cosine between the axis that was given and [`Self::axis`]; not negative.
     pub parallel: Vec<f32>,
     /// `(N,)` in 0..1, how far a sample lies on an open sheet, with air on both sides: there the winding number of the
-    /// samples is not that of a body.
+    /// samples is not that of a body. Set by `expose`, not when the graph is built.
     pub exposed: Vec<f32>,
     pub(super) sheets: Sheets,
     /// Scratch for medians.
@@ -79,7 +79,6 @@ impl Graph {
         sites: &Sites,
     ) {
         let n = neighborhoods.index.len();
-        parallel::fill(&mut self.exposed, n, |_| 0.0);
         self.take_axes(axes, neighborhoods, sites);
         parallel::resize(&mut self.near, n, [0; NEIGHBORS]);
         self.find_neighbors(neighborhoods, sites);
