@@ -12,6 +12,7 @@ FAMILIES = {
     "sampled": "Built-in shapes with different samplings",
     "degraded": "Holes, noise and outliers",
     "thin": "Close sheets",
+    "rounded": "Rounded coordinates",
     "joined": "Cavities, touching bodies, open surfaces",
     "parts": "Parts with sharp edges",
 }

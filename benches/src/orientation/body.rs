@@ -1,5 +1,7 @@
 //! Clouds with known normals, and ways to degrade them.
 
+use std::collections::HashSet;
+use std::f64::consts::TAU;
 use std::path::Path;
 
 use isograd_element::vector::{add, norm, normalized, sub};
@@ -17,6 +19,8 @@ pub struct Body {
     pub normals: Vec<[f64; 3]>,
     /// The samples before noise was added.
     pub clean: Option<Box<Clean>>,
+    /// Whether the surface has no inside: normals that all point the other way are as right.
+    pub open: bool,
 }
 
 /// Samples of the clean surface, and the noise added to them.
@@ -58,7 +62,7 @@ impl Body {
                 .normals()
                 .map(<[_]>::to_vec)
                 .unwrap_or_default(),
-            clean: None,
+            ..Self::default()
         }
     }
 
@@ -71,7 +75,7 @@ impl Body {
         Self {
             points: file.points,
             normals: file.normals.expect("normals"),
-            clean: None,
+            ..Self::default()
         }
     }
 
@@ -110,14 +114,37 @@ impl Body {
 
     /// The samples that satisfy `keep(point)`.
     #[must_use]
-    pub fn filtered(self, keep: impl Fn([f64; 3]) -> bool) -> Self {
+    pub fn filtered(self, mut keep: impl FnMut([f64; 3]) -> bool) -> Self {
         let pairs = self.points.into_iter().zip(self.normals);
         let (points, normals) = pairs.filter(|&(x, _)| keep(x)).unzip();
         Self {
             points,
             normals,
             clean: None,
+            open: self.open,
         }
+    }
+
+    /// Turns the body by this angle, in degrees, about the x axis, and then about the y axis.
+    #[must_use]
+    pub fn turned(mut self, degrees: f64) -> Self {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        for x in self.points.iter_mut().chain(&mut self.normals) {
+            let [y, z] = [cos * x[1] - sin * x[2], sin * x[1] + cos * x[2]];
+            *x = [cos * x[0] + sin * z, y, cos * z - sin * x[0]];
+        }
+        self
+    }
+
+    /// Rounds all coordinates to multiples of a step, in longest sides. Of the samples that then coincide one remains.
+    #[must_use]
+    pub fn rounded(mut self, step: f64) -> Self {
+        let step = step * self.longest();
+        for x in &mut self.points {
+            *x = x.map(|x| (x / step).round() * step);
+        }
+        let mut places = HashSet::new();
+        self.filtered(|x| places.insert(x.map(f64::to_bits)))
     }
 
     /// Excludes the samples that satisfy `ambiguous(point)` from evaluation.
@@ -224,6 +251,40 @@ pub fn wing(thickness: f64, n: usize, seed: u64) -> Body {
     body
 }
 
+/// Random samples of hills and valleys of several sizes over the unit square, with this root mean square slope: an open
+/// surface.
+pub fn terrain(slope: f64, n: usize, seed: u64) -> Body {
+    const WAVES: usize = 12;
+    let mut random = Random::new(seed);
+    let waves = [(); WAVES].map(|()| {
+        let (angle, phase) = (TAU * random.unit(), TAU * random.unit());
+        let number = TAU * 8.0f64.powf(random.unit());
+        ([number * angle.cos(), number * angle.sin()], phase, number)
+    });
+    let slope = slope * (2.0 / WAVES as f64).sqrt();
+    let mut body = Body {
+        open: true,
+        ..Body::default()
+    };
+    for _ in 0..n {
+        let (x, y) = (random.unit(), random.unit());
+        let height = waves
+            .iter()
+            .fold([0.0; 3], |sum, &([u, v], phase, number)| {
+                let (sin, cos) = (u * x + v * y + phase).sin_cos();
+                add(
+                    sum,
+                    [sin, u * cos, v * cos].map(|value| slope / number * value),
+                )
+            });
+        let [z, dx, dy] = height;
+        body.points.push([x, y, z]);
+        body.normals
+            .push(normalized([-dx, -dy, 1.0]).expect("upward"));
+    }
+    body
+}
+
 /// A seeded random generator, the same on every platform.
 #[derive(Debug)]
 pub struct Random(Pcg64);
@@ -242,7 +303,7 @@ impl Random {
     /// Standard normal (Box and Muller).
     pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.unit()).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.unit()).cos()
+        radius * (TAU * self.unit()).cos()
     }
 }
 

@@ -106,7 +106,10 @@ impl Signs {
         let cosine = |(i, &truth): (usize, &[f64; 3])| {
             (i, vector::dot(vector::to_f64(out.normals[i]), truth))
         };
-        let cosines: Vec<(usize, f64)> = known.map(cosine).collect();
+        let mut cosines: Vec<(usize, f64)> = known.map(cosine).collect();
+        if body.open && cosines.iter().map(|c| c.1.signum()).sum::<f64>() < 0.0 {
+            cosines.iter_mut().for_each(|c| c.1 = -c.1);
+        }
         let indices = |keep: &dyn Fn(f64) -> bool| -> Vec<usize> {
             cosines.iter().filter(|c| keep(c.1)).map(|c| c.0).collect()
         };

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::body::{Body, RANDOM, shell, wing};
+use super::body::{Body, RANDOM, shell, terrain, wing};
 use super::parts;
 use crate::sampling::Draw;
 
@@ -27,6 +27,8 @@ pub enum Family {
     Degraded,
     /// Sheets close to each other.
     Thin,
+    /// Coordinates of few digits, and voxels.
+    Rounded,
     /// Bodies that touch, cavities and open surfaces.
     Joined,
     /// Parts with sharp edges, ribs and gaps, some with holes.
@@ -56,6 +58,7 @@ pub fn generated() -> Vec<Cloud> {
     suite.add_degraded();
     suite.add_sheets();
     suite.add_wings();
+    suite.add_rounded();
     suite.add_cavities();
     suite.add_boxes();
     suite.add_parts();
@@ -199,7 +202,22 @@ impl Suite {
         }
     }
 
-    /// Nested bodies, and an open surface.
+    /// Coordinates rounded to steps from a small share of a spacing to several spacings.
+    fn add_rounded(&mut self) {
+        for step in [0.001, 0.003, 0.01] {
+            self.add(Family::Rounded, format!("box slanting {step}"), move || {
+                let cube = Body::cuboid([1.0; 3], SAMPLES, 26);
+                cube.turned(25.0).rounded(step)
+            });
+            for body in ["knot", "fish", "airliner", "car", "vessels"] {
+                self.add(Family::Rounded, format!("{body} {step}"), move || {
+                    Body::of(body, &[], SAMPLES, &RANDOM, 27).rounded(step)
+                });
+            }
+        }
+    }
+
+    /// Nested bodies, and open surfaces.
     fn add_cavities(&mut self) {
         let hollow = || {
             Body::sphere(1.0, SAMPLES / 2, 15).with(Body::sphere(0.7, SAMPLES / 4, 16).inside_out())
@@ -211,6 +229,11 @@ impl Suite {
         self.add(Family::Joined, "hemisphere", || {
             Body::sphere(1.0, SAMPLES, 24).filtered(|x| x[2] > 0.0)
         });
+        for slope in [0.5, 1.0, 1.5] {
+            self.add(Family::Joined, format!("terrain {slope}"), move || {
+                terrain(slope, SAMPLES, 25)
+            });
+        }
     }
 
     /// Two boxes that touch, or overlap.

@@ -10,6 +10,7 @@
 use super::Axes;
 pub use super::coupling::NEIGHBORS;
 use super::coupling::{self, RING, ROUNDS};
+use super::rounding::Rounding;
 use super::sheets::{self, Near, Sheets};
 use super::sites::Sites;
 use crate::neighbors::Neighborhoods;
@@ -82,7 +83,7 @@ impl Graph {
         self.take_axes(axes, neighborhoods, sites);
         parallel::resize(&mut self.near, n, [0; NEIGHBORS]);
         self.find_neighbors(neighborhoods, sites);
-        self.find_sheets();
+        self.find_sheets(Rounding::find(neighborhoods, sites));
         self.measure();
         self.couple();
         self.measure_areas();
@@ -147,12 +148,12 @@ impl Graph {
     }
 
     /// Takes the axis of its own sheet for each point whose neighbors lie on several.
-    fn find_sheets(&mut self) {
+    fn find_sheets(&mut self, rounding: Rounding) {
         let near = Near {
             near: &self.near,
             offset: &self.offset,
         };
-        self.sheets.find(near, &self.axis);
+        self.sheets.find(near, &self.axis, rounding);
         let sheets = self.sheets.sheets();
         parallel::fill(&mut self.scatter, sheets.len(), |p| sheets[p].scatter);
         let own = |p: usize, given: [f32; 3]| match sheets[p].scatter > 0.0 {

@@ -9,7 +9,8 @@
 //!   inside matter is air again, and so on). *Visibility*: where the samples leave holes, the inner side of the
 //!   surface is the one from which fewer of 26 directions lead out of the grid. *Sheets*: where neighbors
 //!   lie on several sheets, a robust fit separates the one through the sample from the others; a parallel
-//!   sheet close by is the other side of a thin body, or of a narrow gap. Where noise has merged the
+//!   sheet close by is the other side of a thin body, or of a narrow gap. Closer sheets than the steps of rounded
+//!   coordinates explain are none. Where noise has merged the
 //!   two sides of a thin body into one layer, a sample above the middle of the layer belongs to the upper side.
 //!   *Neighbors*: the signs of adjacent axes are coupled by a reflection at the plane half-way between their
 //!   samples, which holds along a sheet, around an edge, and across a thin body or a narrow gap. Belief propagation
@@ -83,6 +84,7 @@ mod previous;
 mod pullback;
 mod regions;
 pub(crate) mod rim;
+mod rounding;
 mod sensors;
 #[cfg(test)]
 mod shapes;

@@ -5,6 +5,7 @@
 //! its neighbors agree on. In noise, planes are found by chance: no neighbor finds the same one.
 
 use super::coupling::{self, NEIGHBORS};
+use super::rounding::Rounding;
 use super::sheet::{self, Sheet};
 use crate::parallel::{self, CHUNK};
 use crate::{simd, vector};
@@ -43,7 +44,7 @@ pub(super) struct Sheets {
 
 impl Sheets {
     /// Finds, confirms and extends the sheets. `axes` `(N, 3)` are those of whole neighborhoods.
-    pub(super) fn find(&mut self, near: Near<'_>, axes: &[[f32; 3]]) {
+    pub(super) fn find(&mut self, near: Near<'_>, axes: &[[f32; 3]], rounding: Rounding) {
         let arch = pulp::Arch::new();
         parallel::resize_large(&mut self.sheets, axes.len(), Sheet::default());
         let chunks = self.sheets.chunks_mut(CHUNK);
@@ -51,7 +52,7 @@ impl Sheets {
         parallel::each(chunks, |_, (sheets, (offset, axes))| {
             simd::vectorized!(arch, {
                 for ((sheet, offset), &axis) in sheets.iter_mut().zip(offset).zip(axes) {
-                    *sheet = sheet::find(offset, axis).unwrap_or_default();
+                    *sheet = sheet::find(offset, axis, rounding).unwrap_or_default();
                 }
             });
         });
@@ -168,10 +169,9 @@ impl Sheet {
 
 #[cfg(test)]
 mod tests {
-    use super::super::shapes::{Random, cuboid, neighborhoods, oriented};
-    use super::super::{Method, shapes::Sampled};
+    use super::super::shapes::{Random, Sampled};
+    use super::super::tests::orient;
     use super::*;
-    use crate::normals;
 
     /// `n` random samples of the two sides of a wedge of this angle, in degrees, whose edge is the y axis: 1 × 2.
     fn wedge(n: usize, degrees: f64, seed: u64) -> Sampled {
@@ -204,10 +204,12 @@ mod tests {
             near: &near,
             offset: &offset,
         };
-        let alone = offset.iter().map(|d| sheet::find(d, axis));
+        let alone = offset
+            .iter()
+            .map(|d| sheet::find(d, axis, Rounding::default()));
         let alone = alone.map(Option::unwrap_or_default).collect();
         let mut found = Sheets::default();
-        found.find(near, &vec![axis; points.len()]);
+        found.find(near, &vec![axis; points.len()], Rounding::default());
         (alone, found.sheets)
     }
 
@@ -264,42 +266,14 @@ mod tests {
         assert!(two > 0.5 && bend < 0.2, "{two} {bend}");
     }
 
-    /// Number of samples whose normals point clearly the wrong way.
-    fn wrong_signs((points, normals): &Sampled) -> usize {
-        let near = neighborhoods(points);
-        let mut axes = normals::Residual::default();
-        normals::forward(&near, &mut axes);
-        let out = oriented(points, &axes.normals, &near, None, &Method::Auto).unwrap();
-        let cosines = out.normals.iter().zip(normals);
-        let cosines = cosines.map(|(&a, &b)| vector::dot(a, b));
-        cosines.filter(|&c| c < -0.5).count()
-    }
-
     #[test]
     fn signs_are_right_up_to_the_edge_of_a_wedge() {
         let (mut wrong, mut all) = (0, 0);
         for degrees in [2.0, 10.0, 25.0] {
             let wedge = wedge(6000, degrees, 7);
-            wrong += wrong_signs(&wedge);
+            wrong += orient(&wedge).wrong;
             all += wedge.0.len();
         }
         assert!(100 * wrong < all, "{wrong} of {all}");
-    }
-
-    /// A cube whose faces slant by a degree against the axes, with coordinates that are multiples of a step: each face
-    /// consists of steps. Samples are 0.035 apart.
-    #[test]
-    fn signs_are_right_on_slanting_faces_with_rounded_coordinates() {
-        let (sin, cos) = 1.0f64.to_radians().sin_cos();
-        let turn = |[x, y, z]: [f64; 3]| [x, cos * y - sin * z, sin * y + cos * z];
-        let turn = |[x, y, z]: [f64; 3]| turn([cos * x + sin * z, y, cos * z - sin * x]);
-        let (points, normals) = cuboid(20_000, [1.0; 3], 5);
-        let normals: Vec<[f64; 3]> = normals.into_iter().map(turn).collect();
-        for step in [0.001, 0.004, 0.006] {
-            let round = |x: f64| (x / step).round() * step;
-            let rounded = points.iter().map(|&x| turn(x).map(round)).collect();
-            let wrong = wrong_signs(&(rounded, normals.clone()));
-            assert!(wrong <= 20, "{step}: {wrong}");
-        }
     }
 }

@@ -9,10 +9,10 @@ use crate::vector::{add, dot, scale};
 
 const ORIGIN: [f64; 3] = [0.0; 3];
 
-struct Outcome {
+pub(super) struct Outcome {
     orientation: Orientation<f64>,
     /// Signs that are wrong, among axes within 60 degrees of the truth, and how many those are.
-    wrong: usize,
+    pub(super) wrong: usize,
     judged: usize,
 }
 
@@ -38,7 +38,7 @@ fn run<T: Real>(points: &[[T; 3]], method: &Method) -> (Vec<[T; 3]>, Orientation
     (axes, out)
 }
 
-fn orient(sampled: &Sampled) -> Outcome {
+pub(super) fn orient(sampled: &Sampled) -> Outcome {
     let (_, orientation) = run(&sampled.0, &Method::Auto);
     let cosines = orientation
         .normals
