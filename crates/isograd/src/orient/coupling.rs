@@ -56,28 +56,16 @@ const NOISE: f32 = 4.0;
 /// How soon it is clear on which side of a plane a sample lies, by its height in spreads.
 const SIDE: f32 = 2.0;
 
-/// From here on a hyperbolic tangent is 1; that of large numbers is not, on some devices.
-const CERTAIN: f32 = 10.0;
-
 /// How far the patch extends that a sample stands for, from its own ring and the median of those round it.
 #[inline(always)]
 pub(super) fn reach(ring: f32, median: f32) -> f32 {
-    let most = REACH_GROWTH * median;
-    if most < ring { most } else { ring }
+    ring.min(REACH_GROWTH * median)
 }
 
 /// In −1..1, the side of a plane on which a sample lies; `height` in spreads.
 #[inline(always)]
 pub(super) fn side(height: f32) -> f32 {
-    let mut clear = SIDE * height;
-    let most = CERTAIN;
-    if clear > most {
-        clear = most;
-    }
-    if clear < -most {
-        clear = -most;
-    }
-    clear.tanh()
+    (SIDE * height).tanh()
 }
 
 /// The square of the height from which on one of two samples lies off the sheet of the other, whose sheets
@@ -85,11 +73,8 @@ pub(super) fn side(height: f32) -> f32 {
 #[inline(always)]
 pub(super) fn least_gap(a: f32, b: f32) -> f32 {
     if a > 0.0 && b > 0.0 {
-        let mut larger = a;
-        if b > a {
-            larger = b;
-        }
-        largest_height(larger) * largest_height(larger)
+        let height = largest_height(a.max(b));
+        height * height
     } else {
         UNKNOWN
     }
@@ -110,11 +95,7 @@ fn facing(parallel: f32, interleaved: f32) -> f32 {
     } else {
         let second = parallel * parallel;
         let fourth = second * second;
-        let mut over = interleaved / STEPPED;
-        if over > 1.0 {
-            over = 1.0;
-        }
-        fourth * fourth * over
+        fourth * fourth * (interleaved / STEPPED).min(1.0)
     }
 }
 
@@ -124,11 +105,11 @@ fn facing(parallel: f32, interleaved: f32) -> f32 {
 pub(super) fn blur(reach: f32, spreads: f32, thicknesses: f32, gap: f32) -> f32 {
     let blunt = BLUNT * reach;
     let noise = NOISE * spreads;
-    let mut rough = thicknesses;
     // Where sheets are told apart, it is not noise.
-    if gap >= UNKNOWN && noise > rough {
-        rough = noise;
-    }
+    let rough = match gap >= UNKNOWN {
+        true => thicknesses.max(noise),
+        false => thicknesses,
+    };
     blunt * blunt + rough
 }
 
@@ -145,28 +126,17 @@ pub(super) fn blur(reach: f32, spreads: f32, thicknesses: f32, gap: f32) -> f32 
 ///
 /// Source: the reflected transfer of H. Xie, K. McDonnell, H. Qin, "Surface reconstruction of noisy
 /// and defective data sets" (2004).
-#[allow(clippy::manual_clamp)] // a kernel has no such method
 #[inline(always)]
 pub(super) fn coupled(parallel: f32, heights: f32, square: f32, gap: f32, interleaved: f32) -> f32 {
     let mut divisor = square;
     if gap < square && heights * parallel > 0.0 {
         let share = facing(parallel, interleaved);
-        let full = share * (heights.abs() + gap) + (1.0 - share) * square;
-        if full < square {
-            divisor = full;
-        }
+        divisor = square.min(share * (heights.abs() + gap) + (1.0 - share) * square);
     }
-    let mut tie = parallel;
-    if divisor > 0.0 {
-        tie = parallel - 2.0 * heights / divisor;
+    match divisor > 0.0 {
+        true => (parallel - 2.0 * heights / divisor).clamp(-1.0, 1.0),
+        false => parallel.clamp(-1.0, 1.0),
     }
-    if tie < -1.0 {
-        tie = -1.0;
-    }
-    if tie > 1.0 {
-        tie = 1.0;
-    }
-    tie
 }
 
 /// A coupling for a [tie](coupled), its fifth power: a half-hearted one, as between a sample of one sheet and one
@@ -222,13 +192,11 @@ pub(super) fn bounded_area(area: f32, median: f32) -> f32 {
 #[inline(always)]
 pub(super) fn across(height: f32, square: f32, parallel: f32, gap: f32) -> f32 {
     let sine = height.abs() / f32::sqrt(square);
-    let mut off = sine * sine * sine;
-    if gap < UNKNOWN {
-        off = height * height / (height * height + gap);
-    }
-    if height < 0.0 {
-        off = -off;
-    }
+    let off = match gap < UNKNOWN {
+        true => height * height / (height * height + gap),
+        false => sine * sine * sine,
+    };
+    let off = off.copysign(height);
     let second = parallel * parallel;
     off * (second * second)
 }

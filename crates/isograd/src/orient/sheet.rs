@@ -181,16 +181,13 @@ fn stands_out(fit: f32, rest: f32) -> bool {
 /// How far from the plane a neighbor may lie to be on the sheet.
 #[inline(always)]
 fn largest_residual(fit: f32, rest: f32) -> f32 {
-    let near = ON * fit;
-    let rounded = ROUNDED * rest;
-    if near > rounded { near } else { rounded }
+    (ON * fit).max(ROUNDED * rest)
 }
 
 /// How far samples lie off the sheet, whose root mean square distance is `found`; above 0.
 #[inline(always)]
 fn bounded_scatter(found: f32, limit: f32) -> f32 {
-    let least = limit / ON;
-    if found > least { found } else { least }
+    found.max(limit / ON)
 }
 
 #[cfg(test)]
