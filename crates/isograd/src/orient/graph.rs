@@ -10,7 +10,7 @@
 use super::Axes;
 pub use super::coupling::NEIGHBORS;
 use super::coupling::{self, RING, ROUNDS};
-use super::rounding::Rounding;
+use super::lattice::Lattice;
 use super::sheets::{self, Near, Sheets};
 use super::sites::Sites;
 use crate::neighbors::Neighborhoods;
@@ -83,7 +83,7 @@ impl Graph {
         self.take_axes(axes, neighborhoods, sites);
         parallel::resize(&mut self.near, n, [0; NEIGHBORS]);
         self.find_neighbors(neighborhoods, sites);
-        self.find_sheets(Rounding::find(neighborhoods, sites));
+        self.find_sheets(Lattice::find(neighborhoods, sites));
         self.measure();
         self.couple();
         self.measure_areas();
@@ -148,12 +148,12 @@ impl Graph {
     }
 
     /// Takes the axis of its own sheet for each point whose neighbors lie on several.
-    fn find_sheets(&mut self, rounding: Rounding) {
+    fn find_sheets(&mut self, lattice: Lattice) {
         let near = Near {
             near: &self.near,
             offset: &self.offset,
         };
-        self.sheets.find(near, &self.axis, rounding);
+        self.sheets.find(near, &self.axis, lattice);
         let sheets = self.sheets.sheets();
         parallel::fill(&mut self.scatter, sheets.len(), |p| sheets[p].scatter);
         let own = |p: usize, given: [f32; 3]| match sheets[p].scatter > 0.0 {

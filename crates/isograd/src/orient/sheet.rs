@@ -11,7 +11,7 @@
 //! ones.
 
 use super::coupling::NEIGHBORS;
-use super::rounding::Rounding;
+use super::lattice::Lattice;
 use crate::element::eigen::eigen;
 use crate::vector;
 
@@ -69,13 +69,13 @@ type Bits = [i32; NEIGHBORS];
 /// The sheet through a sample, from the offsets to its neighbors and the axis of all of them together;
 /// `None` where one plane serves for all, or none stands out, or what lies off it may do so by rounding.
 #[inline(always)]
-pub(super) fn find(offset: &Offsets, axis: [f32; 3], rounding: Rounding) -> Option<Sheet> {
+pub(super) fn find(offset: &Offsets, axis: [f32; 3], lattice: Lattice) -> Option<Sheet> {
     let by_axis = std::array::from_fn(|a| std::array::from_fn(|k| offset[k][a]));
     let together = residuals(&by_axis, axis);
     let (normal, fit) = best_plane(offset, &by_axis, axis, quantile(&together, QUORUM));
     let apart = residuals(&by_axis, normal);
     let rest = quantile(&apart, REST).max(quantile(&together, REST));
-    if !stands_out(fit, rest) || rest < rounding.least_distance(normal) {
+    if !stands_out(fit, rest) || rest < lattice.least_distance(normal) {
         return None;
     }
     let limit = largest_residual(fit, rest);
@@ -217,7 +217,7 @@ mod tests {
                 let offset = two_sheets(gap, slope, 0.0, &mut random);
                 // Seven of the eight on the other sheet may by chance lie in a plane with the origin; a
                 // tenth of the clouds is let off.
-                let Some(sheet) = find(&offset, [0.6, 0.0, 0.8], Rounding::default()) else {
+                let Some(sheet) = find(&offset, [0.6, 0.0, 0.8], Lattice::default()) else {
                     panic!("no sheet at gap {gap}, slope {slope}: {offset:?}");
                 };
                 assert!(tilt(sheet.axis) < 1.0, "gap {gap}: {}", tilt(sheet.axis));
@@ -231,16 +231,16 @@ mod tests {
     fn one_sheet_or_noise_is_left_alone() {
         let mut random = Random(9);
         let flat = two_sheets(0.0, 0.0, 0.0, &mut random);
-        assert!(find(&flat, [0.0, 0.0, 1.0], Rounding::default()).is_none());
+        assert!(find(&flat, [0.0, 0.0, 1.0], Lattice::default()).is_none());
         let noisy = |random: &mut Random| two_sheets(0.0, 0.0, 0.5, random);
         let found = (0..1000)
-            .filter(|_| find(&noisy(&mut random), [0.0, 0.0, 1.0], Rounding::default()).is_some());
+            .filter(|_| find(&noisy(&mut random), [0.0, 0.0, 1.0], Lattice::default()).is_some());
         // By chance 6 of 16 lie 20 times closer to one of 36 planes than the others: about one in a hundred.
         assert!(found.count() <= 30);
     }
 
     #[test]
     fn equal_points_have_no_sheet() {
-        assert!(find(&[[0.0; 3]; NEIGHBORS], [0.0, 0.0, 1.0], Rounding::default()).is_none());
+        assert!(find(&[[0.0; 3]; NEIGHBORS], [0.0, 0.0, 1.0], Lattice::default()).is_none());
     }
 }

@@ -5,7 +5,7 @@
 //! its neighbors agree on. In noise, planes are found by chance: no neighbor finds the same one.
 
 use super::coupling::{self, NEIGHBORS};
-use super::rounding::Rounding;
+use super::lattice::Lattice;
 use super::sheet::{self, Sheet};
 use crate::parallel::{self, CHUNK};
 use crate::{simd, vector};
@@ -44,7 +44,7 @@ pub(super) struct Sheets {
 
 impl Sheets {
     /// Finds, confirms and extends the sheets. `axes` `(N, 3)` are those of whole neighborhoods.
-    pub(super) fn find(&mut self, near: Near<'_>, axes: &[[f32; 3]], rounding: Rounding) {
+    pub(super) fn find(&mut self, near: Near<'_>, axes: &[[f32; 3]], lattice: Lattice) {
         let arch = pulp::Arch::new();
         parallel::resize_large(&mut self.sheets, axes.len(), Sheet::default());
         let chunks = self.sheets.chunks_mut(CHUNK);
@@ -52,7 +52,7 @@ impl Sheets {
         parallel::each(chunks, |_, (sheets, (offset, axes))| {
             simd::vectorized!(arch, {
                 for ((sheet, offset), &axis) in sheets.iter_mut().zip(offset).zip(axes) {
-                    *sheet = sheet::find(offset, axis, rounding).unwrap_or_default();
+                    *sheet = sheet::find(offset, axis, lattice).unwrap_or_default();
                 }
             });
         });
@@ -206,10 +206,10 @@ mod tests {
         };
         let alone = offset
             .iter()
-            .map(|d| sheet::find(d, axis, Rounding::default()));
+            .map(|d| sheet::find(d, axis, Lattice::default()));
         let alone = alone.map(Option::unwrap_or_default).collect();
         let mut found = Sheets::default();
-        found.find(near, &vec![axis; points.len()], Rounding::default());
+        found.find(near, &vec![axis; points.len()], Lattice::default());
         (alone, found.sheets)
     }
 

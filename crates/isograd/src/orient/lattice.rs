@@ -1,6 +1,7 @@
-//! How coarsely the coordinates of a cloud are rounded: to the digits of a file, or to voxels.
+//! Steps of which coordinates are multiples: those of few digits, of voxels, and of slices.
 //!
-//! Samples of one rounded surface lie on planes of the lattice of all coordinates, which are not sheets.
+//! Samples of one rounded surface lie on planes of the lattice of all coordinates, and those of one slice on its plane;
+//! these are not sheets.
 //!
 //! # Not differentiable
 //! Nothing here has a derivative: it decides about signs.
@@ -16,26 +17,25 @@ const SAMPLES: usize = 1 << 13;
 /// Differences below this many spacings are rounding of floating point.
 const EQUAL: f64 = 1e-3;
 
-/// Of this many differences the smallest is the step: a few may be smaller.
-const OF: usize = 10;
+/// A tenth of the differences may be smaller than the step.
+const SMALLER: usize = 10;
 
-/// Differences are multiples of a step up to this share of it, and at most one of [`EXCEPTIONS`] is not.
+/// Differences are multiples of a step up to this share of it; a fiftieth may be none.
 const EXACT: f64 = 0.05;
-const EXCEPTIONS: usize = 50;
+const OTHERS: usize = 50;
 
 /// Sheets of which samples on one are this many steps from the other are two: three rounded samples span a plane up to
 /// half a step from the surface between them and farther beyond, and other samples are as far on its other side.
 const STEPS: f32 = 1.5;
 
-/// Lattice of rounded coordinates.
+/// Lattice of the coordinates of a cloud.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Rounding {
-    /// Step along each axis, in spacings; 0 where coordinates have at most two values, and everywhere if any axis has
-    /// no step.
+pub(super) struct Lattice {
+    /// Step along each axis, in spacings; 0 where there is none.
     step: [f32; 3],
 }
 
-impl Rounding {
+impl Lattice {
     /// The lattice of a cloud.
     pub(super) fn find<T: Real>(neighborhoods: &Neighborhoods<T>, sites: &Sites) -> Self {
         let index = &neighborhoods.index;
@@ -44,14 +44,12 @@ impl Rounding {
         let samples: Vec<[f64; 3]> = (0..taken).map(|k| vector::to_f64(sample(k))).collect();
         let spacing = neighborhoods.spacing().f64();
         let along = |a: usize| step(samples.iter().map(|x| x[a] / spacing).collect());
-        let step = match [along(0), along(1), along(2)] {
-            [Some(x), Some(y), Some(z)] => [x, y, z].map(|step| step as f32),
-            _ => [0.0; 3],
-        };
-        Self { step }
+        Self {
+            step: [0, 1, 2].map(|a| along(a) as f32),
+        }
     }
 
-    /// Least distance between two sheets with this normal, in spacings: less can be rounding.
+    /// Least distance between two sheets with this normal, in spacings: less can be rounding, or that of two slices.
     #[inline(always)]
     pub(super) fn least_distance(self, normal: [f32; 3]) -> f32 {
         let [x, y, z] = self.step;
@@ -59,20 +57,23 @@ impl Rounding {
     }
 }
 
-/// The step that all coordinates are multiples of, from some origin on; 0 if they have at most two values, `None` if they
-/// have no step.
-fn step(mut coordinates: Vec<f64>) -> Option<f64> {
+/// The step that all coordinates are multiples of, from some origin on; 0 if there is none, or if they have at most two
+/// values: those of a plate.
+fn step(mut coordinates: Vec<f64>) -> f64 {
     coordinates.sort_unstable_by(f64::total_cmp);
     let differences = coordinates.windows(2).map(|pair| pair[1] - pair[0]);
     let mut differences: Vec<f64> = differences.filter(|&d| d > EQUAL).collect();
     if differences.len() < 2 {
-        return Some(0.0);
+        return 0.0;
     }
-    let tenth = differences.len() / OF;
-    let step = *differences.select_nth_unstable_by(tenth, f64::total_cmp).1;
+    let rank = differences.len() / SMALLER;
+    let step = *differences.select_nth_unstable_by(rank, f64::total_cmp).1;
     let is_multiple = |d: f64| (d / step - (d / step).round()).abs() <= EXACT;
     let others = differences.iter().filter(|&&d| !is_multiple(d)).count();
-    (others * EXCEPTIONS <= differences.len()).then_some(step)
+    match others * OTHERS <= differences.len() {
+        true => step,
+        false => 0.0,
+    }
 }
 
 #[cfg(test)]
@@ -80,14 +81,14 @@ mod tests {
     use super::super::shapes::{Random, Sampled, cuboid, neighborhoods, sphere, torus};
     use super::super::tests::orient;
     use super::*;
-    use std::f64::consts::{PI, TAU};
+    use std::f64::consts::PI;
 
     /// Steps in the unit of the points.
     fn steps<T: Real>(points: &[[T; 3]]) -> [f64; 3] {
         let near = neighborhoods(points);
         let mut sites = Sites::default();
         sites.find(&near);
-        let found = Rounding::find(&near, &sites);
+        let found = Lattice::find(&near, &sites);
         found
             .step
             .map(|step| f64::from(step) * near.spacing().f64())
@@ -128,14 +129,9 @@ mod tests {
         let mut random = Random(3);
         let plate = |_| [random.unit(), random.unit(), random.unit().round() * 0.01];
         let plate: Vec<[f64; 3]> = (0..5000).map(plate).collect();
-        let tube = |k: usize| {
-            let (sin, cos) = (TAU * (k % 100) as f64 / 100.0).sin_cos();
-            [cos, sin, 0.06 * (k / 100) as f64]
-        };
-        let tube: Vec<[f64; 3]> = (0..5000).map(tube).collect();
         let ball = sphere(5000, [0.0; 3], 1.0, 3).0;
         let cube = cuboid(5000, [1.0; 3], 5).0;
-        for points in [plate, tube, ball, cube] {
+        for points in [plate, ball, cube] {
             assert_steps(&points, [0.0; 3]);
         }
     }
@@ -157,10 +153,22 @@ mod tests {
         (points.iter().map(|x| x.map(round)).collect(), normals)
     }
 
-    /// A cube whose faces slant against the axes: each consists of steps. Samples are 0.035 apart.
+    /// A cube whose faces slant against the axes. Samples are 0.035 apart.
+    fn slanting_cube(degrees: f64) -> Sampled {
+        let (points, normals) = cuboid(20_000, [1.0; 3], 5);
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let turn = |&[x, y, z]: &[f64; 3]| {
+            let [y, z] = [cos * y - sin * z, sin * y + cos * z];
+            [cos * x + sin * z, y, cos * z - sin * x]
+        };
+        (
+            points.iter().map(turn).collect(),
+            normals.iter().map(turn).collect(),
+        )
+    }
+
     #[test]
     fn signs_are_right_on_slanting_faces() {
-        let (points, normals) = cuboid(20_000, [1.0; 3], 5);
         for (degrees, step) in [
             (1.0, 0.001),
             (1.0, 0.004),
@@ -168,18 +176,27 @@ mod tests {
             (25.0, 0.006),
             (25.0, 0.018),
         ] {
-            let (sin, cos) = f64::to_radians(degrees).sin_cos();
-            let turn = |&[x, y, z]: &[f64; 3]| {
-                let [y, z] = [cos * y - sin * z, sin * y + cos * z];
-                [cos * x + sin * z, y, cos * z - sin * x]
-            };
-            let turned = (
-                points.iter().map(turn).collect(),
-                normals.iter().map(turn).collect(),
-            );
-            let wrong = orient(&rounded(turned, step)).wrong;
+            let wrong = orient(&rounded(slanting_cube(degrees), step)).wrong;
             assert!(wrong <= 20, "{degrees} degrees, {step}: {wrong}");
         }
+    }
+
+    /// Slices twice as far from each other as the samples: these are moved along their faces to the next slice, some a bit
+    /// beyond the edge.
+    #[test]
+    fn signs_of_slices_are_right() {
+        let between = 0.07;
+        let (mut points, normals) = slanting_cube(25.0);
+        for (x, n) in points.iter_mut().zip(&normals) {
+            let height = (x[2] / between).round() * between;
+            let uphill = [-n[2] * n[0], -n[2] * n[1], 1.0 - n[2] * n[2]];
+            let far = (height - x[2]) / uphill[2];
+            *x = vector::add(*x, vector::scale(uphill, far));
+            x[2] = height;
+        }
+        assert_steps(&points, [0.0, 0.0, between]);
+        let wrong = orient(&(points, normals)).wrong;
+        assert!(wrong <= 100, "{wrong}");
     }
 
     /// Voxels as large as the distance of samples, and twice as large: centers repeat.
