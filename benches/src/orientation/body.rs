@@ -268,7 +268,7 @@ pub fn terrain(slope: f64, n: usize, seed: u64) -> Body {
     };
     for _ in 0..n {
         let (x, y) = (random.unit(), random.unit());
-        let height = waves
+        let [z, dx, dy] = waves
             .iter()
             .fold([0.0; 3], |sum, &([u, v], phase, number)| {
                 let (sin, cos) = (u * x + v * y + phase).sin_cos();
@@ -277,7 +277,6 @@ pub fn terrain(slope: f64, n: usize, seed: u64) -> Body {
                     [sin, u * cos, v * cos].map(|value| slope / number * value),
                 )
             });
-        let [z, dx, dy] = height;
         body.points.push([x, y, z]);
         body.normals
             .push(normalized([-dx, -dy, 1.0]).expect("upward"));

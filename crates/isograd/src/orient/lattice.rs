@@ -9,7 +9,6 @@
 use super::sites::Sites;
 use crate::Real;
 use crate::neighbors::Neighborhoods;
-use crate::vector;
 
 /// Samples whose coordinates are compared.
 const SAMPLES: usize = 1 << 13;
@@ -41,11 +40,10 @@ impl Lattice {
         let index = &neighborhoods.index;
         let taken = index.len().min(SAMPLES);
         let sample = |k: usize| index.point(sites.position(k * index.len() / taken));
-        let samples: Vec<[f64; 3]> = (0..taken).map(|k| vector::to_f64(sample(k))).collect();
         let spacing = neighborhoods.spacing().f64();
-        let along = |a: usize| step(samples.iter().map(|x| x[a] / spacing).collect());
+        let along = |a: usize| (0..taken).map(|k| sample(k)[a].f64() / spacing).collect();
         Self {
-            step: [0, 1, 2].map(|a| along(a) as f32),
+            step: [0, 1, 2].map(|a| step(along(a)) as f32),
         }
     }
 
@@ -81,6 +79,7 @@ mod tests {
     use super::super::shapes::{Random, Sampled, cuboid, neighborhoods, sphere, torus};
     use super::super::tests::orient;
     use super::*;
+    use crate::vector;
     use std::f64::consts::PI;
 
     /// Steps in the unit of the points.
@@ -139,12 +138,8 @@ mod tests {
     /// Two sheets that are closer than their samples are not steps, though these lie on a lattice.
     #[test]
     fn two_values_have_no_step() {
-        let lattice = |k: usize| [k % 50, k / 50 % 50, k / 2500].map(|i| i as f64);
-        let plate = |k: usize| {
-            let [x, y, z] = lattice(k);
-            [x, y, 0.3 * z]
-        };
-        let points: Vec<[f64; 3]> = (0..5000).map(plate).collect();
+        let lattice = (0..5000).map(|k| [k % 50, k / 50 % 50, k / 2500].map(f64::from));
+        let points: Vec<[f64; 3]> = lattice.map(|[x, y, z]| [x, y, 0.3 * z]).collect();
         assert_steps(&points, [1.0, 1.0, 0.0]);
     }
 

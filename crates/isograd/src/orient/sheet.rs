@@ -67,7 +67,7 @@ type ByAxis = [[f32; NEIGHBORS]; 3];
 type Bits = [i32; NEIGHBORS];
 
 /// The sheet through a sample, from the offsets to its neighbors and the axis of all of them together;
-/// `None` where one plane serves for all, or none stands out, or what lies off it may do so by rounding.
+/// `None` where one plane serves for all, or none stands out, or the steps of the coordinates explain what lies off it.
 #[inline(always)]
 pub(super) fn find(offset: &Offsets, axis: [f32; 3], lattice: Lattice) -> Option<Sheet> {
     let by_axis = std::array::from_fn(|a| std::array::from_fn(|k| offset[k][a]));
