@@ -13,6 +13,7 @@ FAMILIES = {
     "degraded": "Holes, noise and outliers",
     "thin": "Close sheets",
     "rounded": "Rounded coordinates",
+    "lines": "Scan lines, so many times as far apart as their samples",
     "joined": "Cavities, touching bodies, open surfaces",
     "parts": "Parts with sharp edges",
 }

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use isograd_element::vector::{add, norm, normalized, sub};
+use isograd_element::vector::{add, dot, norm, normalized, sub};
 use isograd_shapes::{Density, Layout, Sampling, by_name};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
@@ -37,6 +37,9 @@ pub const RANDOM: Sampling = Sampling {
     layout: Layout::Random,
     density: Density::Uniform,
 };
+
+/// Samples that are drawn for one that is on a line.
+const DRAWN_FOR_LINES: usize = 50;
 
 impl Body {
     /// Samples of a shape of `isograd-shapes`.
@@ -145,6 +148,22 @@ impl Body {
         }
         let mut places = HashSet::new();
         self.filtered(|x| places.insert(x.map(f64::to_bits)))
+    }
+
+    /// About `n` samples of a shape of `isograd-shapes` on lines, as a scanner or slices leave them: in parallel planes that
+    /// slant against the axes, `ratio` times as far apart as the samples on one line.
+    ///
+    /// # Panics
+    /// On an unknown shape: the suite is fixed.
+    pub fn on_lines(name: &str, ratio: f64, n: usize, seed: u64) -> Self {
+        let area = by_name(name).expect("a shape of the list").area();
+        let between = (area * ratio / n as f64).sqrt();
+        let across = normalized([0.3, 0.5, 0.8]).expect("a direction");
+        let all = Self::of(name, &[], DRAWN_FOR_LINES * n, &RANDOM, seed);
+        all.filtered(|x| {
+            let place = dot(x, across) / between;
+            (place - place.round()).abs() < 0.5 / DRAWN_FOR_LINES as f64
+        })
     }
 
     /// Excludes the samples that satisfy `ambiguous(point)` from evaluation.

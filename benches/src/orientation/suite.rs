@@ -29,6 +29,8 @@ pub enum Family {
     Thin,
     /// Coordinates of few digits, and voxels.
     Rounded,
+    /// Samples along lines.
+    Lines,
     /// Bodies that touch, cavities and open surfaces.
     Joined,
     /// Parts with sharp edges, ribs and gaps, some with holes.
@@ -59,6 +61,7 @@ pub fn generated() -> Vec<Cloud> {
     suite.add_sheets();
     suite.add_wings();
     suite.add_rounded();
+    suite.add_lines();
     suite.add_cavities();
     suite.add_boxes();
     suite.add_parts();
@@ -212,6 +215,17 @@ impl Suite {
             for body in ["knot", "fish", "airliner", "car", "vessels"] {
                 self.add(Family::Rounded, format!("{body} {step}"), move || {
                     Body::of(body, &[], SAMPLES, &RANDOM, 27).rounded(step)
+                });
+            }
+        }
+    }
+
+    /// Scan lines two to eight times as far apart as the samples on them.
+    fn add_lines(&mut self) {
+        for ratio in [2, 4, 8] {
+            for body in ["knot", "fish", "airliner", "car", "vessels"] {
+                self.add(Family::Lines, format!("{body} lines {ratio}"), move || {
+                    Body::on_lines(body, f64::from(ratio), SAMPLES, 28)
                 });
             }
         }

@@ -10,7 +10,7 @@
 //!   surface is the one from which fewer of 26 directions lead out of the grid. *Sheets*: where neighbors
 //!   lie on several sheets, a robust fit separates the one through the sample from the others; a parallel
 //!   sheet close by is the other side of a thin body, or of a narrow gap. Closer sheets than the steps of rounded
-//!   coordinates, of voxels or of slices explain are none. Where noise has merged the
+//!   coordinates, of voxels or of slices explain are none, and neither are the planes of scan lines. Where noise has merged the
 //!   two sides of a thin body into one layer, a sample above the middle of the layer belongs to the upper side.
 //!   *Neighbors*: the signs of adjacent axes are coupled by a reflection at the plane half-way between their
 //!   samples, which holds along a sheet, around an edge, and across a thin body or a narrow gap. Belief propagation
@@ -77,6 +77,7 @@ mod grid_tests;
 mod known_tests;
 mod lattice;
 mod layers;
+mod lines;
 mod orientation;
 mod parity;
 #[cfg(test)]

@@ -2,10 +2,12 @@
 //!
 //! Of the 16 neighbors of a sample on one of two close sheets, about half lie on each, but by chance five or eleven:
 //! too few, or too many, for [`sheet::find`] to separate them. Such a sample takes the plane of the sheet that most of
-//! its neighbors agree on. In noise, planes are found by chance: no neighbor finds the same one.
+//! its neighbors agree on. In noise, planes are found by chance: no neighbor finds the same one. Samples along
+//! [`lines`] have no sheets.
 
 use super::coupling::{self, NEIGHBORS};
 use super::lattice::Lattice;
+use super::lines;
 use super::sheet::{self, Sheet};
 use crate::parallel::{self, CHUNK};
 use crate::{simd, vector};
@@ -40,6 +42,8 @@ pub(super) struct Sheets {
     /// `(N,)` sheet of each sample; of scatter 0 where none is known.
     sheets: Vec<Sheet>,
     next: Vec<Sheet>,
+    /// `(N,)` [turns](lines::turns) at each sample.
+    turns: Vec<[f32; 2]>,
 }
 
 impl Sheets {
@@ -56,11 +60,19 @@ impl Sheets {
                 }
             });
         });
+        let mut turns = std::mem::take(&mut self.turns);
+        parallel::fill(&mut turns, axes.len(), |p| lines::turns(&near.offset[p]));
+        let is_on_line = |p: usize| {
+            let others = near.near[p].iter().map(|&q| turns[q as usize]);
+            lines::is_on_line(others.chain([turns[p]]))
+        };
         self.update(|sheets, p| {
             let sheet = sheets[p];
-            let confirmed = sheet.is_known() && near.agreeing(sheets, p, sheet) >= CONFIRMING;
+            let confirmed =
+                sheet.is_known() && near.agreeing(sheets, p, sheet) >= CONFIRMING && !is_on_line(p);
             if confirmed { sheet } else { Sheet::default() }
         });
+        self.turns = turns;
         for _ in 0..ROUNDS {
             self.update(|sheets, p| match sheets[p].is_known() {
                 true => sheets[p],
