@@ -21,11 +21,11 @@ const LINE: f32 = 0.36;
 const SEVERAL: f32 = 0.2;
 
 /// Mean squares of the sine of the angle at which two of the nearest, and two of the farthest neighbors are seen.
-pub(super) fn turns(offset: &[[f32; 3]; NEIGHBORS]) -> [f32; 2] {
+fn turns(offset: &[[f32; 3]; NEIGHBORS]) -> [f32; 2] {
     [0, NEIGHBORS - COMPARED].map(|from| turn(&offset[from..from + COMPARED]))
 }
 
-/// ½, as on a surface, where all are in the same place.
+/// Mean square of the sine of the angle between two of these offsets; ½, as on a surface, where all are 0.
 fn turn(offset: &[[f32; 3]]) -> f32 {
     let (mut sum, mut pairs) = (0.0, 0.0);
     for (j, &a) in offset.iter().enumerate() {
@@ -41,10 +41,10 @@ fn turn(offset: &[[f32; 3]]) -> f32 {
     if pairs > 0.0 { sum / pairs } else { 0.5 }
 }
 
-/// Whether a sample lies on one of several lines, from the [`turns`] at itself and at its neighbors.
-pub(super) fn is_on_line(turns: impl Iterator<Item = [f32; 2]>) -> bool {
+/// Whether a sample lies on one of several lines, from the offsets of its neighbors to theirs, and its own.
+pub(super) fn is_on_line<'a>(around: impl Iterator<Item = &'a [[f32; 3]; NEIGHBORS]>) -> bool {
     let (mut near, mut far, mut count) = (0.0, 0.0, 0.0);
-    for turn in turns {
+    for turn in around.map(turns) {
         near += turn[0];
         far += turn[1];
         count += 1.0;
@@ -60,11 +60,10 @@ mod tests {
 
     /// The mean turns of 17 neighborhoods, each of 16 calls of `offset`, and whether a sample among them lies on a line.
     fn around(mut offset: impl FnMut(usize) -> [f32; 3]) -> ([f32; 2], bool) {
-        let all: Vec<[f32; 2]> = (0..17)
-            .map(|_| turns(&std::array::from_fn(&mut offset)))
-            .collect();
-        let mean = |k: usize| all.iter().map(|turns| turns[k]).sum::<f32>() / 17.0;
-        ([mean(0), mean(1)], is_on_line(all.iter().copied()))
+        let all: Vec<[[f32; 3]; NEIGHBORS]> =
+            (0..17).map(|_| std::array::from_fn(&mut offset)).collect();
+        let mean = |k: usize| all.iter().map(|offset| turns(offset)[k]).sum::<f32>() / 17.0;
+        ([mean(0), mean(1)], is_on_line(all.iter()))
     }
 
     #[test]

@@ -10,8 +10,8 @@
 //!   surface is the one from which fewer of 26 directions lead out of the grid. *Sheets*: where neighbors
 //!   lie on several sheets, a robust fit separates the one through the sample from the others; a parallel
 //!   sheet close by is the other side of a thin body, or of a narrow gap. Closer sheets than the steps of rounded
-//!   coordinates, of voxels or of slices explain are none, and neither are the planes of scan lines. Where noise has merged the
-//!   two sides of a thin body into one layer, a sample above the middle of the layer belongs to the upper side.
+//!   coordinates, of voxels or of slices explain are none, and neither are the planes of scan lines. Where noise has
+//!   merged the two sides of a thin body into one layer, a sample above the middle of the layer belongs to the upper side.
 //!   *Neighbors*: the signs of adjacent axes are coupled by a reflection at the plane half-way between their
 //!   samples, which holds along a sheet, around an edge, and across a thin body or a narrow gap. Belief propagation
 //!   on the neighbor graph spreads this evidence. Points that agree form domains; between domains that contradict

@@ -42,8 +42,6 @@ pub(super) struct Sheets {
     /// `(N,)` sheet of each sample; of scatter 0 where none is known.
     sheets: Vec<Sheet>,
     next: Vec<Sheet>,
-    /// `(N,)` [turns](lines::turns) at each sample.
-    turns: Vec<[f32; 2]>,
 }
 
 impl Sheets {
@@ -60,19 +58,13 @@ impl Sheets {
                 }
             });
         });
-        let mut turns = std::mem::take(&mut self.turns);
-        parallel::fill(&mut turns, axes.len(), |p| lines::turns(&near.offset[p]));
-        let is_on_line = |p: usize| {
-            let others = near.near[p].iter().map(|&q| turns[q as usize]);
-            lines::is_on_line(others.chain([turns[p]]))
-        };
         self.update(|sheets, p| {
             let sheet = sheets[p];
-            let confirmed =
-                sheet.is_known() && near.agreeing(sheets, p, sheet) >= CONFIRMING && !is_on_line(p);
+            let confirmed = sheet.is_known()
+                && near.agreeing(sheets, p, sheet) >= CONFIRMING
+                && !near.is_on_line(p);
             if confirmed { sheet } else { Sheet::default() }
         });
-        self.turns = turns;
         for _ in 0..ROUNDS {
             self.update(|sheets, p| match sheets[p].is_known() {
                 true => sheets[p],
@@ -111,6 +103,11 @@ impl Near<'_> {
         let through = self.through(sheets, p);
         let same = |&(other, d): &(Sheet, [f32; 3])| sheet.holds(d) && sheet.is_aligned(&other);
         through.filter(same).count()
+    }
+
+    fn is_on_line(&self, p: usize) -> bool {
+        let others = self.near[p].iter().map(|&q| &self.offset[q as usize]);
+        lines::is_on_line(others.chain([&self.offset[p]]))
     }
 
     /// Of the sheets through a sample, the one that most of its neighbors agree on, and of several the one that it is
