@@ -171,7 +171,8 @@ impl<T: Number> Reconstruction<T> {
             let points = self.vectors(&self.result.points)?;
             let mut found = Neighborhoods::default();
             if !self.held.has_moved {
-                isograd::neighbors::forward(&points, self.radius, &mut found)
+                let count = self.held.neighbors;
+                isograd::neighbors::with_neighbors(&points, self.radius, count, &mut found)
                     .map_err(isograd::Error::from)?;
                 return Ok(found);
             }

@@ -2,7 +2,8 @@
 //!
 //! # Map
 //! Points `(N, 3)` and a [`Radius`] → `R_i`: a radius common to all points, given or automatic, which grows where
-//! few samples are within it. The automatic one is that of the CPU but for the rounding of distances.
+//! few samples are within it. The automatic one is that of the CPU but for the rounding of distances, and where samples lie along
+//! lines: it holds 24 samples there, too.
 //!
 //! # Pullback
 //! None on the device. Those of normals and areas return the cotangents of the radii, and
@@ -88,7 +89,7 @@ pub fn forward<R: Runtime, T: Scalar>(
         neighborhoods: with_radii(device, &sorted, &each)?,
         each,
         common,
-        spacing: rule::spacing(automatic, n),
+        spacing: rule::spacing(automatic, AUTO_NEIGHBORS, n),
         has_apart,
     })
 }

@@ -3,7 +3,7 @@
 //! # Map
 //! Points `(N, 3)` → a radius `R_i` per point and the neighborhoods `N_i = {j : |x_j − x_i| ≤ R_i}`,
 //! each of which contains `i`. The radius is common to all points (given, or chosen so that a sample
-//! has about 24 neighbors), and grows where few samples are within it:
+//! has about 24 neighbors, or more, up to the next lines, where samples lie along lines), and grows where few samples are within it:
 //! `R_i = max(R, 1.05 · distance to the 8th neighbor)`, counting `i` itself. With 10:1 density a
 //! common radius would leave one or two. A sample whose neighbors do not have it as theirs is marked as
 //! isolated.
@@ -17,7 +17,7 @@
 //! neighbor, is in `gather.rs`.
 //!
 //! # Not differentiable
-//! Which sample is the 8th or the 24th, and which points are isolated. Radii are continuous where these change. `j ∈ N_i` and
+//! Which sample is the 8th or the 24th, how many samples reach the next lines, and which points are isolated. Radii are continuous where these change, but for the number: by one more, a radius grows by up to 2 %. `j ∈ N_i` and
 //! `i ∈ N_j` are the same where both radii are the common one, not where one has grown.
 
 mod candidates;
@@ -25,6 +25,7 @@ mod cell_index;
 mod cells;
 mod census;
 mod gather;
+pub(crate) mod lines;
 mod near_cells;
 mod nearest;
 mod nearest_of_all;
@@ -44,7 +45,7 @@ pub use cell_index::CellIndex;
 pub(crate) use cells::Search;
 pub(crate) use census::Census;
 pub(crate) use near_cells::NearCells;
-pub use radius::{Error, Neighborhoods, Radii, Radius, forward, with_radii};
+pub use radius::{Error, Neighborhoods, Radii, Radius, forward, with_neighbors, with_radii};
 pub(crate) use radius::{Found, forward_with, hold};
 pub use radius_pullback::{RadiiCotangent, pullback};
 pub use strays::strays;

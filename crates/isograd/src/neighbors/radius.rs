@@ -6,10 +6,12 @@ use super::candidates::Candidates;
 use super::cell_index::CellIndex;
 use super::cells::Search;
 use super::census::Census;
+use super::lines;
 use super::rule::{self, AUTO_NEIGHBORS, FEWEST_NEIGHBORS, FEWEST_POINTS, GROWTH_MARGIN};
 use crate::parallel::{self, CHUNK};
 use crate::{Real, vector};
-pub use given::{Radii, with_radii};
+pub(crate) use given::hold;
+pub use given::{Radii, with_neighbors, with_radii};
 
 /// Share of a neighborhood whose own must reach back to the sample, or the sample is isolated.
 pub(super) const SMALLEST_MUTUAL_SHARE: f64 = 0.125;
@@ -18,7 +20,8 @@ pub(super) const SMALLEST_MUTUAL_SHARE: f64 = 0.125;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Radius {
     /// 1.001 times the mean of the distance to the 24th sample over the middle half of the points, those with neither the
-    /// smallest nor the largest distances. Independent of the order of the points, and continuous in them unless 24 come to
+    /// smallest nor the largest distances. Where samples lie along lines, as those of scanners or of structured meshes, to that
+    /// of a larger number, which reaches 1.3 times the distance of the lines. Independent of the order of the points, and continuous in them unless 24 come to
     /// lie in one place.
     #[default]
     Auto,
@@ -92,11 +95,13 @@ pub struct Neighborhoods<T> {
     pub isolated: Vec<bool>,
     /// `(N,)` `Σ_j (1 − r_j²/R_i²)²` over the neighborhood, in input order.
     pub(crate) crowd: Vec<T>,
+    /// See [`Self::neighbors`].
+    pub(super) neighbors: usize,
     /// The automatic radius, also where another is given.
     pub(super) automatic: T,
     /// See [`Self::spacing`].
     spacing: T,
-    /// Squares of the distances to the 24th sample, in sorted order.
+    /// Squares of the distances to the last of [`Self::neighbors`], in sorted order.
     pub(super) reach: Vec<T>,
     /// The least and the largest of them that the automatic radius depends on.
     pub(super) middle: Option<[T; 2]>,
@@ -148,6 +153,12 @@ impl<T: Real> Neighborhoods<T> {
     /// that one sample has to itself on the surface, in the middle, `√(π/24)` of the automatic radius.
     pub fn spacing(&self) -> T {
         self.spacing
+    }
+
+    /// Number of samples that the automatic radius holds in the middle, the center included: 24, or more where samples lie along
+    /// lines.
+    pub fn neighbors(&self) -> usize {
+        self.neighbors
     }
 
     /// Number of points whose radius has grown beyond the common one.
@@ -231,32 +242,22 @@ pub(crate) fn forward_with<T: Real, U: Copy + Default + Send + Sync>(
     sorted: &mut Vec<Found<T, U>>,
     sum: &(impl Fn([T; 3], T, &Candidates<T>) -> U + Sync),
 ) -> Result<(), Error> {
-    find_automatic(points, out)?;
-    out.spacing = rule::spacing(out.automatic, points.len());
+    find_automatic(points, None, out)?;
+    finish(radius, out, sorted, sum)
+}
+
+/// All that follows from the automatic radius.
+fn finish<T: Real, U: Copy + Default + Send + Sync>(
+    radius: Radius,
+    out: &mut Neighborhoods<T>,
+    sorted: &mut Vec<Found<T, U>>,
+    sum: &(impl Fn([T; 3], T, &Candidates<T>) -> U + Sync),
+) -> Result<(), Error> {
+    out.spacing = rule::spacing(out.automatic, out.neighbors, out.index.len());
     out.rule = radius;
     out.common_radius = rule::common(radius, out.automatic)?;
     grow(out, sorted, sum);
     find_isolated(out);
-    Ok(())
-}
-
-/// The neighborhoods of moved points, with the samples isolated that were isolated in `held`: what pullbacks hold
-/// constant.
-///
-/// # Errors
-/// As [`forward`], and [`Error::TooFew`] where there are fewer points than before.
-pub(crate) fn hold<T: Real>(
-    points: &[[T; 3]],
-    held: &Neighborhoods<T>,
-    out: &mut Neighborhoods<T>,
-) -> Result<(), Error> {
-    if points.len() < held.radius.len() {
-        return Err(Error::TooFew {
-            points: points.len(),
-        });
-    }
-    forward(points, held.rule, out)?;
-    out.isolated.clone_from(&held.isolated);
     Ok(())
 }
 
@@ -276,29 +277,32 @@ fn check_extent<T: Real>(index: &CellIndex<T>) -> Result<(), Error> {
     rule::check_extent(index.len(), index.bounds().into())
 }
 
-/// Index, distances to the 24th sample, and automatic radius.
+/// Index, number of neighbors unless it is `held`, distances to the last of them, and automatic radius.
 pub(super) fn find_automatic<T: Real>(
     points: &[[T; 3]],
+    held: Option<usize>,
     out: &mut Neighborhoods<T>,
 ) -> Result<(), Error> {
     check(points)?;
     out.index.rebuild(points);
     check_extent(&out.index)?;
+    out.neighbors = held.unwrap_or_else(|| lines::neighbors(&out.index));
     out.automatic = automatic_radius(out);
     Ok(())
 }
 
-/// By the distances to the 24th sample, which stay in `out`.
+/// By the distances to the last neighbor, which stay in `out`.
 fn automatic_radius<T: Real>(out: &mut Neighborhoods<T>) -> T {
     let Neighborhoods {
         index,
+        neighbors,
         reach: squares,
         crowd: scratch,
         ..
     } = out;
     let n = index.len();
     parallel::resize(squares, n, T::zero());
-    index.reaches_squared(AUTO_NEIGHBORS, squares);
+    index.reaches_squared(*neighbors, squares);
     let found = rule::middle_half(squares, scratch);
     out.middle = found.map(|(middle, _)| middle);
     rule::automatic(found.map(|(_, mean)| mean), n, out.index.bounds().into())

@@ -15,7 +15,7 @@ pub const FEWEST_NEIGHBORS: usize = 8;
 /// the radius.
 pub const GROWTH_MARGIN: f64 = 1.05;
 
-/// Samples that the automatic radius holds in the middle, the center included.
+/// Samples that the automatic radius holds in the middle, the center included, unless they lie along lines.
 pub const AUTO_NEIGHBORS: usize = 24;
 
 /// By how much the automatic radius passes the mean: else samples of a lattice would lie exactly on the radius of
@@ -79,9 +79,9 @@ pub fn is_apart<T: Real>(square: T, automatic: T) -> bool {
     square > least * least
 }
 
-/// Typical distance between neighboring samples; see [`Neighborhoods::spacing`](super::Neighborhoods::spacing).
-pub fn spacing<T: Real>(automatic: T, points: usize) -> T {
-    automatic * T::of((std::f64::consts::PI / AUTO_NEIGHBORS.min(points) as f64).sqrt())
+/// Typical distance between neighboring samples, where the automatic radius holds so many `neighbors`; see [`Neighborhoods::spacing`](super::Neighborhoods::spacing).
+pub fn spacing<T: Real>(automatic: T, neighbors: usize, points: usize) -> T {
+    automatic * T::of((std::f64::consts::PI / neighbors.min(points) as f64).sqrt())
 }
 
 /// The radius of every point that has enough neighbors within it.

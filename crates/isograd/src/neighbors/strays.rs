@@ -1,7 +1,7 @@
 //! Stray samples, as those of a scan in mid-air: they lie apart from the surface and, where they are near to one another, fill
 //! a volume.
 //!
-//! A sample lies apart if its 24th nearest is more than twice the automatic radius away. It is off the surface if the nearest 10
+//! A sample lies apart if its 24th nearest (or that of a larger number, where samples lie along lines) is more than twice the automatic radius away. It is off the surface if the nearest 10
 //! fill a volume, or if it is among the 24 nearest of few of its own. Samples of a sparse part of a surface lie apart too, but most
 //! of them in a plane, and each is near to its neighbors; and a sparse part goes on in a dense one. So whole groups are told, of
 //! samples apart that are among each other's 24 nearest, directly or by way of others. A group is stray if
@@ -14,12 +14,10 @@
 //! Strays in a sheet, and more than a tenth of the cloud, are not told from a surface.
 
 use super::radius::{Error, Neighborhoods, SMALLEST_MUTUAL_SHARE, find_automatic};
-use super::rule::{self, AUTO_NEIGHBORS};
+use super::rule;
 use crate::element::eigen;
 use crate::{Real, parallel, union_find, vector};
 
-/// Neighbors of a sample, besides itself.
-const OTHERS: usize = AUTO_NEIGHBORS - 1;
 /// Samples, the nearest and itself, that show whether those round it fill a volume. More would also be of the other side of a
 /// part that is three samples thick.
 const CLOSE: usize = 10;
@@ -65,7 +63,7 @@ struct Group<T> {
 /// As [`forward`](super::forward).
 pub fn strays<T: Real>(points: &[[T; 3]]) -> Result<Vec<u32>, Error> {
     let mut found = Neighborhoods::default();
-    find_automatic(points, &mut found)?;
+    find_automatic(points, None, &mut found)?;
     Ok(found.strays())
 }
 
@@ -93,7 +91,9 @@ impl<T: Real> Neighborhoods<T> {
         let mut strays = Vec::new();
         for members in members.iter().filter(|members| !members.is_empty()) {
             let group = Group::of(members, &apart);
-            if group.is_stray() && off_beyond.most_are(T::of(AS_COARSE * AS_COARSE) * group.reach) {
+            if group.is_stray(self.neighbors)
+                && off_beyond.most_are(T::of(AS_COARSE * AS_COARSE) * group.reach)
+            {
                 strays.extend(members.iter().map(|&k| apart[k].index));
             }
         }
@@ -116,9 +116,9 @@ impl<T: Real> Neighborhoods<T> {
 
     /// Classifies a sample by its 24 nearest.
     fn look_round(&self, position: usize) -> Apart<T> {
-        let mut nearest = Vec::with_capacity(AUTO_NEIGHBORS);
+        let mut nearest = Vec::with_capacity(self.neighbors);
         let center = self.index.point(position);
-        (self.index).nearest_positions(center, AUTO_NEIGHBORS, &mut nearest);
+        (self.index).nearest_positions(center, self.neighbors, &mut nearest);
         let mut apart = Apart {
             position: position as u32,
             index: self.index.order()[position],
@@ -140,7 +140,8 @@ impl<T: Real> Neighborhoods<T> {
             vector::to_f64(vector::sub(self.index.point(other as usize), center))
         };
         let close: Vec<[f64; 3]> = nearest.iter().take(CLOSE).map(offset).collect();
-        apart.is_off = mutual < SMALLEST_MUTUAL_SHARE * OTHERS as f64 || fill_a_volume(&close);
+        apart.is_off =
+            mutual < SMALLEST_MUTUAL_SHARE * (self.neighbors - 1) as f64 || fill_a_volume(&close);
         apart
     }
 }
@@ -158,10 +159,11 @@ impl<T: Real> Group<T> {
         }
     }
 
-    fn is_stray(&self) -> bool {
-        let neighbors = (OTHERS * self.members) as f64;
-        let is_off = 2 * self.off >= self.members || self.members < AUTO_NEIGHBORS;
-        is_off && f64::from(self.connected) < MOST_CONNECTED * neighbors
+    /// Where a neighborhood has so many samples.
+    fn is_stray(&self, neighbors: usize) -> bool {
+        let is_off = 2 * self.off >= self.members || self.members < neighbors;
+        let others = ((neighbors - 1) * self.members) as f64;
+        is_off && f64::from(self.connected) < MOST_CONNECTED * others
     }
 }
 

@@ -1,7 +1,8 @@
-//! Neighborhoods with radii that were found elsewhere.
+//! Neighborhoods of which something was found elsewhere.
 
 use super::{
-    Census, Error, Found, Neighborhoods, check, check_extent, find_isolated, find_positions,
+    AUTO_NEIGHBORS, Census, Error, Found, Neighborhoods, Radius, check, check_extent,
+    find_automatic, find_isolated, find_positions, finish,
 };
 use crate::Real;
 
@@ -14,6 +15,43 @@ pub struct Radii<'a, T> {
     pub common: T,
     /// See [`Neighborhoods::spacing`].
     pub spacing: T,
+}
+
+/// The neighborhoods of moved points, with as many neighbors in the automatic radius as in `held` and the samples isolated
+/// that were isolated there: what pullbacks hold constant.
+///
+/// # Errors
+/// As [`forward`](super::forward), and [`Error::TooFew`] where there are fewer points than before.
+pub(crate) fn hold<T: Real>(
+    points: &[[T; 3]],
+    held: &Neighborhoods<T>,
+    out: &mut Neighborhoods<T>,
+) -> Result<(), Error> {
+    if points.len() < held.radius.len() {
+        return Err(Error::TooFew {
+            points: points.len(),
+        });
+    }
+    with_neighbors(points, held.rule, held.neighbors, out)?;
+    out.isolated.clone_from(&held.isolated);
+    Ok(())
+}
+
+/// [`forward`](super::forward) with an automatic radius that holds so many samples in the middle.
+///
+/// # Errors
+/// As [`forward`](super::forward).
+pub fn with_neighbors<T: Real>(
+    points: &[[T; 3]],
+    radius: Radius,
+    neighbors: usize,
+    out: &mut Neighborhoods<T>,
+) -> Result<(), Error> {
+    find_automatic(points, Some(neighbors), out)?;
+    let mut sorted = std::mem::take(&mut out.sorted);
+    let done = finish(radius, out, &mut sorted, &|_, _, _| ());
+    out.sorted = sorted;
+    done
 }
 
 /// The neighborhoods of `(N, 3)` points with radii that were found elsewhere.
@@ -45,6 +83,7 @@ fn count_within<T: Real>(
     check_extent(&out.index)?;
     out.common_radius = radii.common;
     out.spacing = radii.spacing;
+    out.neighbors = AUTO_NEIGHBORS;
     out.middle = None;
     out.radius.clear();
     out.radius.extend_from_slice(radii.each);
