@@ -171,8 +171,8 @@ impl<T: Number> Reconstruction<T> {
             let points = self.vectors(&self.result.points)?;
             let mut found = Neighborhoods::default();
             if !self.held.has_moved {
-                let count = self.held.neighbors;
-                isograd::neighbors::with_neighbors(&points, self.radius, count, &mut found)
+                let lines = self.held.lines;
+                isograd::neighbors::with_lines(&points, self.radius, lines, &mut found)
                     .map_err(isograd::Error::from)?;
                 return Ok(found);
             }

@@ -4,7 +4,6 @@ use std::ops::ControlFlow;
 
 use cubecl::prelude::*;
 use isograd::neighbors::Radius;
-use isograd::neighbors::rule::AUTO_NEIGHBORS;
 use isograd::orient::Method;
 use isograd::{Orienter, PointCloud, Stage};
 
@@ -27,8 +26,9 @@ pub struct RadiiAndSigns<T> {
     pub common_radius: T,
     /// Typical distance between neighboring samples, which the smoothing follows where areas do not count.
     pub spacing: T,
-    /// Number of samples that the automatic radius holds, as [`isograd::neighbors::Neighborhoods::neighbors`] has it.
-    pub neighbors: usize,
+    /// Number of samples in the automatic radius where they lie along lines: [`isograd::neighbors::Neighborhoods::lines`]. Radii
+    /// that are found on the device do not follow lines.
+    pub lines: Option<usize>,
     /// `(N, 3)` roughly outward: a normal is turned to the side of its vector here.
     pub outward: Buffer<T>,
     /// `(N,)` from 0 to 1, how sure that is: see [`Orientation::confidence`](isograd::orient::Orientation::confidence).
@@ -116,7 +116,7 @@ impl<T: Scalar> RadiiAndSigns<T> {
             area_radii: device.upload(&near.radius)?,
             common_radius: near.common_radius,
             spacing: near.spacing(),
-            neighbors: near.neighbors(),
+            lines: near.lines(),
             outward: device.upload(found.normals.as_flattened())?,
             confidence: device.upload(&found.confidence)?,
             has_moved: false,
@@ -164,7 +164,7 @@ impl<T: Scalar> RadiiAndSigns<T> {
             area_radii: found.each,
             common_radius: found.common,
             spacing: found.spacing,
-            neighbors: AUTO_NEIGHBORS,
+            lines: None,
             outward: oriented.normals,
             confidence: oriented.confidence,
             has_moved: false,
@@ -194,7 +194,7 @@ impl<T: Scalar> RadiiAndSigns<T> {
             area_radii: found.each,
             common_radius: found.common,
             spacing: found.spacing,
-            neighbors: AUTO_NEIGHBORS,
+            lines: None,
             has_moved: false,
         };
         Ok(SearchResult {

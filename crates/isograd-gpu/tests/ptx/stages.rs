@@ -271,7 +271,7 @@ fn whole<T: Scalar>(device: &Device<Recorder>) {
         spacing: <T as isograd::Real>::of(0.02),
         outward: numbers(device, 3 * SAMPLES),
         confidence: numbers(device, SAMPLES),
-        neighbors: 24,
+        lines: None,
         has_moved: true,
     };
     // The local level has its own call.

@@ -6,12 +6,13 @@ use super::candidates::Candidates;
 use super::cell_index::CellIndex;
 use super::cells::Search;
 use super::census::Census;
+use super::growth::Growth;
 use super::lines;
-use super::rule::{self, AUTO_NEIGHBORS, FEWEST_NEIGHBORS, FEWEST_POINTS, GROWTH_MARGIN};
+use super::rule::{self, AUTO_NEIGHBORS, FEWEST_NEIGHBORS, FEWEST_POINTS};
 use crate::parallel::{self, CHUNK};
 use crate::{Real, vector};
 pub(crate) use given::hold;
-pub use given::{Radii, with_neighbors, with_radii};
+pub use given::{Radii, with_lines, with_radii};
 
 /// Share of a neighborhood whose own must reach back to the sample, or the sample is isolated.
 pub(super) const SMALLEST_MUTUAL_SHARE: f64 = 0.125;
@@ -96,7 +97,7 @@ pub struct Neighborhoods<T> {
     /// `(N,)` `Σ_j (1 − r_j²/R_i²)²` over the neighborhood, in input order.
     pub(crate) crowd: Vec<T>,
     /// See [`Self::neighbors`].
-    pub(super) neighbors: usize,
+    pub(super) lines: Option<usize>,
     /// The automatic radius, also where another is given.
     pub(super) automatic: T,
     /// See [`Self::spacing`].
@@ -158,7 +159,12 @@ impl<T: Real> Neighborhoods<T> {
     /// Number of samples that the automatic radius holds in the middle, the center included: 24, or more where samples lie along
     /// lines.
     pub fn neighbors(&self) -> usize {
-        self.neighbors
+        self.lines.unwrap_or(AUTO_NEIGHBORS)
+    }
+
+    /// The [number of neighbors](Self::neighbors) where samples lie along lines.
+    pub fn lines(&self) -> Option<usize> {
+        self.lines
     }
 
     /// Number of points whose radius has grown beyond the common one.
@@ -242,7 +248,7 @@ pub(crate) fn forward_with<T: Real, U: Copy + Default + Send + Sync>(
     sorted: &mut Vec<Found<T, U>>,
     sum: &(impl Fn([T; 3], T, &Candidates<T>) -> U + Sync),
 ) -> Result<(), Error> {
-    find_automatic(points, None, out)?;
+    find_automatic(points, lines::neighbors, out)?;
     finish(radius, out, sorted, sum)
 }
 
@@ -253,7 +259,7 @@ fn finish<T: Real, U: Copy + Default + Send + Sync>(
     sorted: &mut Vec<Found<T, U>>,
     sum: &(impl Fn([T; 3], T, &Candidates<T>) -> U + Sync),
 ) -> Result<(), Error> {
-    out.spacing = rule::spacing(out.automatic, out.neighbors, out.index.len());
+    out.spacing = rule::spacing(out.automatic, out.neighbors(), out.index.len());
     out.rule = radius;
     out.common_radius = rule::common(radius, out.automatic)?;
     grow(out, sorted, sum);
@@ -277,32 +283,32 @@ fn check_extent<T: Real>(index: &CellIndex<T>) -> Result<(), Error> {
     rule::check_extent(index.len(), index.bounds().into())
 }
 
-/// Index, number of neighbors unless it is `held`, distances to the last of them, and automatic radius.
+/// Index, [lines](Neighborhoods::lines), distances to the last neighbor, and automatic radius.
 pub(super) fn find_automatic<T: Real>(
     points: &[[T; 3]],
-    held: Option<usize>,
+    lines: impl FnOnce(&CellIndex<T>) -> Option<usize>,
     out: &mut Neighborhoods<T>,
 ) -> Result<(), Error> {
     check(points)?;
     out.index.rebuild(points);
     check_extent(&out.index)?;
-    out.neighbors = held.unwrap_or_else(|| lines::neighbors(&out.index));
+    out.lines = lines(&out.index);
     out.automatic = automatic_radius(out);
     Ok(())
 }
 
 /// By the distances to the last neighbor, which stay in `out`.
 fn automatic_radius<T: Real>(out: &mut Neighborhoods<T>) -> T {
+    let neighbors = out.neighbors();
     let Neighborhoods {
         index,
-        neighbors,
         reach: squares,
         crowd: scratch,
         ..
     } = out;
     let n = index.len();
     parallel::resize(squares, n, T::zero());
-    index.reaches_squared(*neighbors, squares);
+    index.reaches_squared(neighbors, squares);
     let found = rule::middle_half(squares, scratch);
     out.middle = found.map(|(middle, _)| middle);
     rule::automatic(found.map(|(_, mean)| mean), n, out.index.bounds().into())
@@ -316,19 +322,26 @@ fn grow<T: Real, U: Copy + Default + Send + Sync>(
 ) {
     let n = out.index.len();
     let (index, common, arch) = (&out.index, out.common_radius, pulp::Arch::new());
+    let lines = out.growing_lines();
     parallel::resize_large(sorted, n, Found::default());
     index.for_each_cell(common, [], sorted, &|cell, candidates, sorted| {
+        let mut nearest = Vec::new();
         for (position, found) in cell.zip(sorted) {
             let point = index.point(position);
             let census = Census::of(arch, point, common, candidates);
-            *found = if census.well_within as usize >= FEWEST_NEIGHBORS.min(n) {
+            let is_enough = census.well_within as usize >= FEWEST_NEIGHBORS.min(n);
+            let radius = match is_enough && lines.is_none() {
+                true => common,
+                false => Growth::of(index, position, lines, &mut nearest).radius,
+            };
+            *found = if radius <= common {
                 Found {
                     radius: common,
                     census,
                     sum: sum(point, common, candidates),
                 }
             } else {
-                grown(index, point, common, sum)
+                grown(index, point, radius, sum)
             };
         }
     });
@@ -347,17 +360,13 @@ fn find_positions<T: Real>(out: &mut Neighborhoods<T>) {
     }
 }
 
-/// What is found with the radius that reaches the 8th sample with a margin.
+/// What is found within a radius beyond the common one.
 fn grown<T: Real, U>(
     index: &CellIndex<T>,
     point: [T; 3],
-    common: T,
+    radius: T,
     sum: &impl Fn([T; 3], T, &Candidates<T>) -> U,
 ) -> Found<T, U> {
-    let mut nearest = Vec::with_capacity(FEWEST_NEIGHBORS);
-    index.nearest(point, FEWEST_NEIGHBORS, &mut nearest);
-    let reach = nearest.last().map_or(T::zero(), |&(_, d2)| d2.sqrt());
-    let radius = common.max(T::of(GROWTH_MARGIN) * reach);
     let (values, mut candidates) = ([], Candidates::default());
     index.candidates(point, Search { radius, values }, &mut candidates);
     Found {

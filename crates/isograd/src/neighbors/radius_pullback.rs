@@ -4,8 +4,9 @@
 //! has the `d̄_j` also has `R R̄ = p y ȳ − Σ ⟨d̄_j, d_j⟩`, for a `y` in units of length to the power `p`.
 
 use super::cell_index::compare_points;
+use super::growth::Growth;
 use super::radius::{Neighborhoods, Radius};
-use super::rule::{AUTO_MARGIN, FEWEST_NEIGHBORS, GROWTH_MARGIN};
+use super::rule::AUTO_MARGIN;
 use crate::{Real, parallel, vector};
 
 /// Cotangents of the radii, in one over the unit of the points where the result has no unit.
@@ -56,7 +57,7 @@ impl RadiiCotangent {
 }
 
 /// Adds what the cotangents of the radii mean for the `(N, 3)` points. A radius that was given is constant, as are, for
-/// the automatic one, the points of the middle half and which sample is the 24th; for grown ones, which is the 8th.
+/// the automatic one, the points of the middle half and which sample is the 24th; for grown ones, which is the 8th, and on which side of a line samples are.
 pub fn pullback<T: Real>(
     neighborhoods: &Neighborhoods<T>,
     radii_bar: &RadiiCotangent,
@@ -84,18 +85,19 @@ pub fn pullback<T: Real>(
     }
 }
 
-/// Points whose radius has grown, each with its 8th sample and the cotangent of the distance to it.
+/// Points whose radius has grown, each with the sample that it passes and the cotangent of the distance to it.
 fn grown_pairs<T: Real>(
     neighborhoods: &Neighborhoods<T>,
     grown: &[(u32, f64)],
 ) -> Vec<(u32, u32, f64)> {
     let Neighborhoods { index, radius, .. } = neighborhoods;
+    let lines = neighborhoods.growing_lines();
     parallel::map_with(Vec::new, grown.len(), |nearest, k| {
         let (i, bar) = grown[k];
         let position = neighborhoods.position()[i as usize] as usize;
-        index.nearest(index.point(position), FEWEST_NEIGHBORS, nearest);
-        let j = nearest.last().map_or(i, |&(j, _)| j);
-        (i, j, GROWTH_MARGIN * bar / radius[i as usize].f64())
+        let growth = Growth::of(index, position, lines, nearest);
+        let by_distance = growth.margin * bar / radius[i as usize].f64();
+        (i, index.order()[growth.to], by_distance)
     })
 }
 

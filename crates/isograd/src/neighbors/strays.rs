@@ -14,7 +14,7 @@
 //! Strays in a sheet, and more than a tenth of the cloud, are not told from a surface.
 
 use super::radius::{Error, Neighborhoods, SMALLEST_MUTUAL_SHARE, find_automatic};
-use super::rule;
+use super::{lines, rule};
 use crate::element::eigen;
 use crate::{Real, parallel, union_find, vector};
 
@@ -63,7 +63,7 @@ struct Group<T> {
 /// As [`forward`](super::forward).
 pub fn strays<T: Real>(points: &[[T; 3]]) -> Result<Vec<u32>, Error> {
     let mut found = Neighborhoods::default();
-    find_automatic(points, None, &mut found)?;
+    find_automatic(points, lines::neighbors, &mut found)?;
     Ok(found.strays())
 }
 
@@ -91,7 +91,7 @@ impl<T: Real> Neighborhoods<T> {
         let mut strays = Vec::new();
         for members in members.iter().filter(|members| !members.is_empty()) {
             let group = Group::of(members, &apart);
-            if group.is_stray(self.neighbors)
+            if group.is_stray(self.neighbors())
                 && off_beyond.most_are(T::of(AS_COARSE * AS_COARSE) * group.reach)
             {
                 strays.extend(members.iter().map(|&k| apart[k].index));
@@ -116,9 +116,9 @@ impl<T: Real> Neighborhoods<T> {
 
     /// Classifies a sample by its 24 nearest.
     fn look_round(&self, position: usize) -> Apart<T> {
-        let mut nearest = Vec::with_capacity(self.neighbors);
+        let mut nearest = Vec::with_capacity(self.neighbors());
         let center = self.index.point(position);
-        (self.index).nearest_positions(center, self.neighbors, &mut nearest);
+        (self.index).nearest_positions(center, self.neighbors(), &mut nearest);
         let mut apart = Apart {
             position: position as u32,
             index: self.index.order()[position],
@@ -141,7 +141,7 @@ impl<T: Real> Neighborhoods<T> {
         };
         let close: Vec<[f64; 3]> = nearest.iter().take(CLOSE).map(offset).collect();
         apart.is_off =
-            mutual < SMALLEST_MUTUAL_SHARE * (self.neighbors - 1) as f64 || fill_a_volume(&close);
+            mutual < SMALLEST_MUTUAL_SHARE * (self.neighbors() - 1) as f64 || fill_a_volume(&close);
         apart
     }
 }

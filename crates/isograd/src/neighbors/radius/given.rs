@@ -1,8 +1,8 @@
 //! Neighborhoods of which something was found elsewhere.
 
 use super::{
-    AUTO_NEIGHBORS, Census, Error, Found, Neighborhoods, Radius, check, check_extent,
-    find_automatic, find_isolated, find_positions, finish,
+    Census, Error, Found, Neighborhoods, Radius, check, check_extent, find_automatic,
+    find_isolated, find_positions, finish,
 };
 use crate::Real;
 
@@ -32,22 +32,22 @@ pub(crate) fn hold<T: Real>(
             points: points.len(),
         });
     }
-    with_neighbors(points, held.rule, held.neighbors, out)?;
+    with_lines(points, held.rule, held.lines, out)?;
     out.isolated.clone_from(&held.isolated);
     Ok(())
 }
 
-/// [`forward`](super::forward) with an automatic radius that holds so many samples in the middle.
+/// [`forward`](super::forward) of points of which it is known [whether they lie along lines](Neighborhoods::lines).
 ///
 /// # Errors
 /// As [`forward`](super::forward).
-pub fn with_neighbors<T: Real>(
+pub fn with_lines<T: Real>(
     points: &[[T; 3]],
     radius: Radius,
-    neighbors: usize,
+    lines: Option<usize>,
     out: &mut Neighborhoods<T>,
 ) -> Result<(), Error> {
-    find_automatic(points, Some(neighbors), out)?;
+    find_automatic(points, |_| lines, out)?;
     let mut sorted = std::mem::take(&mut out.sorted);
     let done = finish(radius, out, &mut sorted, &|_, _, _| ());
     out.sorted = sorted;
@@ -83,7 +83,7 @@ fn count_within<T: Real>(
     check_extent(&out.index)?;
     out.common_radius = radii.common;
     out.spacing = radii.spacing;
-    out.neighbors = AUTO_NEIGHBORS;
+    out.lines = None;
     out.middle = None;
     out.radius.clear();
     out.radius.extend_from_slice(radii.each);

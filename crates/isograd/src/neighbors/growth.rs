@@ -1,0 +1,51 @@
+//! Radii beyond the common one: where few samples are within it, and where the next lines of samples are farther than most.
+
+use super::cell_index::{CellIndex, distance_squared};
+use super::lines;
+use super::radius::{Neighborhoods, Radius};
+use super::rule::{FEWEST_NEIGHBORS, GROWTH_MARGIN};
+use crate::Real;
+
+/// By how much a radius passes the next lines at least: with 1.05, those at the radius would get hardly any weight.
+const LINE_MARGIN: f64 = 1.15;
+
+/// How far a radius grows at least.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Growth<T> {
+    /// The sorted position of the sample that it passes,
+    pub to: usize,
+    /// in multiples of the distance,
+    pub margin: f64,
+    pub radius: T,
+}
+
+impl<T: Real> Neighborhoods<T> {
+    /// The number of neighbors where radii grow up to the next lines: automatic ones, where samples lie along lines.
+    pub(super) fn growing_lines(&self) -> Option<usize> {
+        self.lines().filter(|_| self.rule == Radius::Auto)
+    }
+}
+
+impl<T: Real> Growth<T> {
+    /// Of the radius of a sample, by its sorted position; `lines` are the [growing ones](Neighborhoods::growing_lines).
+    pub(super) fn of(
+        index: &CellIndex<T>,
+        position: usize,
+        lines: Option<usize>,
+        nearest: &mut Vec<(u32, T)>,
+    ) -> Self {
+        let up_to = |to: usize, margin: f64| {
+            let square = distance_squared(index.point(position), index.point(to));
+            let radius = T::of(margin) * square.sqrt();
+            Self { to, margin, radius }
+        };
+        index.nearest_positions(index.point(position), FEWEST_NEIGHBORS, nearest);
+        let last = nearest.last().map_or(position, |&(last, _)| last as usize);
+        let fewest = up_to(last, GROWTH_MARGIN);
+        let next = lines.and_then(|neighbors| lines::next(index, position, neighbors, nearest));
+        match next.map(|next| up_to(next, LINE_MARGIN)) {
+            Some(next) if next.radius > fewest.radius => next,
+            _ => fewest,
+        }
+    }
+}
