@@ -20,18 +20,20 @@ pub(super) struct Growth<T> {
 }
 
 impl<T: Real> Neighborhoods<T> {
-    /// The number of neighbors where radii grow up to the next lines: automatic ones, where samples lie along lines.
-    pub(super) fn growing_lines(&self) -> Option<usize> {
-        self.lines().filter(|_| self.rule == Radius::Auto)
+    /// The radius that grows up to the next lines: the common one, where it is automatic and samples lie along lines.
+    pub(super) fn along_lines(&self) -> Option<T> {
+        self.lines()
+            .filter(|_| self.rule == Radius::Auto)
+            .map(|_| self.common_radius)
     }
 }
 
 impl<T: Real> Growth<T> {
-    /// Of the radius of a sample, by its sorted position; `lines` are the [growing ones](Neighborhoods::growing_lines).
+    /// Of the radius of a sample, by its sorted position; `along_lines` as [`Neighborhoods::along_lines`].
     pub(super) fn of(
         index: &CellIndex<T>,
         position: usize,
-        lines: Option<usize>,
+        along_lines: Option<T>,
         nearest: &mut Vec<(u32, T)>,
     ) -> Self {
         let up_to = |to: usize, margin: f64| {
@@ -42,7 +44,7 @@ impl<T: Real> Growth<T> {
         index.nearest_positions(index.point(position), FEWEST_NEIGHBORS, nearest);
         let last = nearest.last().map_or(position, |&(last, _)| last as usize);
         let fewest = up_to(last, GROWTH_MARGIN);
-        let next = lines.and_then(|neighbors| lines::next(index, position, neighbors, nearest));
+        let next = along_lines.and_then(|reach| lines::next(index, position, reach, nearest));
         match next.map(|next| up_to(next, LINE_MARGIN)) {
             Some(next) if next.radius > fewest.radius => next,
             _ => fewest,

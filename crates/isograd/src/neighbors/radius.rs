@@ -322,17 +322,17 @@ fn grow<T: Real, U: Copy + Default + Send + Sync>(
 ) {
     let n = out.index.len();
     let (index, common, arch) = (&out.index, out.common_radius, pulp::Arch::new());
-    let lines = out.growing_lines();
+    let along_lines = out.along_lines();
     parallel::resize_large(sorted, n, Found::default());
     index.for_each_cell(common, [], sorted, &|cell, candidates, sorted| {
-        let mut nearest = Vec::new();
+        let (mut nearest, mut wide) = (Vec::new(), Candidates::default());
         for (position, found) in cell.zip(sorted) {
             let point = index.point(position);
             let census = Census::of(arch, point, common, candidates);
             let is_enough = census.well_within as usize >= FEWEST_NEIGHBORS.min(n);
-            let radius = match is_enough && lines.is_none() {
+            let radius = match is_enough && along_lines.is_none() {
                 true => common,
-                false => Growth::of(index, position, lines, &mut nearest).radius,
+                false => Growth::of(index, position, along_lines, &mut nearest).radius,
             };
             *found = if radius <= common {
                 Found {
@@ -341,7 +341,7 @@ fn grow<T: Real, U: Copy + Default + Send + Sync>(
                     sum: sum(point, common, candidates),
                 }
             } else {
-                grown(index, point, radius, sum)
+                grown(index, point, radius, &mut wide, sum)
             };
         }
     });
@@ -365,14 +365,15 @@ fn grown<T: Real, U>(
     index: &CellIndex<T>,
     point: [T; 3],
     radius: T,
+    candidates: &mut Candidates<T>,
     sum: &impl Fn([T; 3], T, &Candidates<T>) -> U,
 ) -> Found<T, U> {
-    let (values, mut candidates) = ([], Candidates::default());
-    index.candidates(point, Search { radius, values }, &mut candidates);
+    let values = [];
+    index.candidates(point, Search { radius, values }, candidates);
     Found {
         radius,
-        census: Census::of(pulp::Arch::new(), point, radius, &candidates),
-        sum: sum(point, radius, &candidates),
+        census: Census::of(pulp::Arch::new(), point, radius, candidates),
+        sum: sum(point, radius, candidates),
     }
 }
 

@@ -91,11 +91,11 @@ fn grown_pairs<T: Real>(
     grown: &[(u32, f64)],
 ) -> Vec<(u32, u32, f64)> {
     let Neighborhoods { index, radius, .. } = neighborhoods;
-    let lines = neighborhoods.growing_lines();
+    let along_lines = neighborhoods.along_lines();
     parallel::map_with(Vec::new, grown.len(), |nearest, k| {
         let (i, bar) = grown[k];
         let position = neighborhoods.position()[i as usize] as usize;
-        let growth = Growth::of(index, position, lines, nearest);
+        let growth = Growth::of(index, position, along_lines, nearest);
         let by_distance = growth.margin * bar / radius[i as usize].f64();
         (i, index.order()[growth.to], by_distance)
     })
