@@ -22,8 +22,8 @@ pub(super) const SMALLEST_MUTUAL_SHARE: f64 = 0.125;
 pub enum Radius {
     /// 1.001 times the mean of the distance to the 24th sample over the middle half of the points, those with neither the
     /// smallest nor the largest distances. Where samples lie along lines, as those of scanners or of structured meshes, to that
-    /// of a larger number, which reaches 1.3 times the distance of the lines. Independent of the order of the points, and continuous in them unless 24 come to
-    /// lie in one place.
+    /// of a larger number, which reaches 1.3 times the distance of the lines. Independent of the order of the points; continuous
+    /// in them unless 24 come to lie in one place, or the number changes.
     #[default]
     Auto,
     /// This length, in the unit of the points.

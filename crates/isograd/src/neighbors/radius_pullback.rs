@@ -57,7 +57,8 @@ impl RadiiCotangent {
 }
 
 /// Adds what the cotangents of the radii mean for the `(N, 3)` points. A radius that was given is constant, as are, for
-/// the automatic one, the points of the middle half and which sample is the 24th; for grown ones, which is the 8th, and on which side of a line samples are.
+/// the automatic one, the points of the middle half and which sample is the 24th; for grown ones, which is the 8th,
+/// and on which side of a line samples are.
 pub fn pullback<T: Real>(
     neighborhoods: &Neighborhoods<T>,
     radii_bar: &RadiiCotangent,

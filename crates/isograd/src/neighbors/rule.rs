@@ -79,7 +79,8 @@ pub fn is_apart<T: Real>(square: T, automatic: T) -> bool {
     square > least * least
 }
 
-/// Typical distance between neighboring samples, where the automatic radius holds so many `neighbors`; see [`Neighborhoods::spacing`](super::Neighborhoods::spacing).
+/// Typical distance between neighboring samples, where the automatic radius holds so many `neighbors`; see
+/// [`Neighborhoods::spacing`](super::Neighborhoods::spacing).
 pub fn spacing<T: Real>(automatic: T, neighbors: usize, points: usize) -> T {
     automatic * T::of((std::f64::consts::PI / neighbors.min(points) as f64).sqrt())
 }

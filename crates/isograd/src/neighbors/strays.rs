@@ -1,7 +1,8 @@
 //! Stray samples, as those of a scan in mid-air: they lie apart from the surface and, where they are near to one another, fill
 //! a volume.
 //!
-//! A sample lies apart if its 24th nearest (or that of a larger number, where samples lie along lines) is more than twice the automatic radius away. It is off the surface if the nearest 10
+//! A sample lies apart if its 24th nearest is more than twice the automatic radius away. Where samples lie along lines, the number
+//! is larger, as it is for that radius. A sample is off the surface if the nearest 10
 //! fill a volume, or if it is among the 24 nearest of few of its own. Samples of a sparse part of a surface lie apart too, but most
 //! of them in a plane, and each is near to its neighbors; and a sparse part goes on in a dense one. So whole groups are told, of
 //! samples apart that are among each other's 24 nearest, directly or by way of others. A group is stray if

@@ -48,8 +48,8 @@
 //! samples of a thin body to its other side, where nothing tells them from those that belong there: of
 //! bodies as thick as four, two, one deviation of the noise about 2, 16 and 31 % of the signs. Faces
 //! of two bodies that lie in the same place have samples of both signs mixed, which nothing can separate.
-//! Where lines of samples are ten times as far apart as the samples on them, one to two per cent of the signs are wrong, and
-//! twice as many at twenty times.
+//! Where lines of samples are ten times as far apart as the samples on them, about one per cent of the signs are wrong, and
+//! three at twenty times.
 //!
 //! # Residual
 //! [`Orientation::normals`] holds the sign that was chosen: the stage multiplies by it.
