@@ -9,12 +9,12 @@ use crate::Real;
 /// By how much a radius passes the next lines at least: with 1.05, those at the radius would get hardly any weight.
 const LINE_MARGIN: f64 = 1.15;
 
-/// How far a radius grows at least.
+/// The least radius of a sample, as a multiple of the distance to another one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Growth<T> {
-    /// The sorted position of the sample that it passes,
+    /// Sorted position of the other sample.
     pub to: usize,
-    /// in multiples of the distance,
+    /// The radius over the distance to it.
     pub margin: f64,
     pub radius: T,
 }

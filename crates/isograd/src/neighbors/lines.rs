@@ -10,7 +10,7 @@ use std::cell::Cell;
 
 use super::cell_index::{CellIndex, Place, compare_points};
 use super::rule::AUTO_NEIGHBORS;
-use crate::element::eigen;
+use crate::element::eigen::{self, Eigen};
 use crate::{Real, parallel, vector};
 
 /// Samples lie along lines where the mean [turn] of the nearest others is less: it is 0 on a straight line, ½ on a surface that
@@ -101,12 +101,8 @@ pub(super) fn next<T: Real>(
     let others = nearest
         .iter()
         .filter(|&&(other, _)| other as usize != position);
-    let offset = |&(other, _): &(u32, T)| vector::sub(index.point(other as usize), center);
-    let mut offsets = [[0.0; 3]; ALONG];
-    for (to, offset) in offsets.iter_mut().zip(others.map(offset)) {
-        *to = vector::to_f64(offset);
-    }
-    let along = direction(&offsets)?;
+    let offsets = others.map(|&(other, _)| offset(index, center, other as usize));
+    let along = direction(offsets.take(ALONG))?;
     let within = |factor: f64| next_within(index, position, along, T::of(factor) * reach);
     [1.0, 2.0, 4.0].into_iter().find_map(within)
 }
@@ -125,7 +121,7 @@ fn next_within<T: Real>(
         &mut |cell| {
             index.scan(cell, center, limit, &mut |other, square| {
                 seen.set(seen.get() + 1);
-                let offset = vector::to_f64(vector::sub(index.point(other), center));
+                let offset = offset(index, center, other);
                 found.extend(across(along, offset).map(|across| (square, other, across)));
             });
         },
@@ -171,14 +167,21 @@ fn others<T: Real>(
     index.nearest_positions(center, count + 1, nearest);
     nearest.retain(|&(other, _)| other as usize != position);
     nearest.truncate(count);
-    let offset = |&(other, _): &(u32, T)| vector::sub(index.point(other as usize), center);
-    nearest.iter().map(offset).map(vector::to_f64).collect()
+    let offsets = nearest
+        .iter()
+        .map(|&(other, _)| offset(index, center, other as usize));
+    offsets.collect()
+}
+
+/// From a place to the point at a sorted position.
+fn offset<T: Real>(index: &CellIndex<T>, from: [T; 3], position: usize) -> [f64; 3] {
+    vector::to_f64(vector::sub(index.point(position), from))
 }
 
 /// The one of these offsets, of the nearest, up to which there are samples beside a line on either side of it; `None` where
 /// the sample in the middle lies on no line.
 fn beside(offsets: &[[f64; 3]]) -> Option<usize> {
-    let along = direction(&offsets[..ALONG.min(offsets.len())])?;
+    let along = direction(offsets.iter().copied().take(ALONG))?;
     let all = offsets.iter().enumerate();
     let found: Vec<(usize, [f64; 3])> = all
         .filter_map(|(k, &offset)| Some((k, across(along, offset)?)))
@@ -211,14 +214,20 @@ fn first_opposite(directions: impl Iterator<Item = [f64; 3]>) -> Option<usize> {
 }
 
 /// The direction of the line on which some offsets lie, if they do.
-fn direction(offsets: &[[f64; 3]]) -> Option<[f64; 3]> {
-    let mut squares = [0.0; 6];
-    for &[x, y, z] in offsets {
-        let products = [x * x, x * y, x * z, y * y, y * z, z * z];
-        let pairs = squares.iter_mut().zip(products);
-        pairs.for_each(|(sum, product)| *sum += product);
-    }
-    let found = eigen::eigen(squares.into());
+fn direction(offsets: impl Iterator<Item = [f64; 3]>) -> Option<[f64; 3]> {
+    let found = principal(offsets);
     let [_, second, third]: [f64; 3] = found.values.into();
     (second < WIDE * third).then(|| found.third.into())
+}
+
+/// Eigenvalues and eigenvectors of the sum of `d dᵀ` over some offsets `d`.
+pub(super) fn principal(offsets: impl Iterator<Item = [f64; 3]>) -> Eigen<f64> {
+    let mut sums = [0.0; 6];
+    for [x, y, z] in offsets {
+        let products = [x * x, x * y, x * z, y * y, y * z, z * z];
+        for (sum, product) in sums.iter_mut().zip(products) {
+            *sum += product;
+        }
+    }
+    eigen::eigen(sums.into())
 }

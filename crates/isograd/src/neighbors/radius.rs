@@ -230,10 +230,7 @@ pub fn forward<T: Real>(
     radius: Radius,
     out: &mut Neighborhoods<T>,
 ) -> Result<(), Error> {
-    let mut sorted = std::mem::take(&mut out.sorted);
-    let done = forward_with(points, radius, out, &mut sorted, &|_, _, _| ());
-    out.sorted = sorted;
-    done
+    given::find(points, radius, lines::neighbors, out)
 }
 
 /// Like [`forward`], and writes `sum(point, R_i, candidates)` of every neighborhood in sorted order; the candidates
@@ -360,7 +357,7 @@ fn find_positions<T: Real>(out: &mut Neighborhoods<T>) {
     }
 }
 
-/// What is found within a radius beyond the common one.
+/// Census and sum within a radius beyond the common one.
 fn grown<T: Real, U>(
     index: &CellIndex<T>,
     point: [T; 3],

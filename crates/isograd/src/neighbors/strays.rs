@@ -16,7 +16,6 @@
 
 use super::radius::{Error, Neighborhoods, SMALLEST_MUTUAL_SHARE, find_automatic};
 use super::{lines, rule};
-use crate::element::eigen;
 use crate::{Real, parallel, union_find, vector};
 
 /// Samples, the nearest and itself, that show whether those round it fill a volume. More would also be of the other side of a
@@ -217,14 +216,7 @@ fn fill_a_volume(offsets: &[[f64; 3]]) -> bool {
     let per_sample = 1.0 / offsets.len() as f64;
     let sum = offsets.iter().fold([0.0; 3], |sum, &d| vector::add(sum, d));
     let mean = vector::scale(sum, per_sample);
-    let mut covariance = [0.0; 6];
-    for &offset in offsets {
-        let [x, y, z] = vector::sub(offset, mean);
-        let products = [x * x, x * y, x * z, y * y, y * z, z * z];
-        for (sum, product) in covariance.iter_mut().zip(products) {
-            *sum += product;
-        }
-    }
-    let [first, second, third]: [f64; 3] = eigen::eigen(covariance.into()).values.into();
+    let from_mean = offsets.iter().map(|&offset| vector::sub(offset, mean));
+    let [first, second, third]: [f64; 3] = lines::principal(from_mean).values.into();
     first > FILLED[0] * second && first > FILLED[1] * third
 }

@@ -5,6 +5,7 @@ use super::{
     find_isolated, find_positions, finish,
 };
 use crate::Real;
+use crate::neighbors::CellIndex;
 
 /// Radii that were found elsewhere, in the unit of the points.
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +48,17 @@ pub fn with_lines<T: Real>(
     lines: Option<usize>,
     out: &mut Neighborhoods<T>,
 ) -> Result<(), Error> {
-    find_automatic(points, |_| lines, out)?;
+    find(points, radius, |_| lines, out)
+}
+
+/// [`forward`](super::forward) with the [lines](Neighborhoods::lines) that `lines` finds.
+pub(super) fn find<T: Real>(
+    points: &[[T; 3]],
+    radius: Radius,
+    lines: impl FnOnce(&CellIndex<T>) -> Option<usize>,
+    out: &mut Neighborhoods<T>,
+) -> Result<(), Error> {
+    find_automatic(points, lines, out)?;
     let mut sorted = std::mem::take(&mut out.sorted);
     let done = finish(radius, out, &mut sorted, &|_, _, _| ());
     out.sorted = sorted;
