@@ -122,6 +122,12 @@ def test_a_distant_mesh_keeps_its_volume():
     assert abs(moved(CUBE, by=(1e6, -2e6, 3e6)).volume - 1) < 1e-9
 
 
+@pytest.mark.parametrize("lone", [np.nan, 1e300])
+def test_a_vertex_without_faces_does_not_change_the_volume(lone):
+    mesh = Mesh(np.vstack([CUBE.vertices, [[lone, 0.0, 0.0]]]), CUBE.faces)
+    assert mesh.volume == CUBE.volume
+
+
 def test_degenerate_faces_and_lone_vertices_have_the_normal_0():
     vertices = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [5.0, 5.0, 5.0], [2.0, 0.0, 0.0]])
     mesh = Mesh(vertices, np.array([[0, 1, 2], [0, 1, 4], [1, 1, 1]]))

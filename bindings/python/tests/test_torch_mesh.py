@@ -161,6 +161,7 @@ def test_a_compiled_loss_has_the_same_gradient():
         (lambda: it.query(POINTS, GRID, QUERIES[:, :2]), ValueError, r"queries has the shape \(50, 2\)"),
         (lambda: it.mesh(POINTS, GRID, max_faces=9), ValueError, "both max_vertices and max_faces"),
         (lambda: it.mesh(POINTS, GRID, max_vertices=0, max_faces=9), ValueError, "max_vertices is 0"),
+        (lambda: it.mesh(POINTS, GRID, max_vertices=True, max_faces=9), ValueError, "max_vertices is True"),
         (lambda: it.mesh(CLOUDS, GRID), ValueError, "give max_vertices and max_faces"),
         (lambda: it.extend(POINTS, None, GRID), ValueError, "values is None"),
         (lambda: it.extend(POINTS, VALUES[:9], GRID), ValueError, "one row for each point"),

@@ -34,7 +34,8 @@ class Cloud(NamedTuple):
         return summary(self)
 
     def save(self, path: Path) -> None:
-        """Writes points, normals and attributes as PLY, NPZ, XYZ or CSV, as the name ends; see :func:`write_points`."""
+        """Writes points, normals and attributes as PLY, NPZ, XYZ, CSV, TXT or PCD, as the name ends; see
+        :func:`write_points`."""
         _convert.save_cloud(self, path)
 
 

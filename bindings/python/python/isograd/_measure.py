@@ -55,7 +55,10 @@ def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
     open mesh that of the cone from the center of its bounding box, and not meaningful."""
     if len(faces) == 0:
         return 0.0
-    low, high = vertices.min(axis=0).astype(float), vertices.max(axis=0).astype(float)
+    is_used = np.zeros(len(vertices), dtype=bool)
+    is_used[faces] = True
+    used = vertices[is_used]
+    low, high = used.min(axis=0).astype(float), used.max(axis=0).astype(float)
     a, b, c = _corners(vertices - (0.5 * low + 0.5 * high), faces)
     return float(_dot(a, _cross(b, c)).sum() / 6.0)
 

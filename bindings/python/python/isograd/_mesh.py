@@ -104,7 +104,7 @@ class Mesh:
         return signed_distance(self, points) < 0.0
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes PLY, OBJ, STL or VTP, as the name ends; see :func:`write_mesh`."""
+        """Writes PLY, OBJ, STL, OFF, GLB or VTP, as the name ends; see :func:`write_mesh`."""
         _convert.save_mesh(self, path)
 
     def plot(self, **arguments: Any) -> Any:

@@ -34,3 +34,14 @@ def whole(value: object, name: str) -> int:
     if not -(2**63) <= found < 2**63:
         raise ValueError(f"{name} is {found}; give a smaller number")
     return found
+
+
+def size(value: object, name: str) -> int:
+    """The fixed length of an array as ``int``.
+
+    Raises:
+        ValueError: it is no whole number, or not from 1 to 2³¹ - 1.
+    """
+    if isinstance(value, bool) or not 0 < (found := whole(value, name)) < 2**31:
+        raise ValueError(f"{name} is {value!r}; give a whole number from 1 to 2**31 - 1")
+    return found

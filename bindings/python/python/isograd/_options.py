@@ -14,7 +14,7 @@ class Orient(str, Enum):
     """Methods that find the side of each normal.
 
     Attributes:
-        AUTO: from enclosure, sky, sheets and neighbors.
+        AUTO: from enclosure, visibility, sheets and neighbors.
         PARITY: by counting crossings along the normal, as in the paper.
         GIVEN: the given normals, unchanged.
         SIGNS: estimated directions, each on the side of the given normal.

@@ -181,8 +181,8 @@ class Reconstruction(Stored):
             warn_caller(message, ReconstructionWarning)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes a result, as the name ends: φ (.vti, .npz), the mesh (.ply, .obj, .stl, .vtp), the report (.json) or
-        slices of φ (.png). Files are written atomically. In PLY and VTP the mesh has the attributes of the cloud.
+        """Writes a result, as the name ends: φ (.vti, .npz), the mesh (.ply, .obj, .stl, .off, .glb, .vtp), the report
+        (.json) or slices of φ (.png). Files are written atomically. In PLY and VTP the mesh has the attributes of the cloud.
 
         A folder, which exists or ends in ``/``, gets what ``isograd reconstruct -o`` writes: ``sdf.vti``, ``mesh.ply``,
         ``points.ply``, ``report.json`` and ``slices.png``.

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from typing import Any, Literal, NamedTuple
 
 from ._grid import Grid
-from ._numbers import whole
+from ._numbers import size
 from ._options import Fill, Options, Orient, check_fill
 from ._places import band_width
 from ._torch import DEVICES, Tensor, call, checked, grid_shape, in_batches, one_by_one, prepare, rows, torch
@@ -105,7 +105,7 @@ def mesh(
     if (max_vertices is None) != (max_faces is None):
         raise ValueError("give both max_vertices and max_faces, or neither")
     if max_vertices is not None and max_faces is not None:
-        sizes = [_size(max_vertices, "max_vertices"), _size(max_faces, "max_faces")]
+        sizes = [size(max_vertices, "max_vertices"), size(max_faces, "max_faces")]
         return _mesh_of(points, normals, settings, sizes)
     # Enough for most surfaces; others are found again.
     nx, ny, nz = grid.shape
@@ -187,13 +187,6 @@ def _mesh_of(points: Tensor, normals: Tensor | None, settings: str, sizes: list[
     vertices, faces, counts = _mesh(points, None, normals, settings, 0.0, False, sizes)[:3]
     counts = counts.long()
     return Mesh(vertices, faces.long(), counts[0], counts[1])
-
-
-def _size(value: object, name: str) -> int:
-    found = whole(value, name)
-    if not 0 < found < 2**31:
-        raise ValueError(f"{name} is {value!r}; give a whole number from 1 to 2**31 - 1")
-    return found
 
 
 def saved(points: Tensor, settings: str) -> tuple[Tensor, Tensor, Tensor]:

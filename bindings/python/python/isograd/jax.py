@@ -31,6 +31,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ._numbers import size
 from ._options import Fill, Options, Orient, check_fill
 from ._jax_surface import Surface, sample_values, surface
 from ._places import band_width
@@ -214,16 +215,10 @@ def mesh(
         TypeError, ValueError, RuntimeError, jax.errors.JaxRuntimeError: as for :func:`signed_distance`.
     """
     plan, points, normals = prepare(points, grid, normals, options, backend, sdf=False)
-    sizes = (_size(max_vertices, "max_vertices"), _size(max_faces, "max_faces"))
+    sizes = (size(max_vertices, "max_vertices"), size(max_faces, "max_faces"))
     found: Any = _mesh(plan, sizes, points, normals)
     vertices, faces, counts = found
     return Mesh(vertices, faces, counts[0], counts[1])
-
-
-def _size(value: int, name: str) -> int:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 0 < value < 2**31:
-        raise ValueError(f"{name} is {value!r}; give a whole number from 1 to 2**31 - 1")
-    return int(value)
 
 
 @functools.partial(jax.custom_vjp, nondiff_argnums=(0, 1))

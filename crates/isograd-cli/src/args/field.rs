@@ -12,7 +12,7 @@ use super::{CellArgs, Running, STATUS, finite};
 #[derive(Debug, Args)]
 #[command(after_help = STATUS)]
 pub struct Sdf {
-    /// The mesh: PLY, OBJ, STL or VTP; `-` is standard input (PLY)
+    /// The mesh: PLY, OBJ, STL, OFF, GLB or VTP; `-` is standard input (PLY)
     pub mesh: PathBuf,
     /// Output: .vti or .npz
     #[arg(short, long, value_name = "FIELD")]
@@ -42,7 +42,7 @@ pub struct Sdf {
 pub struct Isosurface {
     /// The field: .vti or .npz
     pub field: PathBuf,
-    /// Output: .ply, .obj, .stl or .vtp
+    /// Output: .ply, .obj, .stl, .off, .glb or .vtp
     #[arg(short, long, value_name = "MESH")]
     pub output: PathBuf,
     /// Value of the field at the surface; below it is inside

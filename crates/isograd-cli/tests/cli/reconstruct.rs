@@ -54,9 +54,9 @@ fn the_folder_gets_its_five_files_and_the_report_its_fields() {
     assert_keys(&report["grid"], "shape origin spacing");
     assert_keys(
         &report["normals"],
-        "radius sample_spacing neighbours guarded",
+        "radius sample_spacing neighbors guarded",
     );
-    assert_keys(&report["normals"]["neighbours"], "min median max");
+    assert_keys(&report["normals"]["neighbors"], "min median max");
     assert_keys(
         &report["orientation"],
         "method flipped confidence doubtful regions",

@@ -12,6 +12,8 @@
 //! - Walls are free, also with [`Auto`](isograd::poisson::Walls::Auto); closed ones are an error.
 //! - The signs of [`Method::Auto`](isograd::orient::Method::Auto) and
 //!   [`Method::Sensors`](isograd::orient::Method::Sensors), and the radii with them, are found on the CPU.
+//! - Radii that are found on the device, with given normals, their signs or parity, hold 24 samples also where samples lie
+//!   along lines, and do not grow up to the next ones. A [fixed](isograd::neighbors::Radius::Fixed) radius is the same.
 //! - With [`Method::Previous`](isograd::orient::Method::Previous) radii are found by the first call, by one with another
 //!   number of points, and where more than 3 % of the axes have turned far. Every other call keeps them.
 

@@ -5,10 +5,35 @@ use std::path::Path;
 
 use isograd::data::Attribute;
 use isograd::{Field, Grid, Mesh, PointCloud, Real};
-use isograd_io::{Error, Format, Source, parse_field, parse_geometry};
+use isograd_io::{Error, Format, Geometry, Source, parse_field, parse_geometry};
+
+/// Reads points and faces.
+pub fn geometry(format: Format, bytes: impl Into<Vec<u8>>) -> Geometry {
+    parse_geometry(&source("file", bytes), format).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Checks that a file is refused with a message that contains `parts`.
+pub fn refused(format: Format, bytes: impl Into<Vec<u8>>, parts: &[&str]) {
+    let result = parse_in_bounds(&source("bad.file", bytes), format);
+    let message = result.expect_err("must be refused").to_string();
+    assert!(message.starts_with("bad.file"), "{message}");
+    assert_says(&message, parts);
+}
+
+pub fn assert_says(message: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(message.contains(part), "'{part}' is missing in: {message}");
+    }
+}
 
 /// Parses a file as a field (VTI) or as points and faces, and checks the memory that it takes.
 pub fn parse_in_bounds(source: &Source, format: Format) -> Result<(), Error> {
+    // One byte may become a number of 8 bytes, held twice.
+    parse_within(source, format, 64 * source.bytes.len() as u64)
+}
+
+/// [`parse_in_bounds`] with so many bytes of memory, and 1 MiB for messages and the buffers of the unpackers.
+pub fn parse_within(source: &Source, format: Format, limit: u64) -> Result<(), Error> {
     let mut result = Ok(());
     let memory = allocation_counter::measure(|| {
         result = match format {
@@ -16,12 +41,10 @@ pub fn parse_in_bounds(source: &Source, format: Format) -> Result<(), Error> {
             _ => parse_geometry(source, format).map(drop),
         };
     });
-    // One byte may become a number of 8 bytes, held twice; the constant is for the unpacker's buffers.
-    let allowed = 64 * source.bytes.len() as u64 + (1 << 20);
-    let used = memory.bytes_max;
+    let (size, used) = (source.bytes.len(), memory.bytes_max);
     assert!(
-        used <= allowed,
-        "{}: {used} bytes were allocated",
+        used <= limit + (1 << 20),
+        "{} of {size} bytes took {used} bytes",
         source.name
     );
     result

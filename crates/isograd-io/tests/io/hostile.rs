@@ -6,9 +6,9 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
-use isograd_io::{Error, Format, Source, parse_field, parse_geometry};
+use isograd_io::{Error, Format, Source, parse_geometry};
 
-use crate::files::{npy, npz, source};
+use crate::files::{npy, npz, parse_within, source};
 
 /// Default limit for a file of `bytes`.
 fn limit(bytes: usize) -> u64 {
@@ -17,23 +17,7 @@ fn limit(bytes: usize) -> u64 {
 
 /// Parses a file, and checks the memory that it takes against the limit.
 fn parse(source: &Source, format: Format) -> Result<(), Error> {
-    let mut result = Ok(());
-    let memory = allocation_counter::measure(|| {
-        result = match format {
-            Format::Vti => parse_field(source, format).map(drop),
-            _ => parse_geometry(source, format).map(drop),
-        };
-    });
-    // Buffers of the unpackers, and messages.
-    let allowed = limit(source.bytes.len()) + (1 << 20);
-    assert!(
-        memory.bytes_max <= allowed,
-        "{} of {} bytes took {} bytes",
-        source.name,
-        source.bytes.len(),
-        memory.bytes_max
-    );
-    result
+    parse_within(source, format, limit(source.bytes.len()))
 }
 
 /// Checks that a file is refused for its memory, with a message that says how to go on.

@@ -1,25 +1,12 @@
 //! OFF and GLB: content, and damaged or hostile files.
 
 use isograd::Mesh;
-use isograd_io::{Dtype, Format, Geometry, parse_geometry};
+use isograd_io::{Dtype, Format};
 
-use crate::files::{self, SQUARE, parse_in_bounds, source};
+use crate::files::{self, SQUARE, geometry, parse_in_bounds, refused, source};
 
 const OFF: &str = include_str!("../corpus/mesh.off");
 const GLB: &[u8] = include_bytes!("../corpus/mesh.glb");
-
-fn geometry(format: Format, bytes: impl Into<Vec<u8>>) -> Geometry {
-    parse_geometry(&source("file", bytes), format).unwrap_or_else(|e| panic!("{e}"))
-}
-
-/// Checks that a file is refused with a message that contains `parts`.
-fn refused(format: Format, bytes: impl Into<Vec<u8>>, parts: &[&str]) {
-    let error = parse_in_bounds(&source("bad.file", bytes), format);
-    let message = error.expect_err("must be refused").to_string();
-    for part in ["bad.file"].iter().chain(parts) {
-        assert!(message.contains(part), "'{part}' is missing in: {message}");
-    }
-}
 
 #[test]
 fn off_is_read_with_comments_polygons_and_a_keyword_glued_to_the_counts() {

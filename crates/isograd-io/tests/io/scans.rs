@@ -2,7 +2,7 @@
 
 use isograd_io::{Dtype, Format, Geometry, parse_geometry};
 
-use crate::files::{self, parse_in_bounds, source};
+use crate::files::{self, geometry, refused, source};
 
 fn corpus(name: &str) -> (Format, Vec<u8>) {
     let mut files = files::valid_files().into_iter();
@@ -13,19 +13,6 @@ fn corpus(name: &str) -> (Format, Vec<u8>) {
 fn read(name: &str) -> Geometry {
     let (format, bytes) = corpus(name);
     geometry(format, bytes)
-}
-
-fn geometry(format: Format, bytes: impl Into<Vec<u8>>) -> Geometry {
-    parse_geometry(&source("file", bytes), format).unwrap_or_else(|e| panic!("{e}"))
-}
-
-/// Checks that a file is refused with a message that contains `parts`.
-fn refused(format: Format, bytes: impl Into<Vec<u8>>, parts: &[&str]) {
-    let error = parse_in_bounds(&source("bad.file", bytes), format);
-    let message = error.expect_err("must be refused").to_string();
-    for part in ["bad.file"].iter().chain(parts) {
-        assert!(message.contains(part), "'{part}' is missing in: {message}");
-    }
 }
 
 fn values<'a>(file: &'a Geometry, name: &str) -> &'a [f64] {

@@ -4,21 +4,7 @@ use std::path::Path;
 
 use isograd_io::{Error, Format, check_output, parse_field, parse_geometry};
 
-use crate::files::{self, ASCII_PLY, npy, npz, parse_in_bounds, source};
-
-/// Checks that a file is refused with a message that contains `parts`.
-fn refused(format: Format, bytes: impl Into<Vec<u8>>, parts: &[&str]) {
-    let result = parse_in_bounds(&source("bad.file", bytes), format);
-    let message = result.expect_err("must be refused").to_string();
-    assert!(message.starts_with("bad.file"), "{message}");
-    assert_says(&message, parts);
-}
-
-fn assert_says(message: &str, parts: &[&str]) {
-    for part in parts {
-        assert!(message.contains(part), "'{part}' is missing in: {message}");
-    }
-}
+use crate::files::{self, ASCII_PLY, assert_says, npy, npz, refused, source};
 
 fn ply(format: &str, vertices: u64, faces: u64, data: &[u8]) -> Vec<u8> {
     let mut bytes = format!(

@@ -4,7 +4,7 @@ pub(crate) mod pieces;
 
 use crate::data::Mesh;
 use crate::parallel::{CHUNK, sum_array};
-use crate::{Real, parallel, vector};
+use crate::{Real, parallel, union_find, vector};
 
 /// Area, volume and topology of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -153,9 +153,9 @@ impl Scratch {
                     pieces += 1;
                 }
             }
-            let mut root = find(parent, face[0]);
+            let mut root = union_find::root(parent, face[0]);
             for &v in &face[1..] {
-                let other = find(parent, v);
+                let other = union_find::root(parent, v);
                 if other != root {
                     // The lower number wins: the trees do not depend on the order of a face's corners.
                     let (low, high) = (root.min(other), root.max(other));
@@ -219,16 +219,6 @@ fn count_piece(start: &[usize], uses: &mut [u64]) -> EdgeCounts {
         }
     }
     counts
-}
-
-/// The root of a vertex; halves the path on the way.
-fn find(parent: &mut [u32], mut v: u32) -> u32 {
-    while parent[v as usize] != v {
-        let above = parent[parent[v as usize] as usize];
-        parent[v as usize] = above;
-        v = above;
-    }
-    v
 }
 
 #[cfg(test)]

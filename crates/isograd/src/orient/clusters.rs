@@ -3,6 +3,7 @@
 use super::fill::Lattice;
 use super::graph::Graph;
 use super::signs::Place;
+use crate::gather::Buckets;
 use crate::{union_find, vector};
 
 /// Cells of the two grids over the median reach of the samples, and what their evidence weighs.
@@ -42,11 +43,10 @@ pub struct Clusters {
     size: Vec<u32>,
     /// The part of each point, or [`NONE`].
     part: Vec<u32>,
-    /// Points in order of their cluster.
-    members: Vec<u32>,
-    /// One box for each cluster, and where its members end.
+    /// The points of each cluster.
+    members: Buckets,
+    /// One box for each cluster.
     pub bounds: Vec<Bounds>,
-    ends: Vec<usize>,
 }
 
 /// A box, in user coordinates.
@@ -102,12 +102,7 @@ impl Clusters {
     /// # Panics
     /// There is no such cluster.
     pub fn members(&self, cluster: usize) -> &[u32] {
-        let start = if cluster == 0 {
-            0
-        } else {
-            self.ends[cluster - 1]
-        };
-        &self.members[start..self.ends[cluster]]
+        self.members.of(cluster)
     }
 
     /// The grids of a cluster, finest first. `reaches` is scratch.
@@ -154,7 +149,9 @@ impl Clusters {
         }
         let cluster = merge(&mut parts);
         self.bounds = parts;
-        self.sort_members(&cluster);
+        let cluster_of = |p: usize| cluster.get(self.part[p] as usize).copied();
+        let points = self.part.len();
+        self.members.fill(self.bounds.len(), points, cluster_of);
     }
 
     fn link(&mut self, graph: &Graph) {
@@ -171,27 +168,6 @@ impl Clusters {
         self.size.resize(n, 0);
         for &root in &self.parent {
             self.size[root as usize] += 1;
-        }
-    }
-
-    /// Sorts the points by the cluster of their part, in order within each.
-    fn sort_members(&mut self, cluster: &[u32]) {
-        self.ends.clear();
-        self.ends.resize(self.bounds.len() + 1, 0);
-        let clustered =
-            |(p, &part): (u32, &u32)| cluster.get(part as usize).map(|&g| (g as usize, p));
-        for (g, _) in (0..).zip(&self.part).filter_map(clustered) {
-            self.ends[g + 1] += 1;
-        }
-        for g in 0..self.bounds.len() {
-            self.ends[g + 1] += self.ends[g];
-        }
-        self.members.clear();
-        self.members.resize(self.ends[self.bounds.len()], 0);
-        // Each start moves on to the end of its cluster.
-        for (g, p) in (0..).zip(&self.part).filter_map(clustered) {
-            self.members[self.ends[g]] = p;
-            self.ends[g] += 1;
         }
     }
 }

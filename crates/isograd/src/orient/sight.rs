@@ -3,7 +3,7 @@
 /// Places along a ray to the nearest free cell.
 pub(super) const STEPS: usize = 8;
 
-/// Rays that tell how much of the sky a cell sees.
+/// Rays from a cell that may be free.
 pub(super) const RAYS: usize = 26;
 
 /// How far along a ray a place is, by its number from 0.

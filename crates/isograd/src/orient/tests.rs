@@ -83,7 +83,7 @@ fn closed_bodies_are_oriented_with_hardly_a_doubt() {
 fn separate_bodies_are_oriented_each() {
     for distance in [2.07, 2.5, 1e5] {
         let other = sphere(3000, [distance, 0.0, 0.0], 1.0, 4);
-        // Where they all but touch, the samples of either stand between the other and the sky.
+        // Where they all but touch, the samples of either hide the other from one side.
         assert_right(
             "two spheres",
             join(sphere(3000, ORIGIN, 1.0, 3), other),

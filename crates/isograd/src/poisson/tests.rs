@@ -13,30 +13,41 @@ fn right_hand_side(cells: usize, seed: u64) -> Vec<f64> {
     b.iter().map(|v| v - mean).collect()
 }
 
-/// `(side, center, side)` along one axis, with even reflection at the walls.
-fn along(field: &[f64], shape: [usize; 3], axis: usize, side: f64, center: f64) -> Vec<f64> {
+/// `(side, center, side)` along one axis, with even reflection at the walls, or odd reflection at closed ones.
+fn along(
+    field: &[f64],
+    shape: [usize; 3],
+    axis: usize,
+    [side, center]: [f64; 2],
+    closed: bool,
+) -> Vec<f64> {
     let stride: usize = shape[axis + 1..].iter().product();
     let n = shape[axis];
     let at = |i: usize| {
         let p = i / stride % n;
-        let low = if p == 0 { i } else { i - stride };
-        let high = if p + 1 == n { i } else { i + stride };
-        side * (field[low] + field[high]) + center * field[i]
+        let inside = |is_inside: bool, at: usize| match is_inside {
+            true => field[at],
+            false if closed => -field[i],
+            false => field[i],
+        };
+        let low = inside(p > 0, i.wrapping_sub(stride));
+        let high = inside(p + 1 < n, i + stride);
+        side * (low + high) + center * field[i]
     };
     (0..field.len()).map(at).collect()
 }
 
 /// `A χ`, straight from the definition.
-fn apply_stencil(chi: &[f64], shape: [usize; 3]) -> Vec<f64> {
+pub(super) fn apply_stencil(chi: &[f64], shape: [usize; 3], closed: bool) -> Vec<f64> {
     let mut out = vec![0.0; chi.len()];
     for stiff in 0..3 {
         let mut term = chi.to_vec();
         for axis in 0..3 {
-            term = if axis == stiff {
-                along(&term, shape, axis, -1.0, 2.0)
-            } else {
-                along(&term, shape, axis, 1.0 / 6.0, 4.0 / 6.0)
+            let weights = match axis == stiff {
+                true => [-1.0, 2.0],
+                false => [1.0 / 6.0, 4.0 / 6.0],
             };
+            term = along(&term, shape, axis, weights, closed);
         }
         out.iter_mut().zip(term).for_each(|(o, t)| *o += t);
     }
@@ -44,12 +55,12 @@ fn apply_stencil(chi: &[f64], shape: [usize; 3]) -> Vec<f64> {
 }
 
 /// `A` as a dense matrix: it is symmetric, so columns are rows.
-pub(super) fn stiffness(shape: [usize; 3]) -> Vec<Vec<f64>> {
+pub(super) fn stiffness(shape: [usize; 3], closed: bool) -> Vec<Vec<f64>> {
     let cells: usize = shape.iter().product();
     let unit = |i: usize| {
         let mut unit = vec![0.0; cells];
         unit[i] = 1.0;
-        apply_stencil(&unit, shape)
+        apply_stencil(&unit, shape, closed)
     };
     (0..cells).map(unit).collect()
 }
@@ -76,7 +87,7 @@ fn solve<T: Real>(shape: [usize; 3], b: &[f64], smoothing: f64) -> Vec<f64> {
 fn backward_error<T: Real>(shape: [usize; 3], seed: u64) -> f64 {
     let b = right_hand_side(shape.iter().product(), seed);
     let chi = solve::<T>(shape, &b, 0.0);
-    distance(&apply_stencil(&chi, shape), &b) / (4.0 * norm(&chi) + norm(&b))
+    distance(&apply_stencil(&chi, shape, false), &b) / (4.0 * norm(&chi) + norm(&b))
 }
 
 /// Solves `matrix x = rhs` by elimination with row pivoting.
@@ -107,7 +118,7 @@ pub(crate) fn eliminate(mut matrix: Vec<Vec<f64>>, mut rhs: Vec<f64>) -> Vec<f64
 fn solution_is_that_of_the_dense_matrix() {
     for shape in [[5, 5, 5], [4, 5, 6], [2, 3, 7]] {
         let cells: usize = shape.iter().product();
-        let mut matrix = stiffness(shape);
+        let mut matrix = stiffness(shape, false);
         // Adding 1 everywhere fixes the mean of χ at 0.
         matrix.iter_mut().flatten().for_each(|v| *v += 1.0);
         let b = right_hand_side(cells, 3);

@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use super::tests::eliminate;
+use super::tests::{apply_stencil, eliminate, stiffness};
 use super::{Plan, Scratch, Walls, spectrum};
-use crate::testing::noise;
+use crate::testing::{noise, product};
 use crate::{Grid, Real};
 
 fn solve<T: Real>(shape: [usize; 3], b: &[f64], smoothing: f64) -> Vec<f64> {
@@ -18,10 +18,6 @@ fn solve<T: Real>(shape: [usize; 3], b: &[f64], smoothing: f64) -> Vec<f64> {
 fn random(shape: [usize; 3], seed: u64) -> Vec<f64> {
     let mut next = noise(seed);
     (0..shape.iter().product()).map(|_| next()).collect()
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 /// Largest difference, relative to the largest number.
@@ -51,40 +47,12 @@ fn by_sines(shape: [usize; 3], b: &[f64], smoothing: f64) -> Vec<f64> {
             )
         });
         let eigenvalue = x.0 * y.1 * z.1 + x.1 * y.0 * z.1 + x.1 * y.1 * z.0;
-        let factor = x.2 * y.2 * z.2 / eigenvalue * dot(&wave, b) / dot(&wave, &wave);
+        let factor = x.2 * y.2 * z.2 / eigenvalue * product(&wave, b) / product(&wave, &wave);
         chi.iter_mut()
             .zip(&wave)
             .for_each(|(c, w)| *c += factor * w);
     }
     chi
-}
-
-/// `A χ` with odd reflection at the walls.
-fn apply_stencil(chi: &[f64], shape: [usize; 3]) -> Vec<f64> {
-    let mut out = vec![0.0; chi.len()];
-    for stiff in 0..3 {
-        let mut term = chi.to_vec();
-        for axis in 0..3 {
-            let stride: usize = shape[axis + 1..].iter().product();
-            let (side, center) = match axis == stiff {
-                true => (-1.0, 2.0),
-                false => (1.0 / 6.0, 4.0 / 6.0),
-            };
-            let at = |i: usize| {
-                let p = i / stride % shape[axis];
-                let low = if p == 0 { -term[i] } else { term[i - stride] };
-                let high = if p + 1 == shape[axis] {
-                    -term[i]
-                } else {
-                    term[i + stride]
-                };
-                side * (low + high) + center * term[i]
-            };
-            term = (0..chi.len()).map(at).collect();
-        }
-        out.iter_mut().zip(term).for_each(|(o, t)| *o += t);
-    }
-    out
 }
 
 #[test]
@@ -112,13 +80,8 @@ fn closed_solution_is_the_dense_sum_of_sines() {
 #[test]
 fn closed_solution_is_that_of_the_dense_matrix_with_odd_reflection() {
     let shape = [4, 5, 3];
-    let unit = |i: usize| {
-        let mut unit = vec![0.0; 60];
-        unit[i] = 1.0;
-        apply_stencil(&unit, shape)
-    };
     let b = random(shape, 9);
-    let expected = eliminate((0..60).map(unit).collect(), b.clone());
+    let expected = eliminate(stiffness(shape, true), b.clone());
     assert!(error(&solve::<f64>(shape, &b, 0.0), &expected) < 1e-12);
 }
 
@@ -129,7 +92,7 @@ fn closed_stencil_gives_back_the_right_hand_side_for_awkward_sizes() {
         .enumerate()
     {
         let b = random(shape, seed as u64);
-        let found = apply_stencil(&solve::<f64>(shape, &b, 0.0), shape);
+        let found = apply_stencil(&solve::<f64>(shape, &b, 0.0), shape, true);
         // χ is up to a thousand times as large as b.
         assert!(error(&found, &b) < 1e-11, "{shape:?}");
     }
@@ -140,8 +103,8 @@ fn closed_solve_is_its_own_transpose() {
     let shape = [9, 14, 11];
     let (x, y) = (random(shape, 1), random(shape, 2));
     let [a, b] = [
-        dot(&solve::<f64>(shape, &x, 0.8), &y),
-        dot(&x, &solve::<f64>(shape, &y, 0.8)),
+        product(&solve::<f64>(shape, &x, 0.8), &y),
+        product(&x, &solve::<f64>(shape, &y, 0.8)),
     ];
     assert!((a - b).abs() < 1e-12 * a.abs(), "{a} {b}");
 }

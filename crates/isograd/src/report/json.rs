@@ -53,7 +53,7 @@ struct Outliers {
 struct Normals {
     radius: f64,
     sample_spacing: f64,
-    neighbours: Neighbors,
+    neighbors: Neighbors,
     guarded: usize,
 }
 
@@ -169,7 +169,7 @@ impl JsonReport {
             normals: Normals {
                 radius: report.radius,
                 sample_spacing: report.sample_spacing,
-                neighbours: Neighbors { min, median, max },
+                neighbors: Neighbors { min, median, max },
                 guarded: report.guarded,
             },
             orientation: Orientation {

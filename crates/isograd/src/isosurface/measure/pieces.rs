@@ -1,8 +1,8 @@
 //! Connected components of a mesh, one by one.
 
-use super::{Scratch, find};
+use super::Scratch;
 use crate::data::Mesh;
-use crate::{Real, vector};
+use crate::{Real, union_find, vector};
 
 /// The connected components of a mesh, in the order of their first faces.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -20,7 +20,7 @@ impl Pieces {
         let mut of_root = vec![NONE; mesh.vertices().len()];
         let mut pieces = Self::default();
         for (f, face) in mesh.faces().iter().enumerate() {
-            let root = find(&mut scratch.parent, face[0]) as usize;
+            let root = union_find::root(&mut scratch.parent, face[0]) as usize;
             if of_root[root] == NONE {
                 of_root[root] = pieces.areas.len() as u32;
                 pieces.areas.push(0.0);

@@ -91,7 +91,7 @@ fn solution_is_that_of_the_dense_minimization() {
     let setting = Setting::<f64>::new(40, [0.3; 3], 0.5);
     let (grid, cells) = (*setting.x0.grid(), setting.x0.values().len());
     for screening in [0.0, 0.5, 20.0] {
-        let mut matrix = stiffness(SHAPE);
+        let mut matrix = stiffness(SHAPE, false);
         let b: Vec<f64> = matrix
             .iter()
             .map(|row| product(row, setting.x0.values()))
