@@ -59,7 +59,7 @@ def indicator(cells: int):
     u = jnp.meshgrid(frequency, frequency, last, indexing="ij")
     square = sum(x * x for x in u).at[0, 0, 0].set(1.0)
     gaussian = jnp.exp(-0.5 * SIGMA**2 * square).at[0, 0, 0].set(0.0)
-    # ∇²χ = ∇·V, with χ rising outwards as V points outwards.
+    # ∇²χ = ∇·V, with χ rising outward as V points outward.
     filters = [-1j * x * gaussian / square for x in u]
 
     def corners(places):

@@ -152,7 +152,7 @@ fn run(arguments: &Arguments) -> Result<u64, String> {
     Ok(runner.summary.failures())
 }
 
-/// What every input needs.
+/// Data that every input needs.
 struct Runner {
     watchdog: Watchdog,
     summary: Summary,

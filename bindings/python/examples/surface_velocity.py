@@ -1,4 +1,4 @@
-"""The velocity of a swimming fish, carried from its samples to the grid round it, and a gradient back.
+"""The velocity of a swimming fish, carried from its samples to the grid around it, and a gradient back.
 
 An immersed boundary method needs it there: the velocity of the closest surface point, for every cell near the body.
 """

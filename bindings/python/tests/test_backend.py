@@ -129,7 +129,7 @@ def test_jax_computes_on_a_device_inside_jit():
     assert off(on_device[0], on_cpu[0]) < 2e-4
     apart = np.abs(on_device[1] - on_cpu[1]).max(axis=1) / np.abs(on_cpu[1]).max()
     # A cell may have its closest point so near a corner that rounding takes the other side of a kink, which concerns
-    # the samples round it.
+    # the samples around it.
     assert np.quantile(apart, 0.98) < 2e-3 and apart.max() < 0.1
     with pytest.raises(RuntimeError, match="no CUDA device|build it with"):
         isograd.jax.signed_distance(POINTS, GRID, backend="cuda:77")

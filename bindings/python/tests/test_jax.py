@@ -15,7 +15,7 @@ from isograd import _core, _settings  # noqa: E402
 from jax.test_util import check_grads  # noqa: E402
 
 def torus(seed=0, count=1500, dtype=np.float64):
-    """Points on a torus of radii 1 and 0.4 round the z axis, scattered a little along it, and outward normals."""
+    """Points on a torus of radii 1 and 0.4 around the z axis, scattered a little along it, and outward normals."""
     k = np.arange(count)
     u = 2 * np.pi * (k * 0.6180339887498949 % 1)
     u += 0.01 * np.random.default_rng(seed).standard_normal(count)

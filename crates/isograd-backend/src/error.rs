@@ -17,7 +17,7 @@ pub enum Error {
     /// The grid, the options or a stage.
     #[error(transparent)]
     Reconstruct(#[from] isograd::Error),
-    /// What was saved.
+    /// Normals or results to restore.
     #[error(transparent)]
     Restore(#[from] RestoreError),
     /// Cotangents.

@@ -42,7 +42,7 @@ impl<T: Number> Plan<T> {
     /// `backend` may mean one, and nowhere before.
     ///
     /// # Errors
-    /// What the grid and the options say; a backend that was not built in, or whose device can't be had.
+    /// A bad grid or option; a backend that was not built in, or whose device can't be had.
     pub fn new(backend: Backend, grid: Grid<T>, options: Options) -> Result<Self, Error> {
         choose(backend, grid, options).map(Self)
     }
@@ -65,7 +65,7 @@ impl<T: Number> Plan<T> {
         }
     }
 
-    /// The same, to be said once: the next time there is none.
+    /// [`Self::note`], to be said once: the next time there is none.
     pub fn take_note(&mut self) -> Option<String> {
         match &mut self.0 {
             On::Cpu(_, note) => note.take(),
@@ -77,12 +77,12 @@ impl<T: Number> Plan<T> {
     /// Runs all stages. The result stays with the plan.
     ///
     /// # Errors
-    /// What a stage or the device says.
+    /// An error of a stage or of the device.
     pub fn reconstruct(&mut self, cloud: &PointCloud<T>) -> Result<View<'_, T>, Error> {
         self.reconstruct_observed(cloud, &mut |_| ControlFlow::Continue(()))
     }
 
-    /// The same, calling `observer` before each stage, where it is; where it breaks, so does the work.
+    /// [`Self::reconstruct`] with an `observer` that is called before each stage, where it runs; if it breaks, the work stops.
     ///
     /// # Errors
     /// As [`Self::reconstruct`], and where the observer breaks.
@@ -103,7 +103,7 @@ impl<T: Number> Plan<T> {
         }
     }
 
-    /// The same, with a result to keep: on the CPU a copy.
+    /// [`Self::reconstruct_observed`] with a result to keep: on the CPU a copy.
     pub fn make(
         &mut self,
         cloud: &PointCloud<T>,
@@ -135,7 +135,7 @@ impl<T: Number> Plan<T> {
     /// reconstruction.
     ///
     /// # Errors
-    /// What a stage or the device says; what was saved of another result.
+    /// An error of a stage or of the device; saved results of another reconstruction.
     pub fn restore(
         &mut self,
         cloud: &PointCloud<T>,

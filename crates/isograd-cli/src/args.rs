@@ -121,7 +121,7 @@ pub struct Reconstruct {
     #[command(flatten)]
     pub reading: ReadingArgs,
 
-    /// The clouds are steps in time: all have one grid, round all of them, and from the second on each normal keeps its
+    /// The clouds are steps in time: all have one grid, around all of them, and from the second on each normal keeps its
     /// side (--orient previous), for which the points must be as many, in the same order
     #[arg(long, help_heading = "Several clouds")]
     pub sequence: bool,

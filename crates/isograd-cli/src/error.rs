@@ -21,7 +21,7 @@ pub enum Error {
     Input {
         /// The file.
         file: String,
-        /// What is wrong.
+        /// The cause.
         source: Box<dyn std::error::Error>,
     },
     /// Gradients differ from finite differences by more than the tolerance.
@@ -35,7 +35,7 @@ pub enum Error {
         motion: &'static str,
         /// Its relative error.
         off: f64,
-        /// What was allowed.
+        /// The limit.
         tolerance: f64,
     },
     /// The verdict is bad, with `--strict`.
@@ -96,7 +96,7 @@ pub enum Error {
     Backend {
         /// The requested backend.
         backend: isograd::Backend,
-        /// What is wrong.
+        /// The cause.
         error: isograd_backend::Error,
     },
     /// The threads could not be started.

@@ -67,7 +67,7 @@ fn corners(batch: &mut Batch) -> Result<Vec<[f64; 3]>, Error> {
     }
 }
 
-/// The grid round all frames, or the given one.
+/// The grid around all frames, or the given one.
 fn common_grid<T: Real>(
     args: &args::Reconstruct,
     corners: &[[f64; 3]],

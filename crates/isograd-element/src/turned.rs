@@ -32,7 +32,7 @@ pub fn weight<F: Element>(square: F, blunt: F) -> F {
 }
 
 /// Evidence of a neighbor for the sign of an axis, −1 to 1: their cosine after its normal is reflected at the plane half-way
-/// between the two, so that it turns with the surface round an edge, and changes sides across a thin body.
+/// between the two, so that it turns with the surface around an edge, and changes sides across a thin body.
 /// `parallel` is the cosine of axis and normal, `axis_along` and `normal_along` their products with the offset
 /// between the two, and `weight` is that of the neighbor.
 #[cfg_attr(cube, cube)]

@@ -13,7 +13,7 @@ impl Fingerprint {
     /// Adds a number, by whole words instead of the bytes of FNV: sufficient here, and eight times as fast.
     pub fn number(&mut self, word: u64) {
         self.0 = (self.0 ^ word).wrapping_mul(0x0000_0100_0000_01b3);
-        // A product carries upwards alone.
+        // A product carries upward alone.
         self.0 ^= self.0 >> 29;
     }
 

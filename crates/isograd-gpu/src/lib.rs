@@ -6,7 +6,7 @@
 //! of single elements are those of [`isograd_element`], compiled a second time as parts of kernels.
 //!
 //! # Determinism
-//! The same input gives the same bits on the same device, every time: sums have a fixed order, and nothing
+//! On one device, an input always gives the same bits: sums have a fixed order, and nothing
 //! is added by atomic operations on floating-point numbers.
 
 // The macro makes a public module of every kernel, documented or not.

@@ -1,4 +1,4 @@
-//! Samples spread over the cells round them, as a gather: each cell adds up what the samples near it have
+//! Samples spread over the cells around them, as a gather: each cell adds up what the samples near it have
 //! for it, in the order of the samples, which are sorted by cell.
 //!
 //! Where many samples lie in one cell, a unit would add them up for as long as there are samples while the
@@ -108,7 +108,7 @@ pub(crate) fn first_at_least(keys: &Array<u32>, begin: u32, end: u32, key: u32) 
     low
 }
 
-/// Sums over each run of samples in one cell, for each of the cells round it: a unit for each run and cell.
+/// Sums over each run of samples in one cell, for each of the cells around it: a unit for each run and cell.
 #[cube(launch)]
 fn sum_runs<F: Float, P: Spread>(
     samples: &Array<F>,

@@ -99,7 +99,7 @@ const TOO_MANY: &str = "more than 4096 columns; remove some";
 /// Fields of a line, without surrounding white space and quotes.
 pub(crate) struct Fields<'a> {
     delimiter: Delimiter,
-    /// What follows the last field; `None` at the end of the line.
+    /// The rest of the line after the last field; `None` at its end.
     rest: Option<&'a [u8]>,
 }
 

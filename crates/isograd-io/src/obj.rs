@@ -126,7 +126,7 @@ impl Reader {
     }
 }
 
-/// Converts an index of the file to one from 0: positive ones count from 1, negative ones backwards
+/// Converts an index of the file to one from 0: positive ones count from 1, negative ones backward
 /// from the last of the `so_far` before it.
 fn resolve(word: &[u8], so_far: usize, what: &str) -> Result<u32, String> {
     let index: i64 = std::str::from_utf8(word)

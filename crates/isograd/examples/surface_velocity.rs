@@ -1,4 +1,4 @@
-//! A torus that moves and turns: the velocity of its samples, brought to the cells round its surface, as a
+//! A torus that moves and turns: the velocity of its samples, brought to the cells around its surface, as a
 //! flow solver with an immersed boundary wants it.
 
 use isograd::{Attribute, Grid, Options, PointCloud, Reconstructor, Resolution};

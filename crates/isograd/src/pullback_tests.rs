@@ -149,7 +149,7 @@ fn degenerate<T: Real>() {
     }
 }
 
-/// Samples of a torus on a grid round it.
+/// Samples of a torus on a grid around it.
 struct Setting {
     points: Vec<[f64; 3]>,
     normals: Vec<[f64; 3]>,

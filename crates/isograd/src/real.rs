@@ -31,7 +31,7 @@ pub trait Real:
     /// The nearest value to `x`.
     fn of(x: f64) -> Self;
 
-    /// The same value in double precision (exact).
+    /// This value in double precision (exact).
     fn f64(self) -> f64;
 
     /// The nearest value to the integer `n`.

@@ -1,4 +1,4 @@
-//! What a reconstruction says about itself: numbers, times and warnings.
+//! Report of a reconstruction: numbers, times and warnings.
 
 mod json;
 mod verdict;

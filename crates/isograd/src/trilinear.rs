@@ -13,7 +13,7 @@ use crate::{Field, Grid, Real, parallel};
 /// Planes across x that one task of [`spread`] owns.
 const SLAB: usize = 8;
 
-/// The eight cells round a point, and the position of the point between them.
+/// The eight cells around a point, and the position of the point between them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cube<T> {
     /// The lowest of the eight cells.
@@ -28,7 +28,7 @@ pub(crate) struct Cube<T> {
 }
 
 impl<T: Real> Cube<T> {
-    /// The cube round the point of index coordinates `x`.
+    /// The cube around the point of index coordinates `x`.
     #[inline(always)]
     pub(crate) fn new(grid: &Grid<T>, x: [T; 3]) -> Self {
         let (shape, strides) = (grid.shape(), grid.strides());
@@ -144,7 +144,7 @@ pub(crate) fn spread_on<T: Real>(
     );
 }
 
-/// Adds `value(i)` at every sample to the eight cells round it, in memory order: the transpose of
+/// Adds `value(i)` at every sample to the eight cells around it, in memory order: the transpose of
 /// [`Cube::value`]. Each task owns some planes.
 pub(crate) fn spread<T: Real>(
     grid: &Grid<T>,

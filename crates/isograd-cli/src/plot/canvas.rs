@@ -151,8 +151,8 @@ impl Canvas {
         self.place_text(text, at, anchor, size, |along, down| [along, down]);
     }
 
-    /// The same, reading upwards.
-    pub fn text_upwards(&mut self, text: &str, at: [f32; 2], anchor: Anchor, size: f32) {
+    /// Text that reads upward.
+    pub fn text_upward(&mut self, text: &str, at: [f32; 2], anchor: Anchor, size: f32) {
         self.place_text(text, at, anchor, size, |along, down| [down, -along]);
     }
 
@@ -206,7 +206,7 @@ impl Canvas {
     /// Writes the picture as PNG, 8 bits a color.
     ///
     /// # Errors
-    /// What `out` says.
+    /// An error of `out`.
     pub fn write_png(&self, out: &mut impl Write) -> io::Result<()> {
         let bytes: Vec<u8> = self
             .pixels

@@ -19,8 +19,8 @@ const SCALE: [Color; 9] = [
 /// Of cells without a value (outside the band).
 pub const NO_VALUE: Color = [0.90, 0.90, 0.91];
 
-/// What the two ends of the scale stand for. Inside and outside have scales of their own: a body is often
-/// much thinner than the room round it.
+/// The values at the two ends of the scale. Inside and outside have scales of their own: a body is often
+/// much thinner than the room around it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
     /// Depth at the blue end, positive.

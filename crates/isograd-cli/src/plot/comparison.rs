@@ -13,7 +13,7 @@ use super::slice::{Slice, Style};
 const WIDTH: usize = 620;
 const MARGIN: usize = 18;
 const LETTERS: f32 = 21.0;
-/// Height of a line of text with the room round it.
+/// Height of a line of text with the room around it.
 const LINE: usize = 32;
 const TALLEST: f64 = 300.0;
 const FITTED: Color = [0.10, 0.22, 0.48];

@@ -26,7 +26,7 @@ pub use slices::slices;
 /// Writes a picture as PNG; the file appears whole or not at all.
 ///
 /// # Errors
-/// What the operating system says.
+/// An error of the operating system.
 pub fn write(path: &Path, picture: &Canvas) -> Result<(), isograd_io::Error> {
     isograd_io::atomic::write(path, |out| picture.write_png(out))
 }

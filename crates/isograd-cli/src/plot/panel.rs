@@ -1,4 +1,4 @@
-//! A frame with ticks and labels round a piece of a picture.
+//! A frame with ticks and labels around a piece of a picture.
 
 use super::axis::{label, step, ticks};
 use super::canvas::{Anchor, Canvas, FAINT, INK};
@@ -71,7 +71,7 @@ impl Panel {
         );
         let widest = self.vertical_axis(canvas);
         let column = left - TICK - widest - 1.0 * LETTERS;
-        canvas.text_upwards(
+        canvas.text_upward(
             &self.up.name,
             [column, 0.5 * (top + bottom)],
             Anchor::Middle,

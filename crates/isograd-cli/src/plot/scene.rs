@@ -10,7 +10,7 @@ const SUPERSAMPLING: usize = 3;
 /// Depth, in pixels drawn, over which something translucent comes to cover what is behind it.
 const FADE: f64 = 8.0;
 
-/// Where the viewer stands: a parallel projection, z upwards.
+/// Where the viewer stands: a parallel projection, z upward.
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
     /// Turn about z, in degrees: 0 looks along +y, with x to the right.
@@ -159,7 +159,7 @@ impl Scene {
         }
     }
 
-    /// The same, seen through: `alpha` of it covers what is behind its front, and nothing what is before it.
+    /// A translucent surface: it covers `alpha` of what is behind its front, and nothing of what is in front of it.
     pub fn translucent(
         &mut self,
         vertices: &[[f64; 3]],
@@ -211,7 +211,7 @@ impl Scene {
         }
     }
 
-    /// The pixels of the box round a triangle, within the canvas.
+    /// The pixels of the box around a triangle, within the canvas.
     fn pixels_of(&self, corners: [[f64; 3]; 3]) -> [std::ops::Range<usize>; 2] {
         let sizes = [self.canvas.width(), self.canvas.height()];
         std::array::from_fn(|axis| {

@@ -11,7 +11,7 @@ use super::color::Range;
 pub struct Slice {
     /// The axis across the plane.
     pub normal: usize,
-    /// The axes of the picture: rightwards and upwards.
+    /// The axes of the picture: rightward and upward.
     pub axes: [usize; 2],
     /// Where the plane lies along `normal`, in the field's unit.
     pub position: f64,
@@ -185,7 +185,7 @@ fn mix(color: &mut Color, over: Color, alpha: f32) {
     }
 }
 
-/// The axes of the plane across `normal`, rightwards and upwards, and its cells.
+/// The axes of the plane across `normal`, rightward and upward, and its cells.
 fn plane<T: Real>(grid: &Grid<T>, normal: usize) -> ([usize; 2], [usize; 2]) {
     let axes = [[1, 2], [0, 2], [0, 1]][normal.min(2)];
     (axes, axes.map(|a| grid.shape()[a]))

@@ -28,7 +28,7 @@ fn a_mesh_becomes_a_field_and_a_mesh_again() {
     sandbox.done("query tetrahedron.obj --at back.ply -o back.npz");
     let back = sandbox.geometry("back.npz");
     let mut distance = back.attributes[0].values.iter();
-    // The spheres round the corners have a radius of 0.1, the cells of 1.4 / 40.
+    // The spheres around the corners have a radius of 0.1, the cells of 1.4 / 40.
     assert!(distance.all(|d| (d - 0.1).abs() < 3e-3));
 }
 

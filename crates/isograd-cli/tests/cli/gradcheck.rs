@@ -26,7 +26,7 @@ fn the_pullback_of_a_torus_agrees_with_small_steps() {
     ] {
         assert!(table.contains(motion), "{table}");
     }
-    // A torus does not feel it where it turns round its own axis.
+    // A torus does not feel it where it turns around its own axis.
     let line = table.lines().find(|line| line.starts_with("rotation z"));
     assert!(line.is_some_and(|line| line.contains("≈ 0")), "{table}");
     assert!(

@@ -236,7 +236,7 @@ fn a_start_outside_the_grid_says_so_and_a_step_outside_is_shortened() {
     assert!(matches!(error, Some(Error::Start(_))), "{error:?}");
     let text = error.map(|e| e.to_string()).unwrap_or_default();
     assert!(text.contains("larger grid"), "{text}");
-    // Steps of Adam three times as long as the room that is left: the first one goes outwards and is cut.
+    // Steps of Adam three times as long as the room that is left: the first one goes outward and is cut.
     let adam = Optimizer::Adam(Adam {
         rate: 2.0,
         decay: Decay::Exponential { half_life: 4.0 },

@@ -3,7 +3,7 @@
 //! # Map
 //! As in [`isograd::distance`]: `φ(q) = σ(q) · min_y |q − y|` over all points `y` of the mesh, in the user's
 //! unit, negative inside; exact but for rounding. [`lattice::forward`] takes the sign from `χ − c` at the cell.
-//! [`mod@extend`] carries what is known at samples of the surface to the cells round it.
+//! [`mod@extend`] carries what is known at samples of the surface to the cells around it.
 //! Triangles are found in a hierarchy of boxes that is made on the device; of triangles equally far, to the
 //! last bit, the lowest face is named.
 //!

@@ -62,7 +62,7 @@ pub trait Work<T: Scalar>: Send + Sync {
         sdf: Option<Buffer<T>>,
     ) -> Result<(CloudCotangent<T>, RadiiCotangents<T>), Error>;
 
-    /// An attribute on the surface and round it.
+    /// An attribute on the surface and around it.
     fn extend(
         &self,
         result: &Reconstruction<T>,

@@ -19,7 +19,7 @@ use crate::{Buffer, Device, Scalar};
 /// may be those of another one.
 ///
 /// # Errors
-/// Those of the CPU's stage. [`TooLarge`](crate::Error::TooLarge), also where the cells (counting rows as if
+/// As the CPU's stage. [`TooLarge`](crate::Error::TooLarge), also where the cells (counting rows as if
 /// rounded up to 32) or three times their number exceed what 32 bits can count.
 pub fn forward<R: Runtime, T: Scalar>(
     device: &Device<R>,

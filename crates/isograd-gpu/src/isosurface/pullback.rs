@@ -143,7 +143,7 @@ fn gather_chi<F: Float + CubeElement>(
     }
 }
 
-/// What the vertex on the edge along `axis` from cell `k` of a row, if there is one, means for the cell at the
+/// Cotangent of the vertex on the edge along `axis` from cell `k` of a row, if there is one, for the cell at the
 /// edge's end or at its start.
 #[cube]
 fn part<F: Float + CubeElement>(

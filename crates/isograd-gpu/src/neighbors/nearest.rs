@@ -10,7 +10,7 @@ use crate::primitives::smallest::insert;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
-/// Points along the curve, round the leaf nearest to a place, that bound the distance to its nearest points; more
+/// Points along the curve, around the leaf nearest to a place, that bound the distance to its nearest points; more
 /// where more are asked for.
 const WINDOW: usize = 32;
 
@@ -58,7 +58,7 @@ pub(crate) fn reach_squared<F: Float + CubeElement>(
     for i in 0..k {
         nearest[i] = F::max_value();
     }
-    // Any k points bound the distance; those round the nearest leaf bound it well.
+    // Any k points bound the distance; those around the nearest leaf bound it well.
     let n = points.len() / 3;
     let first = first_of_leaf(links, leaf_towards::<F>(nodes, links, x));
     let begin = min(first - min(first, margin), n - min(n, window));

@@ -66,7 +66,7 @@ pub struct Census {
 /// come to the host.
 ///
 /// # Errors
-/// What [`isograd::neighbors::forward`] says of the same points; [`crate::Error::Length`] where they are not whole;
+/// As [`isograd::neighbors::forward`]; [`crate::Error::Length`] where they are not whole;
 /// [`crate::Error::TooLarge`], [`crate::Error::Failed`].
 pub fn forward<R: Runtime, T: Scalar>(
     device: &Device<R>,

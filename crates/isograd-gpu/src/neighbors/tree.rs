@@ -1,4 +1,4 @@
-//! Boxes round points that follow each other on the curve.
+//! Boxes around points that follow each other on the curve.
 //!
 //! A node at level 0 is a leaf; one at level `l + 1` holds four of level `l`, the last of each level perhaps
 //! fewer. All stand in one array, each before its subtrees: what is missing from a full tree would stand after

@@ -5,7 +5,7 @@
 //! cloud, radii and sides, is [`RadiiAndSigns`]: found once, it does for the steps of a body that moves a little. After
 //! that nothing comes back to the host but a few counts, and the mean area where the smoothing follows it.
 //!
-//! [`Reconstructor::extend`] carries attributes of the samples to the surface and the cells round it.
+//! [`Reconstructor::extend`] carries attributes of the samples to the surface and the cells around it.
 //!
 //! # Pullback
 //! As [`isograd::Reconstruction::pullback`], of any of the results and of extended attributes:

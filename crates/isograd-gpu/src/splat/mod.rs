@@ -1,8 +1,8 @@
 //! The splat: oriented samples → right-hand side `b` of the Poisson equation, as [`isograd::splat`].
 //!
 //! # Map
-//! `V_o = Σ_i α_{o,i} a_i n_i / h²` over the 3×3×3 cells round each sample and `b = Σ_d D_d V_d`, in index space
-//! (no unit); `χ` rises outwards. `V` is never stored: a cell of `b` adds up what the samples at most 2 cells
+//! `V_o = Σ_i α_{o,i} a_i n_i / h²` over the 3×3×3 cells around each sample and `b = Σ_d D_d V_d`, in index space
+//! (no unit); `χ` rises outward. `V` is never stored: a cell of `b` adds up what the samples at most 2 cells
 //! away along each axis have for it. Samples are sorted by cell first, so that those of a row of cells follow
 //! each other and each sum has one order.
 //!
@@ -10,7 +10,7 @@
 //! The order of the samples and the weights. The inputs are not copied: the pullback takes them again.
 //!
 //! # Pullback
-//! A gather per sample from the 5×5×5 values of `b̄` round it: `n̄_i = Σ_o α V̄_o a_i/h²`,
+//! A gather per sample from the 5×5×5 values of `b̄` around it: `n̄_i = Σ_o α V̄_o a_i/h²`,
 //! `ā_i = Σ_o α V̄_o·n_i/h²`, `x̄_i = Σ_o ∇α (V̄_o·n_i) a_i/h³`, with `V̄_d = D_dᵀ b̄`; and of the grid, on which
 //! `x̂ = (x − lower)/h` and `a/h²` depend.
 //!

@@ -87,7 +87,7 @@ macro_rules! tests {
 
 pub(crate) use tests;
 
-/// What a stage may differ by from the CPU.
+/// Largest difference of a stage from the CPU.
 pub fn tolerance<T: isograd::Real>() -> f64 {
     if T::NAME == "f32" { 1e-4 } else { 1e-10 }
 }

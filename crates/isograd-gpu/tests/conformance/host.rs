@@ -78,7 +78,7 @@ fn sampled<T: Number>(count: usize) -> PointCloud<T> {
     samples.unwrap().cloud
 }
 
-/// The same without.
+/// Samples of a torus, without normals.
 fn cloud<T: Number>(count: usize) -> PointCloud<T> {
     PointCloud::new(sampled::<T>(count).points().to_vec()).unwrap()
 }

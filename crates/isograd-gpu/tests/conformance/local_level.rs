@@ -26,14 +26,14 @@ struct Setting<T> {
     options: Options,
 }
 
-/// What a run on the CPU leaves.
+/// Results of a run on the CPU.
 struct OfCpu<T> {
     chi: Field<T>,
     order: isograd::splat::Residual,
     residual: cpu::Residual<T>,
 }
 
-/// What a run on a device leaves.
+/// Results of a run on a device.
 struct OfDevice<T> {
     samples: OnDevice<T>,
     splat: splat::Residual<T>,
@@ -90,7 +90,7 @@ impl<T: Scalar> Setting<T> {
         self
     }
 
-    /// The same in double precision.
+    /// This setting in double precision.
     fn exactly(&self) -> Setting<f64> {
         let vectors = |of: &[[T; 3]]| of.iter().map(|v| v.map(|x| x.f64())).collect();
         let numbers = |of: &[T]| of.iter().map(|x| x.f64()).collect();
@@ -156,7 +156,7 @@ impl<T: Scalar> Setting<T> {
         }
     }
 
-    /// What the stage takes off the indicator.
+    /// The part of the indicator that the stage removes.
     fn taken(&self, chi: &[T]) -> Vec<T> {
         let both = self.chi.values().iter().zip(chi);
         both.map(|(&before, &after)| before - after).collect()
@@ -280,7 +280,7 @@ impl<T: Scalar> Setting<T> {
         numbers.list(cells)
     }
 
-    /// What other stages have added, less than this one will.
+    /// Cotangents that other stages have added, smaller than those of this one.
     fn started(&self) -> isograd::splat::SampleCotangent<T> {
         let mut out = self.cloud.started_cotangent();
         let vectors = [&mut out.points, &mut out.normals].map(|v| v.as_flattened_mut());

@@ -20,7 +20,7 @@ tests! {
         given_normals_without_a_direction_are_refused_by_number;
 }
 
-/// What the CPU makes of a cloud's axes.
+/// Orientation of a cloud's axes by the CPU.
 fn expected<T: Scalar>(
     cloud: &Cloud<T>,
     known: Option<&[[T; 3]]>,

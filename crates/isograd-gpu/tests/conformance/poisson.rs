@@ -39,7 +39,7 @@ const SHAPES: [[usize; 3]; 18] = [
     [1, 2, 2053],
 ];
 
-/// What the CPU finds in f64.
+/// Solution of the CPU in f64.
 fn expected<T: Scalar>(shape: [usize; 3], b: &[T], smoothing: f64) -> Vec<f64> {
     let mut field: Vec<f64> = b.iter().map(|v| v.f64()).collect();
     let plan = Plan::new(shape);

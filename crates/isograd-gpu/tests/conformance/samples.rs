@@ -31,7 +31,7 @@ impl<T> OnDevice<T> {
     }
 }
 
-/// What the CPU's splat makes and leaves.
+/// Result and residual of the CPU's splat.
 pub struct OfCpu<T> {
     pub b: Field<T>,
     pub residual: isograd::splat::Residual,

@@ -34,7 +34,7 @@ type Compiler = CppCompiler<CudaDialect<CudaWmmaCompiler>>;
 static SOURCES: Mutex<BTreeMap<String, String>> = Mutex::new(BTreeMap::new());
 static ANSWERS: Mutex<VecDeque<Vec<u8>>> = Mutex::new(VecDeque::new());
 
-/// What the next reads give, in their order.
+/// Sets the results of the next reads, in their order.
 pub fn answer(values: &[&[u32]]) {
     let mut answers = ANSWERS.lock().unwrap();
     answers.extend(values.iter().map(|v| u32::as_bytes(v).to_vec()));

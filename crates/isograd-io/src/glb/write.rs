@@ -7,7 +7,7 @@ use isograd::{Mesh, Real};
 use super::{BINARY, JSON, MAGIC};
 use crate::bytes::write_reals;
 
-/// Writes a mesh in single precision, with its vertices as they are: viewers show the y axis upwards.
+/// Writes a mesh in single precision, with its vertices as they are: viewers show the y axis upward.
 pub(crate) fn write_mesh<T: Real>(out: &mut impl Write, mesh: &Mesh<T>) -> io::Result<()> {
     let refuse = |problem: &str| Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
     let vertices = || mesh.vertices().iter().map(|v| v.map(|x| x.f64() as f32));

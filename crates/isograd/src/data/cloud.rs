@@ -151,7 +151,7 @@ impl<T: Real> PointCloud<T> {
         }
     }
 
-    /// The same cloud with a normal for each point (any length but zero; outward where the method
+    /// This cloud with a normal for each point (any length but zero; outward where the method
     /// trusts them).
     ///
     /// # Errors
@@ -170,7 +170,7 @@ impl<T: Real> PointCloud<T> {
         Ok(self)
     }
 
-    /// The same cloud, with where its points were seen from.
+    /// This cloud, with the positions that its points were seen from.
     ///
     /// # Errors
     /// A number of positions other than that of the points where there is one for each, none where all share
@@ -194,7 +194,7 @@ impl<T: Real> PointCloud<T> {
         Ok(self)
     }
 
-    /// The same cloud with one more attribute.
+    /// This cloud with one more attribute.
     ///
     /// # Errors
     /// A number of values other than `N · components`.

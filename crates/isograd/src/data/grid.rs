@@ -62,7 +62,7 @@ pub enum GridError {
     /// The cell size is not a positive finite number.
     #[error("the cell size is {spacing}; it must be positive and finite")]
     Spacing {
-        /// What was given.
+        /// The value given.
         spacing: f64,
     },
     /// A corner is not finite, or the upper is not above the lower.
@@ -80,7 +80,7 @@ pub enum GridError {
     TooFew {
         /// Axis: 0, 1 or 2.
         axis: usize,
-        /// What was asked for.
+        /// The value given.
         cells: usize,
         /// The least.
         min: usize,
@@ -90,7 +90,7 @@ pub enum GridError {
         "a grid of {shape:?} cells has more than {max} cells, the most that can be indexed; use a coarser one"
     )]
     TooMany {
-        /// What was asked for.
+        /// The value given.
         shape: [usize; 3],
         /// The limit.
         max: usize,
@@ -98,7 +98,7 @@ pub enum GridError {
     /// The padding is negative or not finite.
     #[error("the padding is {padding}; it must be a fraction of the longest side, 0 or more")]
     Padding {
-        /// What was given.
+        /// The value given.
         padding: f64,
     },
     /// There is nothing to fit to.

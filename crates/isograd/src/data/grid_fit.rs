@@ -6,7 +6,7 @@ use super::outliers::{Outliers, Selection};
 use crate::Real;
 
 impl<T: Real> Grid<T> {
-    /// The grid round a cloud: its bounding box, widened on every side by `padding` times the longest
+    /// The grid around a cloud: its bounding box, widened on every side by `padding` times the longest
     /// side and by at least [`Self::MARGIN_CELLS`] cells, centered. The longest side has as many cells as
     /// asked for; the others are rounded up to a number whose Fourier transform is fast. [Outliers](Outliers) are
     /// ignored: they may lie outside.
@@ -35,7 +35,7 @@ impl<T: Real> Grid<T> {
         Self::fit_used(cloud, resolution, padding, &selection)
     }
 
-    /// The grid round the samples that are used.
+    /// The grid around the samples that are used.
     fn fit_used(
         cloud: &PointCloud<T>,
         resolution: Resolution<T>,
@@ -139,7 +139,7 @@ impl<T: Real> Grid<T> {
     }
 }
 
-/// Cell size of the grid round a box with this longest side.
+/// Cell size of the grid around a box with this longest side.
 fn spacing<T: Real>(longest: f64, resolution: Resolution<T>, padding: T) -> Result<f64, GridError> {
     let margin = Grid::<T>::MARGIN_CELLS;
     let spacing = match resolution {

@@ -3,7 +3,7 @@
 use super::outliers::Outliers;
 use crate::testing::noise;
 
-/// Samples on the unit sphere, times a radius, round a center.
+/// Samples on the unit sphere, times a radius, around a center.
 fn sphere(count: usize, radius: f64, center: [f64; 3], seed: u64) -> Vec<[f64; 3]> {
     let mut next = noise(seed);
     let mut points = Vec::new();

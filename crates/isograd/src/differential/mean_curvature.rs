@@ -3,13 +3,13 @@
 
 use crate::element::Element;
 
-/// What the second derivatives along the axes have in `tr H − nᵀ H n`, with the terms of each taken together.
+/// Part of the second derivatives along the axes in `tr H − nᵀ H n`, with the terms of each taken together.
 #[inline(always)]
 pub(super) fn plain<F: Element>(xx: F, yy: F, zz: F, nx: F, ny: F, nz: F) -> F {
     xx * (ny * ny + nz * nz) + yy * (nx * nx + nz * nz) + zz * (nx * nx + ny * ny)
 }
 
-/// What the mixed ones have in half of `nᵀ H n`.
+/// Part of the mixed ones in half of `nᵀ H n`.
 #[inline(always)]
 pub(super) fn mixed<F: Element>(xy: F, xz: F, yz: F, nx: F, ny: F, nz: F) -> F {
     xy * nx * ny + xz * nx * nz + yz * ny * nz

@@ -12,7 +12,7 @@
 //!   what is called `H` where the mean is meant literally. Second order in `h`, at the walls too (axes of
 //!   four cells or more). It is bounded by `±2/h`, that of a sphere of one cell, and is 0 where `g = 0`:
 //!   a grid holds no sharper body.
-//! - **at a point**: trilinear interpolation of the values at the eight cell centers round it (linear
+//! - **at a point**: trilinear interpolation of the values at the eight cell centers around it (linear
 //!   extrapolation in the half cell along the walls); second order and continuous. It is not the
 //!   derivative of an interpolated `φ`.
 //!

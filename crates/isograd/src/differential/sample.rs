@@ -109,7 +109,7 @@ fn corners<T: Real>(grid: &Grid<T>, point: [T; 3]) -> Option<[(usize, T); 8]> {
     }))
 }
 
-/// Where a point of the grid is between the eight cell centers round it.
+/// Where a point of the grid is between the eight cell centers around it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     /// The lowest of the eight cells.

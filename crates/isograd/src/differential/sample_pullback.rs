@@ -132,7 +132,7 @@ impl<T: Real> Differential<T> {
     }
 }
 
-/// Adds what the four cells round a point that are in one plane get; `side` is 1 for the plane after its base.
+/// Adds what the four cells around a point that are in one plane get; `side` is 1 for the plane after its base.
 fn add_plane(place: &Place, side: usize, nz: usize, bar: [f64; 4], sums: &mut [[f64; 4]]) {
     for corner in 4 * side..4 * side + 4 {
         let [_, j, k] = place.cell(corner);

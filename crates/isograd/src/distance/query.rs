@@ -86,7 +86,7 @@ impl<T: Distance> Query<T> {
     /// Distance, gradient and closest point at `(N, 3)` points, in their order.
     ///
     /// `signs` is a field that is negative inside, such as the distance on the lattice: where its eight values
-    /// round a point agree, they give the sign. Elsewhere, and without it, the pseudonormal of the closest
+    /// around a point agree, they give the sign. Elsewhere, and without it, the pseudonormal of the closest
     /// feature does, which is right for a closed mesh. For an open mesh it distinguishes the two sides near the surface;
     /// near the border it is meaningless.
     ///
@@ -261,7 +261,7 @@ impl<T: Real> Surface<'_, T> {
     }
 }
 
-/// Whether a point is below the level `c` of a field, where the eight values round it are there and agree.
+/// Whether a point is below the level `c` of a field, where the eight values around it are there and agree.
 pub(crate) fn corners_agree<T: Real>(field: Cells<'_, T>, c: T, point: [f64; 3]) -> Option<bool> {
     let grid = field.grid();
     let (lower, spacing) = (to_f64(grid.lower()), grid.spacing().f64());

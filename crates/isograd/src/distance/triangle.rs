@@ -199,7 +199,7 @@ impl Frame {
         (turned, feature)
     }
 
-    /// The same in the plane, the origin being corner 0.
+    /// Barycentric coordinates in the plane, the origin being corner 0.
     fn plane_barycentric(&self, x: f64, y: f64) -> ([f64; 3], Feature) {
         let Outline { base, foot, .. } = self.outline;
         if !(y > 0.0) {

@@ -24,7 +24,7 @@ const SMALL_STEPS: [f64; 2] = [1e-7, 1e-8];
 /// No vertex goes so far: those that do go a thousand times as far as the samples.
 const JUMP: f64 = 1e-2;
 
-/// What is the same for all motions.
+/// Data common to all motions.
 pub(super) struct Check<'a> {
     cloud: &'a PointCloud<f64>,
     base: &'a Reconstruction<f64>,
@@ -195,7 +195,7 @@ fn pull(base: &Reconstruction<f64>, bar: &[f64]) -> Result<CloudCotangent<f64>, 
     Ok(base.pullback(&cotangent)?)
 }
 
-/// What is kept of one end of a step.
+/// Data of one end of a step.
 struct Side {
     /// Of the functional, cell by cell.
     parts: Vec<f64>,

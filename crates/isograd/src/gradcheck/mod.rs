@@ -32,7 +32,7 @@ pub use motion::Motion;
 use crate::{Error, Grid, PointCloud, PullbackError, Reconstructor, SurfaceResolution};
 use check::Check;
 
-/// What to compare.
+/// Options of a check.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The pipeline.
@@ -62,7 +62,7 @@ pub enum CheckError {
     /// The step is not a positive number.
     #[error("a step of {step} cells; give a positive number, such as 0.5")]
     Step {
-        /// What was given.
+        /// The value given.
         step: f64,
     },
     /// The cloud, or the moved one, was not reconstructed.
@@ -110,7 +110,7 @@ impl Difference {
 pub struct Parting {
     /// Center of the block of cells from which most of it comes, in the cloud's coordinates.
     pub place: [f64; 3],
-    /// What comes from that block, as a share of all that all blocks differ by, from 0 to 1.
+    /// Difference in that block, as a share of the differences of all blocks, from 0 to 1.
     pub share: f64,
 }
 
@@ -121,7 +121,7 @@ pub struct Row {
     pub motion: Motion,
     /// Derivative by pullback, per unit length of the motion of the point that moves most.
     pub pullback: f64,
-    /// The same if every part of the surface moved outwards by a unit length: where the derivative is a small
+    /// The derivative if every part of the surface moved outward by a unit length: where that of the motion is a small
     /// share of it, the motion is along the surface, or contributions cancel, and the ratios say little.
     pub scale: f64,
     /// Over a small step, signs held.

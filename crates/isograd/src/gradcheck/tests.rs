@@ -20,7 +20,7 @@ fn pullback_agrees_with_small_steps_and_nearly_with_large_ones() {
             "{row:?}"
         );
         // Half a cell of noise at every point is no small step: normals turn by tens of degrees. And a
-        // torus does not feel it where it turns round its own axis.
+        // torus does not feel it where it turns around its own axis.
         let smooth = row.motion != Motion::Noise && row.motion != Motion::Rotation(2);
         // As the surface passes the cell centers, its place between them wobbles by a hundredth of a cell.
         assert!(!smooth || (row.large_ratio() - 1.0).abs() < 0.05, "{row:?}");

@@ -6,7 +6,7 @@
 //! `y = (1−η) p + η q` with `η = (c − χ_p)/(χ_q − χ_p)`. The signs of a cube's eight corners give the
 //! closed loops of vertices that its triangles fill. On a face with two inside corners on a diagonal those
 //! two are kept apart, whichever side the face is looked at from, so neighboring cubes fit: away from the
-//! walls every edge belongs to exactly two triangles, with opposite directions, and the triangles round a
+//! walls every edge belongs to exactly two triangles, with opposite directions, and the triangles around a
 //! vertex form one ring. Of the triangulations of a loop for which that holds, the one that encloses the most is
 //! taken: the surface then does not jump where another is. Faces are counter-clockwise seen from the side
 //! where `χ ≥ c`.

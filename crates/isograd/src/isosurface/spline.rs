@@ -32,7 +32,7 @@ pub(super) fn at_sample<T: Real>(chi: Cells<'_, T>, point: [T; 3]) -> AtSample<T
     at
 }
 
-/// Adds `value(i)` at every sample to the 3³ cells round it, in memory order: the transpose of [`at_sample`]. Each task
+/// Adds `value(i)` at every sample to the 3³ cells around it, in memory order: the transpose of [`at_sample`]. Each task
 /// owns some planes.
 pub(super) fn spread<T: Real>(
     grid: &Grid<T>,

@@ -230,7 +230,7 @@ pub(super) fn loops(case: u8) -> Vec<Vec<u8>> {
     all
 }
 
-/// For each crossed edge the next one of its loop. A face is walked round its corners; each run of inside
+/// For each crossed edge the next one of its loop. A face is walked around its corners; each run of inside
 /// corners gives the segment from the edge where the walk enters it to the edge where the walk leaves.
 fn successors(case: u8) -> [Option<u8>; 12] {
     let inside = |corner: u8| case >> corner & 1 == 1;

@@ -149,7 +149,7 @@ fn noise_gives_the_same_surface_as_the_plain_version() {
     }
 }
 
-/// Whether the faces round each vertex form a single ring.
+/// Whether the faces around each vertex form a single ring.
 fn vertices_have_one_ring(mesh: &Mesh<f64>) -> bool {
     let mut after: Vec<BTreeMap<u32, u32>> = vec![BTreeMap::new(); mesh.vertices().len()];
     for &[a, b, c] in mesh.faces() {

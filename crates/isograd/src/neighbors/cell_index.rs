@@ -42,7 +42,7 @@ struct Entry<T> {
     index: u32,
 }
 
-/// The box round the points of a subtree, and the least input index among them.
+/// The box around the points of a subtree, and the least input index among them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node<T> {
     pub(super) low: [T; 3],
@@ -177,7 +177,7 @@ impl<T: Real> CellIndex<T> {
         index
     }
 
-    /// The same as [`CellIndex::new`], in the memory of this index.
+    /// [`CellIndex::new`] in the memory of this index.
     pub fn rebuild(&mut self, points: &[[T; 3]]) {
         self.levels = 0;
         while points.len().div_ceil(1 << self.levels) > CELL {
@@ -243,7 +243,7 @@ impl<T: Real> CellIndex<T> {
         [&x[cell.clone()], &y[cell.clone()], &z[cell]]
     }
 
-    /// Low and high corner of the box round all points; an empty box (low above high) for no points.
+    /// Low and high corner of the box around all points; an empty box (low above high) for no points.
     pub(crate) fn bounds(&self) -> ([T; 3], [T; 3]) {
         match self.nodes.first() {
             Some(root) => (root.low, root.high),

@@ -6,7 +6,7 @@ use super::candidates::Candidates;
 use super::cell_index::{CellIndex, Place, TASK};
 use crate::{Real, parallel, simd};
 
-/// What is looked for: points within a radius, with values that they carry, arrays in sorted order.
+/// A search for points within a radius, with values that they carry, arrays in sorted order.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Search<'a, T, const M: usize> {
     pub radius: T,
@@ -16,7 +16,7 @@ pub(crate) struct Search<'a, T, const M: usize> {
 impl<T: Real> CellIndex<T> {
     /// Fills `out`, which has a place for each point in sorted order, cell by cell and in parallel:
     /// `fill(cell, candidates, out of that cell)`, where the candidates are all points within `radius` of
-    /// the box round the cell, each with its `values` (arrays in sorted order).
+    /// the box around the cell, each with its `values` (arrays in sorted order).
     pub(crate) fn for_each_cell<const M: usize, U: Send>(
         &self,
         radius: T,

@@ -1,4 +1,4 @@
-//! What the samples within a radius add up to: how many there are, and how crowded they stand.
+//! Sums over the samples within a radius: how many there are, and how densely they lie.
 
 use super::candidates::{Candidates, LANES, Lanes, sum_lanes};
 use super::rule::GROWTH_MARGIN;

@@ -65,7 +65,7 @@ impl<T: Real> NearBox<T> {
         !self.cells.is_empty() && (0..3).all(|a| low[a] <= query[a] && query[a] <= high[a])
     }
 
-    /// The box round a place.
+    /// The box around a place.
     fn fill(&mut self, index: &CellIndex<T>, query: [T; 3], radius: T) {
         let half = T::of(0.5 * SIDE) * radius;
         let corners = [query.map(|x| x - half), query.map(|x| x + half)];

@@ -96,7 +96,7 @@ impl<T: Real> CellIndex<T> {
         if k == 0 {
             return T::zero();
         }
-        // Any k points bound the distance; those of a small subtree round the query bound it well.
+        // Any k points bound the distance; those of a small subtree around the query bound it well.
         let mut at = self.root();
         while at.levels > 0 {
             let bound = |child: &Place| self.nodes[child.node].distance_squared(query);

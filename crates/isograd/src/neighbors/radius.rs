@@ -112,12 +112,12 @@ pub struct Neighborhoods<T> {
     position: Vec<u32>,
 }
 
-/// What was found round one point.
+/// Result of the search around one point.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Found<T, U> {
     radius: T,
     census: Census<T>,
-    /// What was asked for besides.
+    /// A sum over the samples, by the caller.
     pub(crate) sum: U,
 }
 

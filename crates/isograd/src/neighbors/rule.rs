@@ -41,7 +41,7 @@ pub fn steepness(radius: Radius) -> f64 {
 
 /// The automatic radius, where `mean` is that of the distance to the 24th sample over the middle half of all points:
 /// see [`middle_half`]. Where there is none, the samples are spread evenly over the extent instead. `bounds` are the low and the
-/// high corner of the box round all `points`.
+/// high corner of the box around all `points`.
 pub fn automatic<T: Real>(mean: Option<T>, points: usize, bounds: [[T; 3]; 2]) -> T {
     let [low, high] = bounds;
     match mean {
@@ -108,7 +108,7 @@ fn smallest<T: Real>() -> T {
     T::of(8.0) * T::min_positive_value().sqrt()
 }
 
-/// Whether squares of distances within the box round all `points`, from its low to its high corner, are numbers.
+/// Whether squares of distances within the box around all `points`, from its low to its high corner, are numbers.
 ///
 /// # Errors
 /// [`Error::AllEqual`], [`Error::Extent`].

@@ -18,7 +18,7 @@ use super::radius::{Error, Neighborhoods, SMALLEST_MUTUAL_SHARE, find_automatic}
 use super::{lines, rule};
 use crate::{Real, parallel, union_find, vector};
 
-/// Samples, the nearest and itself, that show whether those round it fill a volume. More would also be of the other side of a
+/// Samples, the nearest and itself, that show whether those around it fill a volume. More would also be of the other side of a
 /// part that is three samples thick.
 const CLOSE: usize = 10;
 /// Quotients `λ₁/λ₂` and `λ₁/λ₃` of their covariance from which they do: below the first they lie in a plane, below the second on

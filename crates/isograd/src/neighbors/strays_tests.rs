@@ -13,7 +13,7 @@ fn body(n: usize, seed: u64) -> Vec<[f64; 3]> {
     torus(n, seed).into_iter().map(larger).collect()
 }
 
-/// Uniform random points of a cube round the origin.
+/// Uniform random points of a cube around the origin.
 fn in_mid_air(n: usize, side: f64, random: &mut Random) -> Vec<[f64; 3]> {
     let mut point = || std::array::from_fn(|_| side * (random.uniform() - 0.5));
     (0..n).map(|_| point()).collect()

@@ -27,7 +27,7 @@
 //! With the paper's weights up to the radius these are 1.75, 2.6, 9.0 and 6.06 at 0.3.
 //!
 //! Where samples scatter about their plane by a large part of the radius, from noise or because they lie on
-//! both sides of a thin body, neighborhoods of up to `3.1 R_i` are tried, and the radius grows towards that of the first
+//! both sides of a thin body, neighborhoods of up to `3.1 R_i` are tried, and the radius grows toward that of the first
 //! that is far less rough than those before it ([`Residual::radius`]; a radius that the caller has given
 //! stays). Mean error of the axes in degrees, with the same radius given and with the automatic one:
 //!
@@ -103,7 +103,7 @@ pub struct Residual<T> {
     pub radius: Vec<T>,
     /// Number of samples within that radius, the point itself included.
     pub count: Vec<u32>,
-    /// The plane round each point.
+    /// The plane around each point.
     pub planes: Vec<Plane<T>>,
     /// Moments in the order of the cells: scratch.
     sorted: Vec<Found<T, forward::Moments<T>>>,

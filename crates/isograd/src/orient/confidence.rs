@@ -2,7 +2,7 @@
 //!
 //! Two things speak for a sign. One is the *belief*: evidence of the sample and of its neighborhood, from 0 to 1. Where a
 //! hole lets light in, it is small, for right and wrong signs alike. The other is the *agreement* of the signs with the
-//! couplings round the sample: that drops wherever one of two neighbors is wrong, whatever the evidence. Of the samples
+//! couplings around the sample: that drops wherever one of two neighbors is wrong, whatever the evidence. Of the samples
 //! with an agreement of 0.99, 0.5 % have wrong signs; of those with 0.95, 0.9 and 0.8, 5, 15 and 30 %, with and without
 //! noise. Above a belief of 0.9 none has.
 //!
@@ -44,7 +44,7 @@ fn agreement(graph: &Graph, sign: &[f32], p: usize) -> f32 {
     }
 }
 
-/// The confidence for a belief in the sign, and the agreement round the sample.
+/// The confidence for a belief in the sign, and the agreement around the sample.
 fn combined(belief: f32, agreement: f32) -> f32 {
     let belief = belief.clamp(0.0, 1.0);
     let (square, half) = (belief * belief, HALF * HALF);

@@ -4,7 +4,7 @@
 /// Neighbors of a point in the graph.
 pub const NEIGHBORS: usize = 16;
 
-/// The reach of a sample is its distance to this neighbor: the first ring round it.
+/// The reach of a sample is its distance to this neighbor: the first ring around it.
 pub(super) const RING: usize = 6;
 
 /// Rounds of belief propagation, in each of which a point takes the mean of its own evidence and its neighbors' beliefs.
@@ -44,7 +44,7 @@ const UNKNOWN: f32 = f32::MAX;
 const SAME_SHEET: f32 = 0.1;
 const LEAST_SHARE: f32 = 1.0 / 3.0;
 
-/// Samples of the graph round one, itself included; and those of the ring, the last of them half.
+/// Samples of the graph around one, itself included; and those of the ring, the last of them half.
 const ALL: f32 = NEIGHBORS as f32 + 1.0;
 const IN_RING: f32 = RING as f32 + 0.5;
 const PI: f32 = std::f32::consts::PI;
@@ -56,7 +56,7 @@ const NOISE: f32 = 4.0;
 /// How soon it is clear on which side of a plane a sample lies, by its height in spreads.
 const SIDE: f32 = 2.0;
 
-/// How far the patch extends that a sample stands for, from its own ring and the median of those round it.
+/// How far the patch extends that a sample stands for, from its own ring and the median of those around it.
 #[inline(always)]
 pub(super) fn reach(ring: f32, median: f32) -> f32 {
     ring.min(REACH_GROWTH * median)
@@ -114,7 +114,7 @@ pub(super) fn blur(reach: f32, spreads: f32, thicknesses: f32, gap: f32) -> f32 
 }
 
 /// Coupling of the signs of two neighboring axes `a` and `b`, `d` apart: `a` is reflected at the
-/// plane half-way between the two samples and compared with `b`. Along a sheet that is `a·b`; round an
+/// plane half-way between the two samples and compared with `b`. Along a sheet that is `a·b`; around an
 /// edge it turns with the surface; and two sheets that face each other, whether matter or air is
 /// between them, have opposite outward normals. A [`blur`] takes the reflection back
 /// where `d` is too short to tell. Two parallel sheets much closer to each other than their samples are

@@ -1,6 +1,6 @@
 //! Evidence for the sign of an axis: which of its two sides is closer to the open air.
 //!
-//! Every sample is drawn on a grid as a disc in its tangent plane, as wide as the samples round it are
+//! Every sample is drawn on a grid as a disc in its tangent plane, as wide as the samples around it are
 //! apart, so that thin bodies keep their inside and sparse sampling leaves no holes. Regions of free cells
 //! that the discs enclose are matter; cells of the open region count as air in proportion to the directions
 //! in which they see out of the grid. A body with a hole in its sampling, which a flood fill alone would classify as
@@ -26,7 +26,7 @@ const SLAB: usize = 8;
 /// Most cells of a row that a disc may cover: the diameter of the largest, and one more.
 const LONGEST: usize = 16;
 
-/// A cubic grid round a part of the cloud, in user coordinates.
+/// A cubic grid around a part of the cloud, in user coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lattice {
     lower: [f64; 3],
@@ -36,7 +36,7 @@ pub struct Lattice {
 
 impl Lattice {
     /// A grid over the box from `low` to `high`, which are finite, with cells of the given size, which is positive;
-    /// larger cells where there would be more than `budget` of them, or than 216. Three cells are free round the
+    /// larger cells where there would be more than `budget` of them, or than 216. Three cells are free around the
     /// box.
     pub fn new(low: [f64; 3], high: [f64; 3], cell: f64, budget: usize) -> Self {
         let count = |cell: f64, a: usize| ((high[a] - low[a]) / cell).ceil() + 2.0 * MARGIN;

@@ -375,7 +375,7 @@ fn spread<const K: usize>(
     sum
 }
 
-/// Spread of the samples about the plane round one of them, in spacings, and the side of it on which that one lies.
+/// Spread of the samples about the plane around one of them, in spacings, and the side of it on which that one lies.
 fn scatter<T: Real>(plane: &Plane<T>, axis: [T; 3], spacing: f64) -> (f32, f32) {
     let spread = plane.eigenvalues[0].f64().sqrt();
     let height = -vector::dot(plane.centroid, axis).f64();

@@ -71,7 +71,7 @@ impl ParityOptions {
     }
 }
 
-/// What a detection array says: `N_i` and `N_{i,one}`.
+/// Counts of a detection array: `N_i` and `N_{i,one}`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Pattern {
     /// Crossings after the first block.

@@ -163,7 +163,7 @@ pub(super) fn cut(sampled: Sampled, keep: impl Fn([f64; 3]) -> bool) -> Sampled 
         .unzip()
 }
 
-/// The same surface seen from the other side.
+/// The surface with its normals turned.
 pub(super) fn inside_out(sampled: Sampled) -> Sampled {
     (sampled.0, sampled.1.iter().map(|n| n.map(|x| -x)).collect())
 }

@@ -26,7 +26,7 @@ pub(super) fn dimmed(light: f32, step: f32, steps: f32) -> f32 {
 }
 
 /// The first term of the evidence, from the light in front of a sample and behind it. The others are its differences
-/// along four directions round the axis.
+/// along four directions around the axis.
 #[inline(always)]
 pub(super) fn along_axis(front: f32, back: f32) -> f32 {
     2.0 * (front - back)

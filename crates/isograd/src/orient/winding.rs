@@ -22,7 +22,7 @@ const PROBES: usize = 2048;
 const FEWEST_PROBES: usize = 4;
 
 /// Weight of a sample with air on both sides. The winding number of an open sheet is ½ nowhere: that of a bulge comes closer
-/// to it if the bulge is turned outward, whatever the sheet round it is.
+/// to it if the bulge is turned outward, whatever the sheet around it is.
 const EXPOSED: f64 = 0.1;
 
 /// `(probes, domains)` the winding number that each domain, with these `members` and signs of all axes, gives at each of the

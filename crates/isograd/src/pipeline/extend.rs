@@ -1,4 +1,4 @@
-//! Attributes of the samples on the reconstructed surface and round it.
+//! Attributes of the samples on the reconstructed surface and around it.
 
 use std::borrow::Cow;
 

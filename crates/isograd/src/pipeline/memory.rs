@@ -28,7 +28,7 @@ const OF_POINT_GIVEN: [f64; 2] = [10.0, 58.0];
 /// Largest number of values held at once for each cell in a block of a sparse solve: right-hand side and indicator of all
 /// octaves, and what the local iso-value needs.
 const BLOCK_VALUES: f64 = 6.0;
-/// The same for each cell of its coarsest grid.
+/// [`BLOCK_VALUES`] for each cell of its coarsest grid.
 const COARSE_VALUES: f64 = 4.0;
 
 const MIB: f64 = (1u64 << 20) as f64;

@@ -1,4 +1,4 @@
-//! What to compute, and why it may fail.
+//! Options of a reconstruction, and its errors.
 
 use super::{MemoryError, Solve, SurfaceResolution};
 use crate::data::GridError;

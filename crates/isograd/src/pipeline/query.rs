@@ -10,7 +10,7 @@ impl<T: Pipeline> Reconstruction<T> {
     /// order. Outside the surface, a point farther than `within`, in the unit of the points, gets that distance and
     /// [no face](Hit::beyond); a point that is not finite gets NaN and none.
     ///
-    /// The sign is that of `χ − c`, where the eight values round a point agree, else that of the pseudonormal of the
+    /// The sign is that of `χ − c`, where the eight values around a point agree, else that of the pseudonormal of the
     /// closest feature. φ is not used, unless the surface is trimmed or a sheet: then the signs are those of φ where these
     /// agree.
     ///
@@ -33,7 +33,7 @@ impl<T: Real> Reconstruction<T> {
         }
     }
 
-    /// Whether a point is inside, where values of the indicator round it agree: those that the surface was found from, or
+    /// Whether a point is inside, where values of the indicator around it agree: those that the surface was found from, or
     /// beyond their blocks all that there are.
     fn is_inside(&self, point: [f64; 3]) -> Option<bool> {
         let level = self.iso_value;
@@ -49,7 +49,7 @@ impl<T: Real> Reconstruction<T> {
     }
 }
 
-/// The cell of centers round a point, or the last one toward the wall that the point is near; `None` off the grid.
+/// The cell of centers around a point, or the last one toward the wall that the point is near; `None` off the grid.
 fn cell_of<T: Real>(field: Cells<'_, T>, point: [f64; 3]) -> Option<[usize; 3]> {
     let grid = field.grid();
     let (lower, spacing, shape) = (grid.lower(), grid.spacing().f64(), grid.shape());

@@ -10,7 +10,7 @@ use crate::isosurface;
 use crate::poisson::pyramid::{Octaves, Pyramid};
 use crate::{Field, Grid, Real, poisson, splat};
 
-/// Cells round a sample that are in the blocks. The surface seldom is farther from all samples: then blocks are added.
+/// Cells around a sample that are in the blocks. The surface seldom is farther from all samples: then blocks are added.
 const REACH: isize = 5;
 
 /// Times that blocks are added where the surface leaves them.

@@ -1,7 +1,7 @@
 //! One axis: its cosine transforms and its eigenvalues.
 //!
 //! Two real lines travel as one complex line `x` of length `n`. With `v` its Makhoul order (even places
-//! first, then odd places backwards), `Z = FFT(v)` and `w_k = exp(−iπk/2n)`, the cosine transforms of both
+//! first, then odd places backward), `Z = FFT(v)` and `w_k = exp(−iπk/2n)`, the cosine transforms of both
 //! lines are `Y_k = w_k Z_k + w̄_k Z_{n−k} = 2 Σ_j x_j cos(πk(2j+1)/2n)`. Backwards,
 //! `Z_k = w̄_k (Y_k − i Y_{n−k})` with `Y_n = 0`, and the result is `2n x`.
 

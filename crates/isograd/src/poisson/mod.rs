@@ -36,7 +36,7 @@
 //! Nothing: the map is linear.
 //!
 //! # Reproducibility
-//! The same bits for any number of threads. The Fourier transforms (`rustfft`) are chosen by the
+//! The number of threads does not change a bit. The Fourier transforms (`rustfft`) are chosen by the
 //! instruction set at run time, so two kinds of processor may differ in the last bits.
 //!
 //! Reference for the transform of a reordered line: J. Makhoul, *A fast cosine transform in one and two

@@ -1,14 +1,14 @@
 //! The splat: oriented samples → right-hand side of the Poisson equation.
 //!
 //! # Map
-//! Each sample `i` of area `a_i` and outward unit normal `n_i` is spread over the 3×3×3 cells round it,
+//! Each sample `i` of area `a_i` and outward unit normal `n_i` is spread over the 3×3×3 cells around it,
 //! `V_o = Σ_i α_{o,i} a_i n_i / h²` (paper, eq. `V_field`), and `b = Σ_d D_d V_d` (eq. `rhs_discrete`):
 //! `(D u)_p = (u_{p−1} − u_{p+1})/2` along `d`, mass `(1, 4, 1)/6` along the other two axes. `V` is never
 //! stored: per axis the 3 weights become 5 numbers under the mass and 5 under the derivative, and the
 //! sample's part of `b` on 5×5×5 cells is made of their products. Samples keep 2 cells off every wall, so
 //! the operators' rows at the walls are never met. `Σ b = 0`, so the equation has a solution.
 //!
-//! `b` and `V` are in index space (no unit). The solution `χ` rises outwards, by 1 where the areas are
+//! `b` and `V` are in index space (no unit). The solution `χ` rises outward, by 1 where the areas are
 //! right.
 //!
 //! # Residual
@@ -47,7 +47,7 @@ pub(crate) use stencil::{bspline_slopes, bspline_weights};
 /// Planes across x that one task owns.
 const SLAB: usize = 8;
 
-/// How a sample is spread over the 3×3×3 cells round it.
+/// How a sample is spread over the 3×3×3 cells around it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Weights {
     /// Product of quadratic B-splines: continuously differentiable in the point.

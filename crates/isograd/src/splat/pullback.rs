@@ -134,7 +134,7 @@ impl<T: Real> Samples<'_, T> {
         }
     }
 
-    /// Cotangents of sample `i` from the 5³ cells of `b_bar` round it.
+    /// Cotangents of sample `i` from the 5³ cells of `b_bar` around it.
     #[inline(always)]
     fn gather(&self, i: usize, residual: &Residual, b_bar: Cells<'_, T>) -> Gathered<T> {
         let grid = b_bar.grid();

@@ -1,4 +1,4 @@
-//! What one sample adds to the cells round it: small pure functions.
+//! Contribution of one sample to the cells around it: small pure functions.
 //!
 //! Along each axis, weights on 3 cells become 5 numbers under the mass `M` and 5 under the derivative
 //! `D`; the sample's part of `b` is made of products of those. Backwards, the same products gather.
@@ -31,7 +31,7 @@ impl<T: Real> Term<T> {
         }
     }
 
-    /// What is added to the 5 cells along z of row `(i, j)` of the 5³ cells.
+    /// Contribution to the 5 cells along z of row `(i, j)` of the 5³ cells.
     #[inline(always)]
     pub(super) fn row(&self, i: usize, j: usize) -> [T; WIDTH] {
         let (mx, my, mz) = (self.mass[0][i], self.mass[1][j], &self.mass[2]);
@@ -71,10 +71,10 @@ pub(super) fn for_each_term<T: Real>(
     }
 }
 
-/// 5³ cells round the central cell of a sample.
+/// 5³ cells around the central cell of a sample.
 pub(super) type Block<T> = [[[T; WIDTH]; WIDTH]; WIDTH];
 
-/// What the cells round a sample hold for it, in index space.
+/// Values of the cells around a sample for it, in index space.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Gathered<T> {
     /// Cotangent of the vector that was spread.
@@ -122,7 +122,7 @@ fn gather_paper<T: Real>(vector: [T; 3], f: [T; 3], block: &Block<T>) -> Gathere
     Gathered { spread, gradient }
 }
 
-/// The same where the weights are a product, with these slopes.
+/// [`Gathered`] of weights that are a product, with these slopes.
 #[inline(always)]
 fn gather_product<T: Real>(
     v: [T; 3],

@@ -355,7 +355,7 @@ fn indicator_of_a_sphere_rises_by_one_from_inside_to_outside() {
         let (points, areas) = (&cloud.points, &cloud.areas);
         let c =
             crate::isosurface::iso_value::forward(&chi, points, areas, residual).expect("a value");
-        // A blur of s cells puts more than half of a ball round a surface sample outside the sphere, by
+        // A blur of s cells puts more than half of a ball around a surface sample outside the sphere, by
         // s/(√2π r): 0.02 for s = 0.75 and r = 13 cells.
         let rise = outside - c;
         assert!((0.46..0.5).contains(&rise), "{weights:?}: {rise}");

@@ -19,7 +19,7 @@ impl Uniform {
     }
 }
 
-/// A torus round the z axis.
+/// A torus around the z axis.
 pub struct Torus {
     pub major: f64,
     pub minor: f64,

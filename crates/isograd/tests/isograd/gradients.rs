@@ -419,7 +419,7 @@ fn what_does_not_fit_is_refused_with_a_reason() {
     assert!(pulled.points.iter().flatten().all(|&x| x == 0.0));
 }
 
-/// What is brought back from φ, closest faces and normals pulls back to the same bits.
+/// A reconstruction restored from φ, closest faces and normals pulls back to the same bits.
 fn assert_restored<T: Pipeline>(options: &Options) {
     let cloud = cloud::<T>();
     let mut plan = Reconstructor::new(grid(), options.clone()).expect("options");

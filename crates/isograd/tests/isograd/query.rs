@@ -75,7 +75,7 @@ fn assert_phi_at_centers(result: &Reconstruction<f64>, case: usize) {
     }
 }
 
-/// Where values on half cells round a center differ, and those on whole cells agree.
+/// Where values on half cells around a center differ, and those on whole cells agree.
 #[test]
 fn at_cell_centers_it_is_phi_where_only_half_cells_see_the_surface() {
     for seed in 0..8 {

@@ -15,7 +15,7 @@ use crate::{Buffer, Device, Error, Scalar};
 pub(super) struct Near {
     /// Those that have a closest face.
     pub band: Buffer<u32>,
-    /// Those of them whose closest face is not part of the surface.
+    /// Cells of the band whose closest face is not part of the surface.
     pub astray: Buffer<u32>,
 }
 

@@ -70,7 +70,7 @@ pub struct Attribute<'a, T> {
     pub components: usize,
 }
 
-/// The surface, and the grid round it.
+/// The surface, and the grid around it.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface<'a, T> {
     /// The surface itself.
@@ -83,7 +83,7 @@ pub struct Surface<'a, T> {
     pub closest: &'a Buffer<u32>,
 }
 
-/// An attribute at the vertices of a surface and at the cells round it: [`isograd::distance::extend::Extension`].
+/// An attribute at the vertices of a surface and at the cells around it: [`isograd::distance::extend::Extension`].
 #[derive(Clone, Debug)]
 pub struct Extension<T> {
     /// Components per value.

@@ -1,4 +1,4 @@
-//! The samples round a vertex.
+//! The samples around a vertex.
 
 use cubecl::prelude::*;
 
@@ -111,7 +111,7 @@ pub(super) fn neighbor<F: Float>(offset: Vector3<F>, unit: F, area: F) -> Neighb
     }
 }
 
-/// `Σ w`, `Σ w d` and `Σ w d dᵀ` of the samples round the vertex at `y`, in units of the radius.
+/// `Σ w`, `Σ w d` and `Σ w d dᵀ` of the samples around the vertex at `y`, in units of the radius.
 #[cube]
 pub(super) fn sum_moments<F: Float + CubeElement>(
     samples: &SampleArrays<F>,

@@ -15,7 +15,7 @@ pub(super) const REACH: u32 = 1;
 /// Numbers of a sample that is spread as a bump: offset from the center of its cell, and how much.
 pub(super) const BUMP: usize = 4;
 
-/// Numbers of a sample in the form that is spread back: offset; `m̄`; `w̄ n`; and for the 2³ cell centers round it
+/// Numbers of a sample in the form that is spread back: offset; `m̄`; `w̄ n`; and for the 2³ cell centers around it
 /// `y`, and `−y v`.
 pub(super) const FORM: usize = 23;
 pub(super) const OTHERS: usize = 7;
@@ -75,7 +75,7 @@ impl Spread for Taken {
     }
 }
 
-/// The number that a sample has for one of the 2³ cell centers round it, at `first` and after; 0 for the other
+/// The number that a sample has for one of the 2³ cell centers around it, at `first` and after; 0 for the other
 /// cells of the 3³.
 #[cube]
 fn of_side<F: Float>(

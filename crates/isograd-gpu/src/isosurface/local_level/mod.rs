@@ -15,7 +15,7 @@
 //! The samples in the form that is worked with; and of each pass its sums, and of each sample `s_i` and `u_i`.
 //!
 //! # Pullback
-//! As on the CPU, pass by pass backwards: samples → cells → samples. Of each pass one sum comes back, for `λ̄`; of the coarse
+//! As on the CPU, pass by pass backward: samples → cells → samples. Of each pass one sum comes back, for `λ̄`; of the coarse
 //! one the cotangents of all samples.
 //!
 //! # Bad samples

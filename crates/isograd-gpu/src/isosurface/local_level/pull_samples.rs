@@ -149,7 +149,7 @@ struct OfSample<F: Float> {
     offset: F,
 }
 
-/// From `m̄` and `p̄` of a sample to itself, by the 2³ cell centers round it; `y` and `−y v` of those become its
+/// From `m̄` and `p̄` of a sample to itself, by the 2³ cell centers around it; `y` and `−y v` of those become its
 /// form to spread.
 #[cube]
 fn pull_forecast<F: Float + CubeElement>(

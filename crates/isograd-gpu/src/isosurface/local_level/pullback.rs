@@ -121,7 +121,7 @@ struct Pulled<T> {
 }
 
 impl<T: Scalar> Pulled<T> {
-    /// One pass backwards. Takes and returns the cotangent of the share of the slope that is gone; `of_gain` is that of `λ` through
+    /// One pass backward. Takes and returns the cotangent of the share of the slope that is gone; `of_gain` is that of `λ` through
     /// the coarse pass.
     fn pull_pass<R: Runtime>(
         &mut self,
@@ -145,7 +145,7 @@ impl<T: Scalar> Pulled<T> {
         Ok(before_bar)
     }
 
-    /// The coarse pass backwards, from cells to the means that samples were given. `bars` are 0 before, and then those of samples
+    /// The coarse pass backward, from cells to the means that samples were given. `bars` are 0 before, and then those of samples
     /// that are all trusted.
     fn pull_given<R: Runtime>(
         &mut self,

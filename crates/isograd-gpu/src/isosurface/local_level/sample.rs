@@ -50,7 +50,7 @@ pub(super) fn sample<F: Float>(samples: &Array<F>, s: usize) -> Sample<F> {
     }
 }
 
-/// Place in memory of the lowest of the 3³ cells round the cell `key`, which is not at a wall.
+/// Place in memory of the lowest of the 3³ cells around the cell `key`, which is not at a wall.
 #[cube]
 pub(super) fn corner<F: Float + CubeElement>(key: u32, grid: &Lattice<F>) -> u32 {
     key - ((grid.ny + 1u32) * grid.nz + 1u32)
@@ -95,7 +95,7 @@ pub(super) fn without<F: Float>(
     }
 }
 
-/// One of the two cell centers round a sample, along an axis.
+/// One of the two cell centers around a sample, along an axis.
 #[derive(CubeType, Clone, Copy)]
 pub(super) struct Side<F: Float> {
     /// Which of the three cells it is.
@@ -108,7 +108,7 @@ pub(super) struct Side<F: Float> {
     pub bump_slope: F,
 }
 
-/// The lower (0) or upper (1) cell center round a sample `f` from the center of its cell.
+/// The lower (0) or upper (1) cell center around a sample `f` from the center of its cell.
 #[cube]
 pub(super) fn side<F: Float>(f: F, upper: u32) -> Side<F> {
     let one = F::new(1.0);

@@ -1,7 +1,7 @@
 //! Cosine transforms of lines in shared memory, by Fourier transforms.
 //!
 //! A group has a tile of pairs of lines; a pair travels as one complex line `x` of length `n`. With `v` its
-//! Makhoul order (even places first, then odd places backwards), `Z = FFT(v)` and `w_k = exp(−iπk/2n)`, the
+//! Makhoul order (even places first, then odd places backward), `Z = FFT(v)` and `w_k = exp(−iπk/2n)`, the
 //! cosine transforms of both lines are `Y_k = w_k Z_k + w̄_k Z_{n−k}`. Backwards, `Z_k = w̄_k (Y_k − i Y_{n−k})`
 //! with `Y_n = 0`, and `x` comes out times `2n`. The passes of the Fourier transform are Stockham's, from one
 //! half of the shared memory to the other. Its inverse is itself, with real and imaginary parts exchanged. Lengths with

@@ -123,7 +123,7 @@ pub(super) fn next_place(tile: &Tile, j: usize) -> usize {
     }
 }
 
-/// Even places first, then odd places backwards.
+/// Even places first, then odd places backward.
 #[cube]
 fn makhoul(j: usize, n: usize) -> usize {
     let odd = j % 2;

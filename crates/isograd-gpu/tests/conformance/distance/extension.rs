@@ -1,4 +1,4 @@
-//! Attributes on the surface and round it, beside the CPU's stage.
+//! Attributes on the surface and around it, beside the CPU's stage.
 
 mod cotangents;
 mod degenerate;
@@ -21,7 +21,7 @@ tests! {
     in_each_number: values_are_those_of_the_cpu, constants_are_exact;
 }
 
-/// Samples, a surface and the grid round it, on the CPU.
+/// Samples, a surface and the grid around it, on the CPU.
 struct Scene<T> {
     name: &'static str,
     points: Vec<[T; 3]>,
@@ -73,7 +73,7 @@ impl<T: Scalar> Scene<T> {
         Self::new("torus", &torus_points(1200), meshes::torus(36, 14))
     }
 
-    /// The same with holes, with an outlier, in few places, with areas of 0, and a box with flat sides.
+    /// A torus as it is, with holes, with an outlier, in few places, with areas of 0; and a box with flat sides.
     fn all() -> Vec<Self> {
         let points = torus_points(1600);
         let outlier = [0.7, 0.0, 0.4];
@@ -196,13 +196,13 @@ fn plate<T: Scalar>() -> Mesh<T> {
     Mesh::new((0..SIDE * SIDE).map(vertex).collect(), faces).unwrap()
 }
 
-/// φ round a mesh within 4 cells, and the closest faces.
+/// φ around a mesh within 4 cells, and the closest faces.
 fn measure<T: Scalar>(mesh: &Mesh<T>) -> (Field<T>, Vec<u32>) {
     let grid = grid::<T>([-1.03, -1.07, -0.41], 0.083, [26, 26, 11]);
     super::solve_on_cpu(mesh, &super::signs(grid), Band::Within(4.0 * 0.083))
 }
 
-/// The same on a device.
+/// A [`Scene`] on a device.
 struct OnDevice<T> {
     near: isograd_gpu::neighbors::Neighborhoods<T>,
     radius: T,
@@ -263,7 +263,7 @@ impl<T: Scalar> OnDevice<T> {
     }
 }
 
-/// What came out on a device, in the host's memory.
+/// Results of a device, in the host's memory.
 fn downloaded<R: Runtime, T: Scalar>(
     device: &Device<R>,
     shape: [usize; 3],

@@ -22,7 +22,7 @@ fn quads(rows: usize, columns: usize, closed: bool) -> Vec<[u32; 3]> {
         .collect()
 }
 
-/// A closed torus round the z axis, normals outward.
+/// A closed torus around the z axis, normals outward.
 pub fn torus<T: Real>(around: usize, across: usize) -> Mesh<T> {
     let turn = |i: usize, n: usize| std::f64::consts::TAU * i as f64 / n as f64;
     let vertex = |index: usize| {
@@ -115,7 +115,7 @@ pub fn copies<T: Real>(faces: usize) -> Mesh<T> {
     .unwrap()
 }
 
-/// Triangles round one vertex.
+/// Triangles around one vertex.
 pub fn fan<T: Real>(triangles: usize) -> Mesh<T> {
     let on_circle = |i: usize| {
         let turn = std::f64::consts::TAU * i as f64 / triangles as f64;

@@ -46,7 +46,7 @@ fn solve<R: Runtime, T: Scalar>(
     (device.download(&phi).unwrap(), closest, residual)
 }
 
-/// The same of the CPU.
+/// [`solve`] on the CPU.
 fn solve_on_cpu<T: Real>(mesh: &Mesh<T>, chi: &Field<T>, band: Band) -> (Field<T>, Vec<u32>) {
     let mut phi = Field::zeros(*chi.grid());
     let mut closest = Vec::new();

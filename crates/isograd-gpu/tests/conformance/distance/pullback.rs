@@ -66,7 +66,7 @@ fn worst<R: Runtime, T: Scalar>(
         .max(relative(&of_cells[3..], &of_grid[3..]))
 }
 
-/// What twelve motions of each triangle on its own are worth: moved along an axis, or stretched or sheared. The
+/// Derivatives along twelve motions of each triangle on its own: moved along an axis, stretched, sheared. The
 /// single corners of a needle, or of a triangle without area, have cotangents that rounding shares out; so has a triangle
 /// that names one vertex of theirs.
 fn of_affine_motions<T: Real>(mesh: &Mesh<T>, bars: &[f64]) -> Vec<f64> {

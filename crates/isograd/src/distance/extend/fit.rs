@@ -29,7 +29,7 @@ pub(super) struct Neighbor {
     pub correction: f64,
 }
 
-/// Fits a linear function to the samples round a vertex, and writes the weight of each.
+/// Fits a linear function to the samples around a vertex, and writes the weight of each.
 pub(super) fn fit(radius: f64, neighbors: &mut [Neighbor]) -> Fit {
     let (mut weight, mut mean) = (0.0, [0.0; 3]);
     for n in &*neighbors {

@@ -195,7 +195,7 @@ fn extend_to_vertices<T: Real>(
     );
 }
 
-/// Collects the samples round a vertex with their weights `w_j`, and returns the radius.
+/// Collects the samples around a vertex with their weights `w_j`, and returns the radius.
 fn gather<T: Real>(
     samples: Samples<'_, T>,
     smallest_area: f64,

@@ -7,7 +7,7 @@
 //! coordinates of the closest point. The value is constant along the normal of the surface, as a
 //! boundary condition at a cell near the wall needs it.
 //!
-//! At a vertex a linear function is fitted to the samples round it and taken at the vertex (moving least
+//! At a vertex a linear function is fitted to the samples around it and taken at the vertex (moving least
 //! squares: D. Levin, *The approximation power of moving least-squares*, Math. Comp. 67, 1998). With
 //! `d_j = x_j − y_v`, `r_j = |d_j|`:
 //! ```text
@@ -23,7 +23,7 @@
 //! more), where a slope would be extrapolated. Nothing depends on the unit of length.
 //!
 //! `R_v = max(R, min(1.5 r₆, 1.05 r₆₄))` with `r_k` the distance to the `k`-th nearest sample: `R` where a vertex has
-//! enough samples round it; a vertex in a hole takes the samples round the hole. In the pipeline `R` is the common radius
+//! enough samples around it; a vertex in a hole takes the samples around the hole. In the pipeline `R` is the common radius
 //! of the neighborhoods, or the cell size of the surface where that is larger: then every sample has a share in a vertex.
 //! `a₀` is a millionth of the mean area: outliers, whose area is 0, count only where there is nothing else.
 //!
@@ -57,7 +57,7 @@
 //! `a₀` and which sample is the 6th or 64th are held constant. Which cells are in the band, which triangle is closest and
 //! which of its features: values jump on the medial axis, and their slopes jump from feature to feature. A triangle much
 //! thinner than a cell turns without bound when a corner moves: the direction in which it is thinner than `√ε`
-//! cells (`ε` of the number type) is left out. Where all samples round a vertex coincide, the fit has no slope,
+//! cells (`ε` of the number type) is left out. Where all samples around a vertex coincide, the fit has no slope,
 //! and none is differentiated. [`Cotangent::guarded`] counts both.
 
 mod fit;
@@ -88,7 +88,7 @@ pub struct Samples<'a, T> {
     pub areas: &'a [T],
 }
 
-/// The surface, and the grid round it.
+/// The surface, and the grid around it.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface<'a, T> {
     /// The surface itself.
@@ -133,7 +133,7 @@ impl Region {
     }
 }
 
-/// An attribute at the vertices of a surface and at the cells round it.
+/// An attribute at the vertices of a surface and at the cells around it.
 ///
 /// The cells are a list, as a solver with an immersed boundary goes through them: [`Self::iter`] yields each
 /// with its value; [`Self::scatter`] writes them into an array over the whole grid.

@@ -54,7 +54,7 @@ impl Shares {
         self.order.sort_unstable();
     }
 
-    /// Adds the cotangents of the samples round a vertex from `ū_v`, which is in `work.bar`. Returns `ȳ_v`.
+    /// Adds the cotangents of the samples around a vertex from `ū_v`, which is in `work.bar`. Returns `ȳ_v`.
     pub(super) fn add_fit<T: Real>(
         &mut self,
         inputs: &Inputs<'_, T>,

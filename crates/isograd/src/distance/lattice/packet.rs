@@ -158,14 +158,14 @@ impl<T: Real> BlockCandidates<'_, T> {
         self.measure::<S>(packet, first, best, measured);
     }
 
-    /// Lists the small triangles round a site.
+    /// Lists the small triangles around a site.
     #[inline(always)]
     fn collect_star(&self, place: u32, measured: &mut Candidates) {
         let site = &self.all[place as usize];
         measured.extend(self.sites.star(site.number), site.position);
     }
 
-    /// Lists the small triangles round the sites that matter.
+    /// Lists the small triangles around the sites that matter.
     #[inline(always)]
     fn collect_near<S: Simd>(
         &self,

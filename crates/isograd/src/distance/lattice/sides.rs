@@ -47,7 +47,7 @@ impl<'a, T: Real> Sides<'a, T> {
     }
 
     /// Whether the center of the cell at `index` in memory, whose closest face is given, is inside: `χ < c` where `χ` has
-    /// a value there. Between values of `χ` all eight round the center decide where they agree, since the surface does
+    /// a value there. Between values of `χ` all eight around the center decide where they agree, since the surface does
     /// not pass between them; elsewhere the pseudonormal of the closest feature decides, or beyond the band `χ`
     /// interpolated.
     #[inline(always)]

@@ -1,4 +1,4 @@
-//! Vertices of a mesh in the order of the tree, with the triangles round each, for culling.
+//! Vertices of a mesh in the order of the tree, with the triangles around each, for culling.
 
 use super::facet::Facet;
 use crate::distance::bvh::{Bvh, LEAF};
@@ -234,7 +234,7 @@ impl Sites {
         &self.facets
     }
 
-    /// The small triangles round a site.
+    /// The small triangles around a site.
     #[inline(always)]
     pub(super) fn star(&self, site: u32) -> &[Spoke] {
         let s = site as usize;

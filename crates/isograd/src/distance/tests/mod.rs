@@ -76,7 +76,7 @@ pub(super) fn soup<T: Real>(triangles: usize, seed: u64) -> Mesh<T> {
     Mesh::new(vertices, faces).expect("finite")
 }
 
-/// A closed torus round the z axis, its quads cut in two, normals outward.
+/// A closed torus around the z axis, its quads cut in two, normals outward.
 pub(super) fn torus<T: Real>(around: usize, across: usize) -> Mesh<T> {
     let tau = std::f64::consts::TAU;
     let mut vertices = Vec::new();
@@ -97,7 +97,7 @@ pub(super) fn torus<T: Real>(around: usize, across: usize) -> Mesh<T> {
     Mesh::new(vertices, faces).expect("finite")
 }
 
-/// A closed sphere of radius `r` round the origin: a cube of `n × n` quads a side, blown up.
+/// A closed sphere of radius `r` around the origin: a cube of `n × n` quads a side, blown up.
 pub(super) fn sphere<T: Real>(n: usize, r: f64) -> Mesh<T> {
     let mut vertices = Vec::new();
     let mut faces = Vec::new();

@@ -12,7 +12,7 @@ use crate::vector::{add, norm, scale, sub};
 pub(super) struct Cluster {
     /// Mean of the centroids, weighted by area.
     pub center: [f64; 3],
-    /// Radius of a ball round the center that contains the triangles.
+    /// Radius of a ball around the center that contains the triangles.
     pub radius: f64,
     /// Sum of the areas.
     area: f64,

@@ -54,7 +54,7 @@ fn is_mixed(inside: &[Option<bool>], step: [usize; 3]) -> bool {
     sides == [true; 2]
 }
 
-/// Signs at a block and the cells round it; `None` where there is no value.
+/// Signs at a block and the cells around it; `None` where there is no value.
 fn surroundings<T: Real>(chi: &BlockField<T>, level: T, block: usize) -> Vec<Option<bool>> {
     let corner = chi.blocks.corner(block);
     let sign = |place: usize| {

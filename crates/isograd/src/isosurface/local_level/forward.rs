@@ -9,7 +9,7 @@ use crate::isosurface::iso_value;
 use crate::splat::SortedSamples;
 use crate::{Field, Real, parallel};
 
-/// Scratch buffers reused between calls: a few numbers for each cell of the layer round the surface, and for
+/// Scratch buffers reused between calls: a few numbers for each cell of the layer around the surface, and for
 /// each sample.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch<T> {

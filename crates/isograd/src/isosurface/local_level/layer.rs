@@ -26,7 +26,7 @@ pub(super) struct Layer {
 }
 
 impl Layer {
-    /// Builds the layer round the samples, in their sorted order.
+    /// Builds the layer around the samples, in their sorted order.
     pub(super) fn build<T: Real>(&mut self, grid: &Grid<T>, sorted: SortedSamples<'_, T>) {
         let (points, order) = (sorted.samples.points, &sorted.order.order);
         self.shape = grid.shape().map(|n| n.div_ceil(EDGE));

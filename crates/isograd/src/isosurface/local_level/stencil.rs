@@ -1,4 +1,4 @@
-//! Weights and derivatives on the cells round a sample: small pure functions.
+//! Weights and derivatives on the cells around a sample: small pure functions.
 
 use crate::isosurface::Interpolation;
 use crate::vector::dot;

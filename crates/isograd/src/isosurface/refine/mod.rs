@@ -35,7 +35,7 @@ const OWN: usize = EDGE / 2;
 /// [`OWN`] and one more at both ends.
 const WIDE: usize = OWN + 2;
 
-/// Values at the cells of the indicator under a block and round it.
+/// Values at the cells of the indicator under a block and around it.
 type Halo<T> = [T; WIDE * WIDE * WIDE];
 
 /// Weights of the cells below, at and above that of a lower half; an upper half has them in reverse.
@@ -85,7 +85,7 @@ pub(crate) fn on_edge<T: Real>(chi: &Field<T>, fine: &Grid<T>, level: T, edge: L
     T::of(crossing.fraction())
 }
 
-/// Blocks of the refined grid that may be crossed: cells of the indicator under them and round them are on both sides.
+/// Blocks of the refined grid that may be crossed: cells of the indicator under them and around them are on both sides.
 fn crossed<T: Real>(chi: &Field<T>, level: T) -> Vec<[usize; 3]> {
     let [nx, ny, nz] = chi.grid().shape();
     let [bx, by, bz] = [nx, ny, nz].map(|n| n.div_ceil(OWN));
@@ -138,7 +138,7 @@ fn cell_near(cells: usize, half: usize, n: usize) -> usize {
     (half / 2 + n).saturating_sub(1).min(cells - 1)
 }
 
-/// From the three cells round that under half `half` of a block to the value there.
+/// From the three cells around that under half `half` of a block to the value there.
 fn weight<T: Real>(half: usize, tap: usize) -> T {
     T::of(WEIGHTS[if half.is_multiple_of(2) { tap } else { 2 - tap }])
 }

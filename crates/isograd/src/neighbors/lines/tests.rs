@@ -57,7 +57,7 @@ fn the_other_side_of_a_thin_body_is_not_the_next_line() {
     assert!((1.2..1.6).contains(&reach), "{reach}");
 }
 
-/// Rings of samples round the long axis of an ellipsoid, closer to each other toward its ends; and the normals.
+/// Rings of samples around the long axis of an ellipsoid, closer to each other toward its ends; and the normals.
 fn rings(rings: usize, samples: usize) -> (Vec<[f64; 3]>, Vec<[f64; 3]>) {
     let axes = [1.0, 0.35, 0.25];
     let point = |ring: usize, k: usize| {

@@ -9,7 +9,7 @@
 //! - *thin*: its 24 nearest samples lie in two sheets, told apart by their height along its normal, or by the
 //!   sides that they face. 24 samples of one sheet reach 2.8 spacings, so such sheets are closer than that;
 //! - *noisy*: its 24 nearest samples scatter by 0.3 of their spacing about the quadric fitted to them, and so
-//!   do most samples round it;
+//!   do most samples around it;
 //! - *open* again: doubtful samples without a reason of their own lead from it to a rim or hole;
 //! - else it is *unexplained*.
 //!
@@ -41,7 +41,7 @@ const NOISY: f64 = 0.3;
 /// Doubtful points that are looked at in one task.
 const TASK: usize = 64;
 
-/// Of so many samples round a noisy one, more than half must be noisy too.
+/// Of so many samples around a noisy one, more than half must be noisy too.
 const ASKED: usize = 8;
 
 /// Why the sign of a point is doubtful.

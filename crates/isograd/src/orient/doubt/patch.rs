@@ -13,7 +13,7 @@ const FEWEST: usize = 3;
 /// scatter beside it. One sheet of noise, cut in two, has 2.7.
 const STEP: f64 = 5.0;
 
-/// The same for groups that face opposite ways: two sheets that meet at a sharp edge have 3.5 there.
+/// [`STEP`] for groups that face opposite ways: two sheets that meet at a sharp edge have 3.5 there.
 const OPPOSED_STEP: f64 = 3.0;
 
 /// Steps of less than this many spacings are none: a smooth surface has some by chance.

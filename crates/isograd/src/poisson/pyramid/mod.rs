@@ -38,7 +38,7 @@ use super::{Error, Plan, Scratch, Symbol};
 use crate::data::blocks::{BRICK, Blocks, Brick, EDGE, Marks, NODES};
 use crate::{Real, parallel};
 
-/// Cells round a brick of which the samples have an effect in it.
+/// Cells around a brick of which the samples have an effect in it.
 const HALO: usize = 12;
 
 /// Cells along each side of a brick and its surroundings.

@@ -8,7 +8,7 @@ use crate::neighbors::tests::Random;
 use crate::poisson::{Plan, Scratch};
 use crate::{Field, Grid, Real, splat};
 
-/// Samples of an ellipsoid of half-axes `axes`, in cells, round the center of a grid, and their right-hand side.
+/// Samples of an ellipsoid of half-axes `axes`, in cells, around the center of a grid, and their right-hand side.
 fn ellipsoid<T: Real>(cells: usize, axes: [f64; 3], count: usize) -> (Vec<[T; 3]>, Field<T>) {
     let mut random = Random::new(7);
     let (mut points, mut normals, mut areas) = (Vec::new(), Vec::new(), Vec::new());

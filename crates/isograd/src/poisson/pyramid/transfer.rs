@@ -86,7 +86,7 @@ pub(super) fn restrict<T: Real>(
     });
 }
 
-/// Cells round a block, and sums of them.
+/// Cells around a block, and sums of them.
 #[derive(Default)]
 struct Rooms<T> {
     from: Vec<T>,

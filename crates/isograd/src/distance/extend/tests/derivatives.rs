@@ -8,7 +8,7 @@ use crate::distance::triangle::closest_point;
 use crate::element::fit::kernel;
 use crate::vector::{dot, norm_squared, scale, sub};
 
-/// A vertex at `vertex`, samples round it with areas and one value each, and a radius held constant.
+/// A vertex at `vertex`, samples around it with areas and one value each, and a radius held constant.
 #[derive(Clone)]
 struct Patch {
     points: Vec<[f64; 3]>,

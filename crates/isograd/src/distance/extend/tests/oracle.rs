@@ -1,4 +1,4 @@
-//! The same fit in its plainest form: all samples, and the normal equations of the weighted least squares.
+//! The fit in its plainest form: all samples, and the normal equations of the weighted least squares.
 
 use super::*;
 use crate::poisson::tests::eliminate;

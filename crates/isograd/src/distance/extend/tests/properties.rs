@@ -1,4 +1,4 @@
-//! What an extension promises.
+//! Properties of an extension.
 
 use super::super::Fit;
 use super::*;
@@ -83,7 +83,7 @@ fn a_cell_has_the_value_of_its_closest_surface_point() {
         assert!((distance - scene.phi.values()[cell].abs()).abs() <= 1e-12);
         let truth = wavy(closest);
         for c in 0..2 {
-            // Curvature of the field over a cell of 0.055, and over the samples round a vertex.
+            // Curvature of the field over a cell of 0.055, and over the samples around a vertex.
             assert!((value[c] - truth[c]).abs() <= 0.03, "{value:?} {truth:?}");
         }
         let mut queried = [0.0; 2];

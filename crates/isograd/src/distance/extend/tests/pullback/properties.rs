@@ -1,4 +1,4 @@
-//! What must hold of any pullback.
+//! Properties of any pullback.
 
 use super::*;
 use crate::vector::{add, scale};
