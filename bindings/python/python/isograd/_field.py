@@ -71,7 +71,8 @@ def sdf_grid(
     """Exact signed distance of a mesh at every cell center of a grid, in the type of the vertices.
 
     Args:
-        mesh: any triangles: they need not share vertices, may intersect, may be wound either way, and may be open.
+        mesh: any triangles: they need not share vertices, may intersect, and may be open. A body
+            may be wound either way, but all its triangles the same way.
         grid: the grid, such as ``Grid.fit(mesh.vertices, outliers="keep")``.
         band: distance from the surface up to which ``sdf`` is computed, in the unit of the vertices; elsewhere it is this
             distance with the right sign. By default it is computed at every cell.

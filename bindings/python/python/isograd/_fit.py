@@ -12,9 +12,9 @@ import numpy as np
 from . import _core
 from ._arrays import floats
 from ._grid import Grid, as_grid
-from ._mesh import Mesh
+from ._mesh import Mesh, as_mesh
 from ._numbers import number, whole
-from ._options import Options, length
+from ._options import Options, length, resolve
 from ._settings import check_backend, check_pure, encode, warn_note
 from ._shapes import Shape
 
@@ -72,15 +72,16 @@ def fit(
     """Fits the parameters of ``shape``, or each of ``points``, so that the field matches ``target``, in double precision.
 
     Args:
-        target: a field ``(nx, ny, nz)`` on ``grid``, a closed :class:`Mesh`, or a cloud ``(N, 3)``.
+        target: a field ``(nx, ny, nz)`` on ``grid``, a closed :class:`Mesh` (or other object with ``vertices`` and ``faces``),
+            or a cloud ``(N, 3)``.
         grid: where the fields are compared; it must have room for start and target.
         kind: kind of the target array, where its shape is ambiguous.
-        only: names of the fitted parameters; by default all but time and whole numbers.
-        samples: number of samples of the shape.
+        only: of a shape: names of the fitted parameters; by default all but time and whole numbers.
+        samples: of a shape: number of its samples.
         seed: of the samples, and of the random start.
-        resample: number of epochs after which new samples are drawn.
-        random_start: each initial value is multiplied or divided by up to ``1 + random_start``.
-        smoothness: weight of the smoothness of the displacement of points; 0 for none.
+        resample: of a shape: number of epochs after which new samples are drawn.
+        random_start: of a shape: each initial value is multiplied or divided by up to ``1 + random_start``.
+        smoothness: of points: weight of the smoothness of their displacement; 0 for none.
         rate: length of the first steps, relative to the parameters, or in cells for points.
         tolerance: mean difference of φ, in cells, at which the fit ends.
         band: compare up to this distance from the target's surface, in the unit of the points; ``"auto"`` for 8 cells,
@@ -98,7 +99,11 @@ def fit(
         raise TypeError(f"shape is a {type(shape).__name__}; give an isograd.Shape")
     if optimizer not in ("lbfgs", "adam"):
         raise ValueError(f"optimizer is {optimizer!r}; give 'lbfgs' or 'adam'")
-    check_pure(options or Options())
+    for name, value in (("only", only), ("resample", resample), ("random_start", random_start)):
+        if points is not None and value is not None:
+            raise ValueError(f"{name} is for a shape, not for points; leave it out")
+    options = resolve(options, {})
+    check_pure(options)
     target_kind, arrays = _target(target, grid, kind)
     how = {
         "settings": json.loads(encode(grid, options, check_backend(backend))),
@@ -130,9 +135,9 @@ def fit(
 
 def _target(target: object, grid: Grid, kind: str | None) -> tuple[str, list[np.ndarray]]:
     as_grid(grid)
-    if isinstance(target, Mesh):
-        vertices = floats(target.vertices, "vertices", (None, 3), np.float64)
-        return "mesh", [vertices, target.faces]
+    if hasattr(target, "faces"):
+        mesh = as_mesh(target)
+        return "mesh", [floats(mesh.vertices, "vertices", (None, 3), np.float64), mesh.faces]
     if kind is None:
         kind = "sdf" if np.ndim(target) == 3 else "cloud"  # type: ignore[arg-type]
     if kind not in ("sdf", "cloud"):

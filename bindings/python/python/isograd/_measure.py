@@ -53,6 +53,7 @@ def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
     """Enclosed volume by the divergence theorem, positive for faces that are counter-clockwise seen from outside. For an
     open mesh that of the cone from the center of its bounding box, and not meaningful."""
+    check_faces(vertices, faces)
     if len(faces) == 0:
         return 0.0
     is_used = np.zeros(len(vertices), dtype=bool)

@@ -184,10 +184,12 @@ def query_pullback(
     return vertices_bar, points_bar
 
 
-def as_mesh(mesh: Mesh | tuple[ArrayLike, ArrayLike]) -> Mesh:
-    """A mesh from a mesh, or from a pair of vertices and faces."""
+def as_mesh(mesh: object) -> Mesh:
+    """A mesh from a mesh, from one of trimesh or another object with vertices and faces, or from a pair of these."""
     if isinstance(mesh, Mesh):
         return mesh
     if isinstance(mesh, tuple) and len(mesh) == 2:
-        return Mesh(*mesh)  # type: ignore[arg-type]
-    raise TypeError(f"mesh is a {type(mesh).__name__}; give an isograd.Mesh or (vertices, faces)")
+        return Mesh(*mesh)
+    if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
+        return Mesh(mesh.vertices, mesh.faces)
+    raise TypeError(f"mesh is a {type(mesh).__name__}; give an isograd.Mesh, a trimesh.Trimesh or (vertices, faces)")

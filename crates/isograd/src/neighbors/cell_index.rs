@@ -3,7 +3,8 @@
 use std::cmp::Ordering;
 use std::ops::Range;
 
-use crate::{Real, parallel};
+use crate::Real;
+use crate::parallel::{self, CHUNK};
 
 /// Most points in one cell.
 pub(super) const CELL: usize = 16;
@@ -212,6 +213,19 @@ impl<T: Real> CellIndex<T> {
             let point = |position: &u32| self.point(*position as usize);
             out[cell.positions()].sort_by(|a, b| compare_points(point(a), point(b)));
         });
+    }
+
+    /// Number of points equal to another one, the first one in each place not counted. Equal points that are not close in the
+    /// sorted order are missed.
+    pub(crate) fn duplicates(&self) -> usize {
+        let in_chunk = |chunk: usize| {
+            let end = self.len().min((chunk + 1) * CHUNK);
+            let mut points: Vec<[T; 3]> = (chunk * CHUNK..end).map(|p| self.point(p)).collect();
+            points.sort_unstable_by(|&a, &b| compare_points(a, b));
+            points.windows(2).filter(|pair| pair[0] == pair[1]).count()
+        };
+        let counts = parallel::map(self.len().div_ceil(CHUNK), in_chunk);
+        counts.into_iter().sum()
     }
 
     /// Number of points.

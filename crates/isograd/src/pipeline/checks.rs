@@ -20,6 +20,8 @@ const SPARSE_CELLS: f64 = 1.25;
 const THIN_DEPTH: f64 = 2.0;
 /// Distance between a sample and the surface beyond which they are far from each other, in cells of φ.
 const FAR: f64 = 2.0;
+/// Share of the samples in the same place as others from which on they are named.
+const MANY_COPIES: f64 = 0.1;
 /// Share of the area of the largest piece below which another one is a fragment.
 const SMALL_PIECE: f64 = 0.01;
 
@@ -139,6 +141,9 @@ impl Report {
         }
         warnings.extend(guarded(self.guarded, points.len()));
         warnings.extend(stray(neighborhoods));
+        if !warnings.is_empty() {
+            warnings.extend(duplicates(neighborhoods));
+        }
     }
 }
 
@@ -177,6 +182,13 @@ fn sparse(sample_spacing: f64, spacing: f64) -> Option<Warning> {
         sample_spacing,
         spacing,
     })
+}
+
+/// Samples in the same place as others.
+fn duplicates<T: Real>(neighborhoods: &Neighborhoods<T>) -> Option<Warning> {
+    let samples = neighborhoods.index.duplicates();
+    let share = share(samples, neighborhoods.index.len());
+    (share > MANY_COPIES).then_some(Warning::Duplicates { samples })
 }
 
 /// Signs that are little more than a guess.

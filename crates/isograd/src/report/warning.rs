@@ -30,6 +30,11 @@ pub enum Warning {
         /// Share of the area of the surface that they are taken to stand for, from 0 to 1.
         share: f64,
     },
+    /// Samples are in the same place as others, in a result that has other warnings, too.
+    Duplicates {
+        /// Number of such samples, the first one in each place not counted; at least.
+        samples: usize,
+    },
     /// Parts of the body are thinner than three cells.
     Thin {
         /// Share of the samples that lie on such parts, from 0 to 1.
@@ -97,8 +102,9 @@ pub enum Warning {
 
 impl Warning {
     /// Codes of all warnings.
-    pub const CODES: [&str; 13] = [
+    pub const CODES: [&str; 14] = [
         "stray",
+        "duplicates",
         "missed",
         "open",
         "inside-out",
@@ -118,6 +124,7 @@ impl Warning {
         match self {
             Self::Outliers { .. } => "outliers",
             Self::Stray { .. } => "stray",
+            Self::Duplicates { .. } => "duplicates",
             Self::Thin { .. } => "thin",
             Self::Sparse { .. } => "sparse",
             Self::Open { .. } => "open",
@@ -150,6 +157,9 @@ impl Warning {
             }
             Self::Stray { .. } => {
                 "the cloud without them: clean(points, statistical=(16, 2)) (isograd clean --statistical 16,2)"
+            }
+            Self::Duplicates { .. } => {
+                "the cloud without them: clean(points, duplicates=0) (isograd clean --duplicates 0)"
             }
             Self::Thin { .. } if level != Level::Thin => {
                 "level=\"thin\" (--level thin), which keeps them whole, or smaller cells of the surface (surface, --surface)"
@@ -206,6 +216,10 @@ impl fmt::Display for Warning {
                 f,
                 "{samples} samples lie apart from the surface and from one another; they stand for {} of its area",
                 percent(*share)
+            ),
+            Self::Duplicates { samples } => write!(
+                f,
+                "{samples} samples are in the same place as others: neighborhoods hold copies instead of neighbors"
             ),
             Self::Thin { share } => write!(
                 f,
@@ -280,7 +294,7 @@ fn doubtful_signs(doubt: &Doubt, largest: Option<&Region>) -> String {
     if let Some(region) = largest {
         let [x, y, z] = region.center();
         text += &format!(
-            "; the largest region has {} samples round ({x:.4}, {y:.4}, {z:.4})",
+            "; the largest region has {} samples around ({x:.4}, {y:.4}, {z:.4})",
             region.samples
         );
     }
@@ -335,6 +349,7 @@ mod tests {
                 samples: 7,
                 share: 0.1,
             },
+            Warning::Duplicates { samples: 9 },
             Warning::Missed {
                 share: 0.1,
                 far: 0.0,

@@ -132,6 +132,18 @@ fn a_plate_much_thinner_than_a_cell_is_missed() {
 }
 
 #[test]
+fn copies_of_samples_are_named_where_they_do_harm() {
+    let once = sphere(3000, -1.0, [0.0; 3], 1.0);
+    let copies: Vec<[f64; 3]> = (0..4).flat_map(|_| once.clone()).collect();
+    let spoilt = report(copies.clone(), 32);
+    let named = |warning: &Warning| matches!(warning, Warning::Duplicates { samples: 9000 });
+    assert!(spoilt.warnings.iter().any(named), "{spoilt:?}");
+    let kept = clean::duplicates(&copies, 0.0).expect("valid");
+    let kept = kept.into_iter().map(|i| copies[i as usize]).collect();
+    assert_eq!(report(kept, 32).warnings, []);
+}
+
+#[test]
 fn a_bowl_is_called_open() {
     for lowest in [0.0, -0.8] {
         let report = report(sphere(12_000, lowest, [0.0; 3], 1.0), 48);
