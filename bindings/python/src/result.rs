@@ -11,7 +11,7 @@ use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{self, Either, Number};
+use crate::arrays::{self, Either, Number, each};
 use crate::backend::Failure;
 use crate::background;
 use crate::errors::{file, value};
@@ -42,16 +42,6 @@ pub struct Extended<T> {
     attribute: isograd::Attribute<T>,
     extension: extend::Extension<T>,
     residual: extend::Residual<T>,
-}
-
-/// Expands an expression for both number types.
-macro_rules! each {
-    ($of:expr, $this:ident => $body:expr) => {
-        match $of {
-            Either::F32($this) => $body,
-            Either::F64($this) => $body,
-        }
-    };
 }
 
 #[pymethods]
