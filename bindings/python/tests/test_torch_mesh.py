@@ -127,6 +127,16 @@ def test_a_batch_is_the_stack_of_its_clouds(name, given):
     assert torch.equal(batch.grad, alone.grad) and batch.grad.any()
 
 
+@pytest.mark.parametrize("name", CALLS)
+def test_the_order_of_the_memory_does_not_matter(name):
+    gradients = []
+    for points in (POINTS, POINTS.t().contiguous().t()):
+        points = leaf(points)
+        sum(part.square().sum() for part in CALLS[name](points)).backward()
+        gradients.append(points.grad)
+    assert not points.is_contiguous() and torch.equal(*gradients)
+
+
 def test_a_batch_has_values_queries_and_normals_of_its_own():
     values, queries, normals = torch.stack([VALUES] * 3), torch.stack([QUERIES] * 3), torch.stack([NORMALS] * 3)
     values[1] *= 2

@@ -255,7 +255,7 @@ def _operator(name: str, outputs: Callable[..., tuple[Tensor, ...]], count: int,
         return found
 
     def empty_bars(points: Tensor, other: Any, given: Any, *_others: Any) -> list[Tensor]:
-        return [torch.empty_like(x) for x in (other, points, given) if x is not None]
+        return [x.new_empty(x.shape) for x in (other, points, given) if x is not None]
 
     def save(ctx: Any, inputs: tuple[Any, ...], output: tuple[Tensor, ...]) -> None:
         points, other, given, *ctx.how = inputs
