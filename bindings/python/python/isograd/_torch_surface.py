@@ -132,6 +132,7 @@ def _outputs(points: Tensor, values: Tensor, settings: str, count: int) -> tuple
     )
 
 
+# Operators say Optional and not `| None`: PyTorch reads their annotations, in every version the former.
 @torch.library.custom_op("isograd::surface", mutates_args=(), device_types=DEVICES)
 def _surface(
     points: Tensor,
