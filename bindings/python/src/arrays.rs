@@ -33,6 +33,34 @@ pub enum Either<S, D> {
     F64(D),
 }
 
+/// Expands an expression, of any type, for both cases of [`Either`].
+macro_rules! each {
+    ($of:expr, $this:ident => $body:expr) => {
+        match $of {
+            $crate::arrays::Either::F32($this) => $body,
+            $crate::arrays::Either::F64($this) => $body,
+        }
+    };
+}
+pub(crate) use each;
+
+/// Expands an expression with `$number` as the number type of an array. Errors are returned from the function around it.
+macro_rules! by_dtype {
+    ($array:expr, $name:literal, $number:ident => $body:expr) => {
+        match $crate::arrays::dtype($array, $name)? {
+            $crate::arrays::Dtype::F32 => {
+                type $number = f32;
+                $body
+            }
+            $crate::arrays::Dtype::F64 => {
+                type $number = f64;
+                $body
+            }
+        }
+    };
+}
+pub(crate) use by_dtype;
+
 /// The number type of an array.
 ///
 /// # Errors

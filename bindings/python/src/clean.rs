@@ -3,7 +3,7 @@
 use isograd::clean::{Options, Sparse, Statistical, clean};
 use pyo3::prelude::*;
 
-use crate::arrays::{self, Dtype, Number};
+use crate::arrays::{self, by_dtype};
 use crate::background;
 use crate::errors::value;
 
@@ -37,16 +37,11 @@ pub fn clean_points<'py>(points: &Bound<'py, PyAny>, steps: Steps) -> PyResult<C
         voxel: steps.voxel,
         poisson_disk: steps.poisson_disk,
     };
-    match arrays::dtype(points, "points")? {
-        Dtype::F32 => run::<f32>(points, options),
-        Dtype::F64 => run::<f64>(points, options),
-    }
-}
-
-fn run<'py, T: Number>(points: &Bound<'py, PyAny>, options: Options) -> PyResult<Cleaned<'py>> {
     let py = points.py();
-    let points = arrays::vectors::<T>(points, "points")?;
-    let cleaned = background::run(py, move |_| clean(&points, &options))?;
+    let cleaned = by_dtype!(points, "points", T => {
+        let points = arrays::vectors::<T>(points, "points")?;
+        background::run(py, move |_| clean(&points, &options))?
+    });
     let cleaned = cleaned.map_err(value)?;
     let count = cleaned.kept.len();
     Ok((arrays::shaped(py, cleaned.kept, [count])?, cleaned.removed))

@@ -3,12 +3,13 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use isograd::{Field, Grid};
+use isograd::Field;
 use isograd_io::{Attributes, Columns, Dtype as Stored, Limits, ReadOptions, parse_size};
 use pyo3::prelude::*;
 
-use crate::arrays::{self, Dtype, Number};
+use crate::arrays::{self, Number, by_dtype};
 use crate::errors::{file, value};
+use crate::grid::grid;
 use crate::plan::{AttributeArray, cloud};
 
 /// Points, normals, attributes by name, and faces of a file.
@@ -113,22 +114,12 @@ pub fn write_points(
     normals: Option<&Bound<'_, PyAny>>,
     attributes: Vec<AttributeArray<'_>>,
 ) -> PyResult<()> {
-    match arrays::dtype(points, "points")? {
-        Dtype::F32 => write_cloud::<f32>(path, points, normals, attributes),
-        Dtype::F64 => write_cloud::<f64>(path, points, normals, attributes),
-    }
-}
-
-fn write_cloud<T: Number>(
-    path: PathBuf,
-    points: &Bound<'_, PyAny>,
-    normals: Option<&Bound<'_, PyAny>>,
-    attributes: Vec<AttributeArray<'_>>,
-) -> PyResult<()> {
     let py = points.py();
-    let cloud = cloud::<T>(points, normals, attributes)?;
-    py.detach(|| isograd_io::write_cloud(&path, &cloud))
-        .map_err(file)
+    let written = by_dtype!(points, "points", T => {
+        let cloud = cloud::<T>(points, normals, attributes)?;
+        py.detach(|| isograd_io::write_cloud(&path, &cloud))
+    });
+    written.map_err(file)
 }
 
 /// Writes a mesh.
@@ -138,20 +129,12 @@ pub fn write_mesh(
     vertices: &Bound<'_, PyAny>,
     faces: &Bound<'_, PyAny>,
 ) -> PyResult<()> {
-    fn write<T: Number>(
-        path: PathBuf,
-        vertices: &Bound<'_, PyAny>,
-        faces: &Bound<'_, PyAny>,
-    ) -> PyResult<()> {
+    let py = vertices.py();
+    let written = by_dtype!(vertices, "vertices", T => {
         let mesh = arrays::mesh::<T>(vertices, faces)?;
-        let py = vertices.py();
         py.detach(|| isograd_io::write_mesh(&path, &mesh))
-            .map_err(file)
-    }
-    match arrays::dtype(vertices, "vertices")? {
-        Dtype::F32 => write::<f32>(path, vertices, faces),
-        Dtype::F64 => write::<f64>(path, vertices, faces),
-    }
+    });
+    written.map_err(file)
 }
 
 /// Writes a file of these bytes.
@@ -170,21 +153,11 @@ pub fn write_field(
     shape: [usize; 3],
     values: &Bound<'_, PyAny>,
 ) -> PyResult<()> {
-    fn write<T: Number>(
-        path: PathBuf,
-        grid: &Grid<f64>,
-        values: &Bound<'_, PyAny>,
-    ) -> PyResult<()> {
-        let lower = grid.lower().map(T::of);
-        let grid = Grid::new(lower, T::of(grid.spacing()), grid.shape()).map_err(value)?;
-        let field = Field::new(grid, arrays::values::<T>(values, "sdf")?).map_err(value)?;
-        let py = values.py();
+    let py = values.py();
+    let written = by_dtype!(values, "sdf", T => {
+        let grid = grid::<T>((lower, spacing, shape))?;
+        let field = Field::new(grid, arrays::values(values, "sdf")?).map_err(value)?;
         py.detach(|| isograd_io::write_field(&path, &field))
-            .map_err(file)
-    }
-    let grid = Grid::new(lower, spacing, shape).map_err(value)?;
-    match arrays::dtype(values, "sdf")? {
-        Dtype::F32 => write::<f32>(path, &grid, values),
-        Dtype::F64 => write::<f64>(path, &grid, values),
-    }
+    });
+    written.map_err(file)
 }

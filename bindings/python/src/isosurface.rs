@@ -6,7 +6,7 @@ use isograd::isosurface::{Error, LevelCotangent, Scratch, forward, pullback};
 use isograd::{Field, Mesh};
 use pyo3::prelude::*;
 
-use crate::arrays::{self, Dtype, Either, Number};
+use crate::arrays::{self, Dtype, Either, Number, each};
 use crate::background;
 use crate::errors::value;
 use crate::grid::{Parts, grid};
@@ -59,32 +59,20 @@ fn extract<T: Number>(
 impl Isosurface {
     /// Vertices and faces.
     fn mesh<'py>(&self, py: Python<'py>) -> [Bound<'py, PyAny>; 2] {
-        fn arrays_of<'py, T: Number>(py: Python<'py>, mesh: &Mesh<T>) -> [Bound<'py, PyAny>; 2] {
-            [
-                arrays::from_vectors(py, mesh.vertices()),
-                arrays::from_vectors(py, mesh.faces()),
-            ]
-        }
-        match &self.0 {
-            Either::F32(of) => arrays_of(py, &of.mesh),
-            Either::F64(of) => arrays_of(py, &of.mesh),
-        }
+        each!(&self.0, of => [
+            arrays::from_vectors(py, of.mesh.vertices()),
+            arrays::from_vectors(py, of.mesh.faces()),
+        ])
     }
 
     /// Whether the surface reaches the low and the high wall of each axis.
     fn walls(&self) -> [[bool; 2]; 3] {
-        match &self.0 {
-            Either::F32(of) => of.walls,
-            Either::F64(of) => of.walls,
-        }
+        each!(&self.0, of => of.walls)
     }
 
     /// Cotangents of the inputs from those of the vertices `(V, 3)`.
     fn pullback<'py>(&self, vertices_bar: &Bound<'py, PyAny>) -> PyResult<Cotangents<'py>> {
-        match &self.0 {
-            Either::F32(of) => pull_back(of, vertices_bar),
-            Either::F64(of) => pull_back(of, vertices_bar),
-        }
+        each!(&self.0, of => pull_back(of, vertices_bar))
     }
 }
 

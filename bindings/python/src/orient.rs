@@ -3,7 +3,7 @@
 use isograd::{JsonReport, Options, Orienter};
 use pyo3::prelude::*;
 
-use crate::arrays::{self, Dtype, Number};
+use crate::arrays::{self, by_dtype};
 use crate::background;
 use crate::errors::value;
 use crate::plan::{cloud, with_sensors};
@@ -21,31 +21,21 @@ pub fn orient<'py>(
     sensors: Option<&Bound<'py, PyAny>>,
     options: &str,
 ) -> PyResult<Oriented<'py>> {
-    let options: Options = serde_json::from_str(options).map_err(value)?;
-    match arrays::dtype(points, "points")? {
-        Dtype::F32 => run::<f32>(&options, points, normals, sensors),
-        Dtype::F64 => run::<f64>(&options, points, normals, sensors),
-    }
-}
-
-fn run<'py, T: Number>(
-    options: &Options,
-    points: &Bound<'py, PyAny>,
-    normals: Option<&Bound<'py, PyAny>>,
-    sensors: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Oriented<'py>> {
     let py = points.py();
-    let cloud = with_sensors(cloud::<T>(points, normals, Vec::new())?, sensors)?;
-    let mut plan = Orienter::<T>::new(options.radius, options.orient);
-    let result = background::run(py, move |_| {
-        plan.orient(&cloud).map_err(|e| e.to_string())?;
-        Ok::<_, String>(plan.into_parts())
-    })?;
-    let (orientation, report) = result.map_err(value)?;
-    let count = orientation.confidence.len();
-    Ok((
-        arrays::from_vectors(py, &orientation.normals),
-        arrays::shaped(py, orientation.confidence, count)?,
-        serde_json::to_string(&JsonReport::samples(&report)).map_err(value)?,
-    ))
+    let options: Options = serde_json::from_str(options).map_err(value)?;
+    by_dtype!(points, "points", T => {
+        let cloud = with_sensors(cloud::<T>(points, normals, Vec::new())?, sensors)?;
+        let mut plan = Orienter::<T>::new(options.radius, options.orient);
+        let result = background::run(py, move |_| {
+            plan.orient(&cloud).map_err(|e| e.to_string())?;
+            Ok::<_, String>(plan.into_parts())
+        })?;
+        let (orientation, report) = result.map_err(value)?;
+        let count = orientation.confidence.len();
+        Ok((
+            arrays::from_vectors(py, &orientation.normals),
+            arrays::shaped(py, orientation.confidence, count)?,
+            serde_json::to_string(&JsonReport::samples(&report)).map_err(value)?,
+        ))
+    })
 }

@@ -1,9 +1,9 @@
 //! Exact distances to a mesh, behind `isograd.signed_distance` and `isograd.query`.
 
-use isograd::distance::{Hit, Query};
+use isograd::distance::{Error, Hit, Query};
 use pyo3::prelude::*;
 
-use crate::arrays::{self, Dtype, Number};
+use crate::arrays::{self, by_dtype};
 use crate::background;
 use crate::errors::value;
 
@@ -17,37 +17,28 @@ pub fn query_mesh<'py>(
     faces: &Bound<'py, PyAny>,
     queries: &Bound<'py, PyAny>,
 ) -> PyResult<Hits<'py>> {
-    match arrays::dtype(vertices, "vertices")? {
-        Dtype::F32 => query::<f32>(vertices, faces, queries),
-        Dtype::F64 => query::<f64>(vertices, faces, queries),
-    }
-}
-
-fn query<'py, T: Number>(
-    vertices: &Bound<'py, PyAny>,
-    faces: &Bound<'py, PyAny>,
-    queries: &Bound<'py, PyAny>,
-) -> PyResult<Hits<'py>> {
     let py = vertices.py();
-    let mesh = arrays::mesh::<T>(vertices, faces)?;
-    let points = arrays::vectors::<T>(queries, "queries")?;
-    let hits = background::run(py, move |_| {
-        Query::new(mesh).map(|query| query.query(&points, None))
-    })?;
-    let hits: Vec<Hit<T>> = hits.map_err(value)?;
-    let vectors = |of: fn(&Hit<T>) -> [T; 3]| {
-        let all: Vec<[T; 3]> = hits.iter().map(of).collect();
-        arrays::from_vectors(py, &all)
-    };
-    let distance: Vec<T> = hits.iter().map(|hit| hit.distance).collect();
-    let face: Vec<u32> = hits.iter().map(|hit| hit.triangle).collect();
-    Ok([
-        arrays::shaped(py, distance, [hits.len()])?,
-        vectors(|hit| hit.gradient),
-        vectors(|hit| hit.point),
-        arrays::shaped(py, face, [hits.len()])?,
-        vectors(|hit| hit.barycentric),
-    ])
+    by_dtype!(vertices, "vertices", T => {
+        let mesh = arrays::mesh::<T>(vertices, faces)?;
+        let points = arrays::vectors::<T>(queries, "queries")?;
+        let hits = background::run(py, move |_| {
+            Query::new(mesh).map(|query| query.query(&points, None))
+        })?;
+        let hits: Vec<Hit<T>> = hits.map_err(value)?;
+        let vectors = |of: fn(&Hit<T>) -> [T; 3]| {
+            let all: Vec<[T; 3]> = hits.iter().map(of).collect();
+            arrays::from_vectors(py, &all)
+        };
+        let distance: Vec<T> = hits.iter().map(|hit| hit.distance).collect();
+        let face: Vec<u32> = hits.iter().map(|hit| hit.triangle).collect();
+        Ok([
+            arrays::shaped(py, distance, [hits.len()])?,
+            vectors(|hit| hit.gradient),
+            vectors(|hit| hit.point),
+            arrays::shaped(py, face, [hits.len()])?,
+            vectors(|hit| hit.barycentric),
+        ])
+    })
 }
 
 /// Cotangents of vertices and queries from those of the distances.
@@ -58,39 +49,19 @@ pub fn query_mesh_pullback<'py>(
     queries: &Bound<'py, PyAny>,
     distance_bar: &Bound<'py, PyAny>,
 ) -> PyResult<[Bound<'py, PyAny>; 2]> {
-    match arrays::dtype(vertices, "vertices")? {
-        Dtype::F32 => pullback::<f32>(vertices, faces, queries, distance_bar),
-        Dtype::F64 => pullback::<f64>(vertices, faces, queries, distance_bar),
-    }
-}
-
-fn pullback<'py, T: Number>(
-    vertices: &Bound<'py, PyAny>,
-    faces: &Bound<'py, PyAny>,
-    queries: &Bound<'py, PyAny>,
-    distance_bar: &Bound<'py, PyAny>,
-) -> PyResult<[Bound<'py, PyAny>; 2]> {
     let py = vertices.py();
-    let mesh = arrays::mesh::<T>(vertices, faces)?;
-    let points = arrays::vectors::<T>(queries, "queries")?;
-    let bar = arrays::values::<T>(distance_bar, "distance_bar")?;
-    let result = background::run(py, move |_| {
-        let query = Query::new(mesh)?;
-        let hits = query.query(&points, None);
-        let (mut points_bar, mut vertices_bar) = (Vec::new(), Vec::new());
-        query.pullback(
-            &points,
-            &hits,
-            &bar,
-            None,
-            &mut points_bar,
-            &mut vertices_bar,
-        )?;
-        Ok::<_, isograd::distance::Error>((vertices_bar, points_bar))
-    })?;
-    let (vertices_bar, points_bar) = result.map_err(value)?;
-    Ok([
-        arrays::from_vectors(py, &vertices_bar),
-        arrays::from_vectors(py, &points_bar),
-    ])
+    by_dtype!(vertices, "vertices", T => {
+        let mesh = arrays::mesh::<T>(vertices, faces)?;
+        let points = arrays::vectors::<T>(queries, "queries")?;
+        let bar = arrays::values::<T>(distance_bar, "distance_bar")?;
+        let result = background::run(py, move |_| {
+            let query = Query::new(mesh)?;
+            let hits = query.query(&points, None);
+            let (mut points_bar, mut vertices_bar) = (Vec::new(), Vec::new());
+            query.pullback(&points, &hits, &bar, None, &mut points_bar, &mut vertices_bar)?;
+            Ok::<_, Error>([vertices_bar, points_bar])
+        })?;
+        let bars = result.map_err(value)?;
+        Ok(bars.map(|bar| arrays::from_vectors(py, &bar)))
+    })
 }

@@ -1,5 +1,6 @@
 //! A reconstruction, its arrays and its pullback.
 
+use std::any::Any;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -11,7 +12,7 @@ use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{self, Either, Number};
+use crate::arrays::{self, Either, Number, each};
 use crate::backend::Failure;
 use crate::background;
 use crate::errors::{file, value};
@@ -42,16 +43,6 @@ pub struct Extended<T> {
     attribute: isograd::Attribute<T>,
     extension: extend::Extension<T>,
     residual: extend::Residual<T>,
-}
-
-/// Expands an expression for both number types.
-macro_rules! each {
-    ($of:expr, $this:ident => $body:expr) => {
-        match $of {
-            Either::F32($this) => $body,
-            Either::F64($this) => $body,
-        }
-    };
 }
 
 #[pymethods]
@@ -138,10 +129,7 @@ impl ReconstructionArrays {
         iso_value: f64,
         extensions: Vec<ExtensionBar<'py>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        match &self.0 {
-            Either::F32(this) => pullback(py, this, bars, iso_value as f32, extensions),
-            Either::F64(this) => pullback(py, this, bars, iso_value, extensions),
-        }
+        each!(&self.0, this => pullback(py, this, bars, iso_value, extensions))
     }
 
     /// The attribute `name` of the cloud up to the distance `band` from the surface, or, with `inside`, everywhere inside
@@ -256,29 +244,6 @@ type ExtensionBar<'py> = (
     Option<Bound<'py, PyAny>>,
 );
 
-/// A number type of extensions.
-trait ExtensionType: Number {
-    fn of_type(extension: &Extension) -> Option<Arc<Extended<Self>>>;
-}
-
-impl ExtensionType for f32 {
-    fn of_type(extension: &Extension) -> Option<Arc<Extended<Self>>> {
-        match &extension.0 {
-            Either::F32(of) => Some(of.clone()),
-            Either::F64(_) => None,
-        }
-    }
-}
-
-impl ExtensionType for f64 {
-    fn of_type(extension: &Extension) -> Option<Arc<Extended<Self>>> {
-        match &extension.0 {
-            Either::F64(of) => Some(of.clone()),
-            Either::F32(_) => None,
-        }
-    }
-}
-
 /// An extension with the cotangents of its values at vertices and cells.
 type ExtendedBar<T> = (Arc<Extended<T>>, Option<Vec<T>>, Option<Vec<T>>);
 
@@ -293,11 +258,11 @@ struct Bars<T> {
     extensions: Vec<ExtendedBar<T>>,
 }
 
-fn pullback<'py, T: ExtensionType>(
+fn pullback<'py, T: Number>(
     py: Python<'py>,
     this: &Arc<Reconstruction<T>>,
     bars: &Bound<'py, PyDict>,
-    iso_value: T,
+    iso_value: f64,
     extensions: Vec<ExtensionBar<'py>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let values = |name: &str| {
@@ -310,15 +275,15 @@ fn pullback<'py, T: ExtensionType>(
     };
     let mut extended_bars = Vec::with_capacity(extensions.len());
     for (extension, at_vertices, in_band) in extensions {
-        let of = T::of_type(extension.get());
-        let of = of.ok_or_else(|| {
+        let of = each!(&extension.get().0, of => (of as &dyn Any).downcast_ref());
+        let of: &Arc<Extended<T>> = of.ok_or_else(|| {
             value("an extension is of another number type than the reconstruction")
         })?;
         let numbers = |a: Option<Bound<'py, PyAny>>| {
             a.map(|a| arrays::values::<T>(&a, "an extension's cotangent"))
                 .transpose()
         };
-        extended_bars.push((of, numbers(at_vertices)?, numbers(in_band)?));
+        extended_bars.push((of.clone(), numbers(at_vertices)?, numbers(in_band)?));
     }
     let bars = Bars {
         sdf: values("sdf")?,
@@ -326,7 +291,7 @@ fn pullback<'py, T: ExtensionType>(
         areas: values("areas")?,
         vertices: vectors("vertices")?,
         normals: vectors("normals")?,
-        iso_value,
+        iso_value: T::of(iso_value),
         extensions: extended_bars,
     };
     let this = this.clone();

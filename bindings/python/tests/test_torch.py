@@ -8,7 +8,7 @@ from isograd import Grid, Options, _settings
 
 torch = pytest.importorskip("torch", reason="PyTorch is not here: its tests are left out", exc_type=ImportError)
 
-from isograd.torch import _pullback, _signed_distance, signed_distance  # noqa: E402
+from isograd.torch import _signed_distance, signed_distance  # noqa: E402
 
 # "auto" takes a radius from the points and holds it fixed, which differences don't.
 SMOOTH = Options(radius=0.5, checks=False)
@@ -79,12 +79,13 @@ def test_opcheck_passes_for_both_operators():
     points = sphere()
     normals = torch.nn.functional.normalize(points, dim=1).requires_grad_()
     for given, options in ((None, SMOOTH), (normals, GIVEN)):
-        settings = _settings.encode(GRID, options)
-        torch.library.opcheck(_signed_distance, (points.clone().requires_grad_(), given, settings))
+        how = (_settings.encode(GRID, options), 0.0, False)
+        torch.library.opcheck(_signed_distance, (points.clone().requires_grad_(), None, given, *how, []))
         given = None if given is None else given.detach()
-        saved = _signed_distance(points, given, settings)
-        # The operators' order: φ, closest faces, normals.
-        torch.library.opcheck(_pullback, (points, given, *saved, weights(), settings))
+        # φ, closest faces, normals.
+        saved = _signed_distance(points, None, given, *how, [])
+        pullback = torch.ops.isograd.signed_distance_pullback
+        torch.library.opcheck(pullback, (points, None, given, *saved, weights(), *how))
 
 
 def test_a_compiled_loss_has_the_same_gradient():

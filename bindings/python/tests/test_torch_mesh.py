@@ -1,5 +1,7 @@
 """`query`, `mesh`, `extend`, `orient` and batches of `isograd.torch`: results and gradients are those of NumPy's functions."""
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -125,6 +127,27 @@ def test_a_batch_is_the_stack_of_its_clouds(name, given):
     for results in (found, expected):
         sum(part.square().sum() for part in results).backward()
     assert torch.equal(batch.grad, alone.grad) and batch.grad.any()
+
+
+@pytest.mark.parametrize("name", ["signed_distance", "query", "mesh", "extend"])
+def test_a_batch_of_cotangents_is_pulled_back_one_by_one(name):
+    points = leaf(POINTS)
+    found = it.extend(points, VALUES, GRID).values if name == "extend" else CALLS[name](points)[0]
+    bars = torch.stack([torch.ones_like(found), found.detach()])
+    pull = functools.partial(torch.autograd.grad, found, points, retain_graph=True)
+    alone = torch.stack([pull(bar)[0] for bar in bars])
+    assert torch.equal(pull(bars, is_grads_batched=True)[0], alone) and alone.any()
+    assert torch.equal(torch.vmap(lambda bar: pull(bar)[0])(bars), alone)
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_the_order_of_the_memory_does_not_matter(name):
+    gradients = []
+    for points in (POINTS, POINTS.t().contiguous().t()):
+        points = leaf(points)
+        sum(part.square().sum() for part in CALLS[name](points)).backward()
+        gradients.append(points.grad)
+    assert not points.is_contiguous() and torch.equal(*gradients)
 
 
 def test_a_batch_has_values_queries_and_normals_of_its_own():

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     import pyvista
     import trimesh
     import xarray
-    from matplotlib.figure import Figure
 
     from ._files import Cloud
     from ._mesh import Mesh
@@ -45,20 +44,6 @@ def require(module: str, caller: str, package: str) -> Any:
     except (ImportError, OSError) as error:
         library = module.partition(".")[0]
         raise ImportError(f"{caller} needs {library} ({error}); `pip install {package}`") from error
-
-
-def save_mesh(mesh: Mesh, path: Path) -> None:
-    """Writes a mesh in the format that the name ends in."""
-    from ._files import write_mesh
-
-    write_mesh(path, mesh)
-
-
-def save_cloud(cloud: Cloud, path: Path) -> None:
-    """Writes a cloud in the format that the name ends in."""
-    from ._files import write_points
-
-    write_points(path, cloud.points, normals=cloud.normals, attributes=cloud.attributes)
 
 
 def save_reconstruction(result: Reconstruction, path: Path) -> None:
@@ -104,7 +89,7 @@ def _save_folder(result: Reconstruction, folder: pathlib.Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name in ("mesh.ply", "sdf.vti", "slices.png", "report.json"):
         save_reconstruction(result, folder / name)
-    save_cloud(result.cloud, folder / "points.ply")
+    result.cloud.save(folder / "points.ply")
 
 
 def _report_text(result: Reconstruction) -> str:
@@ -136,13 +121,6 @@ def plot_mesh(mesh: Mesh, *, screenshot: Path | None = None, **arguments: Any) -
 
     plotter = scene(mesh, **arguments)
     return plotter.show(screenshot=False if screenshot is None else os.fspath(screenshot))
-
-
-def plot_reconstruction(result: Reconstruction, **arguments: Any) -> Figure:
-    """:func:`isograd.viz.slices` of φ and the samples."""
-    from .viz import slices
-
-    return slices(result.sdf, result.grid, **{"points": result.cloud.points, **arguments})
 
 
 def to_trimesh(mesh: Mesh) -> trimesh.Trimesh:

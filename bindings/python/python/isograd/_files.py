@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from . import _convert, _core
+from . import _core
 from ._arrays import floats, summary
 from ._grid import Grid
 from ._mesh import Mesh, as_mesh
@@ -36,7 +36,7 @@ class Cloud(NamedTuple):
     def save(self, path: Path) -> None:
         """Writes points, normals and attributes as PLY, NPZ, XYZ, CSV, TXT or PCD, as the name ends; see
         :func:`write_points`."""
-        _convert.save_cloud(self, path)
+        write_points(path, self.points, normals=self.normals, attributes=self.attributes)
 
 
 def _names(columns: Sequence[str | int] | None) -> list[str] | None:

@@ -105,7 +105,9 @@ class Mesh:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes PLY, OBJ, STL, OFF, GLB or VTP, as the name ends; see :func:`write_mesh`."""
-        _convert.save_mesh(self, path)
+        from ._files import write_mesh
+
+        write_mesh(path, self)
 
     def plot(self, **arguments: Any) -> Any:
         """Shows the surface with PyVista: arguments of :func:`isograd.viz.scene`, and ``screenshot`` for a file.

@@ -200,7 +200,9 @@ class Reconstruction(Stored):
         Raises:
             ImportError: matplotlib is not installed.
         """
-        return _convert.plot_reconstruction(self, **arguments)
+        from .viz import slices
+
+        return slices(self.sdf, self.grid, **{"points": self.cloud.points, **arguments})
 
     def to_pyvista(self, *, cells: bool = False) -> pyvista.ImageData:
         """φ for PyVista, named ``sdf``, as in the VTI file: values at points, which are the centers of the cells, so that

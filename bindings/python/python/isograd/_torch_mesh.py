@@ -215,7 +215,14 @@ def _of_extend(points: Tensor, values: Tensor, settings: str, _sizes: Sequence[i
     return points.new_empty((*grid_shape(settings), values.shape[1])), *saved(points, settings)
 
 
-def _operator(name: str, outputs: Callable[..., tuple[Tensor, ...]], count: int, bars: int, kept: int) -> Any:
+def operator(
+    name: str,
+    outputs: Callable[..., tuple[Tensor, ...]],
+    count: int,
+    bars: int,
+    kept: int,
+    targets: tuple[str, str] | None = None,
+) -> Any:
     """A target as a differentiable operator of points, another input or ``None``, and normals or ``None``.
 
     Args:
@@ -223,10 +230,14 @@ def _operator(name: str, outputs: Callable[..., tuple[Tensor, ...]], count: int,
         count: number of results.
         bars: number of results with a derivative, the first ones.
         kept: first of the results that the pullback needs.
+        targets: that of the operator and that of its pullback, if not named like it.
     """
+    target, target_of_pullback = targets or (f"isograd_{name}", f"isograd_{name}_pullback")
     inputs = "Tensor points, Tensor? other, Tensor? given, "
     how = "str settings, float band, bool inside"
     results = ", ".join(["Tensor"] * count)
+    # No lists, of which `is_grads_batched` of `torch.autograd.grad` makes no batches: what is kept, then the cotangents.
+    saved = ", ".join(f"Tensor saved_{i}" for i in range(count - kept + bars))
 
     @torch.library.custom_op(
         f"isograd::{name}",
@@ -238,24 +249,24 @@ def _operator(name: str, outputs: Callable[..., tuple[Tensor, ...]], count: int,
         points: Tensor, other: Any, given: Any, settings: str, band: float, inside: bool, sizes: Sequence[int]
     ) -> tuple[Tensor, ...]:
         found = outputs(points, other, settings, sizes)
-        call(f"isograd_{name}", [points, other, given], found, settings, band, inside)
+        call(target, [points, other, given], found, settings, band, inside)
         return found
 
     @torch.library.custom_op(
         f"isograd::{name}_pullback",
         mutates_args=(),
         device_types=DEVICES,
-        schema=f"({inputs}Tensor[] saved, Tensor[] bars, {how}) -> Tensor[]",
+        schema=f"({inputs}{saved}, {how}) -> (Tensor, Tensor, Tensor)",
     )
-    def pullback(
-        points: Tensor, other: Any, given: Any, saved: Any, bars: Any, settings: str, band: float, inside: bool
-    ) -> list[Tensor]:
-        found = empty_bars(points, other, given)
-        call(f"isograd_{name}_pullback", [points, other, *saved, *bars, given], found, settings, band, inside)
-        return found
+    def pullback(points: Tensor, other: Any, given: Any, *rest: Any) -> tuple[Tensor, ...]:
+        *saved, settings, band, inside = rest
+        bars = empty_bars(points, other, given)
+        found = [bar for bar, x in zip(bars, (other, points, given)) if x is not None]
+        call(target_of_pullback, [points, other, *saved, given], found, settings, band, inside)
+        return bars
 
-    def empty_bars(points: Tensor, other: Any, given: Any, *_others: Any) -> list[Tensor]:
-        return [torch.empty_like(x) for x in (other, points, given) if x is not None]
+    def empty_bars(points: Tensor, other: Any, given: Any, *_rest: Any) -> tuple[Tensor, ...]:
+        return tuple(points.new_empty(0 if x is None else x.shape) for x in (other, points, given))
 
     def save(ctx: Any, inputs: tuple[Any, ...], output: tuple[Tensor, ...]) -> None:
         points, other, given, *ctx.how = inputs
@@ -265,10 +276,9 @@ def _operator(name: str, outputs: Callable[..., tuple[Tensor, ...]], count: int,
     def backward(ctx: Any, *cotangents: Tensor) -> tuple[Tensor | None, ...]:
         points, other, given, *saved = ctx.saved_tensors
         settings, band, inside, _ = ctx.how
-        wanted = [bar.contiguous() for bar in cotangents[:bars]]
-        found = pullback(points, other, given, saved, wanted, settings, band, inside)
-        other_bar = None if other is None else found.pop(0)
-        return found[0], other_bar, None if given is None else found[1], None, None, None, None
+        found = pullback(points, other, given, *saved, *cotangents[:bars], settings, band, inside)
+        other_bar, points_bar, given_bar = found
+        return points_bar, None if other is None else other_bar, None if given is None else given_bar, None, None, None, None
 
     def twice(_ctx: Any, *_bars: Any) -> None:
         raise RuntimeError(f"isograd.torch.{name} can be differentiated once, not twice")
@@ -278,12 +288,13 @@ def _operator(name: str, outputs: Callable[..., tuple[Tensor, ...]], count: int,
     forward.register_vmap(one_by_one(forward))
     pullback.register_fake(empty_bars)
     pullback.register_autograd(twice)
+    pullback.register_vmap(one_by_one(pullback))
     return forward
 
 
-_query = _operator("query", _of_query, count=7, bars=1, kept=1)
-_mesh = _operator("mesh", _of_mesh, count=6, bars=1, kept=3)
-_extend = _operator("extend", _of_extend, count=4, bars=2, kept=1)
+_query = operator("query", _of_query, count=7, bars=1, kept=1)
+_mesh = operator("mesh", _of_mesh, count=6, bars=1, kept=3)
+_extend = operator("extend", _of_extend, count=4, bars=2, kept=1)
 
 
 @torch.library.custom_op("isograd::orient", mutates_args=(), device_types=DEVICES)

@@ -132,6 +132,7 @@ def _outputs(points: Tensor, values: Tensor, settings: str, count: int) -> tuple
     )
 
 
+# Operators say Optional and not `| None`: PyTorch reads their annotations, in every version the former.
 @torch.library.custom_op("isograd::surface", mutates_args=(), device_types=DEVICES)
 def _surface(
     points: Tensor,
@@ -158,7 +159,7 @@ def _pullback(
 ) -> list[Tensor]:
     """Cotangents of places, values, points and, where they are given, normals."""
     points, places, values, *given = inputs
-    outputs = tuple(torch.empty_like(a) for a in (places, values, points, *given))
+    outputs = tuple(a.new_empty(a.shape) for a in (places, values, points, *given))
     call("isograd_surface_pullback", [points, places, values, *saved, *bars, *given], outputs, settings, band)
     return list(outputs)
 
@@ -166,7 +167,7 @@ def _pullback(
 @_pullback.register_fake
 def _(inputs: list[Tensor], saved: list[Tensor], bars: list[Tensor], settings: str, band: float) -> list[Tensor]:
     points, places, values, *given = inputs
-    return [torch.empty_like(a) for a in (places, values, points, *given)]
+    return [a.new_empty(a.shape) for a in (places, values, points, *given)]
 
 
 def _save(ctx: Any, inputs: tuple[Any, ...], output: tuple[Tensor, ...]) -> None:

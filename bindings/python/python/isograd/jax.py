@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import functools
 import json
+from collections.abc import Callable
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -76,29 +77,8 @@ def signed_distance(
         jax.errors.JaxRuntimeError: values from which no surface can be made.
     """
     plan, points, normals = prepare(points, grid, normals, options, backend)
-    return _distance(plan, points, normals)
-
-
-@functools.partial(jax.custom_vjp, nondiff_argnums=(0,))
-def _distance(plan: Plan, points: jax.Array, normals: jax.Array | None) -> jax.Array:
-    (sdf,) = call("isograd_forward", plan, plan.saved(points)[:1], points, normals)
+    sdf: jax.Array = _distance(plan, (), points, None, normals)[0]
     return sdf
-
-
-def _distance_forward(plan: Plan, points: jax.Array, normals: jax.Array | None) -> tuple[Any, ...]:
-    saved = call("isograd_forward", plan, plan.saved(points), points, normals)
-    return saved[0], (points, normals, saved)
-
-
-def _distance_pullback(plan: Plan, residuals: tuple[Any, ...], sdf_bar: jax.Array) -> tuple[Any, ...]:
-    points, normals, saved = residuals
-    bars = call(
-        "isograd_pullback", plan, like(points, normals), points, *saved, sdf_bar, normals
-    )
-    return pair(bars)
-
-
-_distance.defvjp(_distance_forward, _distance_pullback)
 
 
 def query(
@@ -132,41 +112,8 @@ def query(
     """
     plan, points, normals = prepare(points, grid, normals, options, backend, sdf=False)
     queries = floats(queries, "queries", (None, 3), points.dtype)
-    return _query(plan, points, queries, normals)
-
-
-@functools.partial(jax.custom_vjp, nondiff_argnums=(0,))
-def _query(
-    plan: Plan, points: jax.Array, queries: jax.Array, normals: jax.Array | None
-) -> jax.Array:
-    (distance,) = call("isograd_query", plan, _distances(queries), points, queries, normals)
+    distance: jax.Array = _query(plan, (), points, queries, normals)[0]
     return distance
-
-
-def _query_forward(
-    plan: Plan, points: jax.Array, queries: jax.Array, normals: jax.Array | None
-) -> tuple[Any, ...]:
-    triangle = jax.ShapeDtypeStruct(queries.shape[:1], np.uint32)
-    (vector,) = like(queries)
-    results = (*_distances(queries), vector, triangle, vector, *plan.saved(points))
-    distance, *saved = call("isograd_query", plan, results, points, queries, normals)
-    return distance, (points, queries, normals, saved)
-
-
-def _query_pullback(plan: Plan, residuals: tuple[Any, ...], distance_bar: jax.Array) -> tuple[Any, ...]:
-    points, queries, normals, saved = residuals
-    results = like(queries, points, normals)
-    arrays = (points, queries, *saved, distance_bar, normals)
-    queries_bar, *bars = call("isograd_query_pullback", plan, results, *arrays)
-    points_bar, normals_bar = pair(bars)
-    return points_bar, queries_bar, normals_bar
-
-
-def _distances(queries: jax.Array) -> tuple[jax.ShapeDtypeStruct]:
-    return (jax.ShapeDtypeStruct(queries.shape[:1], queries.dtype),)
-
-
-_query.defvjp(_query_forward, _query_pullback)
 
 
 class Mesh(NamedTuple):
@@ -216,39 +163,8 @@ def mesh(
     """
     plan, points, normals = prepare(points, grid, normals, options, backend, sdf=False)
     sizes = (size(max_vertices, "max_vertices"), size(max_faces, "max_faces"))
-    found: Any = _mesh(plan, sizes, points, normals)
-    vertices, faces, counts = found
+    vertices, faces, counts = _mesh(plan, sizes, points, None, normals)
     return Mesh(vertices, faces, counts[0], counts[1])
-
-
-@functools.partial(jax.custom_vjp, nondiff_argnums=(0, 1))
-def _mesh(
-    plan: Plan, sizes: tuple[int, int], points: jax.Array, normals: jax.Array | None
-) -> tuple[jax.Array, ...]:
-    return call("isograd_mesh", plan, _surface(points, sizes), points, normals)
-
-
-def _mesh_forward(
-    plan: Plan, sizes: tuple[int, int], points: jax.Array, normals: jax.Array | None
-) -> tuple[Any, ...]:
-    results = (*_surface(points, sizes), *plan.saved(points))
-    found = call("isograd_mesh", plan, results, points, normals)
-    return found[:3], (points, normals, found[3:])
-
-
-def _mesh_pullback(plan: Plan, sizes: tuple[int, int], residuals: tuple[Any, ...], bars: tuple[Any, ...]) -> tuple[Any, ...]:
-    points, normals, saved = residuals
-    arrays = (points, *saved, bars[0], normals)
-    return pair(call("isograd_mesh_pullback", plan, like(points, normals), *arrays))
-
-
-def _surface(points: jax.Array, sizes: tuple[int, int]) -> tuple[jax.ShapeDtypeStruct, ...]:
-    vertices = jax.ShapeDtypeStruct((sizes[0], 3), points.dtype)
-    faces = jax.ShapeDtypeStruct((sizes[1], 3), np.uint32)
-    return vertices, faces, jax.ShapeDtypeStruct((2,), np.uint32)
-
-
-_mesh.defvjp(_mesh_forward, _mesh_pullback)
 
 
 def orient(
@@ -324,35 +240,75 @@ def extend(
     if values is None:
         raise ValueError("values is None; give the values of the samples")
     values, is_scalar = sample_values(values, points)
-    found: Any = _extend(plan, points, values, normals)
-    field, sdf = found
+    field, sdf = _extend(plan, (), points, values, normals)
     return Extension(sdf, field[..., 0] if is_scalar else field)
 
 
-@functools.partial(jax.custom_vjp, nondiff_argnums=(0,))
-def _extend(
-    plan: Plan, points: jax.Array, values: jax.Array, normals: jax.Array | None
-) -> tuple[jax.Array, jax.Array]:
-    field, sdf = _extend_forward(plan, points, values, normals)[0]
-    return field, sdf
+def _of_distance(plan: Plan, _sizes: tuple[int, ...], points: jax.Array, _none: None) -> tuple[jax.ShapeDtypeStruct, ...]:
+    return plan.saved(points)
 
 
-def _extend_forward(
-    plan: Plan, points: jax.Array, values: jax.Array, normals: jax.Array | None
-) -> tuple[Any, ...]:
-    shape = jax.ShapeDtypeStruct((*plan.shape, values.shape[1]), points.dtype)
-    results = (shape, *plan.saved(points))
-    field, *saved = call("isograd_extend", plan, results, points, values, normals)
-    return (field, saved[0]), (points, values, normals, saved)
+def _of_query(plan: Plan, _sizes: tuple[int, ...], points: jax.Array, queries: jax.Array) -> tuple[jax.ShapeDtypeStruct, ...]:
+    """Distances; gradients, faces and weights."""
+    distance = jax.ShapeDtypeStruct(queries.shape[:1], queries.dtype)
+    faces = jax.ShapeDtypeStruct(queries.shape[:1], np.uint32)
+    (vectors,) = like(queries)
+    return distance, vectors, faces, vectors, *plan.saved(points)
 
 
-def _extend_pullback(plan: Plan, residuals: tuple[Any, ...], bars: tuple[Any, ...]) -> tuple[Any, ...]:
-    points, values, normals, saved = residuals
-    results = like(values, points, normals)
-    arrays = (points, values, *saved, *bars, normals)
-    values_bar, *cloud_bars = call("isograd_extend_pullback", plan, results, *arrays)
-    points_bar, normals_bar = pair(cloud_bars)
-    return points_bar, values_bar, normals_bar
+def _of_mesh(plan: Plan, sizes: tuple[int, ...], points: jax.Array, _none: None) -> tuple[jax.ShapeDtypeStruct, ...]:
+    """Vertices, faces, and the numbers of both."""
+    vertices = jax.ShapeDtypeStruct((sizes[0], 3), points.dtype)
+    faces = jax.ShapeDtypeStruct((sizes[1], 3), np.uint32)
+    return vertices, faces, jax.ShapeDtypeStruct((2,), np.uint32), *plan.saved(points)
 
 
-_extend.defvjp(_extend_forward, _extend_pullback)
+def _of_extend(plan: Plan, _sizes: tuple[int, ...], points: jax.Array, values: jax.Array) -> tuple[jax.ShapeDtypeStruct, ...]:
+    """Values at all cells."""
+    return jax.ShapeDtypeStruct((*plan.shape, values.shape[1]), points.dtype), *plan.saved(points)
+
+
+def _operator(
+    targets: tuple[str, str],
+    outputs: Callable[..., tuple[jax.ShapeDtypeStruct, ...]],
+    results: int,
+    bars: int,
+    kept: int,
+    asked: int | None,
+) -> Any:
+    """A target and its pullback as a differentiable function of points, another input or ``None``, and normals or ``None``.
+
+    Args:
+        outputs: shapes and types of all outputs of the target.
+        results: number of outputs that are returned, the first ones.
+        bars: number of outputs with a derivative, the first ones.
+        kept: first of the outputs that the pullback needs.
+        asked: number of outputs that the target is asked for without a derivative; ``None`` for all.
+    """
+    target, target_of_pullback = targets
+
+    @functools.partial(jax.custom_vjp, nondiff_argnums=(0, 1))
+    def operator(plan: Plan, sizes: tuple[int, ...], *arrays: jax.Array | None) -> tuple[jax.Array, ...]:
+        return call(target, plan, outputs(plan, sizes, *arrays[:2])[:asked], *arrays)[:results]
+
+    def forward(plan: Plan, sizes: tuple[int, ...], *arrays: jax.Array | None) -> tuple[Any, ...]:
+        found = call(target, plan, outputs(plan, sizes, *arrays[:2]), *arrays)
+        return found[:results], (arrays, found[kept:])
+
+    def pullback(plan: Plan, _sizes: tuple[int, ...], residuals: tuple[Any, ...], cotangents: tuple[Any, ...]) -> tuple[Any, ...]:
+        (points, other, normals), saved = residuals
+        arrays = (points, other, *saved, *cotangents[:bars], normals)
+        found = list(call(target_of_pullback, plan, like(other, points, normals), *arrays))
+        other_bar = None if other is None else found.pop(0)
+        points_bar, normals_bar = pair(found)
+        return points_bar, other_bar, normals_bar
+
+    operator.defvjp(forward, pullback)
+    return operator
+
+
+_distance = _operator(("isograd_forward", "isograd_pullback"), _of_distance, results=1, bars=1, kept=0, asked=1)
+_query = _operator(("isograd_query", "isograd_query_pullback"), _of_query, results=1, bars=1, kept=1, asked=1)
+_mesh = _operator(("isograd_mesh", "isograd_mesh_pullback"), _of_mesh, results=3, bars=1, kept=3, asked=3)
+# The target of an extension has no shorter list of outputs.
+_extend = _operator(("isograd_extend", "isograd_extend_pullback"), _of_extend, results=2, bars=2, kept=1, asked=None)

@@ -14,12 +14,10 @@ the batch too; ``values`` always have it.
 
 from __future__ import annotations
 
-from typing import Any, Optional
-
 from ._grid import Grid
 from ._options import Options
-from ._torch import DEVICES, Tensor, call, in_batches, one_by_one, prepare, torch
-from ._torch_mesh import Extension, Mesh, extend, mesh, orient, query, saved
+from ._torch import Tensor, in_batches, prepare
+from ._torch_mesh import Extension, Mesh, extend, mesh, operator, orient, query, saved
 from ._torch_surface import Surface, surface
 
 __all__ = ["Extension", "Mesh", "Surface", "extend", "mesh", "orient", "query", "signed_distance", "surface"]
@@ -58,72 +56,15 @@ def signed_distance(
         RuntimeError: an unavailable backend.
     """
     points, normals, settings = prepare(points, grid, normals, options, backend)
-    sdf: Tensor = _signed_distance(points, normals, settings)[0]
+    sdf: Tensor = _signed_distance(points, None, normals, settings, 0.0, False, [])[0]
     return sdf
 
 
-# Operators say Optional and not `| None`: PyTorch reads their annotations, in every version the former.
-@torch.library.custom_op("isograd::signed_distance", mutates_args=(), device_types=DEVICES)
-def _signed_distance(
-    points: Tensor, given: Optional[Tensor], settings: str
-) -> tuple[Tensor, Tensor, Tensor]:
-    """φ, and what its pullback needs: closest faces and normals."""
-    found = saved(points, settings)
-    call("isograd_forward", [points, given], found, settings)
-    return found
-
-
-@_signed_distance.register_fake
-def _(points: Tensor, given: Optional[Tensor], settings: str) -> tuple[Tensor, Tensor, Tensor]:
-    return saved(points, settings)
-
-
-@torch.library.custom_op("isograd::signed_distance_pullback", mutates_args=(), device_types=DEVICES)
-def _pullback(
-    points: Tensor,
-    given: Optional[Tensor],
-    sdf: Tensor,
-    closest: Tensor,
-    normals: Tensor,
-    sdf_bar: Tensor,
-    settings: str,
-) -> tuple[Tensor, Tensor]:
-    """Cotangents of the points and of the given normals; the latter has no rows where none were given."""
-    points_bar, given_bar = _empty_bars(points, given)
-    bars = [points_bar] if given is None else [points_bar, given_bar]
-    call("isograd_pullback", [points, sdf, closest, normals, sdf_bar, given], bars, settings)
-    return points_bar, given_bar
-
-
-@_pullback.register_fake
-def _empty_bars(points: Tensor, given: Optional[Tensor], *_others: Any) -> tuple[Tensor, Tensor]:
-    given_shape = (0, 3) if given is None else given.shape
-    return points.new_empty(points.shape), points.new_empty(given_shape)
-
-
-def _save(ctx: Any, inputs: tuple[Any, ...], output: tuple[Tensor, ...]) -> None:
-    points, given, ctx.settings = inputs
-    sdf, closest, normals = output
-    ctx.save_for_backward(points, given, sdf, closest, normals)
-    # Only φ is pulled back; the others are there to be saved.
-    ctx.mark_non_differentiable(closest, normals)
-
-
-def _backward(ctx: Any, sdf_bar: Tensor, *_unused: Tensor) -> tuple[Tensor | None, Tensor | None, None]:
-    points, given, *saved = ctx.saved_tensors
-    points_bar, given_bar = _pullback(points, given, *saved, sdf_bar, ctx.settings)
-    return points_bar, None if given is None else given_bar, None
-
-
-_signed_distance.register_autograd(_backward, setup_context=_save)
-
-
-def _twice(ctx: Any, *_bars: Tensor) -> None:
-    raise RuntimeError("isograd.torch.signed_distance can be differentiated once, not twice")
-
-
-_pullback.register_autograd(_twice)
-
-
-_signed_distance.register_vmap(one_by_one(_signed_distance))
-_pullback.register_vmap(one_by_one(_pullback))
+_signed_distance = operator(
+    "signed_distance",
+    lambda points, _none, settings, _sizes: saved(points, settings),
+    count=3,
+    bars=1,
+    kept=0,
+    targets=("isograd_forward", "isograd_pullback"),
+)
