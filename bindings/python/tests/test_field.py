@@ -1,6 +1,7 @@
 """Fields of meshes and meshes of fields, against plain NumPy."""
 
 import os
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -107,6 +108,15 @@ def test_bad_meshes_and_grids_are_refused_with_a_reason():
     result = isograd.sdf_grid((CUBE, CUBE_FACES), GRID)
     with pytest.raises(ValueError, match="sdf_bar has the shape"):
         result.pullback(np.ones(3))
+    with pytest.raises(ValueError, match=r"sdf_bar is not finite at entry \(0, 0, 0\)"):
+        result.pullback(np.full(GRID.shape, np.nan))
+    with pytest.raises(TypeError, match="mesh is a ndarray"):
+        isograd.sdf_grid(CUBE, GRID)
+
+
+def test_a_mesh_may_be_any_object_with_vertices_and_faces():
+    other = SimpleNamespace(vertices=CUBE, faces=np.asarray(CUBE_FACES, np.int64))
+    assert (isograd.sdf_grid(other, GRID).sdf == isograd.sdf_grid((CUBE, CUBE_FACES), GRID).sdf).all()
 
 
 @pytest.mark.skipif(

@@ -47,6 +47,8 @@ def test_what_a_callback_raises_is_raised_and_bad_input_is_refused():
         (TypeError, "Shape", {"shape": "sphere"}),
         (ValueError, "lbfgs", {"shape": START, "optimizer": "newton"}),
         (ValueError, "color", {"shape": START, "only": ["color"]}),
+        (ValueError, "random_start is for a shape", {"points": SPHERE.points, "random_start": 0.5}),
+        (TypeError, "options is a dict", {"shape": START, "options": {}}),
         (ValueError, "epochs", {"shape": START, "epochs": -1}),
         (ValueError, "larger grid|padding", {"shape": isograd.Shape("sphere", radius=3.0)}),
     ]:

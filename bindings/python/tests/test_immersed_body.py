@@ -69,6 +69,13 @@ def test_the_body_of_a_cloud_is_that_of_its_closed_form(layout, x64):  # noqa: F
     assert abs(volume / (4 / 3 * np.pi) - 1) < 0.01
 
 
+@pytest.mark.parametrize("layout", [immersed.staggered, immersed.collocated])
+def test_velocities_of_another_shape_are_refused(layout):
+    for velocity in (np.ones((1500, 2)), np.ones(1500), 1.0):
+        with pytest.raises(ValueError, match=r"velocity has the shape .* must have \(N, 3\)"):
+            layout(ball(), velocity, GRID)
+
+
 def test_the_blend_is_the_fluid_outside_and_the_body_inside(x64):  # noqa: F811
     body = sphere((0, 0, 0), 1.0, (1.0, 2.0, 3.0))
     fluid = tuple(jnp.asarray(RNG.standard_normal(GRID.shape)) for _ in range(3))

@@ -148,6 +148,16 @@ def test_a_second_derivative_is_refused_not_zero():
         first.sum().backward()
 
 
+def test_forward_mode_is_refused_not_zero():
+    points = sphere()
+    with pytest.raises(NotImplementedError, match="points has a tangent"):
+        torch.func.jvp(lambda p: signed_distance(p, GRID), (points,), (points,))
+    with torch.autograd.forward_ad.dual_level():
+        dual = torch.autograd.forward_ad.make_dual(points, points)
+        with pytest.raises(NotImplementedError, match="use backward"):
+            signed_distance(dual, GRID)
+
+
 @pytest.mark.parametrize(
     ("change", "error", "words"),
     [

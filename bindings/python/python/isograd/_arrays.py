@@ -49,6 +49,19 @@ def floats(values: object, name: str, shape: tuple[int | None, ...], dtype: DTyp
     return np.require(array, dtype=wanted, requirements=["C", "A"])
 
 
+def cotangent(values: object, name: str, shape: tuple[int | None, ...], dtype: DTypeLike) -> np.ndarray:
+    """The cotangent of a result, as :func:`floats`.
+
+    Raises:
+        TypeError, ValueError: as :func:`floats`, and a number that is not finite.
+    """
+    found = floats(values, name, shape, dtype)
+    if not np.isfinite(found).all():
+        index = tuple(int(i) for i in np.argwhere(~np.isfinite(found))[0])
+        raise ValueError(f"{name} is not finite at entry {index}; correct the function that computes it")
+    return found
+
+
 def indices(values: object, name: str, shape: tuple[int | None, ...]) -> np.ndarray:
     """A uint32 array, C-contiguous and aligned, from whole numbers.
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from . import _core
-from ._arrays import floats
+from ._arrays import cotangent, floats
 from ._grid import Grid, as_grid
 from ._mesh import Mesh, as_mesh
 from ._numbers import number
@@ -58,7 +58,7 @@ class SdfGrid:
             TypeError, ValueError: an array of another type or shape.
         """
         mesh = self.mesh
-        bar = floats(sdf_bar, "sdf_bar", self.grid.shape, mesh.vertices.dtype)
+        bar = cotangent(sdf_bar, "sdf_bar", self.grid.shape, mesh.vertices.dtype)
         cotangents = _core.sdf_of_mesh_pullback(
             mesh.vertices, mesh.faces, _parts(self.grid), self.sdf, self.closest, bar
         )
@@ -124,10 +124,10 @@ class Isosurface:
         """Cotangents of field, level and grid, from those of the vertices ``(V, 3)``. The faces are held constant.
 
         Raises:
-            TypeError, ValueError: an array of another type or shape.
+            TypeError, ValueError: an array of another type or shape, or one that is not finite.
         """
         own = self.mesh.vertices
-        bar = floats(vertices, "vertices", own.shape, own.dtype)
+        bar = cotangent(vertices, "vertices", own.shape, own.dtype)
         return FieldGradients(*self._found.pullback(bar))
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from . import _convert, _core, _measure
-from ._arrays import floats, indices, summary
+from ._arrays import cotangent, floats, indices, summary
 
 if TYPE_CHECKING:
     import os
@@ -177,11 +177,14 @@ def query_pullback(
     """Cotangents of the vertices ``(V, 3)`` and of the queries ``(M, 3)``, from those of the distances ``(M,)``.
 
     Sign and closest face are held constant: on the medial axis the derivative is one-sided.
+
+    Raises:
+        TypeError, ValueError: as :func:`query`; cotangents of another shape, or that are not finite.
     """
     mesh = as_mesh(mesh)
     dtype = mesh.vertices.dtype
     points = floats(queries, "queries", (None, 3), dtype)
-    bar = floats(distance_bar, "distance_bar", (len(points),), dtype)
+    bar = cotangent(distance_bar, "distance_bar", (len(points),), dtype)
     vertices_bar, points_bar = _core.query_mesh_pullback(mesh.vertices, mesh.faces, points, bar)
     return vertices_bar, points_bar
 

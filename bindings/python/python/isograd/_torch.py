@@ -17,6 +17,7 @@ from ._options import Options
 try:
     import torch
     from torch import Tensor
+    from torch.autograd import forward_ad
 except ImportError as error:
     raise ImportError(f"isograd.torch needs PyTorch ({error}); install it by `pip install torch`") from error
 
@@ -43,6 +44,7 @@ def checked(values: Tensor, name: str, columns: int | None = 3) -> Tensor:
     Raises:
         TypeError: no tensor, or of other numbers.
         ValueError: another device, layout or shape.
+        NotImplementedError: a derivative in forward mode, which PyTorch would take for 0.
     """
     if not isinstance(values, Tensor):
         raise TypeError(f"{name} is a {type(values).__name__}; give a torch.Tensor")
@@ -54,6 +56,11 @@ def checked(values: Tensor, name: str, columns: int | None = 3) -> Tensor:
     if values.ndim != 2 or columns not in (None, values.shape[1]):
         wanted = "C" if columns is None else columns
         raise ValueError(f"{name} has the shape {tuple(values.shape)} and must have (N, {wanted})")
+    if not torch.compiler.is_compiling() and forward_ad.unpack_dual(values).tangent is not None:
+        raise NotImplementedError(
+            f"{name} has a tangent; isograd has no derivatives in forward mode (torch.func.jvp, jacfwd, linearize): "
+            "use backward or torch.autograd.grad"
+        )
     if values.dtype in (torch.float16, torch.bfloat16):
         return values.to(torch.float32)
     if values.dtype not in (torch.float32, torch.float64):

@@ -52,14 +52,21 @@ def staggered(
         arguments: ``normals``, ``band``, ``fill`` and ``options`` of :func:`isograd.jax.surface`.
 
     Raises:
-        TypeError, ValueError, jax.errors.JaxRuntimeError: as for :func:`isograd.jax.surface`.
+        TypeError, ValueError, jax.errors.JaxRuntimeError: as for :func:`isograd.jax.surface`; another shape of ``velocity``.
     """
-    return _body(surface(points, grid, tuple(offsets), values=velocity, **arguments))
+    return _body(surface(points, grid, tuple(offsets), values=_checked(velocity), **arguments))
 
 
 def collocated(points: ArrayLike, velocity: ArrayLike, grid: Grid, **arguments: Any) -> Body:
     """The body of a moving cloud at the cell centers, where all components are; arguments as for :func:`staggered`."""
-    return _body((surface(points, grid, values=velocity, **arguments),) * 3)
+    return _body((surface(points, grid, values=_checked(velocity), **arguments),) * 3)
+
+
+def _checked(velocity: ArrayLike) -> ArrayLike:
+    shape = jnp.shape(velocity)
+    if len(shape) != 2 or shape[1] != 3:
+        raise ValueError(f"velocity has the shape {shape} and must have (N, 3)")
+    return velocity
 
 
 def _body(found: Sequence[Surface]) -> Body:
