@@ -9,6 +9,15 @@
 use super::coupling::NEIGHBORS;
 use crate::neighbors::lines::{COMPARED, LINE, turn};
 
+/// Reach of a sample along a line in radii of its neighborhood, which hold the next lines: discs of .6 of their distance. With
+/// .4, signs of lines ten times as far apart as their samples are wrong a third more often.
+const REACH: f64 = 0.35;
+
+/// Least reach of a sample with a neighborhood of this radius, where samples lie along lines.
+pub(super) fn reach(radius: f64) -> f32 {
+    (REACH * radius) as f32
+}
+
 /// Whether a sample lies on a line, from the offsets of its neighbors to theirs, and its own.
 pub(super) fn is_on_line<'a>(around: impl Iterator<Item = &'a [[f32; 3]; NEIGHBORS]>) -> bool {
     mean_turn(around) < LINE
@@ -67,6 +76,26 @@ mod tests {
             (place - place.round()).abs() < 0.008
         };
         cut(cuboid(600_000, [0.5; 3], seed), near)
+    }
+
+    /// The unit sphere in so many rings of so many samples.
+    fn rings(count: usize, samples: usize) -> Sampled {
+        let point = |i: usize| {
+            let turn = std::f64::consts::TAU * (i % samples) as f64 / samples as f64;
+            let polar = std::f64::consts::PI * ((i / samples) as f64 + 0.5) / count as f64;
+            let (sin, cos) = polar.sin_cos();
+            [sin * turn.cos(), sin * turn.sin(), cos]
+        };
+        let points: Vec<[f64; 3]> = (0..count * samples).map(point).collect();
+        (points.clone(), points)
+    }
+
+    #[test]
+    fn rings_have_the_sides_of_the_next_ones() {
+        for (count, samples) in [(20, 280), (30, 420), (30, 480), (25, 500)] {
+            let wrong = orient(&rings(count, samples)).wrong;
+            assert_eq!(wrong, 0, "{count} rings of {samples}");
+        }
     }
 
     #[test]
