@@ -31,8 +31,10 @@ pub(crate) struct Samples<'a, T> {
 /// Numbers of samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Counts {
-    /// At the depth below the sample, the gradient of the distance is against its normal.
+    /// At the depth below the sample, the gradient of the distance is against its normal, but not at the sample.
     pub thin: usize,
+    /// At the sample, the gradient of the distance is against its normal.
+    pub turned: usize,
     /// The surface is not within the limit.
     pub missed: usize,
     /// The surface is not within the larger limit.
@@ -76,11 +78,14 @@ pub(crate) fn count<T: Real>(
 }
 
 impl<T: Real> Samples<'_, T> {
-    /// Counts of one sample, from its normal, its distance from the surface and the gradient of the distance below it.
+    /// Counts of one sample, from its normal, its distance from the surface and the gradients of the distance there and below.
     #[inline(always)]
-    pub(crate) fn judged(&self, normal: [T; 3], distance: T, gradient: [T; 3]) -> Counts {
+    pub(crate) fn judged(&self, normal: [T; 3], distance: T, gradients: [[T; 3]; 2]) -> Counts {
+        let [at, below] = gradients.map(|gradient| dot(gradient, normal) < T::of(-0.5));
+        let turned = at && distance <= self.within;
         Counts {
-            thin: usize::from(dot(gradient, normal) < T::of(-0.5)),
+            thin: usize::from(below && !turned),
+            turned: usize::from(turned),
             // True for NaN.
             missed: usize::from(!(distance <= self.within)),
             far: usize::from(!(distance <= self.far)),
@@ -92,6 +97,7 @@ impl Counts {
     pub(crate) fn add(self, other: Self) -> Self {
         Self {
             thin: self.thin + other.thin,
+            turned: self.turned + other.turned,
             missed: self.missed + other.missed,
             far: self.far + other.far,
         }
@@ -159,8 +165,9 @@ impl<T: Real> WithSimd for Task<'_, T> {
             let points = index.map(|i| self.samples.points[i]);
             let normals = index.map(|i| self.samples.normals[i]);
             let at = self.nearest(&points, [f64::INFINITY; LANES], &mut stack);
-            let at: [T; LANES] =
-                std::array::from_fn(|l| self.surface.hit(points[l], at[l], None).distance.abs());
+            let hits: [_; LANES] =
+                std::array::from_fn(|l| self.surface.hit(points[l], at[l], None));
+            let at = hits.map(|hit| hit.distance.abs());
             let below: [[T; 3]; LANES] =
                 std::array::from_fn(|l| sub(points[l], scale(normals[l], depth)));
             // By the triangle inequality no farther than the surface is from the sample.
@@ -170,8 +177,9 @@ impl<T: Real> WithSimd for Task<'_, T> {
             });
             let nearest = self.nearest(&below, bounds, &mut stack);
             for l in 0..order.len() {
-                let gradient = self.surface.hit(below[l], nearest[l], None).gradient;
-                counts = counts.add(self.samples.judged(normals[l], at[l], gradient));
+                let below = self.surface.hit(below[l], nearest[l], None);
+                let gradients = [hits[l].gradient, below.gradient];
+                counts = counts.add(self.samples.judged(normals[l], at[l], gradients));
             }
         }
         counts

@@ -44,6 +44,7 @@ impl Report {
         let samples = self.samples(points, normals, sdf);
         let counts = self.count(samples, sdf, mesh, built);
         let (warnings, spacing) = (&mut self.warnings, self.surface_spacing);
+        warnings.extend(turned(counts.turned, points.len()));
         warnings.extend(thin(counts.thin, points.len()));
         warnings.extend(missed(counts, points.len()));
         warnings.extend(sparse(self.sample_spacing, spacing));
@@ -152,9 +153,9 @@ fn interpolated<T: Real>(samples: Samples<'_, T>, sdf: &Field<T>) -> Counts {
     let count = |i: usize| {
         let (x, n) = (samples.points[i], samples.normals[i]);
         let below = vector::sub(x, vector::scale(n, samples.depth));
-        let gradient = sdf.interpolate_with_gradient(below).1;
-        let distance = sdf.interpolate(x);
-        samples.judged(n, distance.abs(), gradient)
+        let (distance, at) = sdf.interpolate_with_gradient(x);
+        let below = sdf.interpolate_with_gradient(below).1;
+        samples.judged(n, distance.abs(), [at, below])
     };
     parallel::reduce(samples.points.len(), Counts::default(), count, Counts::add)
 }
@@ -168,6 +169,12 @@ fn share(count: usize, all: usize) -> f64 {
 fn thin(count: usize, points: usize) -> Option<Warning> {
     let share = share(count, points);
     (share > TOLERATED_SHARE).then_some(Warning::Thin { share })
+}
+
+/// Samples whose normals are against the surface.
+fn turned(count: usize, points: usize) -> Option<Warning> {
+    let share = share(count, points);
+    (share > TOLERATED_SHARE).then_some(Warning::Turned { share })
 }
 
 /// Samples off the surface.

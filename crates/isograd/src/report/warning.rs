@@ -8,6 +8,9 @@ use super::{TOLERATED_SHARE, Verdict};
 use crate::isosurface::Level;
 use crate::orient::doubt::{Doubt, Reason, Region};
 
+/// Share of the samples with normals against the surface above which it is wrong in many places.
+const MANY_TURNED: f64 = 0.05;
+
 /// A reason is named where it stands for one in this many of the doubtful samples.
 const SMALLEST_REASON: usize = 10;
 
@@ -34,6 +37,11 @@ pub enum Warning {
     Duplicates {
         /// Number of such samples, the first one in each place not counted; at least.
         samples: usize,
+    },
+    /// Normals point to the other side of the surface than it has where they are: they contradict their neighbors.
+    Turned {
+        /// Share of the samples with such a normal, from 0 to 1.
+        share: f64,
     },
     /// Parts of the body are thinner than three cells.
     Thin {
@@ -102,9 +110,10 @@ pub enum Warning {
 
 impl Warning {
     /// Codes of all warnings.
-    pub const CODES: [&str; 14] = [
+    pub const CODES: [&str; 15] = [
         "stray",
         "duplicates",
+        "turned",
         "missed",
         "open",
         "inside-out",
@@ -125,6 +134,7 @@ impl Warning {
             Self::Outliers { .. } => "outliers",
             Self::Stray { .. } => "stray",
             Self::Duplicates { .. } => "duplicates",
+            Self::Turned { .. } => "turned",
             Self::Thin { .. } => "thin",
             Self::Sparse { .. } => "sparse",
             Self::Open { .. } => "open",
@@ -144,6 +154,7 @@ impl Warning {
         let is_bad = match self {
             Self::Open { .. } | Self::TouchesWall | Self::InsideOut { .. } => true,
             Self::Missed { far: share, .. } | Self::Stray { share, .. } => *share > TOLERATED_SHARE,
+            Self::Turned { share } => *share > MANY_TURNED,
             _ => false,
         };
         if is_bad { Verdict::Bad } else { Verdict::Check }
@@ -160,6 +171,9 @@ impl Warning {
             }
             Self::Duplicates { .. } => {
                 "the cloud without them: clean(points, duplicates=0) (isograd clean --duplicates 0)"
+            }
+            Self::Turned { .. } => {
+                "orient=\"auto\" (--orient auto), or normals that are all outward"
             }
             Self::Thin { .. } if level != Level::Thin => {
                 "level=\"thin\" (--level thin), which keeps them whole, or smaller cells of the surface (surface, --surface)"
@@ -220,6 +234,11 @@ impl fmt::Display for Warning {
             Self::Duplicates { samples } => write!(
                 f,
                 "{samples} samples are in the same place as others: neighborhoods hold copies instead of neighbors"
+            ),
+            Self::Turned { share } => write!(
+                f,
+                "{} of the normals point to the other side of the surface than those around them",
+                percent(*share)
             ),
             Self::Thin { share } => write!(
                 f,
@@ -350,6 +369,7 @@ mod tests {
                 share: 0.1,
             },
             Warning::Duplicates { samples: 9 },
+            Warning::Turned { share: 0.1 },
             Warning::Missed {
                 share: 0.1,
                 far: 0.0,

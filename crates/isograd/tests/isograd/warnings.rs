@@ -144,6 +144,27 @@ fn copies_of_samples_are_named_where_they_do_harm() {
 }
 
 #[test]
+fn normals_that_contradict_each_other_are_named() {
+    let torus = TORUS.uniform::<f64>(10_000, 7);
+    let normals = torus.normals().expect("normals");
+    for (one_in, verdict) in [(40, Verdict::Check), (3, Verdict::Bad)] {
+        let turned = normals.iter().enumerate();
+        let turned = turned.map(|(i, &n)| if i % one_in == 0 { n.map(|x| -x) } else { n });
+        let cloud = PointCloud::new(torus.points().to_vec()).expect("finite points");
+        let cloud = cloud.with_normals(turned.collect()).expect("one a point");
+        let report = report_with(&cloud, 64, Options::default().orient(Method::Given));
+        let share = report.warnings.iter().find_map(|warning| match warning {
+            Warning::Turned { share } => Some(*share),
+            _ => None,
+        });
+        let share = share.expect("a warning");
+        assert!((share * one_in as f64 - 1.0).abs() < 0.1, "{share}");
+        assert!(!codes(&report).contains(&"thin"), "{report:?}");
+        assert_eq!(report.verdict(), Some(verdict));
+    }
+}
+
+#[test]
 fn a_bowl_is_called_open() {
     for lowest in [0.0, -0.8] {
         let report = report(sphere(12_000, lowest, [0.0; 3], 1.0), 48);
