@@ -7,7 +7,7 @@ use isograd_io::{Dtype, FIELD_EXTENSIONS, MESH_EXTENSIONS};
 use crate::args;
 use crate::error::Error;
 use crate::outputs::{check_extension, check_not_input};
-use crate::progress::Progress;
+use crate::progress::{Progress, decimal};
 
 /// Runs the command in the number type of the file.
 ///
@@ -49,7 +49,7 @@ fn extract<T: Real>(
     progress.print(&format!("wrote {}", args.output.display()));
     let measures = Measures::of(&mesh);
     progress.print(&format!(
-        "surface: {} faces, {}, components: {}, area {:.6}, volume {:.6}",
+        "surface: {} faces, {}, components: {}, area {}, volume {}",
         measures.faces,
         if measures.closed {
             "closed"
@@ -57,8 +57,8 @@ fn extract<T: Real>(
             "not closed"
         },
         measures.components,
-        measures.area,
-        measures.volume
+        decimal(measures.area),
+        decimal(measures.volume)
     ));
     Ok(())
 }

@@ -13,7 +13,7 @@ use crate::args::{self, Precision};
 use crate::error::{Error, file_name};
 use crate::inputs::{Inputs, stem};
 use crate::outputs::{Outputs, write_report};
-use crate::progress::Progress;
+use crate::progress::{Progress, decimal};
 use crate::report::{Normals, Report, Times};
 use crate::{backend, batch, orient, plot, prediction, resample, surface};
 
@@ -369,7 +369,7 @@ impl<'a> Job<'a> {
             self.start.elapsed().as_secs_f64()
         ));
         progress.print_one(&format!(
-            "surface: {} faces, {}, {} piece{}, area {:.6}, volume {:.6}",
+            "surface: {} faces, {}, {} piece{}, area {}, volume {}",
             surface.faces,
             if surface.closed {
                 "closed"
@@ -378,8 +378,8 @@ impl<'a> Job<'a> {
             },
             surface.components,
             if surface.components == 1 { "" } else { "s" },
-            surface.area,
-            surface.volume
+            decimal(surface.area),
+            decimal(surface.volume)
         ));
         progress.conclude(report);
     }

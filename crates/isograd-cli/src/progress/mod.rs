@@ -211,6 +211,14 @@ fn draw(work: &Work, now: Instant) -> String {
     format!("[{bar:WIDTH$}] {:3.0} %{clouds}", 100.0 * share)
 }
 
+/// Text of an area or a volume: six decimals, or powers of ten where these say little.
+pub fn decimal(value: f64) -> String {
+    match value.abs() {
+        0.0 | 1e-3..1e7 => format!("{value:.6}"),
+        _ => format!("{value:.5e}"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

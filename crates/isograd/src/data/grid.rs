@@ -119,7 +119,8 @@ pub enum GridError {
     },
     /// Neighboring cell centers are not distinct numbers of this type.
     #[error(
-        "cells of {spacing:?} at coordinates up to {extent:?} can't be told apart in {real}; use f64, a coarser grid, or move the cloud toward the origin"
+        "cells of {spacing:?} at coordinates up to {extent:?} can't be told apart in {real}; use {}a coarser grid, or move the cloud toward the origin",
+        if *real == "f64" { "" } else { "f64, " }
     )]
     Unresolvable {
         /// Cell size.

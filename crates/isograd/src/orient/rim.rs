@@ -1,5 +1,7 @@
 //! Samples along the boundary of an open surface.
 
+use std::cmp::Ordering;
+
 use pulp::Arch;
 
 use crate::neighbors::{Candidates, LANES, Neighborhoods};
@@ -46,8 +48,9 @@ pub(crate) fn rims<T: Real>(
         one_sided[position[i] as usize]
             && borders_a_gap(i, points, normals, neighborhoods, directions)
     });
-    let has_company = |i| rim_neighbors(i, points, &at_rim, neighborhoods) >= RIM_NEIGHBORS;
-    parallel::map(points.len(), |i| at_rim[i] && has_company(i))
+    parallel::map_with(Vec::new, points.len(), |places, i| {
+        at_rim[i] && rim_neighbors(i, points, &at_rim, neighborhoods, places) >= RIM_NEIGHBORS
+    })
 }
 
 /// Distance from a point to the centroid of its neighbors weighted by `1/r`, itself left out, in radii.
@@ -120,21 +123,34 @@ fn borders_a_gap<T: Real>(
     neighborhoods: &Neighborhoods<T>,
     directions: &mut Vec<[T; 3]>,
 ) -> bool {
-    let mut facing = T::zero();
-    directions.clear();
-    let index = &neighborhoods.index;
-    index.for_each_within(
-        points[i],
-        radius(i, neighborhoods),
-        |j, distance_squared| {
+    let is_flat_within = |radius: T, directions: &mut Vec<[T; 3]>| {
+        let (mut facing, mut samples) = (T::zero(), 1);
+        directions.clear();
+        let index = &neighborhoods.index;
+        index.for_each_within(points[i], radius, |j, distance_squared| {
             facing += vector::dot(normals[i], normals[j]);
             if distance_squared > T::zero() {
                 directions.push(vector::sub(points[j], points[i]));
+                samples += 1;
             }
-        },
-    );
-    let flat = T::of(RIM_FLATNESS) * T::of_usize(directions.len() + 1);
-    facing > flat && widest_gap(directions, normals[i]) > RIM_GAP
+        });
+        (facing > T::of(RIM_FLATNESS) * T::of_usize(samples), samples)
+    };
+    let radius = radius(i, neighborhoods);
+    let (mut is_flat, samples) = is_flat_within(radius, directions);
+    let places = 1 + drop_copies(directions);
+    if is_flat && places < samples {
+        let wider = (samples as f64 / places as f64).sqrt();
+        (is_flat, _) = is_flat_within(T::of(wider) * radius, directions);
+    }
+    is_flat && widest_gap(directions, normals[i]) > RIM_GAP
+}
+
+/// Keeps one of the equal vectors, and returns how many are left. Copies of a sample say nothing about gaps.
+fn drop_copies<T: Real>(vectors: &mut Vec<[T; 3]>) -> usize {
+    vectors.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
+    vectors.dedup();
+    vectors.len()
 }
 
 /// The widest sector of the plane across `normal` that no direction points into, in radians.
@@ -159,19 +175,22 @@ fn radius<T: Real>(i: usize, neighborhoods: &Neighborhoods<T>) -> T {
     neighborhoods.radius[i] * wanted.max(T::one()).sqrt()
 }
 
+/// Number of other places within the radius of a sample with samples at a rim.
 fn rim_neighbors<T: Real>(
     i: usize,
     points: &[[T; 3]],
     at_rim: &[bool],
     neighborhoods: &Neighborhoods<T>,
+    places: &mut Vec<[T; 3]>,
 ) -> usize {
-    let mut count = 0;
-    neighborhoods
-        .index
-        .for_each_within(points[i], radius(i, neighborhoods), |j, _| {
-            count += usize::from(j != i && at_rim[j]);
-        });
-    count
+    places.clear();
+    let (index, radius) = (&neighborhoods.index, radius(i, neighborhoods));
+    index.for_each_within(points[i], radius, |j, distance_squared| {
+        if at_rim[j] && distance_squared > T::zero() {
+            places.push(points[j]);
+        }
+    });
+    drop_copies(places)
 }
 
 #[cfg(test)]
@@ -209,6 +228,18 @@ mod tests {
         };
         let is_rim = |i: usize| at_rim[i] && company(i) >= RIM_NEIGHBORS;
         (0..points.len()).map(is_rim).collect()
+    }
+
+    #[test]
+    fn copies_of_samples_are_no_rims() {
+        let (points, normals) = sphere(3000, [0.0; 3], 1.0, 5);
+        for times in [1, 2, 4] {
+            let [points, normals] = [&points, &normals].map(|of| of.repeat(times));
+            let mut near = Neighborhoods::default();
+            neighbors::forward(&points, Radius::Auto, &mut near).expect("valid");
+            let found = rims(&points, &normals, &near);
+            assert!(!found.contains(&true), "{times}");
+        }
     }
 
     #[test]
