@@ -74,6 +74,11 @@ impl PointTable {
         Ok(())
     }
 
+    /// `(N, 3)` points of the rows so far.
+    pub fn points(&self) -> &[[f64; 3]] {
+        &self.points
+    }
+
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.points.len()

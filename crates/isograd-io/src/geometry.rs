@@ -4,7 +4,6 @@ use isograd::data::Attribute;
 use isograd::{Mesh, MeshError, PointCloud, PointCloudError, Real, Sensors};
 
 use crate::format::Format;
-use crate::limits::Memory;
 use crate::number::Dtype;
 
 /// The content of a file of points or of a mesh, in double precision: every coordinate and normal is
@@ -17,7 +16,7 @@ pub struct Geometry {
     pub normals: Option<Vec<[f64; 3]>>,
     /// Further values per point.
     pub attributes: Vec<Attribute<f64>>,
-    /// `(F, 3)` triangles; polygons are cut into fans. Empty if the file has none.
+    /// `(F, 3)` triangles, into which polygons are cut. Empty if the file has none.
     pub faces: Vec<[u32; 3]>,
     /// Number type of the coordinates in the file.
     pub dtype: Dtype,
@@ -104,19 +103,6 @@ pub fn is_sensor(name: &str) -> bool {
 
 fn convert<T: Real>(points: &[[f64; 3]]) -> Vec<[T; 3]> {
     points.iter().map(|p| p.map(T::of)).collect()
-}
-
-/// Appends the triangles of a polygon: a fan around its first corner, with the polygon's winding.
-pub(crate) fn triangulate(
-    memory: &Memory,
-    corners: &[u32],
-    faces: &mut Vec<[u32; 3]>,
-) -> Result<(), String> {
-    if let Some((&first, rest)) = corners.split_first() {
-        memory.make_room(faces, rest.len())?;
-        faces.extend(rest.windows(2).map(|pair| [first, pair[0], pair[1]]));
-    }
-    Ok(())
 }
 
 /// Refuses a point or normal (`what`) that is not finite.

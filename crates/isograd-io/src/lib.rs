@@ -68,6 +68,7 @@ mod off;
 mod options;
 mod pcd;
 mod ply;
+mod polygon;
 mod read;
 mod source;
 mod stl;

@@ -8,10 +8,11 @@ use isograd::{Mesh, Real};
 
 use crate::error::{Error, Location};
 use crate::format::Format;
-use crate::geometry::{Geometry, triangulate};
+use crate::geometry::Geometry;
 use crate::limits::Memory;
 use crate::lines::{Lines, coordinates, quoted, words};
 use crate::number::Dtype;
+use crate::polygon::Triangles;
 use crate::source::Input;
 
 /// Reads an OBJ file. Normals are kept if there is one per vertex and every face pairs them by index.
@@ -49,7 +50,7 @@ fn append(memory: &Memory, text: &mut Vec<u8>, part: &[u8]) -> Result<(), String
 struct Reader {
     points: Vec<[f64; 3]>,
     normals: Vec<[f64; 3]>,
-    faces: Vec<[u32; 3]>,
+    faces: Triangles,
     corners: Vec<u32>,
     /// Whether a corner has a normal of another index than its vertex.
     normals_differ: bool,
@@ -99,7 +100,7 @@ impl Reader {
         if count < 3 {
             return Err(format!("the face has {count} corners; remove it"));
         }
-        triangulate(memory, &self.corners, &mut self.faces)
+        self.faces.push(memory, &self.points, &self.corners)
     }
 
     fn finish(self, input: &Input) -> Result<Geometry, Error> {
@@ -118,9 +119,10 @@ impl Reader {
             return Err(input.error(Location::Line(line), problem));
         }
         let per_vertex = self.normals.len() == self.points.len() && !self.normals_differ;
+        let faces = self.faces.finish(&input.memory, &self.points);
         Ok(Geometry {
             normals: per_vertex.then_some(self.normals),
-            faces: self.faces,
+            faces: faces.map_err(|problem| input.error(Location::Whole, problem))?,
             ..Geometry::from_points(self.points, Dtype::Text, Format::Obj)
         })
     }

@@ -8,9 +8,10 @@ use isograd::{Mesh, Real};
 use crate::columns::PointTable;
 use crate::error::{Error, Location};
 use crate::format::Format;
-use crate::geometry::{Geometry, triangulate};
+use crate::geometry::Geometry;
 use crate::lines::{Lines, number, quoted, words};
 use crate::number::{Dtype, as_index};
+use crate::polygon::triangulate;
 use crate::source::Input;
 
 /// Kind of the vertices, from the keyword in the first line.
@@ -122,7 +123,8 @@ pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
     let left = input.bytes.len().saturating_sub(rows.lines.offset) + 1;
     let [vertices, faces] = counts(text, left).map_err(|problem| bad(line, problem))?;
     let table = read_vertices(&mut rows, kind, vertices)?;
-    let triangles = read_faces(&mut rows, faces, vertices)?;
+    let points = table.as_ref().map_or(&[][..], PointTable::points);
+    let triangles = read_faces(&mut rows, faces, points)?;
     Ok(Geometry {
         faces: triangles,
         ..match table {
@@ -191,7 +193,8 @@ fn read_vertices(rows: &mut Rows, kind: Kind, count: usize) -> Result<Option<Poi
 const LONGEST: usize = 12;
 
 /// Reads faces and cuts them into triangles.
-fn read_faces(rows: &mut Rows, count: usize, vertices: usize) -> Result<Vec<[u32; 3]>, Error> {
+fn read_faces(rows: &mut Rows, count: usize, points: &[[f64; 3]]) -> Result<Vec<[u32; 3]>, Error> {
+    let vertices = points.len();
     let memory = &rows.input.memory;
     let mut triangles = Vec::new();
     let mut corners = Vec::new();
@@ -221,7 +224,7 @@ fn read_faces(rows: &mut Rows, count: usize, vertices: usize) -> Result<Vec<[u32
                 memory.make_room(&mut corners, 1)?;
                 corners.push(corner as u32);
             }
-            triangulate(memory, &corners, &mut triangles)
+            triangulate(memory, points, &corners, &mut triangles)
         };
         push().map_err(|problem| rows.input.error(Location::Line(line), problem))?;
     }

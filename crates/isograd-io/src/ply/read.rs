@@ -4,10 +4,11 @@ use super::header::{Element, Encoding, Header, Kind, Property};
 use crate::columns::{NORMAL, PointTable, find_columns};
 use crate::error::{Error, Location};
 use crate::format::Format;
-use crate::geometry::{Geometry, triangulate};
+use crate::geometry::Geometry;
 use crate::limits::Memory;
 use crate::lines::{Lines, number, quoted, words};
 use crate::number::{Dtype, Endian, Number, as_index};
+use crate::polygon::Triangles;
 use crate::source::Input;
 
 /// Position of the reader in the data.
@@ -131,14 +132,15 @@ pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
             "face" => {
                 faces.list = face_list(element);
                 read_rows(input, &mut cursor, element, |_, list| {
-                    faces.push(memory, list)
+                    faces.push(memory, vertices.points(), list)
                 })?;
             }
             _ => skip(input, &mut cursor, element)?,
         }
     }
+    let triangles = faces.triangles.finish(memory, vertices.points());
     Ok(Geometry {
-        faces: faces.triangles,
+        faces: triangles.map_err(|problem| input.error(Location::Whole, problem))?,
         ..vertices.into_geometry(dtype, Format::Ply)
     })
 }
@@ -259,7 +261,7 @@ struct Faces {
     list: Option<usize>,
     vertices: usize,
     corners: Vec<u32>,
-    triangles: Vec<[u32; 3]>,
+    triangles: Triangles,
 }
 
 impl Faces {
@@ -268,11 +270,12 @@ impl Faces {
             list: None,
             vertices,
             corners: Vec::new(),
-            triangles: Vec::new(),
+            triangles: Triangles::default(),
         }
     }
 
-    fn push(&mut self, memory: &Memory, list: &[f64]) -> Result<(), String> {
+    /// Appends the face of this list; `points` are those read so far.
+    fn push(&mut self, memory: &Memory, points: &[[f64; 3]], list: &[f64]) -> Result<(), String> {
         if self.list.is_none() {
             return Ok(());
         }
@@ -291,6 +294,6 @@ impl Faces {
             memory.make_room(&mut self.corners, 1)?;
             self.corners.push(vertex as u32);
         }
-        triangulate(memory, &self.corners, &mut self.triangles)
+        self.triangles.push(memory, points, &self.corners)
     }
 }
