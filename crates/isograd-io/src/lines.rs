@@ -3,6 +3,7 @@
 use crate::geometry::check_finite;
 
 /// Lines of a text, numbered from 1, without line ends and surrounding white space. A line ends in `\n`, `\r\n` or `\r`.
+#[derive(Clone)]
 pub(crate) struct Lines<'a> {
     text: &'a [u8],
     /// Whether `\r` ends the first line: then a `\n` behind a `\r` is not part of the line end.
