@@ -6,6 +6,7 @@ use isograd::data::Attribute;
 use isograd_element::vector;
 
 use super::accessor::{Vectors, open};
+use super::buffers::Buffers;
 use super::document::{self, Attributes, Document, Node, Primitive};
 use crate::error::{Error, Location};
 use crate::format::Format;
@@ -106,11 +107,11 @@ impl Transform {
 
 /// Reads the meshes of the default scene as one.
 pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
-    let (document, binary) = document::parse(input)?;
+    let (document, buffers) = document::parse(input)?;
     let mut reader = Reader {
         input,
         document: &document,
-        binary,
+        buffers: &buffers,
         geometry: Geometry::from_points(Vec::new(), Dtype::F32, Format::Glb),
         normals: Some(Vec::new()),
         colors: Some(Default::default()),
@@ -141,7 +142,7 @@ pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
 struct Reader<'a> {
     input: &'a Input<'a>,
     document: &'a Document,
-    binary: &'a [u8],
+    buffers: &'a Buffers<'a>,
     geometry: Geometry,
     /// `None` as soon as a part of the mesh has none.
     normals: Option<Vec<[f64; 3]>>,
@@ -248,7 +249,7 @@ impl<'a> Reader<'a> {
     }
 
     fn open(&self, index: usize, shapes: &[(&str, usize)]) -> Result<Vectors<'a>, Error> {
-        open(self.input, (self.document, self.binary), index, shapes)
+        open(self.input, (self.document, self.buffers), index, shapes)
     }
 
     /// Appends the vertices of a part; the index of the first one, and their number.
