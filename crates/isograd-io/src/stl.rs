@@ -27,8 +27,9 @@ pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
     let count = count.map(|b| u32::from_le_bytes(*b) as usize);
     let needed = count.and_then(|n| n.checked_mul(TRIANGLE)?.checked_add(HEADER));
     let is_exact = needed == Some(bytes.len());
-    let has_facets = memchr::memmem::find(&bytes[..bytes.len().min(4096)], b"facet").is_some();
-    if !is_exact && bytes.trim_ascii_start().starts_with(b"solid") && has_facets {
+    let head = bytes[..bytes.len().min(4096)].to_ascii_lowercase();
+    let has_facets = memchr::memmem::find(&head, b"facet").is_some();
+    if !is_exact && head.trim_ascii_start().starts_with(b"solid") && has_facets {
         return read_ascii(input);
     }
     match (count, needed) {
