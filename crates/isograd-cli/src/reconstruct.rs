@@ -15,10 +15,7 @@ use crate::inputs::{Inputs, stem};
 use crate::outputs::{Outputs, write_report};
 use crate::progress::Progress;
 use crate::report::{Normals, Report, Times};
-use crate::{backend, batch, orient, plot, prediction, resample, surface};
-
-/// Rounding of the coordinates to single precision, in cells, above which the computation uses double precision.
-const TOLERATED_ROUNDING: f64 = 1e-2;
+use crate::{backend, batch, orient, plot, prediction, resample, rounding, surface};
 
 /// Parts of the work on a cloud: reading, the stages, writing.
 pub const PARTS: usize = 2 + Stage::ALL.len();
@@ -68,19 +65,6 @@ pub fn read(
             file: cloud.display().to_string(),
             problem: "its faces have no area; --sample can't be used".into(),
         })
-    })
-}
-
-/// The note if single precision was requested and can't represent coordinates on a grid; then double is to be used.
-pub fn rounding(args: &args::Reconstruct, grid: &Grid<f64>) -> Option<String> {
-    let corners = grid.lower().into_iter().chain(grid.upper());
-    let largest = corners.fold(0.0f64, |m, x| m.max(x.abs()));
-    let cells = largest * f64::from(f32::EPSILON) / grid.spacing();
-    (args.precision == Precision::F32 && cells > TOLERATED_ROUNDING).then(|| {
-        format!(
-            "coordinates reach {largest:.3e} with cells of {:.3e}, which f32 rounds to {cells:.1e} cells; computed in f64",
-            grid.spacing()
-        )
     })
 }
 
@@ -196,7 +180,7 @@ impl<'a> Job<'a> {
     ) -> Result<Option<Verdict>, Error> {
         let cloud = PointCloud::new(geometry.points.clone());
         let grid = self.grid(&cloud.map_err(Error::input(self.cloud))?)?;
-        match rounding(self.args, &grid) {
+        match rounding::rounding(self.args, Some(geometry.dtype), &grid) {
             Some(note) => {
                 progress.warn(&note);
                 self.alone_in::<f64>(geometry, Some(&note), progress)
