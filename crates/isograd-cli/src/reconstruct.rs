@@ -7,7 +7,7 @@ use std::time::Instant;
 use isograd::orient::Method;
 use isograd::{Field, Grid, JsonReport, Mesh, PointCloud, Real, Stage, Verdict};
 use isograd_backend::{Number, Plan, View};
-use isograd_io::{Attributes, Geometry};
+use isograd_io::{Attributes, Geometry, NotFinite, ReadOptions};
 
 use crate::args::{self, Precision};
 use crate::error::{Error, file_name};
@@ -55,11 +55,15 @@ pub fn read(
     cloud: &Path,
     attributes: Attributes,
 ) -> Result<Geometry, Error> {
-    let options = args.reading.options(attributes);
     let Some(n) = args.sample else {
-        return Ok(options.read_geometry(cloud)?);
+        let uses_normals = args.method.normals.uses_normals();
+        return Ok(args.reading.read(cloud, attributes, uses_normals)?);
     };
-    let mesh = options.read_mesh(cloud)?;
+    let mesh = ReadOptions {
+        not_finite: NotFinite::KeepNormals,
+        ..args.reading.options(attributes)
+    };
+    let mesh = mesh.read_mesh(cloud)?;
     resample::resample(&mesh, n as usize).ok_or_else(|| {
         Error::File(isograd_io::Error::Format {
             file: cloud.display().to_string(),

@@ -12,13 +12,17 @@ use crate::geometry::Geometry;
 use crate::limits::Memory;
 use crate::lines::{Lines, coordinates, quoted, words};
 use crate::number::Dtype;
+use crate::options::NotFinite;
 use crate::polygon::Triangles;
 use crate::source::Input;
 
 /// Reads an OBJ file. Normals are kept if there is one per vertex and every face pairs them by index.
 pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
     let memory = &input.memory;
-    let mut reader = Reader::default();
+    let mut reader = Reader {
+        not_finite: input.options.not_finite,
+        ..Reader::default()
+    };
     let mut lines = Lines::new(input.bytes);
     let mut joined = Vec::new();
     while let Some((line_number, line)) = lines.next() {
@@ -52,6 +56,7 @@ struct Reader {
     normals: Vec<[f64; 3]>,
     faces: Triangles,
     corners: Vec<u32>,
+    not_finite: NotFinite,
     /// Whether a corner has a normal of another index than its vertex.
     normals_differ: bool,
     /// Highest vertex index of a face, and the line of the face.
@@ -64,11 +69,15 @@ impl Reader {
         match fields.next() {
             Some(b"v") => {
                 memory.make_room(&mut self.points, 1)?;
-                self.points.push(coordinates("vertex", fields)?);
+                let point = coordinates(fields)?;
+                self.not_finite.check("vertex", point)?;
+                self.points.push(point);
             }
             Some(b"vn") => {
                 memory.make_room(&mut self.normals, 1)?;
-                self.normals.push(coordinates("normal", fields)?);
+                let normal = coordinates(fields)?;
+                self.not_finite.check("normal", normal)?;
+                self.normals.push(normal);
             }
             Some(b"f") => self.face(memory, fields, line_number)?,
             _ => {}

@@ -10,7 +10,7 @@ use super::buffers::Buffers;
 use super::document::{self, Attributes, Document, Node, Primitive};
 use crate::error::{Error, Location};
 use crate::format::Format;
-use crate::geometry::{Geometry, check_finite};
+use crate::geometry::Geometry;
 use crate::number::{Dtype, as_index};
 use crate::source::Input;
 
@@ -266,9 +266,11 @@ impl<'a> Reader<'a> {
         let positions = self.open(position, &[("VEC3", 3)])?;
         let room = memory.make_room(&mut self.geometry.points, positions.count);
         room.map_err(|problem| self.bad(problem))?;
+        let not_finite = self.input.options.not_finite;
         for index in 0..positions.count {
             let point = transform.point(positions.vector(index));
-            check_finite("vertex", point)
+            not_finite
+                .check("vertex", point)
                 .map_err(|problem| self.input.error(positions.location(index), problem))?;
             self.geometry.points.push(point);
         }
@@ -310,9 +312,11 @@ impl<'a> Reader<'a> {
             .make_room(&mut all, count)
             .map_err(|problem| self.bad(problem))?;
         let (cofactors, sign) = transform.cofactors();
+        let not_finite = self.input.options.not_finite;
         for row in 0..count {
             let mut normal = normals.vector(row);
-            check_finite("normal", normal)
+            not_finite
+                .check("normal", normal)
                 .map_err(|problem| self.input.error(normals.location(row), problem))?;
             if transform.linear != Transform::IDENTITY.linear {
                 let turned = cofactors.map(|row| sign * vector::dot(row, normal));
