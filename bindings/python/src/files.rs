@@ -4,7 +4,9 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use isograd::Field;
-use isograd_io::{Attributes, Columns, Dtype as Stored, Limits, ReadOptions, parse_size};
+use isograd_io::{
+    Attributes, Columns, Dtype as Stored, Limits, NotFinite, ReadOptions, parse_size,
+};
 use pyo3::prelude::*;
 
 use crate::arrays::{self, Number, by_dtype};
@@ -36,9 +38,10 @@ fn limits(max_memory: Option<Size>) -> PyResult<Limits> {
     Ok(Limits { memory })
 }
 
-/// Reads points or a mesh, in the number type of the file.
+/// Reads points or a mesh, in the number type of the file. Points and normals that are not finite are refused; `"normals"`
+/// keeps the normals, and `"drop"` leaves out the points.
 #[pyfunction]
-#[pyo3(signature = (path, columns=None, normal_columns=None, max_memory=None, attributes=true))]
+#[pyo3(signature = (path, columns=None, normal_columns=None, max_memory=None, attributes=true, not_finite="refuse"))]
 pub fn read_geometry(
     py: Python<'_>,
     path: PathBuf,
@@ -46,6 +49,7 @@ pub fn read_geometry(
     normal_columns: Option<[String; 3]>,
     max_memory: Option<Size>,
     attributes: bool,
+    not_finite: &str,
 ) -> PyResult<Geometry<'_>> {
     let options = ReadOptions {
         limits: limits(max_memory)?,
@@ -57,23 +61,36 @@ pub fn read_geometry(
             true => Attributes::All,
             false => Attributes::Sensors,
         },
+        not_finite: match not_finite {
+            "normals" => NotFinite::KeepNormals,
+            "drop" => NotFinite::Keep,
+            _ => NotFinite::Refuse,
+        },
     };
     let geometry = py.detach(|| options.read_geometry(&path));
-    let geometry = geometry.map_err(file)?;
+    let mut geometry = geometry.map_err(file)?;
+    if options.not_finite == NotFinite::Keep {
+        geometry.drop_not_finite();
+    }
     match geometry.dtype {
-        Stored::F32 => geometry_arrays::<f32>(py, &geometry),
-        _ => geometry_arrays::<f64>(py, &geometry),
+        Stored::F32 => geometry_arrays::<f32>(py, geometry),
+        _ => geometry_arrays::<f64>(py, geometry),
     }
 }
 
 fn geometry_arrays<'py, T: Number>(
     py: Python<'py>,
-    geometry: &isograd_io::Geometry,
+    mut geometry: isograd_io::Geometry,
 ) -> PyResult<Geometry<'py>> {
+    // A cloud has none that are not finite.
+    let normals = geometry.normals.take();
     let cloud = geometry.cloud::<T>().map_err(value)?;
+    let rounded = |normals: Vec<[f64; 3]>| -> Vec<[T; 3]> {
+        normals.into_iter().map(|n| n.map(T::of)).collect()
+    };
     Ok((
         arrays::from_vectors(py, cloud.points()),
-        cloud.normals().map(|n| arrays::from_vectors(py, n)),
+        normals.map(|n| arrays::from_vectors(py, &rounded(n))),
         arrays::attributes(py, &cloud)?,
         arrays::from_vectors(py, &geometry.faces),
     ))

@@ -52,7 +52,7 @@ pub enum Command {
     Orient(Box<OrientCloud>),
     /// Sample a parametric shape as a point cloud
     Sample(Sample),
-    /// Remove duplicates and outliers of a point cloud, and thin it
+    /// Remove points and normals that are not finite, duplicates and outliers of a point cloud, and thin it
     Clean(Clean),
     /// Compute the signed distance field of a mesh
     Sdf(Box<Sdf>),

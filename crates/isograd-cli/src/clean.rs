@@ -1,8 +1,8 @@
-//! `isograd clean`: a cloud without duplicates and outliers, thinned.
+//! `isograd clean`: a cloud without duplicates, outliers and points that are not finite, thinned.
 
 use isograd::Real;
 use isograd::clean::clean;
-use isograd_io::{Attributes, CLOUD_EXTENSIONS, Geometry};
+use isograd_io::{Attributes, CLOUD_EXTENSIONS, Geometry, NotFinite, ReadOptions};
 
 use crate::args;
 use crate::error::Error;
@@ -20,29 +20,37 @@ pub fn run(args: &args::Clean) -> Result<(), Error> {
     isograd_io::check_output(&args.output, CLOUD_EXTENSIONS)?;
     let mut progress = Progress::new(3, args.running);
     progress.step("read");
-    let options = args.reading.options(Attributes::All);
-    let geometry = options.read_geometry(&args.cloud)?;
+    let options = ReadOptions {
+        not_finite: NotFinite::Keep,
+        ..args.reading.options(Attributes::All)
+    };
+    let mut geometry = options.read_geometry(&args.cloud)?;
+    let removed = geometry.drop_not_finite();
     match is_single(&geometry) {
-        true => run_on::<f32>(args, &geometry, progress),
-        false => run_on::<f64>(args, &geometry, progress),
+        true => run_on::<f32>(args, &geometry, removed, progress),
+        false => run_on::<f64>(args, &geometry, removed, progress),
     }
 }
 
 fn run_on<T: Real>(
     args: &args::Clean,
     geometry: &Geometry,
+    not_finite: usize,
     mut progress: Progress,
 ) -> Result<(), Error> {
     let cloud = geometry.cloud::<T>().map_err(Error::input(&args.cloud))?;
     progress.step("clean");
-    let cleaned = clean(cloud.points(), &args.options()).map_err(Error::input(&args.cloud))?;
+    let mut cleaned = clean(cloud.points(), &args.options()).map_err(Error::input(&args.cloud))?;
+    if not_finite > 0 {
+        cleaned.removed.insert(0, ("not_finite", not_finite));
+    }
+    let all = not_finite + cloud.len();
     let kept = cleaned.apply(&cloud).map_err(Error::input(&args.cloud))?;
     if kept.is_empty() {
         let steps = cleaned.removed.iter();
         let steps: Vec<String> = steps.map(|(name, n)| format!("{name} {n}")).collect();
         let problem = format!(
-            "no point of {} is left (removed: {}); use a larger radius or fewer neighbors",
-            cloud.len(),
+            "no point of {all} is left (removed: {}); use a larger radius or fewer neighbors",
             steps.join(", ")
         );
         return Err(Error::input(&args.cloud)(problem));
@@ -54,6 +62,6 @@ fn run_on<T: Real>(
     for (name, removed) in &cleaned.removed {
         progress.print(&format!("{}: {removed} removed", name.replace('_', "-")));
     }
-    progress.print(&format!("{} of {} points kept", kept.len(), cloud.len()));
+    progress.print(&format!("{} of {all} points kept", kept.len()));
     Ok(())
 }

@@ -24,6 +24,7 @@ mod query;
 mod reconstruct;
 mod report;
 mod resample;
+mod rounding;
 mod sample;
 mod sdf;
 mod sequence;

@@ -21,8 +21,9 @@ pub fn run(args: &args::OrientCloud) -> Result<(), Error> {
     check(args)?;
     let mut progress = Progress::new(3, args.running);
     progress.step("read");
-    let options = args.reading.options(Attributes::All);
-    let geometry = options.read_geometry(&args.cloud)?;
+    let uses_normals = args.normals.uses_normals();
+    let reading = &args.reading;
+    let geometry = reading.read(&args.cloud, Attributes::All, uses_normals)?;
     progress.detail(&format!(
         "{} points, stored as {}",
         geometry.points.len(),

@@ -7,7 +7,7 @@ use std::time::Instant;
 use isograd::orient::Method;
 use isograd::{Field, Grid, JsonReport, Mesh, PointCloud, Real, Stage, Verdict};
 use isograd_backend::{Number, Plan, View};
-use isograd_io::{Attributes, Geometry};
+use isograd_io::{Attributes, Geometry, NotFinite, ReadOptions};
 
 use crate::args::{self, Precision};
 use crate::error::{Error, file_name};
@@ -15,10 +15,7 @@ use crate::inputs::{Inputs, stem};
 use crate::outputs::{Outputs, write_report};
 use crate::progress::{Progress, decimal};
 use crate::report::{Normals, Report, Times};
-use crate::{backend, batch, orient, plot, prediction, resample, surface};
-
-/// Rounding of the coordinates to single precision, in cells, above which the computation uses double precision.
-const TOLERATED_ROUNDING: f64 = 1e-2;
+use crate::{backend, batch, orient, plot, prediction, resample, rounding, surface};
 
 /// Parts of the work on a cloud: reading, the stages, writing.
 pub const PARTS: usize = 2 + Stage::ALL.len();
@@ -58,29 +55,20 @@ pub fn read(
     cloud: &Path,
     attributes: Attributes,
 ) -> Result<Geometry, Error> {
-    let options = args.reading.options(attributes);
     let Some(n) = args.sample else {
-        return Ok(options.read_geometry(cloud)?);
+        let uses_normals = args.method.normals.uses_normals();
+        return Ok(args.reading.read(cloud, attributes, uses_normals)?);
     };
-    let mesh = options.read_mesh(cloud)?;
+    let mesh = ReadOptions {
+        not_finite: NotFinite::KeepNormals,
+        ..args.reading.options(attributes)
+    };
+    let mesh = mesh.read_mesh(cloud)?;
     resample::resample(&mesh, n as usize).ok_or_else(|| {
         Error::File(isograd_io::Error::Format {
             file: cloud.display().to_string(),
             problem: "its faces have no area; --sample can't be used".into(),
         })
-    })
-}
-
-/// The note if single precision was requested and can't represent coordinates on a grid; then double is to be used.
-pub fn rounding(args: &args::Reconstruct, grid: &Grid<f64>) -> Option<String> {
-    let corners = grid.lower().into_iter().chain(grid.upper());
-    let largest = corners.fold(0.0f64, |m, x| m.max(x.abs()));
-    let cells = largest * f64::from(f32::EPSILON) / grid.spacing();
-    (args.precision == Precision::F32 && cells > TOLERATED_ROUNDING).then(|| {
-        format!(
-            "coordinates reach {largest:.3e} with cells of {:.3e}, which f32 rounds to {cells:.1e} cells; computed in f64",
-            grid.spacing()
-        )
     })
 }
 
@@ -196,7 +184,7 @@ impl<'a> Job<'a> {
     ) -> Result<Option<Verdict>, Error> {
         let cloud = PointCloud::new(geometry.points.clone());
         let grid = self.grid(&cloud.map_err(Error::input(self.cloud))?)?;
-        match rounding(self.args, &grid) {
+        match rounding::rounding(self.args, Some(geometry.dtype), &grid) {
             Some(note) => {
                 progress.warn(&note);
                 self.alone_in::<f64>(geometry, Some(&note), progress)

@@ -3,13 +3,14 @@
 use isograd::orient::Method;
 use isograd::{Grid, Outliers, PointCloud, Real, Verdict};
 use isograd_backend::{Number, Plan};
-use isograd_io::{Attributes, Geometry};
+use isograd_io::{Attributes, Dtype, Geometry};
 
 use crate::args::{self, Precision};
 use crate::batch::Batch;
 use crate::error::{Error, file_name};
 use crate::progress::Progress;
 use crate::reconstruct::{self, Job};
+use crate::rounding;
 
 /// Reconstructs the frames in order.
 ///
@@ -20,10 +21,10 @@ pub fn run(batch: &mut Batch) -> Result<(), Error> {
         return batch.go(&mut |job, geometry, progress| job.alone(geometry, progress));
     }
     let args = batch.args;
-    let corners = corners(batch)?;
+    let (corners, stored) = corners(batch)?;
     let first = &batch.clouds[0].path;
     let grid = common_grid::<f64>(args, &corners).map_err(Error::input(first))?;
-    let note = reconstruct::rounding(args, &grid);
+    let note = rounding::rounding(args, stored, &grid);
     if let Some(note) = &note {
         batch.progress.warn(note);
     }
@@ -34,21 +35,22 @@ pub fn run(batch: &mut Batch) -> Result<(), Error> {
     Sequence::new(batch, grid, None)?.go(batch)
 }
 
-/// Low and high corners of every frame, without outliers. Empty if the grid is given.
+/// Low and high corners of every frame, without outliers, and the number type of the last one. Empty if the grid is given.
 ///
 /// # Errors
 /// That of the first frame, if none can be read.
-fn corners(batch: &mut Batch) -> Result<Vec<[f64; 3]>, Error> {
+fn corners(batch: &mut Batch) -> Result<(Vec<[f64; 3]>, Option<Dtype>), Error> {
     let args = batch.args;
-    let mut corners = Vec::new();
+    let (mut corners, mut stored) = (Vec::new(), None);
     if args.grid.cells.bounds.is_some() {
-        return Ok(corners);
+        return Ok((corners, stored));
     }
     let mut first_error = None;
     for cloud in batch.clouds {
         batch.progress.step("bounds");
         let read = reconstruct::read(args, &cloud.path, Attributes::Sensors);
         let read = read.and_then(|geometry| {
+            stored = Some(geometry.dtype);
             PointCloud::new(geometry.points).map_err(Error::input(&cloud.path))
         });
         match read {
@@ -63,7 +65,7 @@ fn corners(batch: &mut Batch) -> Result<Vec<[f64; 3]>, Error> {
     }
     match first_error {
         Some(error) if corners.is_empty() => Err(error),
-        _ => Ok(corners),
+        _ => Ok((corners, stored)),
     }
 }
 

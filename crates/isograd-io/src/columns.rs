@@ -7,10 +7,11 @@ use isograd::{PointCloud, Real};
 
 use crate::colors::{CHANNELS, byte_colors};
 use crate::format::Format;
-use crate::geometry::{Geometry, check_finite};
+use crate::geometry::Geometry;
 use crate::limits::Memory;
 use crate::names::{MAX_COLUMNS, UniqueNames, is_normal};
 use crate::number::Dtype;
+use crate::options::NotFinite;
 use crate::source::Input;
 
 /// Points, normals and attributes collected row by row.
@@ -22,6 +23,7 @@ pub(crate) struct PointTable {
     points: Vec<[f64; 3]>,
     normals: Vec<[f64; 3]>,
     attributes: Vec<Attribute<f64>>,
+    not_finite: NotFinite,
 }
 
 impl PointTable {
@@ -52,18 +54,19 @@ impl PointTable {
             points: memory.with_capacity(rows)?,
             normals: memory.with_capacity(normal.map_or(0, |_| rows))?,
             attributes,
+            not_finite: input.options.not_finite,
         })
     }
 
     /// Appends a row, which has a value for every column.
     pub fn push(&mut self, memory: &Memory, row: &[f64]) -> Result<(), String> {
         let point = self.xyz.map(|column| row[column]);
-        check_finite("point", point)?;
+        self.not_finite.check("point", point)?;
         memory.make_room(&mut self.points, 1)?;
         self.points.push(point);
         if let Some(columns) = self.normal {
             let normal = columns.map(|column| row[column]);
-            check_finite("normal", normal)?;
+            self.not_finite.check("normal", normal)?;
             memory.make_room(&mut self.normals, 1)?;
             self.normals.push(normal);
         }
@@ -72,6 +75,11 @@ impl PointTable {
             attribute.values.push(row[column]);
         }
         Ok(())
+    }
+
+    /// `(N, 3)` points of the rows so far.
+    pub fn points(&self) -> &[[f64; 3]] {
+        &self.points
     }
 
     /// Number of rows.

@@ -3,12 +3,13 @@
 use isograd::data::Attribute;
 use isograd::{Mesh, MeshError, PointCloud, PointCloudError, Real, Sensors};
 
+use isograd_element::vector;
+
 use crate::format::Format;
-use crate::limits::Memory;
 use crate::number::Dtype;
 
 /// The content of a file of points or of a mesh, in double precision: every coordinate and normal is
-/// finite, every face names vertices that are there.
+/// finite, unless the reader was to [keep](crate::NotFinite) others, and every face names vertices that are there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Geometry {
     /// `(N, 3)` points or vertices, in the file's order and unit.
@@ -17,7 +18,7 @@ pub struct Geometry {
     pub normals: Option<Vec<[f64; 3]>>,
     /// Further values per point.
     pub attributes: Vec<Attribute<f64>>,
-    /// `(F, 3)` triangles; polygons are cut into fans. Empty if the file has none.
+    /// `(F, 3)` triangles, into which polygons are cut. Empty if the file has none.
     pub faces: Vec<[u32; 3]>,
     /// Number type of the coordinates in the file.
     pub dtype: Dtype,
@@ -36,6 +37,50 @@ impl Geometry {
             dtype,
             format,
         }
+    }
+
+    /// Whether all normals are finite.
+    pub fn has_finite_normals(&self) -> bool {
+        let mut normals = self.normals.iter().flatten();
+        normals.all(|&normal| vector::is_finite(normal))
+    }
+
+    /// Removes points that are not finite or whose normal is not, and faces with such corners. Returns the number of points
+    /// removed.
+    pub fn drop_not_finite(&mut self) -> usize {
+        let normals = self.normals.as_deref().unwrap_or_default();
+        let normals = normals.iter().map(Some).chain(std::iter::repeat(None));
+        let rows = self.points.iter().zip(normals);
+        let is_finite = |row: &[f64; 3]| vector::is_finite(*row);
+        let kept: Vec<bool> = rows
+            .map(|(point, normal)| is_finite(point) && normal.is_none_or(is_finite))
+            .collect();
+        let removed = kept.iter().filter(|&&is_kept| !is_kept).count();
+        if removed == 0 {
+            return 0;
+        }
+        retain(&mut self.points, &kept, 1);
+        if let Some(normals) = &mut self.normals {
+            retain(normals, &kept, 1);
+        }
+        for attribute in &mut self.attributes {
+            retain(&mut attribute.values, &kept, attribute.components);
+        }
+        let mut next = 0;
+        let index = |&is_kept: &bool| {
+            next += u32::from(is_kept);
+            is_kept.then_some(next.wrapping_sub(1))
+        };
+        let indices: Vec<Option<u32>> = kept.iter().map(index).collect();
+        self.faces.retain_mut(|face| {
+            let all = face.map(|corner| indices.get(corner as usize).copied().flatten());
+            let [Some(a), Some(b), Some(c)] = all else {
+                return false;
+            };
+            *face = [a, b, c];
+            true
+        });
+        removed
     }
 
     /// Converts the points to a cloud of type `T`. Attributes with sensor positions (`sensor_x`,
@@ -102,21 +147,16 @@ pub fn is_sensor(name: &str) -> bool {
     names.any(|known| name.eq_ignore_ascii_case(known))
 }
 
-fn convert<T: Real>(points: &[[f64; 3]]) -> Vec<[T; 3]> {
-    points.iter().map(|p| p.map(T::of)).collect()
+/// Retains the rows that are kept, each of so many values.
+fn retain<V>(values: &mut Vec<V>, kept: &[bool], components: usize) {
+    let mut rows = kept
+        .iter()
+        .flat_map(|&is_kept| std::iter::repeat_n(is_kept, components));
+    values.retain(|_| rows.next().unwrap_or(true));
 }
 
-/// Appends the triangles of a polygon: a fan around its first corner, with the polygon's winding.
-pub(crate) fn triangulate(
-    memory: &Memory,
-    corners: &[u32],
-    faces: &mut Vec<[u32; 3]>,
-) -> Result<(), String> {
-    if let Some((&first, rest)) = corners.split_first() {
-        memory.make_room(faces, rest.len())?;
-        faces.extend(rest.windows(2).map(|pair| [first, pair[0], pair[1]]));
-    }
-    Ok(())
+fn convert<T: Real>(points: &[[f64; 3]]) -> Vec<[T; 3]> {
+    points.iter().map(|p| p.map(T::of)).collect()
 }
 
 /// Refuses a point or normal (`what`) that is not finite.
@@ -125,7 +165,7 @@ pub(crate) fn check_finite(what: &str, [x, y, z]: [f64; 3]) -> Result<(), String
         return Ok(());
     }
     Err(format!(
-        "the {what} ({x}, {y}, {z}) is not finite; remove or correct the point"
+        "the {what} ({x}, {y}, {z}) is not finite; correct it, or leave such points out with 'isograd clean' (drop_not_finite in Python)"
     ))
 }
 
@@ -143,6 +183,36 @@ mod tests {
             attributes: attributes.iter().map(attribute).collect(),
             ..Geometry::from_points(vec![[0.0; 3], [1.0; 3]], Dtype::F64, Format::Npz)
         }
+    }
+
+    #[test]
+    fn rows_that_are_not_finite_are_dropped_with_their_faces() {
+        let nan = f64::NAN;
+        let mut points: Vec<[f64; 3]> = (0..6).map(|i| [f64::from(i); 3]).collect();
+        let mut normals = points.clone();
+        (points[1][2], normals[4][0]) = (nan, f64::INFINITY);
+        let mut geometry = Geometry {
+            faces: vec![[0, 1, 2], [0, 2, 3], [3, 4, 5], [5, 3, 2]],
+            attributes: vec![Attribute {
+                name: "a".into(),
+                components: 2,
+                values: (0..12).map(f64::from).collect(),
+            }],
+            normals: Some(normals),
+            ..Geometry::from_points(points, Dtype::F64, Format::Ply)
+        };
+        assert!(!geometry.has_finite_normals());
+        assert_eq!(geometry.drop_not_finite(), 2);
+        let left = [0.0, 2.0, 3.0, 5.0];
+        assert_eq!(geometry.points, left.map(|x| [x; 3]));
+        assert_eq!(geometry.normals, Some(left.map(|x| [x; 3]).to_vec()));
+        let values: Vec<f64> = left.iter().flat_map(|x| [2.0 * x, 2.0 * x + 1.0]).collect();
+        assert_eq!(geometry.attributes[0].values, values);
+        assert_eq!(geometry.faces, [[0, 1, 2], [3, 2, 1]]);
+        assert_eq!(
+            (geometry.drop_not_finite(), geometry.has_finite_normals()),
+            (0, true)
+        );
     }
 
     #[test]

@@ -68,6 +68,7 @@ mod off;
 mod options;
 mod pcd;
 mod ply;
+mod polygon;
 mod read;
 mod source;
 mod stl;
@@ -83,7 +84,7 @@ pub use geometry::{Geometry, is_sensor};
 pub use limits::{Limits, parse_size};
 pub use message::{LONGEST_LINE, printable};
 pub use number::Dtype;
-pub use options::{Attributes, Columns, ReadOptions};
+pub use options::{Attributes, Columns, NotFinite, ReadOptions};
 pub use read::{Content, parse_field, parse_geometry, read, read_field, read_geometry, read_mesh};
 pub use source::Source;
 pub use write::{

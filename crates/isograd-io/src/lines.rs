@@ -1,8 +1,7 @@
 //! Lines, words and numbers of text.
 
-use crate::geometry::check_finite;
-
 /// Lines of a text, numbered from 1, without line ends and surrounding white space. A line ends in `\n`, `\r\n` or `\r`.
+#[derive(Clone)]
 pub(crate) struct Lines<'a> {
     text: &'a [u8],
     /// Whether `\r` ends the first line: then a `\n` behind a `\r` is not part of the line end.
@@ -65,16 +64,14 @@ pub(crate) fn number(word: &[u8]) -> Result<f64, String> {
         .ok_or_else(|| format!("{} is not a number", quoted(word)))
 }
 
-/// The first three numbers of a line, which are finite coordinates of a `what`.
+/// The first three numbers of a line.
 pub(crate) fn coordinates<'a>(
-    what: &str,
     mut words: impl Iterator<Item = &'a [u8]>,
 ) -> Result<[f64; 3], String> {
     let mut v = [0.0; 3];
     for value in &mut v {
         *value = number(words.next().ok_or("the line has fewer than 3 numbers")?)?;
     }
-    check_finite(what, v)?;
     Ok(v)
 }
 

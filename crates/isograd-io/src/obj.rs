@@ -8,16 +8,21 @@ use isograd::{Mesh, Real};
 
 use crate::error::{Error, Location};
 use crate::format::Format;
-use crate::geometry::{Geometry, triangulate};
+use crate::geometry::Geometry;
 use crate::limits::Memory;
 use crate::lines::{Lines, coordinates, quoted, words};
 use crate::number::Dtype;
+use crate::options::NotFinite;
+use crate::polygon::Triangles;
 use crate::source::Input;
 
 /// Reads an OBJ file. Normals are kept if there is one per vertex and every face pairs them by index.
 pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
     let memory = &input.memory;
-    let mut reader = Reader::default();
+    let mut reader = Reader {
+        not_finite: input.options.not_finite,
+        ..Reader::default()
+    };
     let mut lines = Lines::new(input.bytes);
     let mut joined = Vec::new();
     while let Some((line_number, line)) = lines.next() {
@@ -49,8 +54,9 @@ fn append(memory: &Memory, text: &mut Vec<u8>, part: &[u8]) -> Result<(), String
 struct Reader {
     points: Vec<[f64; 3]>,
     normals: Vec<[f64; 3]>,
-    faces: Vec<[u32; 3]>,
+    faces: Triangles,
     corners: Vec<u32>,
+    not_finite: NotFinite,
     /// Whether a corner has a normal of another index than its vertex.
     normals_differ: bool,
     /// Highest vertex index of a face, and the line of the face.
@@ -63,11 +69,15 @@ impl Reader {
         match fields.next() {
             Some(b"v") => {
                 memory.make_room(&mut self.points, 1)?;
-                self.points.push(coordinates("vertex", fields)?);
+                let point = coordinates(fields)?;
+                self.not_finite.check("vertex", point)?;
+                self.points.push(point);
             }
             Some(b"vn") => {
                 memory.make_room(&mut self.normals, 1)?;
-                self.normals.push(coordinates("normal", fields)?);
+                let normal = coordinates(fields)?;
+                self.not_finite.check("normal", normal)?;
+                self.normals.push(normal);
             }
             Some(b"f") => self.face(memory, fields, line_number)?,
             _ => {}
@@ -99,7 +109,7 @@ impl Reader {
         if count < 3 {
             return Err(format!("the face has {count} corners; remove it"));
         }
-        triangulate(memory, &self.corners, &mut self.faces)
+        self.faces.push(memory, &self.points, &self.corners)
     }
 
     fn finish(self, input: &Input) -> Result<Geometry, Error> {
@@ -118,9 +128,10 @@ impl Reader {
             return Err(input.error(Location::Line(line), problem));
         }
         let per_vertex = self.normals.len() == self.points.len() && !self.normals_differ;
+        let faces = self.faces.finish(&input.memory, &self.points);
         Ok(Geometry {
             normals: per_vertex.then_some(self.normals),
-            faces: self.faces,
+            faces: faces.map_err(|problem| input.error(Location::Whole, problem))?,
             ..Geometry::from_points(self.points, Dtype::Text, Format::Obj)
         })
     }

@@ -1,16 +1,19 @@
 //! Object file format as text: `OFF`, with normals (`N`) and colors (`C`) of the vertices. Texture coordinates (`ST`) and colors
 //! of faces are ignored.
+//!
+//! Geomview, whose format it is, has normals before colors. MeshLab begins with `NCOFF`, and has colors before normals.
 
 use std::io::{self, Write};
 
 use isograd::{Mesh, Real};
 
-use crate::columns::PointTable;
+use crate::columns::{NORMAL, PointTable, find_columns};
 use crate::error::{Error, Location};
 use crate::format::Format;
-use crate::geometry::{Geometry, triangulate};
+use crate::geometry::Geometry;
 use crate::lines::{Lines, number, quoted, words};
 use crate::number::{Dtype, as_index};
+use crate::polygon::triangulate;
 use crate::source::Input;
 
 /// Kind of the vertices, from the keyword in the first line.
@@ -19,6 +22,10 @@ struct Kind {
     texture: bool,
     colors: bool,
     normals: bool,
+    /// Whether the keyword has the normals before the colors.
+    normals_named_first: bool,
+    /// Whether vertices have their colors before their normals.
+    colors_come_first: bool,
 }
 
 impl Kind {
@@ -26,14 +33,22 @@ impl Kind {
     fn split(line: &[u8]) -> Result<(Self, &[u8]), String> {
         let mut kind = Self::default();
         let mut rest = line;
-        for (prefix, flag) in [
-            (&b"ST"[..], &mut kind.texture),
-            (b"C", &mut kind.colors),
-            (b"N", &mut kind.normals),
-        ] {
-            if let Some(after) = rest.strip_prefix(prefix) {
-                (rest, *flag) = (after, true);
-            }
+        loop {
+            rest = match rest {
+                [b'S', b'T', after @ ..] if !kind.texture => {
+                    kind.texture = true;
+                    after
+                }
+                [b'C', after @ ..] if !kind.colors => {
+                    (kind.colors, kind.normals_named_first) = (true, kind.normals);
+                    after
+                }
+                [b'N', after @ ..] if !kind.normals => {
+                    kind.normals = true;
+                    after
+                }
+                _ => break,
+            };
         }
         match rest.strip_prefix(b"OFF") {
             Some(counts) if counts.trim_ascii().starts_with(b"BINARY") => {
@@ -42,7 +57,7 @@ impl Kind {
             Some(counts) => Ok((kind, counts)),
             None if line.first().is_some_and(u8::is_ascii_digit) => Ok((Self::default(), line)),
             None => Err(format!(
-                "{} is not 'OFF', 'COFF', 'NOFF' or 'CNOFF'",
+                "{} is not 'OFF', 'COFF', 'NOFF', 'CNOFF' or 'NCOFF'",
                 quoted(line)
             )),
         }
@@ -51,15 +66,16 @@ impl Kind {
     /// Names of the columns of a vertex with `width` numbers.
     fn names(self, width: usize) -> Result<Vec<Option<&'static str>>, String> {
         let mut names = vec!["x", "y", "z"];
-        if self.normals {
-            names.extend(["nx", "ny", "nz"]);
-        }
+        let normals = if self.normals { &NORMAL[..] } else { &[] };
         let texture = if self.texture { 2 } else { 0 };
-        if self.colors {
-            let colors = ["red", "green", "blue", "alpha"];
-            let count = width.saturating_sub(names.len() + texture);
-            names.extend(&colors[..count.clamp(3, 4)]);
-        }
+        let colors = match width.saturating_sub(names.len() + normals.len() + texture) {
+            _ if !self.colors => &[][..],
+            count => &["red", "green", "blue", "alpha"][..count.clamp(3, 4)],
+        };
+        names.extend(match self.colors_come_first {
+            true => [colors, normals].concat(),
+            false => [normals, colors].concat(),
+        });
         let names: Vec<_> = names
             .into_iter()
             .map(Some)
@@ -76,6 +92,7 @@ impl Kind {
 }
 
 /// Lines without comments, and the number of the last one.
+#[derive(Clone)]
 struct Rows<'a> {
     input: &'a Input<'a>,
     lines: Lines<'a>,
@@ -115,14 +132,17 @@ pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
     let bad = |line: usize, problem: String| input.error(Location::Line(line), problem);
     let no_counts = "the numbers of vertices and faces are missing; the file is cut short";
     let (mut line, first) = rows.next().ok_or_else(|| bad(1, no_counts.into()))?;
-    let (kind, mut text) = Kind::split(first).map_err(|problem| bad(line, problem))?;
+    let (mut kind, mut text) = Kind::split(first).map_err(|problem| bad(line, problem))?;
     if text.trim_ascii().is_empty() {
         (line, text) = rows.next().ok_or_else(|| bad(line, no_counts.into()))?;
     }
     let left = input.bytes.len().saturating_sub(rows.lines.offset) + 1;
     let [vertices, faces] = counts(text, left).map_err(|problem| bad(line, problem))?;
+    kind.colors_come_first =
+        kind.normals_named_first && colors_come_first(rows.clone(), kind.texture, vertices);
     let table = read_vertices(&mut rows, kind, vertices)?;
-    let triangles = read_faces(&mut rows, faces, vertices)?;
+    let points = table.as_ref().map_or(&[][..], PointTable::points);
+    let triangles = read_faces(&mut rows, faces, points)?;
     Ok(Geometry {
         faces: triangles,
         ..match table {
@@ -152,6 +172,32 @@ fn counts(line: &[u8], left: usize) -> Result<[usize; 2], String> {
     }
 }
 
+/// Whether a vertex has a color only if colors come before normals.
+fn colors_come_first(mut rows: Rows, texture: bool, count: usize) -> bool {
+    let is_color = |values: &[f64]| {
+        let is_byte = |v: &f64| v.fract() == 0.0 && (0.0..=255.0).contains(v);
+        values.iter().all(|v| (0.0..=1.0).contains(v)) || values.iter().all(is_byte)
+    };
+    let mut row = Vec::new();
+    (0..count).map_while(|_| rows.next()).any(|(_, text)| {
+        row.clear();
+        row.extend(
+            words(text)
+                .take(LONGEST)
+                .map_while(|word| number(word).ok()),
+        );
+        let end = row.len() - if texture { 2.min(row.len()) } else { 0 };
+        // Three numbers of the normal, and three or four of the color.
+        let values = row.get(3..end).unwrap_or_default();
+        match values {
+            [_, _, _, last @ ..] if matches!(last.len(), 3 | 4) => {
+                !is_color(last) && is_color(&values[..last.len()])
+            }
+            _ => false,
+        }
+    })
+}
+
 /// Reads the vertices; `None` if there are none.
 fn read_vertices(rows: &mut Rows, kind: Kind, count: usize) -> Result<Option<PointTable>, Error> {
     let input = rows.input;
@@ -169,8 +215,8 @@ fn read_vertices(rows: &mut Rows, kind: Kind, count: usize) -> Result<Option<Poi
             }
             if table.is_none() {
                 width = row.len();
-                let normal = kind.normals.then_some([3, 4, 5]);
                 let names = kind.names(width)?;
+                let normal = find_columns(&names, NORMAL);
                 table = Some(PointTable::new(input, &names, [0, 1, 2], normal, count)?);
             } else if row.len() != width {
                 return Err(format!(
@@ -191,7 +237,8 @@ fn read_vertices(rows: &mut Rows, kind: Kind, count: usize) -> Result<Option<Poi
 const LONGEST: usize = 12;
 
 /// Reads faces and cuts them into triangles.
-fn read_faces(rows: &mut Rows, count: usize, vertices: usize) -> Result<Vec<[u32; 3]>, Error> {
+fn read_faces(rows: &mut Rows, count: usize, points: &[[f64; 3]]) -> Result<Vec<[u32; 3]>, Error> {
+    let vertices = points.len();
     let memory = &rows.input.memory;
     let mut triangles = Vec::new();
     let mut corners = Vec::new();
@@ -221,7 +268,7 @@ fn read_faces(rows: &mut Rows, count: usize, vertices: usize) -> Result<Vec<[u32
                 memory.make_room(&mut corners, 1)?;
                 corners.push(corner as u32);
             }
-            triangulate(memory, &corners, &mut triangles)
+            triangulate(memory, points, &corners, &mut triangles)
         };
         push().map_err(|problem| rows.input.error(Location::Line(line), problem))?;
     }

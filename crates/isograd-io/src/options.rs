@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::format::Format;
-use crate::geometry::is_sensor;
+use crate::geometry::{check_finite, is_sensor};
 use crate::limits::Limits;
 
 /// Options of the readers; see [`crate::read_geometry`] and its siblings for the defaults.
@@ -26,6 +26,8 @@ pub struct ReadOptions {
     pub columns: Columns,
     /// Attributes to keep.
     pub attributes: Attributes,
+    /// Points and normals with numbers that are not finite.
+    pub not_finite: NotFinite,
 }
 
 /// Columns of a text file, each by its name in the header or by its number from 1. `None`: recognized by name.
@@ -45,6 +47,29 @@ pub enum Attributes {
     All,
     /// Sensor positions only; see [`crate::Geometry::cloud`].
     Sensors,
+}
+
+/// Points and normals with numbers that are not finite.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum NotFinite {
+    /// Refused.
+    #[default]
+    Refuse,
+    /// Kept in normals, refused in points: for work that may not need the normals.
+    KeepNormals,
+    /// Kept; see [`crate::Geometry::drop_not_finite`].
+    Keep,
+}
+
+impl NotFinite {
+    /// Refuses a point, or a normal, that is not finite, unless it is to be kept.
+    pub(crate) fn check(self, what: &str, row: [f64; 3]) -> Result<(), String> {
+        match self {
+            Self::Keep => Ok(()),
+            Self::KeepNormals if what == "normal" => Ok(()),
+            Self::KeepNormals | Self::Refuse => check_finite(what, row),
+        }
+    }
 }
 
 impl Columns {

@@ -5,7 +5,6 @@ use std::io::{self, Read};
 use std::path::Path;
 
 use crate::error::{Error, Location};
-use crate::geometry::check_finite;
 use crate::limits::{Limits, Memory, exceeded};
 use crate::options::ReadOptions;
 
@@ -94,10 +93,10 @@ impl<'a> Input<'a> {
         }
     }
 
-    /// Refuses rows of the array `name` that are not finite.
+    /// Refuses rows of the array `name` that are not finite, unless they are to be kept.
     pub fn check_rows(&self, name: &str, what: &str, rows: &[[f64; 3]]) -> Result<(), Error> {
         rows.iter().enumerate().try_for_each(|(index, &row)| {
-            check_finite(what, row).map_err(|problem| {
+            self.options.not_finite.check(what, row).map_err(|problem| {
                 let name = name.into();
                 self.error(Location::Row { name, index }, problem)
             })

@@ -11,10 +11,11 @@ use isograd_element::vector;
 
 use crate::error::{Error, Location};
 use crate::format::Format;
-use crate::geometry::{Geometry, check_finite};
+use crate::geometry::Geometry;
 use crate::limits::Memory;
 use crate::lines::{Lines, coordinates, quoted, words};
 use crate::number::{Dtype, Endian, Number};
+use crate::options::NotFinite;
 use crate::source::Input;
 
 const HEADER: usize = 84;
@@ -27,8 +28,9 @@ pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
     let count = count.map(|b| u32::from_le_bytes(*b) as usize);
     let needed = count.and_then(|n| n.checked_mul(TRIANGLE)?.checked_add(HEADER));
     let is_exact = needed == Some(bytes.len());
-    let has_facets = memchr::memmem::find(&bytes[..bytes.len().min(4096)], b"facet").is_some();
-    if !is_exact && bytes.trim_ascii_start().starts_with(b"solid") && has_facets {
+    let head = bytes[..bytes.len().min(4096)].to_ascii_lowercase();
+    let has_facets = memchr::memmem::find(&head, b"facet").is_some();
+    if !is_exact && head.trim_ascii_start().starts_with(b"solid") && has_facets {
         return read_ascii(input);
     }
     match (count, needed) {
@@ -50,15 +52,17 @@ pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
 /// Triangles whose equal corners are merged.
 struct Merger<'a> {
     memory: &'a Memory,
+    not_finite: NotFinite,
     points: Vec<[f64; 3]>,
     index: HashMap<[u64; 3], u32>,
     faces: Vec<[u32; 3]>,
 }
 
 impl<'a> Merger<'a> {
-    fn new(memory: &'a Memory) -> Self {
+    fn new(input: &'a Input) -> Self {
         Self {
-            memory,
+            memory: &input.memory,
+            not_finite: input.options.not_finite,
             points: Vec::new(),
             index: HashMap::new(),
             faces: Vec::new(),
@@ -66,7 +70,7 @@ impl<'a> Merger<'a> {
     }
 
     fn vertex(&mut self, point: [f64; 3]) -> Result<u32, String> {
-        check_finite("vertex", point)?;
+        self.not_finite.check("vertex", point)?;
         // Adding 0 turns −0 into 0, so that the two are equal.
         let key = point.map(|x| (x + 0.0).to_bits());
         let next = self.points.len() as u32;
@@ -117,7 +121,7 @@ impl<'a> Merger<'a> {
 }
 
 fn read_binary(input: &Input, count: usize) -> Result<Geometry, Error> {
-    let mut merger = Merger::new(&input.memory);
+    let mut merger = Merger::new(input);
     let triangles = input.bytes[HEADER..].chunks_exact(TRIANGLE).take(count);
     for (index, triangle) in triangles.enumerate() {
         add_triangle(&mut merger, triangle).map_err(|problem| {
@@ -147,7 +151,7 @@ fn add_triangle(merger: &mut Merger, triangle: &[u8]) -> Result<(), String> {
 }
 
 fn read_ascii(input: &Input) -> Result<Geometry, Error> {
-    let mut merger = Merger::new(&input.memory);
+    let mut merger = Merger::new(input);
     let mut corners: Vec<u32> = Vec::new();
     let mut open = false;
     let mut lines = Lines::new(input.bytes);
@@ -157,7 +161,7 @@ fn read_ascii(input: &Input) -> Result<Geometry, Error> {
         match fields.next().map(<[u8]>::to_ascii_lowercase).as_deref() {
             Some(b"facet") => open = true,
             Some(b"vertex") => {
-                let vertex = coordinates("vertex", fields).and_then(|point| merger.vertex(point));
+                let vertex = coordinates(fields).and_then(|point| merger.vertex(point));
                 input.memory.make_room(&mut corners, 1).map_err(bad)?;
                 corners.push(vertex.map_err(bad)?);
             }

@@ -58,7 +58,7 @@ def clean(
         points: ``(N, 3)``, or a :class:`Cloud` with its normals and attributes. Lengths are in their unit.
         normals: ``(N, 3)``, to go along.
         attributes: ``(N,)`` or ``(N, components)`` by name, to go along.
-        drop_not_finite: removes points that are not finite, which are an error otherwise.
+        drop_not_finite: removes points that are not finite, which are an error otherwise, and points whose normal is not.
         duplicates: removes all but one of the samples within this distance of each other; 0 or True: of equal ones.
         statistical: ``(neighbors, ratio)``: removes samples whose mean distance to so many nearest neighbors is above the
             mean of all by more than ``ratio`` standard deviations. As in PCL; Open3D's ``nb_neighbors`` is one more.
@@ -88,7 +88,10 @@ def clean(
         "voxel": None if voxel is None else number(voxel, "voxel"),
         "poisson_disk": None if poisson_disk is None else number(poisson_disk, "poisson_disk"),
     }
-    kept, removed = _core.clean_points(cloud, steps)
+    rows = cloud
+    if drop_not_finite and normals is not None:
+        rows = np.where(np.isfinite(normals).all(axis=1, keepdims=True), cloud, cloud.dtype.type(np.nan))
+    kept, removed = _core.clean_points(rows, steps)
     return Cleaned(
         kept,
         cloud[kept],

@@ -311,8 +311,10 @@ def read_geometry(
     normal_columns: Sequence[str] | None = None,
     max_memory: int | str | None = None,
     attributes: bool = True,
+    not_finite: str = "refuse",
 ) -> tuple[_Floats, _Floats | None, list[tuple[str, _Floats]], _Indices]:
-    """Points, normals, attributes by name, and faces of a file, in its number type."""
+    """Points, normals, attributes by name, and faces of a file, in its number type. Points and normals that are not finite
+    are refused; ``"normals"`` keeps the normals, and ``"drop"`` leaves out the points."""
 
 def read_field(
     path: _Path, max_memory: int | str | None = None

@@ -49,6 +49,7 @@ def read_points(
     columns: Sequence[str | int] | None = None,
     normal_columns: Sequence[str | int] | None = None,
     max_memory: int | str | None = None,
+    drop_not_finite: bool = False,
 ) -> Cloud:
     """Reads the points of a file, or the vertices of a mesh.
 
@@ -58,20 +59,25 @@ def read_points(
         normal_columns: Likewise the columns of the normals.
         max_memory: Memory that reading may take, in bytes or as text such as ``"4G"``. By default 64 times the size of
             the file, at least 64 MiB.
+        drop_not_finite: Leaves out points that are not finite or whose normal is not, which are an error otherwise.
 
     Raises:
         FileNotFoundError, OSError: an error of the operating system.
         ValueError: invalid content, with its line or byte; columns that are not clear; more than ``max_memory``.
     """
     points, normals, attributes, _ = _core.read_geometry(
-        os.fspath(path), _names(columns), _names(normal_columns), max_memory
+        os.fspath(path),
+        _names(columns),
+        _names(normal_columns),
+        max_memory,
+        not_finite="drop" if drop_not_finite else "refuse",
     )
     return Cloud(points, normals, dict(attributes))
 
 
 def read_mesh(path: Path, *, max_memory: int | str | None = None) -> Mesh:
     """Reads a triangle mesh; errors and ``max_memory`` as :func:`read_points`, and ValueError for a file without faces."""
-    points, _, _, faces = _core.read_geometry(os.fspath(path), max_memory=max_memory, attributes=False)
+    points, _, _, faces = _core.read_geometry(os.fspath(path), max_memory=max_memory, attributes=False, not_finite="normals")
     if len(faces) == 0:
         raise ValueError(f"{os.fspath(path)} has points and no faces; read it with read_points")
     return Mesh(points, faces)

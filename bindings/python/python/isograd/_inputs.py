@@ -96,7 +96,7 @@ def read_input(cloud: object) -> Input:
     if isinstance(cloud, Input):
         return cloud
     if isinstance(cloud, (str, os.PathLike)):
-        points, normals, attributes, _ = _core.read_geometry(os.fspath(cloud))
+        points, normals, attributes, _ = _core.read_geometry(os.fspath(cloud), not_finite="normals")
         return _input(points, normals, dict(attributes))
     for kind in type(cloud).__mro__:
         library = kind.__module__.partition(".")[0]

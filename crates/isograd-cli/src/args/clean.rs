@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{ArgGroup, Args};
+use clap::Args;
 use isograd::clean::{Options, Sparse, Statistical};
 
 use super::{ReadingArgs, Running, STATUS, not_negative, positive};
@@ -10,7 +10,6 @@ use super::{ReadingArgs, Running, STATUS, not_negative, positive};
 /// Arguments of `clean`.
 #[derive(Debug, Args)]
 #[command(after_help = STATUS)]
-#[command(group(ArgGroup::new("steps").required(true).multiple(true)))]
 pub struct Clean {
     /// The cloud, in any format that `reconstruct` reads
     pub cloud: PathBuf,
@@ -18,24 +17,24 @@ pub struct Clean {
     #[arg(short, long, value_name = "OUT")]
     pub output: PathBuf,
     /// Remove all but one of the points within DISTANCE of each other, in the cloud's unit; 0: of equal points
-    #[arg(long, value_name = "DISTANCE", value_parser = not_negative, group = "steps",
+    #[arg(long, value_name = "DISTANCE", value_parser = not_negative,
         help_heading = "Steps, in this order")]
     pub duplicates: Option<f64>,
     /// Remove points whose mean distance to their K nearest neighbors is above the mean of all plus S standard deviations,
     /// such as 20,2
-    #[arg(long, value_name = "K,S", value_parser = statistical, group = "steps",
+    #[arg(long, value_name = "K,S", value_parser = statistical,
         help_heading = "Steps, in this order")]
     pub statistical: Option<Statistical>,
     /// Remove points with fewer than N others within R, in the cloud's unit, such as 0.05,3
-    #[arg(long, value_name = "R,N", value_parser = sparse, group = "steps",
+    #[arg(long, value_name = "R,N", value_parser = sparse,
         help_heading = "Steps, in this order")]
     pub radius: Option<Sparse>,
     /// Keep one point in each cube of side H, in the cloud's unit: the one nearest to their mean
-    #[arg(long, value_name = "H", value_parser = positive, group = "steps",
+    #[arg(long, value_name = "H", value_parser = positive,
         help_heading = "Steps, in this order")]
     pub voxel: Option<f64>,
     /// Keep points that are more than R apart, as many as fit in, in the cloud's unit
-    #[arg(long, value_name = "R", value_parser = positive, group = "steps",
+    #[arg(long, value_name = "R", value_parser = positive,
         help_heading = "Steps, in this order")]
     pub poisson_disk: Option<f64>,
     /// Arguments of the input.
@@ -47,7 +46,7 @@ pub struct Clean {
 }
 
 impl Clean {
-    /// The steps.
+    /// The steps behind the removal of points that are not finite.
     pub fn options(&self) -> Options {
         Options {
             drop_not_finite: false,

@@ -1,7 +1,9 @@
 //! Arguments of every command that reads files.
 
+use std::path::Path;
+
 use clap::Args;
-use isograd_io::{Attributes, Columns, Limits, ReadOptions, parse_size};
+use isograd_io::{Attributes, Columns, Geometry, Limits, NotFinite, ReadOptions, parse_size};
 
 /// Limit on memory.
 #[derive(Clone, Copy, Debug, Args)]
@@ -41,6 +43,30 @@ pub struct ReadingArgs {
 }
 
 impl ReadingArgs {
+    /// Reads a cloud with these attributes. Normals that are not finite are left out where they are not used.
+    ///
+    /// # Errors
+    /// Those of the reader.
+    pub fn read(
+        &self,
+        cloud: &Path,
+        attributes: Attributes,
+        uses_normals: bool,
+    ) -> Result<Geometry, isograd_io::Error> {
+        let options = ReadOptions {
+            not_finite: match uses_normals {
+                true => NotFinite::Refuse,
+                false => NotFinite::KeepNormals,
+            },
+            ..self.options(attributes)
+        };
+        let mut geometry = options.read_geometry(cloud)?;
+        if !geometry.has_finite_normals() {
+            geometry.normals = None;
+        }
+        Ok(geometry)
+    }
+
     /// Options of a reader that keeps these attributes.
     pub fn options(&self, attributes: Attributes) -> ReadOptions {
         ReadOptions {

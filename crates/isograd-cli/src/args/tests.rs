@@ -120,7 +120,6 @@ fn values_that_make_no_sense_are_refused() {
         "isograd sdf a.ply -o b.vti --band -1",
         "isograd sdf a.ply -o b.vti --outliers keep",
         "isograd isosurface a.vti -o b.ply --level nan",
-        "isograd clean a.ply -o b.ply",
         "isograd clean a.ply -o b.ply --voxel 0",
         "isograd clean a.ply -o b.ply --statistical 8",
         "isograd clean a.ply -o b.ply --statistical 0,2",

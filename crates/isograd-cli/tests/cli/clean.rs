@@ -37,9 +37,25 @@ fn thinned_clouds_are_apart() {
 }
 
 #[test]
-fn command_lines_without_steps_or_with_bad_numbers_are_refused() {
+fn points_and_normals_that_are_not_finite_are_left_out() {
+    let sandbox = Sandbox::new();
+    let text = "x,y,z,nx,ny,nz,heat\n0,0,0,0,0,1,7\n0,nan,0,0,0,1,8\n1,0,0,0,0,inf,9\n1,0,0,0,0,1,10\n0,0,0,0,0,1,11\n";
+    sandbox.write("cloud.csv", text);
+    let kept = |steps: &str, removed: &str| {
+        let run = sandbox.done(&format!("clean cloud.csv -o out.csv {steps}"));
+        assert!(run.stdout.contains("not-finite: 2 removed"), "{run:?}");
+        assert!(run.stdout.contains(removed), "{run:?}");
+        sandbox.geometry("out.csv").attributes[0].values.clone()
+    };
+    assert_eq!(kept("", "3 of 5 points kept"), [7.0, 10.0, 11.0]);
+    assert_eq!(kept("--duplicates 0", "2 of 5 points kept"), [7.0, 10.0]);
+    sandbox.write("none.csv", "x,y,z\nnan,0,0\n");
+    sandbox.says("1 clean none.csv -o new.csv | no point of 1 is left | not_finite 1");
+}
+
+#[test]
+fn command_lines_with_bad_numbers_are_refused() {
     let sandbox = Sandbox::with("sample sphere -n 100 -o cloud.ply");
-    sandbox.says("2 clean cloud.ply -o out.ply | required");
     sandbox.says("2 clean cloud.ply -o out.ply --voxel=-1 | above 0");
     sandbox.says("2 clean cloud.ply -o out.ply --statistical 8 | is not K,S");
     sandbox.says("2 clean cloud.ply -o out.ply --radius 0.1,some | whole number");

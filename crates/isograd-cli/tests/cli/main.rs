@@ -10,6 +10,7 @@ mod generate;
 mod gradcheck;
 #[cfg(target_os = "linux")]
 mod memory;
+mod numbers;
 mod orient;
 mod outputs;
 #[cfg(target_os = "linux")]

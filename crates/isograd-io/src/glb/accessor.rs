@@ -1,11 +1,12 @@
-//! Numbers of a GLB: accessors into views of the binary part.
+//! Numbers of a GLB: accessors into views of the buffers.
 
+use super::buffers::Buffers;
 use super::document::{Accessor, Document};
 use crate::error::{Error, Location};
 use crate::number::{Endian, Number};
 use crate::source::Input;
 
-/// Vectors of numbers in the binary part.
+/// Vectors of numbers in a buffer.
 pub(super) struct Vectors<'a> {
     /// Index of the accessor.
     pub index: usize,
@@ -52,7 +53,7 @@ fn name(index: usize) -> String {
 /// Opens accessor `index`, whose type must be one of `shapes`. Nothing is allocated.
 pub(super) fn open<'a>(
     input: &Input,
-    (document, binary): (&Document, &'a [u8]),
+    (document, buffers): (&Document, &'a Buffers<'_>),
     index: usize,
     shapes: &[(&str, usize)],
 ) -> Result<Vectors<'a>, Error> {
@@ -61,13 +62,13 @@ pub(super) fn open<'a>(
         format!("there are only {count} accessors; the file is damaged")
     });
     found
-        .and_then(|accessor| resolve(document, binary, accessor, index, shapes))
+        .and_then(|accessor| resolve(document, buffers, accessor, index, shapes))
         .map_err(|problem| input.error(Location::Array(name(index)), problem))
 }
 
 fn resolve<'a>(
     document: &Document,
-    binary: &'a [u8],
+    buffers: &'a Buffers<'_>,
     accessor: &Accessor,
     index: usize,
     shapes: &[(&str, usize)],
@@ -98,17 +99,12 @@ fn resolve<'a>(
         .buffer_views
         .get(view)
         .ok_or("its buffer view is missing; the file is damaged")?;
-    if view.buffer != 0
-        || document
-            .buffers
-            .first()
-            .is_none_or(|buffer| buffer.uri.is_some())
-    {
+    let Some(Some(buffer)) = buffers.get(view.buffer) else {
         return Err("its values are in another file; save all in one .glb".into());
-    }
+    };
     let end = view.byte_offset.checked_add(view.byte_length);
     let bytes = end
-        .and_then(|end| binary.get(view.byte_offset..end))
+        .and_then(|end| buffer.get(view.byte_offset..end))
         .ok_or(DAMAGED)?;
     let bytes = bytes.get(accessor.byte_offset..).ok_or(DAMAGED)?;
     let size = components * number.size();

@@ -3,6 +3,7 @@
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
+use super::buffers::{self, Buffers};
 use super::{BINARY, JSON, MAGIC};
 use crate::error::{Error, Location};
 use crate::source::Input;
@@ -94,11 +95,11 @@ pub(super) struct View {
 
 #[derive(Deserialize)]
 pub(super) struct Buffer {
-    pub uri: Option<IgnoredAny>,
+    pub uri: Option<String>,
 }
 
-/// Splits a file into its document and its binary part.
-pub(super) fn parse<'a>(input: &Input<'a>) -> Result<(Document, &'a [u8]), Error> {
+/// Splits a file into its document and its buffers.
+pub(super) fn parse<'a>(input: &Input<'a>) -> Result<(Document, Buffers<'a>), Error> {
     let bad = |byte: usize, problem: String| input.error(Location::Byte(byte), problem);
     let word = |at: usize| {
         let bytes = input.bytes.get(at..)?.first_chunk()?;
@@ -144,7 +145,7 @@ pub(super) fn parse<'a>(input: &Input<'a>) -> Result<(Document, &'a [u8]), Error
         .memory
         .reserve(memory)
         .map_err(|problem| bad(20, problem))?;
-    let document: Document = serde_json::from_slice(json)
+    let mut document: Document = serde_json::from_slice(json)
         .map_err(|error| bad(20, format!("the JSON part is damaged: {error}")))?;
     let compressed = ["KHR_draco_mesh_compression", "EXT_meshopt_compression"];
     let mut required = document.extensions_required.iter();
@@ -154,12 +155,15 @@ pub(super) fn parse<'a>(input: &Input<'a>) -> Result<(Document, &'a [u8]), Error
             format!("the meshes are compressed ({name}); save the file without compression"),
         ));
     }
-    Ok((document, binary))
+    let buffers = buffers::read(input, &mut document, binary)?;
+    Ok((document, buffers))
 }
 
 /// Upper bound for the memory of the document: every value follows one of these characters, and takes up to 100 bytes in a
-/// vector whose capacity doubles while the old one is still there.
+/// vector whose capacity doubles while the old one is still there. Data in the document are copied, up to three times more if they
+/// have escaped characters.
 fn memory_of(json: &[u8]) -> usize {
     const EACH: usize = 300;
-    memchr::memchr3_iter(b'{', b'[', b',', json).count() * EACH
+    let text = memchr::memmem::find(json, b"\"uri\"").map_or(0, |_| 4 * json.len());
+    memchr::memchr3_iter(b'{', b'[', b',', json).count() * EACH + text
 }

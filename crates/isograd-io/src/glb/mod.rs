@@ -4,6 +4,7 @@
 //! need, and its errors do not name the accessor.
 
 mod accessor;
+mod buffers;
 mod document;
 mod read;
 mod write;

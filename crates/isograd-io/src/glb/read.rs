@@ -6,10 +6,11 @@ use isograd::data::Attribute;
 use isograd_element::vector;
 
 use super::accessor::{Vectors, open};
+use super::buffers::Buffers;
 use super::document::{self, Attributes, Document, Node, Primitive};
 use crate::error::{Error, Location};
 use crate::format::Format;
-use crate::geometry::{Geometry, check_finite};
+use crate::geometry::Geometry;
 use crate::number::{Dtype, as_index};
 use crate::source::Input;
 
@@ -106,11 +107,11 @@ impl Transform {
 
 /// Reads the meshes of the default scene as one.
 pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
-    let (document, binary) = document::parse(input)?;
+    let (document, buffers) = document::parse(input)?;
     let mut reader = Reader {
         input,
         document: &document,
-        binary,
+        buffers: &buffers,
         geometry: Geometry::from_points(Vec::new(), Dtype::F32, Format::Glb),
         normals: Some(Vec::new()),
         colors: Some(Default::default()),
@@ -141,7 +142,7 @@ pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
 struct Reader<'a> {
     input: &'a Input<'a>,
     document: &'a Document,
-    binary: &'a [u8],
+    buffers: &'a Buffers<'a>,
     geometry: Geometry,
     /// `None` as soon as a part of the mesh has none.
     normals: Option<Vec<[f64; 3]>>,
@@ -248,7 +249,7 @@ impl<'a> Reader<'a> {
     }
 
     fn open(&self, index: usize, shapes: &[(&str, usize)]) -> Result<Vectors<'a>, Error> {
-        open(self.input, (self.document, self.binary), index, shapes)
+        open(self.input, (self.document, self.buffers), index, shapes)
     }
 
     /// Appends the vertices of a part; the index of the first one, and their number.
@@ -265,9 +266,11 @@ impl<'a> Reader<'a> {
         let positions = self.open(position, &[("VEC3", 3)])?;
         let room = memory.make_room(&mut self.geometry.points, positions.count);
         room.map_err(|problem| self.bad(problem))?;
+        let not_finite = self.input.options.not_finite;
         for index in 0..positions.count {
             let point = transform.point(positions.vector(index));
-            check_finite("vertex", point)
+            not_finite
+                .check("vertex", point)
                 .map_err(|problem| self.input.error(positions.location(index), problem))?;
             self.geometry.points.push(point);
         }
@@ -309,9 +312,11 @@ impl<'a> Reader<'a> {
             .make_room(&mut all, count)
             .map_err(|problem| self.bad(problem))?;
         let (cofactors, sign) = transform.cofactors();
+        let not_finite = self.input.options.not_finite;
         for row in 0..count {
             let mut normal = normals.vector(row);
-            check_finite("normal", normal)
+            not_finite
+                .check("normal", normal)
                 .map_err(|problem| self.input.error(normals.location(row), problem))?;
             if transform.linear != Transform::IDENTITY.linear {
                 let turned = cofactors.map(|row| sign * vector::dot(row, normal));

@@ -4,10 +4,12 @@ use super::header::{Element, Encoding, Header, Kind, Property};
 use crate::columns::{NORMAL, PointTable, find_columns};
 use crate::error::{Error, Location};
 use crate::format::Format;
-use crate::geometry::{Geometry, triangulate};
+use crate::geometry::Geometry;
 use crate::limits::Memory;
 use crate::lines::{Lines, number, quoted, words};
+use crate::names::{self, Quantity};
 use crate::number::{Dtype, Endian, Number, as_index};
+use crate::polygon::Triangles;
 use crate::source::Input;
 
 /// Position of the reader in the data.
@@ -128,17 +130,18 @@ pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
             "vertex" => read_rows(input, &mut cursor, element, |row, _| {
                 vertices.push(memory, row)
             })?,
-            "face" => {
-                faces.list = face_list(element);
+            "face" | "tristrips" => {
+                (faces.list, faces.are_strips) = (face_list(element), element.name != "face");
                 read_rows(input, &mut cursor, element, |_, list| {
-                    faces.push(memory, list)
+                    faces.push(memory, vertices.points(), list)
                 })?;
             }
             _ => skip(input, &mut cursor, element)?,
         }
     }
+    let triangles = faces.triangles.finish(memory, vertices.points());
     Ok(Geometry {
-        faces: faces.triangles,
+        faces: triangles.map_err(|problem| input.error(Location::Whole, problem))?,
         ..vertices.into_geometry(dtype, Format::Ply)
     })
 }
@@ -243,11 +246,16 @@ fn point_table(input: &Input, element: &Element) -> Result<(PointTable, Dtype), 
     let names: Vec<Option<&str>> = properties
         .map(|p| scalar(p).map(|_| p.name.as_str()))
         .collect();
-    let Some(xyz) = find_columns(&names, ["x", "y", "z"]) else {
+    let find = |exact: [&str; 3], quantity| {
+        let all = names.iter().map(|name| name.unwrap_or_default().into());
+        let all: Vec<String> = all.collect();
+        find_columns(&names, exact).or_else(|| names::find(&all, quantity))
+    };
+    let Some(xyz) = find(["x", "y", "z"], Quantity::Points) else {
         let problem = "element 'vertex' lacks one of the properties x, y, z";
         return Err(input.error(Location::Whole, problem));
     };
-    let normal = find_columns(&names, NORMAL);
+    let normal = find(NORMAL, Quantity::Normals);
     let dtype = scalar(&element.properties[xyz[0]]).map_or(Dtype::Integer, Number::dtype);
     let table = PointTable::new(input, &names, xyz, normal, element.count);
     let table = table.map_err(|problem| input.error(Location::Whole, problem))?;
@@ -257,28 +265,62 @@ fn point_table(input: &Input, element: &Element) -> Result<(PointTable, Dtype), 
 /// Polygons, cut into triangles.
 struct Faces {
     list: Option<usize>,
+    /// Whether the lists are strips of triangles rather than polygons.
+    are_strips: bool,
     vertices: usize,
     corners: Vec<u32>,
-    triangles: Vec<[u32; 3]>,
+    triangles: Triangles,
 }
 
 impl Faces {
     fn new(vertices: usize) -> Self {
         Self {
             list: None,
+            are_strips: false,
             vertices,
             corners: Vec::new(),
-            triangles: Vec::new(),
+            triangles: Triangles::default(),
         }
     }
 
-    fn push(&mut self, memory: &Memory, list: &[f64]) -> Result<(), String> {
+    /// Appends the face of this list; `points` are those read so far.
+    fn push(&mut self, memory: &Memory, points: &[[f64; 3]], list: &[f64]) -> Result<(), String> {
         if self.list.is_none() {
             return Ok(());
+        }
+        if self.are_strips {
+            // −1 ends a strip.
+            let mut strips = list.split(|&value| value == -1.0);
+            return strips.try_for_each(|strip| self.push_strip(memory, points, strip));
         }
         if list.len() < 3 {
             return Err(format!("the face has {} corners; remove it", list.len()));
         }
+        self.read_corners(memory, list)?;
+        self.triangles.push(memory, points, &self.corners)
+    }
+
+    /// Appends the triangles of a strip, of which every second one has the opposite winding. Those with two equal corners only
+    /// lead from one part to the next.
+    fn push_strip(
+        &mut self,
+        memory: &Memory,
+        points: &[[f64; 3]],
+        strip: &[f64],
+    ) -> Result<(), String> {
+        self.read_corners(memory, strip)?;
+        for (index, triangle) in self.corners.windows(3).enumerate() {
+            let [a, b, c] = [triangle[0], triangle[1], triangle[2]];
+            if a != b && b != c && c != a {
+                let triangle = if index % 2 == 0 { [a, b, c] } else { [b, a, c] };
+                self.triangles.push(memory, points, &triangle)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks the corners of a list.
+    fn read_corners(&mut self, memory: &Memory, list: &[f64]) -> Result<(), String> {
         self.corners.clear();
         for &value in list {
             let vertex =
@@ -291,6 +333,6 @@ impl Faces {
             memory.make_room(&mut self.corners, 1)?;
             self.corners.push(vertex as u32);
         }
-        triangulate(memory, &self.corners, &mut self.triangles)
+        Ok(())
     }
 }

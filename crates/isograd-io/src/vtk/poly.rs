@@ -8,8 +8,9 @@ use super::data::{DataArray, VtkFile};
 use super::xml::Node;
 use crate::error::Error;
 use crate::format::Format;
-use crate::geometry::{Geometry, triangulate};
+use crate::geometry::Geometry;
 use crate::number::{Dtype, as_index};
+use crate::polygon::triangulate;
 use crate::source::Input;
 
 /// Reads all pieces as one. Point data are kept if every piece has them; normals are the active normals
@@ -22,10 +23,9 @@ pub(crate) fn read(input: &Input) -> Result<Geometry, Error> {
         let offset = geometry.points.len();
         read_points(&file, piece, &mut geometry)?;
         read_point_data(&file, piece, index == 0, offset, &mut geometry)?;
-        let count = geometry.points.len() - offset;
         for (section, is_strip) in [("Polys", false), ("Strips", true)] {
             if let Some(node) = piece.child(section) {
-                read_cells(&file, node, is_strip, offset, count, &mut geometry.faces)?;
+                read_cells(&file, node, is_strip, offset, &mut geometry)?;
             }
         }
     }
@@ -158,8 +158,7 @@ fn read_cells(
     section: &Node,
     is_strip: bool,
     first_point: usize,
-    points: usize,
-    faces: &mut Vec<[u32; 3]>,
+    geometry: &mut Geometry,
 ) -> Result<(), Error> {
     let array = |name: &str| {
         let mut nodes = section.children_named("DataArray");
@@ -168,6 +167,8 @@ fn read_cells(
     let (Some(connectivity), Some(offsets)) = (array("connectivity"), array("offsets")) else {
         return Ok(());
     };
+    let faces = &mut geometry.faces;
+    let points = geometry.points.len() - first_point;
     let values = |node| file.values(node, &file.array(node)?);
     let (indices, ends) = (values(connectivity)?, values(offsets)?);
     let memory = &file.input.memory;
@@ -198,7 +199,7 @@ fn read_cells(
                 _ => [t[1], t[0], t[2]],
             }));
         } else {
-            triangulate(memory, &corners, faces).map_err(cell_error)?;
+            triangulate(memory, &geometry.points, &corners, faces).map_err(cell_error)?;
         }
         begin = end;
     }

@@ -2,7 +2,7 @@
 
 use isograd_io::{Content, Dtype, Error, Format, Geometry, parse_field, parse_geometry};
 
-use crate::files::{self, SQUARE, npy, npz, source};
+use crate::files::{self, SQUARE, npy, npz, refused, source};
 
 fn geometry(format: Format, bytes: impl Into<Vec<u8>>) -> Geometry {
     parse_geometry(&source("file", bytes), format).expect("valid")
@@ -220,4 +220,53 @@ fn a_name_that_contradicts_the_content_is_refused() {
         assert!(matches!(error, Error::Format { .. }), "{error:?}");
         assert!(error.to_string().contains(part), "{error}");
     }
+}
+
+#[test]
+fn keywords_of_stl_may_have_upper_case() {
+    let text = include_str!("../corpus/mesh_ascii.stl");
+    let upper = geometry(Format::Stl, text.to_uppercase());
+    assert_eq!(upper, geometry(Format::Stl, text));
+}
+
+#[test]
+fn properties_of_ply_may_have_the_names_that_columns_of_text_have() {
+    let file = |names: [&str; 6]| {
+        let properties = names.map(|name| format!("property double {name}\n"));
+        let head = "ply\nformat ascii 1.0\nelement vertex 1\n";
+        let text = format!("{head}{}end_header\n1 2 3 4 5 6\n", properties.concat());
+        geometry(Format::Ply, text)
+    };
+    for names in [
+        ["X", "Y", "Z", "NX", "NY", "NZ"],
+        [
+            "pos_x", "pos_y", "pos_z", "normal_x", "normal_y", "normal_z",
+        ],
+    ] {
+        let file = file(names);
+        assert_eq!(file.points, [[1.0, 2.0, 3.0]]);
+        assert_eq!(file.normals, Some(vec![[4.0, 5.0, 6.0]]));
+    }
+    let file = file(["X", "Y", "Z", "x", "y", "z"]);
+    assert_eq!(file.points, [[4.0, 5.0, 6.0]]);
+    assert_eq!(file.attributes.len(), 3);
+}
+
+#[test]
+fn strips_of_ply_are_cut_into_triangles() {
+    let file = |strips: &str| {
+        let head = "ply\nformat ascii 1.0\nelement vertex 5\nproperty int x\nproperty int y\nproperty int z\n";
+        let points = "0 0 0\n0 1 0\n1 0 0\n1 1 0\n2 0 0\n";
+        let list = "element tristrips 1\nproperty list int int vertex_indices\nend_header\n";
+        format!("{head}{list}{points}{strips}\n")
+    };
+    // Two equal corners lead from one part to the next; −1 ends a strip.
+    let mesh = geometry(Format::Ply, file("14 0 2 1 3 3 2 2 4 3 -1 0 2 1 -1"));
+    assert_eq!(mesh.faces, [[0, 2, 1], [1, 2, 3], [2, 4, 3], [0, 2, 1]]);
+    refused(
+        Format::Ply,
+        file("4 0 2 1 5"),
+        &["line 15", "vertex 5", "0 to 4"],
+    );
+    refused(Format::Ply, file("4 0 2 1 -2"), &["line 15", "vertex -2"]);
 }

@@ -8,6 +8,7 @@ mod meshes;
 mod mutations;
 mod names;
 mod options;
+mod polygons;
 mod round_trips;
 mod scans;
 mod stopping;

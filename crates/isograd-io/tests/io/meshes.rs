@@ -1,5 +1,7 @@
 //! OFF and GLB: content, and damaged or hostile files.
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use isograd::Mesh;
 use isograd_io::{Dtype, Format};
 
@@ -32,6 +34,37 @@ fn vertices_of_off_have_normals_and_colors_if_the_keyword_says_so() {
         (file.attributes.len(), file.attributes[2].values[0]),
         (3, 1.0)
     );
+}
+
+#[test]
+fn normals_and_colors_of_off_may_have_either_order() {
+    // Geomview has normals before colors, MeshLab colors before normals, whose length is not 1.
+    let [colors, normals] = [[255.0, 255.0, 0.0, 255.0], [6.5, 0.0, -2.0, 0.0]];
+    let geomview = "1 2 3 6.5 0 -2 255 255 0 255\n";
+    let mesh_lab = "1 2 3 255 255 0 255 6.5 0 -2\n";
+    let either = "1 2 3 0 0 1 1 0 0 1\n";
+    for (keyword, rows) in [
+        ("CNOFF", [geomview, either]),
+        ("NCOFF", [geomview, either]),
+        ("NCOFF", [either, geomview]),
+        ("NCOFF", [mesh_lab, mesh_lab]),
+    ] {
+        let file = geometry(Format::Off, format!("{keyword}\n2 0 0\n{}", rows.concat()));
+        let row = usize::from(rows[0] == either);
+        let normal = file.normals.expect("normals")[row];
+        assert_eq!(normal, normals[..3], "{keyword} {rows:?}");
+        let found: Vec<f64> = file.attributes.iter().map(|a| a.values[row]).collect();
+        assert_eq!(found, colors, "{keyword} {rows:?}");
+        assert_eq!(file.attributes[0].name, "red");
+    }
+    let file = geometry(Format::Off, format!("NCOFF\n1 0 0\n{either}"));
+    assert_eq!(file.normals, Some(vec![[0.0, 0.0, 1.0]]));
+    let file = geometry(
+        Format::Off,
+        "NCSTOFF\n1 0 0\n1 2 3 255 9 8 0 0 1.5 0.5 0.5\n",
+    );
+    assert_eq!(file.normals, Some(vec![[0.0, 0.0, 1.5]]));
+    refused(Format::Off, "NCNOFF\n1 0 0\n1 2 3\n", &["line 1", "NCOFF"]);
 }
 
 #[test]
@@ -260,6 +293,48 @@ fn damaged_glb_files_are_refused() {
         at(data + 112, &[9, 0]),
         &["accessor 3", "row 0", "vertex 9", "there are 4"],
     );
+}
+
+/// The corpus file with its numbers in the JSON, in an address with this beginning.
+fn with_data(beginning: &str, data: impl Fn(&str) -> String) -> Vec<u8> {
+    let length = "\"byteLength\":124";
+    let text = data(&STANDARD.encode(&GLB[GLB.len() - 124..]));
+    let edited = edited(length, &format!("{length},\"uri\":\"{beginning}{text}\""));
+    edited[..edited.len() - 132].to_vec()
+}
+
+#[test]
+fn a_glb_may_have_its_numbers_in_the_document() {
+    let same = |text: &str| text.to_string();
+    for beginning in ["application/octet-stream", "application/gltf-buffer", ""] {
+        let beginning = format!("data:{beginning};base64,");
+        for data in [
+            same,
+            |text: &str| text.trim_end_matches('=').into(),
+            |text: &str| text.replace('/', "\\/"),
+        ] {
+            let mut file = with_data(&beginning, data);
+            let size = file.len() as u32;
+            file[8..12].copy_from_slice(&size.to_le_bytes());
+            assert_eq!(geometry(Format::Glb, file), geometry(Format::Glb, GLB));
+        }
+    }
+    let base64 = "data:application/octet-stream;base64,";
+    let bad = |file: Vec<u8>, parts: &[&str]| refused(Format::Glb, file, parts);
+    bad(
+        with_data(base64, |text| text.replacen('A', "!", 1)),
+        &["buffer 0", "not base64", "damaged"],
+    );
+    bad(
+        with_data(base64, |text| text[..60].into()),
+        &["accessor 0", "cut short"],
+    );
+    bad(with_data("data:", same), &["buffer 0", "not base64"]);
+    bad(
+        with_data("data:text/plain,", same),
+        &["buffer 0", "binary part"],
+    );
+    bad(with_data("", same), &["another file"]);
 }
 
 #[test]

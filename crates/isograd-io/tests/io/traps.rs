@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use isograd_io::{Error, Format, check_output, parse_field, parse_geometry};
+use isograd_io::{
+    Error, Format, NotFinite, ReadOptions, check_output, parse_field, parse_geometry,
+};
 
 use crate::files::{self, ASCII_PLY, assert_says, npy, npz, refused, source};
 
@@ -97,7 +99,7 @@ fn coordinates_that_are_not_finite() {
         refused(
             Format::Ply,
             ply("ascii", 2, 0, data.as_bytes()),
-            &["line 11", "not finite", "remove or correct"],
+            &["line 11", "not finite", "isograd clean", "drop_not_finite"],
         );
         refused(Format::Text, data.clone(), &["line 2", "not finite"]);
         refused(Format::Obj, format!("v 0 0 0\nv 1 {bad} 0\n"), &["line 2"]);
@@ -120,6 +122,51 @@ fn coordinates_that_are_not_finite() {
     );
     let normals = "0 0 0 0 0 1\n1 0 0 nan 0 1\n";
     refused(Format::Text, normals, &["line 2", "normal"]);
+}
+
+#[test]
+fn numbers_that_are_not_finite_are_kept_on_request() {
+    let read = |format: Format, text: &str, not_finite: NotFinite| {
+        let options = ReadOptions {
+            not_finite,
+            ..ReadOptions::default()
+        };
+        options.parse_geometry(&source("file", text), format)
+    };
+    let vtp = files::ASCII_VTP.replace("1 0 0 0 1 0 1 1 0", "1 0 0 0 nan 0 1 1 0");
+    let stl = files::ASCII_STL.replacen("vertex 1 0 0", "vertex 1 nan 0", 1);
+    for (format, text) in [
+        (Format::Text, "0 0 0\n0 nan 0\n"),
+        (Format::Off, "OFF\n2 0 0\n0 0 0\n0 nan 0\n"),
+        (Format::Obj, "v 0 0 0\nv 1 nan 0\nv 1 1 1\nf 1 2 3\n"),
+        (Format::Stl, &stl),
+        (Format::Vtp, &vtp),
+    ] {
+        assert!(
+            read(format, text, NotFinite::KeepNormals).is_err(),
+            "{format:?}"
+        );
+        let mut file = read(format, text, NotFinite::Keep).expect("kept");
+        assert_eq!(file.drop_not_finite(), 1, "{format:?}");
+        assert!(file.points.iter().flatten().all(|x| x.is_finite()));
+        file.mesh::<f64>()
+            .expect("its faces name points that are there");
+    }
+    for (format, text) in [
+        (Format::Text, "0 0 0 0 0 1\n1 0 0 nan 0 1\n"),
+        (Format::Off, "NOFF\n2 0 0\n0 0 0 0 0 1\n1 0 0 nan 0 1\n"),
+        (Format::Obj, "v 0 0 0\nv 1 0 0\nvn 0 0 1\nvn nan 0 1\n"),
+    ] {
+        for not_finite in [NotFinite::KeepNormals, NotFinite::Keep] {
+            let mut file = read(format, text, not_finite).expect("kept");
+            assert!(!file.has_finite_normals(), "{format:?}");
+            assert_eq!(
+                (file.drop_not_finite(), file.points.len()),
+                (1, 1),
+                "{format:?}"
+            );
+        }
+    }
 }
 
 #[test]
