@@ -42,15 +42,15 @@ fn limits(max_memory: Option<Size>) -> PyResult<Limits> {
 /// keeps the normals, and `"drop"` leaves out the points.
 #[pyfunction]
 #[pyo3(signature = (path, columns=None, normal_columns=None, max_memory=None, attributes=true, not_finite="refuse"))]
-pub fn read_geometry(
-    py: Python<'_>,
+pub fn read_geometry<'py>(
+    py: Python<'py>,
     path: PathBuf,
     columns: Option<[String; 3]>,
     normal_columns: Option<[String; 3]>,
     max_memory: Option<Size>,
     attributes: bool,
     not_finite: &str,
-) -> PyResult<Geometry<'_>> {
+) -> PyResult<Geometry<'py>> {
     let options = ReadOptions {
         limits: limits(max_memory)?,
         columns: Columns {

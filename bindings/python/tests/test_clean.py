@@ -107,3 +107,23 @@ def test_points_that_are_not_finite_are_dropped_only_on_request():
 def test_bad_numbers_are_refused_with_a_reason(steps, text):
     with pytest.raises(ValueError, match=text):
         isograd.clean(cloud(6), **steps)
+
+
+def test_normals_that_are_not_finite_matter_only_where_they_are_used(tmp_path):
+    path = tmp_path / "cloud.csv"
+    points = np.random.default_rng(6).normal(size=(400, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    normals = 2 * points
+    normals[3, 0] = np.inf
+    rows = "\n".join(",".join(map(repr, row)) for row in np.hstack([points, normals]).tolist())
+    path.write_text("x,y,z,nx,ny,nz\n" + rows)
+    assert (isograd.orient(path).normals == isograd.orient(points).normals).all()
+    with pytest.raises(ValueError, match="normal of point 3 is not finite"):
+        isograd.orient(path, orient="signs")
+    with pytest.raises(ValueError, match="line 5.*drop_not_finite"):
+        isograd.read_points(path)
+    read = isograd.read_points(path, drop_not_finite=True)
+    assert (read.points == np.delete(points, 3, axis=0)).all()
+    cleaned = isograd.clean(points, normals=normals, drop_not_finite=True)
+    assert cleaned.removed == {"drop_not_finite": 1} and np.isfinite(cleaned.normals).all()
+    assert (cleaned.points == read.points).all()

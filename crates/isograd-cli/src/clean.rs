@@ -49,8 +49,12 @@ fn run_on<T: Real>(
     if kept.is_empty() {
         let steps = cleaned.removed.iter();
         let steps: Vec<String> = steps.map(|(name, n)| format!("{name} {n}")).collect();
+        let remedy = match cloud.is_empty() {
+            true => "correct them, or write the file without its normals",
+            false => "use a larger radius or fewer neighbors",
+        };
         let problem = format!(
-            "no point of {all} is left (removed: {}); use a larger radius or fewer neighbors",
+            "no point of {all} is left (removed: {}); {remedy}",
             steps.join(", ")
         );
         return Err(Error::input(&args.cloud)(problem));
