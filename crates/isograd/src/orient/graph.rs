@@ -88,19 +88,7 @@ impl Graph {
         self.measure();
         self.couple();
         self.measure_areas();
-        self.reach_next_lines(neighborhoods, sites);
-    }
-
-    /// Widens the reach of samples along lines, so that their discs leave no gaps between the lines.
-    fn reach_next_lines<T: Real>(&mut self, neighborhoods: &Neighborhoods<T>, sites: &Sites) {
-        if neighborhoods.lines().is_none() {
-            return;
-        }
-        let (order, spacing) = (sites.order(), neighborhoods.spacing().f64());
-        parallel::for_each(&mut self.reach, |p, reach| {
-            let radius = neighborhoods.radius[order[p] as usize].f64();
-            *reach = reach.max(lines::reach(radius / spacing));
-        });
+        lines::widen(&mut self.reach, neighborhoods, sites);
     }
 
     /// Frees the offsets and what they were for. [`Self::second_sheet`] and the parts of the graph must have been found.

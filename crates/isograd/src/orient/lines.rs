@@ -7,15 +7,26 @@
 //! Nothing here has a derivative: it decides about signs.
 
 use super::coupling::NEIGHBORS;
+use super::sites::Sites;
+use crate::neighbors::Neighborhoods;
 use crate::neighbors::lines::{COMPARED, LINE, turn};
+use crate::{Real, parallel};
 
 /// Reach of a sample along a line in radii of its neighborhood, which hold the next lines: discs of .6 of their distance. With
 /// .4, signs of lines ten times as far apart as their samples are wrong a third more often.
 const REACH: f64 = 0.35;
 
-/// Least reach of a sample with a neighborhood of this radius, where samples lie along lines.
-pub(super) fn reach(radius: f64) -> f32 {
-    (REACH * radius) as f32
+/// Widens the reach of samples along lines, so that their discs leave no gaps between the lines; in the order of the sites, in
+/// spacings.
+pub(super) fn widen<T: Real>(reach: &mut [f32], neighborhoods: &Neighborhoods<T>, sites: &Sites) {
+    if neighborhoods.lines().is_none() {
+        return;
+    }
+    let (order, spacing) = (sites.order(), neighborhoods.spacing().f64());
+    parallel::for_each(reach, |p, reach| {
+        let radius = neighborhoods.radius[order[p] as usize].f64();
+        *reach = reach.max((REACH * radius / spacing) as f32);
+    });
 }
 
 /// Whether a sample lies on a line, from the offsets of its neighbors to theirs, and its own.
