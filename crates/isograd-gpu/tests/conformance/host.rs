@@ -111,7 +111,7 @@ fn relative<T: Number>(found: &[T], expected: &[T]) -> f64 {
 }
 
 fn outliers_are_left_out_as_on_the_cpu<T: Number>(backend: Backend) {
-    let clean = cloud::<T>(800);
+    let clean = cloud::<T>(2000);
     let grid = Grid::fit(&clean, Resolution::Cells(16), real(0.1)).unwrap();
     let mut points = clean.points().to_vec();
     points.insert(5, [real(90.0), real(0.0), real(-3.0)]);
@@ -133,7 +133,7 @@ fn outliers_are_left_out_as_on_the_cpu<T: Number>(backend: Backend) {
         };
         for (found, expected) in all(&spoilt).into_iter().zip(all(&clean)) {
             assert_eq!(found.outliers(), [5, 9]);
-            assert_eq!(found.points(), 802);
+            assert_eq!(found.points(), 2002);
             assert_eq!(found.report().unwrap().outliers, [5, 9]);
             assert_eq!(found.sdf().unwrap(), expected.sdf().unwrap());
             let mut normals = found.normals().unwrap().to_vec();
