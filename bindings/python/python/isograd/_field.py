@@ -55,7 +55,7 @@ class SdfGrid:
         Sign and closest face are held constant; cells beyond the band contribute nothing.
 
         Raises:
-            TypeError, ValueError: an array of another type or shape.
+            TypeError, ValueError: an array of another type or shape, or one that is not finite.
         """
         mesh = self.mesh
         bar = cotangent(sdf_bar, "sdf_bar", self.grid.shape, mesh.vertices.dtype)

@@ -56,10 +56,8 @@ def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
     check_faces(vertices, faces)
     if len(faces) == 0:
         return 0.0
-    is_used = np.zeros(len(vertices), dtype=bool)
-    is_used[faces] = True
-    used = vertices[is_used]
-    low, high = used.min(axis=0).astype(float), used.max(axis=0).astype(float)
+    vertices, faces = compact(vertices, faces)
+    low, high = vertices.min(axis=0).astype(float), vertices.max(axis=0).astype(float)
     a, b, c = _corners(vertices - (0.5 * low + 0.5 * high), faces)
     return float(_dot(a, _cross(b, c)).sum() / 6.0)
 

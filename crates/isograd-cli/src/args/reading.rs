@@ -46,7 +46,7 @@ impl ReadingArgs {
     /// Reads a cloud with these attributes. Normals that are not finite are left out where they are not used.
     ///
     /// # Errors
-    /// Those of the reader.
+    /// An error of the reader.
     pub fn read(
         &self,
         cloud: &Path,
