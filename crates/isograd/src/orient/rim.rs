@@ -137,12 +137,13 @@ fn borders_a_gap<T: Real>(
         (facing > T::of(RIM_FLATNESS) * T::of_usize(samples), samples)
     };
     let radius = radius(i, neighborhoods);
-    let (mut is_flat, samples) = is_flat_within(radius, directions);
-    let places = 1 + drop_copies(directions);
-    if is_flat && places < samples {
-        let wider = (samples as f64 / places as f64).sqrt();
-        (is_flat, _) = is_flat_within(T::of(wider) * radius, directions);
+    let (is_flat, samples) = is_flat_within(radius, directions);
+    if !is_flat {
+        return false;
     }
+    let places = 1 + drop_copies(directions);
+    let wider = T::of((samples as f64 / places as f64).sqrt());
+    let is_flat = places == samples || is_flat_within(wider * radius, directions).0;
     is_flat && widest_gap(directions, normals[i]) > RIM_GAP
 }
 
