@@ -125,8 +125,8 @@ pub struct Report {
     pub trim: Option<(f64, usize)>,
     /// Measures of the mesh.
     pub surface: Measures,
-    /// Share of the surface, from 0 to 1, that is a guess: further from all samples than 2 cells of φ and than 4 times
-    /// the distance between samples.
+    /// Share of the surface, from 0 to 1, that is a guess: further from all samples than 2 cells of φ, than 4 times the
+    /// typical distance between samples, and than 2.5 times that around the nearest one.
     pub guessed: f64,
     /// Least φ.
     pub sdf_min: f64,

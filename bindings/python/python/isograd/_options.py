@@ -129,7 +129,8 @@ class Options:
         solve: cells at which the indicator is computed; see :class:`Solve`.
         walls: condition of the indicator at the walls of the grid; see :class:`Walls`.
         trim: distance from all samples, in the unit of the points, beyond which faces of the mesh are removed; ``"auto"`` for
-            4 times the typical distance between samples, ``"off"`` for none. φ is not changed by it.
+            4 times the typical distance between samples or, where they are sparse, 2.5 times that around the nearest one;
+            ``"off"`` for none. φ is not changed by it.
         sheet: thickness of a membrane or sail, in the unit of the points, or ``"off"``: φ is the unsigned distance to the
             trimmed surface less half of it, and the mesh is the closed shell. ``trim`` is ``"auto"`` unless it is given.
         outliers: use of samples that are far from all others, or in mid-air; see :class:`Outliers`.

@@ -86,8 +86,8 @@ pub struct MethodArgs {
     /// them), or auto (free if a sample lies within 3.5 cells of a wall, else closed)
     #[arg(long, value_name = "free|closed|auto", default_value = "free")]
     pub walls: Walls,
-    /// Removes the faces of the mesh further than this from all samples, in the cloud's unit; auto: 4 times the distance
-    /// between samples. φ stays
+    /// Removes the faces of the mesh further than this from all samples, in the cloud's unit; auto: 4 times their typical
+    /// distance or, where they are sparse, 2.5 times that around the nearest one. φ stays
     #[arg(long, value_name = "auto|off|DISTANCE", default_value = "off")]
     pub trim: Trim,
     /// Membranes and sails: φ is the unsigned distance to the trimmed surface (--trim auto unless given) less half of

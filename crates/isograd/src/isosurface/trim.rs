@@ -13,14 +13,15 @@
 //! # Not differentiable
 //! Which faces stay.
 
-use rayon::slice::ParallelSliceMut;
-
 use crate::data::Mesh;
-use crate::neighbors::CellIndex;
-use crate::{Real, parallel, vector};
+use crate::neighbors::Neighborhoods;
+use crate::{Real, parallel, splat, vector};
 
-/// Automatic distance, in sample spacings: beyond gaps of clouds whose density varies by a factor of ten.
+/// Automatic distance, in typical distances between samples.
 const SPACINGS: f64 = 4.0;
+/// Automatic distance, in distances between samples around the nearest one. At the rim of a hole that distance is found √2 times
+/// too large: where samples are even, [`SPACINGS`] decides there.
+const LOCAL_SPACINGS: f64 = 2.5;
 
 /// Removal of the faces that have no samples nearby.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -28,14 +29,15 @@ pub enum Trim {
     /// All faces stay.
     #[default]
     Off,
-    /// Faces further than four times the typical distance between samples are removed.
+    /// Faces further than four times the typical distance between samples are removed; where samples are sparse, those
+    /// further than 2.5 times their distance there.
     Auto,
     /// Faces further than this from all samples, in the cloud's unit, are removed.
     Distance(f64),
 }
 
 impl Trim {
-    /// The distance for samples that are `spacing` apart; `None` if all faces stay.
+    /// The distance where samples are `spacing` apart, as they typically are; `None` if all faces stay.
     pub fn distance(self, spacing: f64) -> Option<f64> {
         match self {
             Self::Off => None,
@@ -60,18 +62,51 @@ pub struct Trimmed<T> {
     pub mesh: Mesh<T>,
     /// Index of each of its vertices in the whole mesh, ascending.
     pub vertices: Vec<u32>,
-    /// The distance.
-    pub distance: f64,
     /// Number of faces that were removed.
     pub removed: usize,
 }
 
-/// The part of `mesh` whose corners are within `distance` of the points.
-pub fn forward<T: Real>(mesh: &Mesh<T>, points: &[[T; 3]], distance: f64) -> Trimmed<T> {
-    let samples = SampleCells::new(points, distance);
+/// Where a surface has samples nearby.
+#[derive(Clone, Copy)]
+pub(crate) struct Nearby<'a, T> {
+    pub(crate) neighborhoods: &'a Neighborhoods<T>,
+    /// From some sample, in the cloud's unit.
+    pub(crate) distance: f64,
+    /// Whether it is larger where samples are sparse.
+    pub(crate) is_local: bool,
+}
+
+impl<T: Real> Nearby<'_, T> {
+    fn holds(&self, place: [T; 3]) -> bool {
+        let Self { neighborhoods, .. } = *self;
+        let is_near = neighborhoods.index.any_within(place, T::of(self.distance));
+        is_near || self.is_local && is_near_sparse(neighborhoods, place)
+    }
+
+    /// Share of the vertices of a mesh, from 0 to 1, that have no sample nearby. Of large meshes about 2¹⁶ vertices are
+    /// looked at.
+    pub(crate) fn far_share(&self, mesh: &Mesh<T>) -> f64 {
+        let step = (mesh.vertices().len() >> 16).max(1);
+        let looked_at = mesh.vertices().len().div_ceil(step);
+        let is_far = |n: usize| !self.holds(mesh.vertices()[n * step]);
+        parallel::count(looked_at, is_far) as f64 / looked_at.max(1) as f64
+    }
+}
+
+/// Whether the nearest sample is as near as samples are to each other there.
+fn is_near_sparse<T: Real>(neighborhoods: &Neighborhoods<T>, place: [T; 3]) -> bool {
+    let mut nearest = Vec::with_capacity(1);
+    neighborhoods.index.nearest(place, 1, &mut nearest);
+    nearest.iter().any(|&(sample, distance_squared)| {
+        let area = splat::area::at(neighborhoods, sample as usize);
+        distance_squared.f64() <= LOCAL_SPACINGS * LOCAL_SPACINGS * area.f64()
+    })
+}
+
+/// The part of `mesh` whose corners have samples nearby.
+pub(crate) fn forward<T: Real>(mesh: &Mesh<T>, nearby: Nearby<'_, T>) -> Trimmed<T> {
     let vertices = mesh.vertices();
-    let is_near = |v: usize| samples.any_near(vector::to_f64(vertices[v]));
-    let is_near = parallel::map(vertices.len(), is_near);
+    let is_near = parallel::map(vertices.len(), |v| nearby.holds(vertices[v]));
     let stays = |face: &&[u32; 3]| face.iter().all(|&v| is_near[v as usize]);
     let mut faces: Vec<[u32; 3]> = mesh.faces().iter().filter(stays).copied().collect();
     let mut is_used = vec![false; is_near.len()];
@@ -98,18 +133,8 @@ pub fn forward<T: Real>(mesh: &Mesh<T>, points: &[[T; 3]], distance: f64) -> Tri
             ..Mesh::default()
         },
         vertices,
-        distance,
         removed,
     }
-}
-
-/// Share of the vertices of a mesh, from 0 to 1, that are further than `distance` from all points of an index. Of large
-/// meshes about 2¹⁶ vertices are looked at.
-pub(crate) fn far_share<T: Real>(mesh: &Mesh<T>, index: &CellIndex<T>, distance: T) -> f64 {
-    let step = (mesh.vertices().len() >> 16).max(1);
-    let looked_at = mesh.vertices().len().div_ceil(step);
-    let is_far = |n: usize| !index.any_within(mesh.vertices()[n * step], distance);
-    parallel::count(looked_at, is_far) as f64 / looked_at.max(1) as f64
 }
 
 /// Adds the cotangents of the vertices that stay to those of the whole mesh.
@@ -120,51 +145,17 @@ pub fn pullback<T: Real>(trimmed: &Trimmed<T>, bars: &[[T; 3]], whole: &mut [[T;
     }
 }
 
-/// Samples sorted by cubic cells, whose side is the distance.
-struct SampleCells {
-    cells: Vec<([i64; 3], [f64; 3])>,
-    size: f64,
-}
-
-impl SampleCells {
-    fn new<T: Real>(points: &[[T; 3]], size: f64) -> Self {
-        let mut cells = parallel::map(points.len(), |i| {
-            let p = vector::to_f64(points[i]);
-            (cell(p, size), p)
-        });
-        cells.par_sort_unstable_by_key(|(cell, _)| *cell);
-        Self { cells, size }
-    }
-
-    /// Whether there is a sample within the distance.
-    fn any_near(&self, p: [f64; 3]) -> bool {
-        let [i, j, k] = cell(p, self.size);
-        let around = |i: i64| i.saturating_sub(1)..=i.saturating_add(1);
-        around(i).any(|x| around(j).any(|y| self.any_in_row(x, y, k, p)))
-    }
-
-    fn any_in_row(&self, x: i64, y: i64, k: i64, p: [f64; 3]) -> bool {
-        let first = [x, y, k.saturating_sub(1)];
-        let last = [x, y, k.saturating_add(1)];
-        let from = self.cells.partition_point(|(cell, _)| *cell < first);
-        let row = self.cells[from..]
-            .iter()
-            .take_while(|(cell, _)| *cell <= last);
-        row.into_iter().any(|(_, sample)| {
-            let d = vector::sub(*sample, p);
-            d[0].hypot(d[1]).hypot(d[2]) <= self.size
-        })
-    }
-}
-
-fn cell(p: [f64; 3], size: f64) -> [i64; 3] {
-    p.map(|x| (x / size).floor() as i64)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::neighbors::{self, Radius};
     use crate::testing::noise;
+
+    fn neighborhoods(points: &[[f64; 3]]) -> Neighborhoods<f64> {
+        let mut found = Neighborhoods::default();
+        neighbors::forward(points, Radius::Auto, &mut found).expect("a valid cloud");
+        found
+    }
 
     #[test]
     fn faces_stay_where_each_corner_has_a_sample_nearby() {
@@ -175,27 +166,37 @@ mod tests {
             let (points, vertices) = (vectors(300), vectors(200));
             let faces: Vec<[u32; 3]> = (0..150).map(|k| [k, (7 * k + 1) % 200, k + 50]).collect();
             let mesh = Mesh::new(vertices.clone(), faces.clone()).expect("a mesh");
-            let is_near = |v: u32| {
-                let d = |p: &[f64; 3]| vector::norm(vector::sub(*p, vertices[v as usize]));
-                points.iter().any(|p| d(p) <= size)
-            };
-            let mut expected = faces;
-            expected.retain(|face| face.iter().all(|&v| is_near(v)));
-            let found = forward(&mesh, &points, size);
-            let whole = |face: &[u32; 3]| face.map(|v| found.vertices[v as usize]);
-            let stays: Vec<_> = found.mesh.faces().iter().map(whole).collect();
-            assert_eq!(stays, expected, "{size}");
-            assert_eq!(found.removed, 150 - expected.len());
-            let at = |&v: &u32| vertices[v as usize];
-            let kept: Vec<_> = found.vertices.iter().map(at).collect();
-            assert_eq!(found.mesh.vertices(), kept);
-            let far = (0..200).filter(|&v| !is_near(v)).count();
-            let share = far_share(&mesh, &CellIndex::new(&points), size);
-            assert_eq!(share, far as f64 / 200.0);
-            let mut bars = vec![[1.0; 3]; 200];
-            pullback(&found, &vec![[2.0; 3]; kept.len()], &mut bars);
-            let moved = bars.iter().filter(|bar| bar[0] == 3.0).count();
-            assert_eq!(moved, found.vertices.len());
+            let neighborhoods = neighborhoods(&points);
+            for is_local in [false, true] {
+                let is_near = |v: u32| {
+                    let d = |i: usize| vector::norm(vector::sub(points[i], vertices[v as usize]));
+                    let nearest = (0..300).min_by(|&i, &j| d(i).total_cmp(&d(j))).unwrap();
+                    let around = splat::area::at(&neighborhoods, nearest).sqrt();
+                    let local = if is_local { 2.5 * around } else { 0.0 };
+                    d(nearest) <= local.max(size)
+                };
+                let mut expected = faces.clone();
+                expected.retain(|face| face.iter().all(|&v| is_near(v)));
+                let nearby = Nearby {
+                    neighborhoods: &neighborhoods,
+                    distance: size,
+                    is_local,
+                };
+                let found = forward(&mesh, nearby);
+                let whole = |face: &[u32; 3]| face.map(|v| found.vertices[v as usize]);
+                let stays: Vec<_> = found.mesh.faces().iter().map(whole).collect();
+                assert_eq!(stays, expected, "{size}");
+                assert_eq!(found.removed, 150 - expected.len());
+                let at = |&v: &u32| vertices[v as usize];
+                let kept: Vec<_> = found.vertices.iter().map(at).collect();
+                assert_eq!(found.mesh.vertices(), kept);
+                let far = (0..200).filter(|&v| !is_near(v)).count();
+                assert_eq!(nearby.far_share(&mesh), far as f64 / 200.0);
+                let mut bars = vec![[1.0; 3]; 200];
+                pullback(&found, &vec![[2.0; 3]; kept.len()], &mut bars);
+                let moved = bars.iter().filter(|bar| bar[0] == 3.0).count();
+                assert_eq!(moved, found.vertices.len());
+            }
         }
     }
 }

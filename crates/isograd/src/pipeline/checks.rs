@@ -4,7 +4,7 @@ use crate::data::Mesh;
 use crate::distance::samples::{self, Counts, Samples};
 use crate::isosurface::measure::pieces::Pieces;
 use crate::isosurface::measure::{self, Measures};
-use crate::isosurface::trim::{self, Trim};
+use crate::isosurface::trim::{Nearby, Trim};
 use crate::neighbors::Neighborhoods;
 use crate::orient::Orientation;
 use crate::orient::doubt::{self, Doubt, Region};
@@ -116,8 +116,12 @@ impl Report {
         spacing: T,
     ) {
         let between = Trim::Auto.distance(self.sample_spacing).unwrap_or(0.0);
-        let gap = T::of((FAR * spacing.f64()).max(between));
-        self.guessed = trim::far_share(mesh, &neighborhoods.index, gap);
+        let nearby = Nearby {
+            neighborhoods,
+            distance: between.max(FAR * spacing.f64()),
+            is_local: true,
+        };
+        self.guessed = nearby.far_share(mesh);
     }
 
     /// Measures the samples and their normals and adds warnings about them. `neighborhoods` are those of the points;

@@ -3,7 +3,7 @@
 use super::{Error, Reconstruction, Reconstructor};
 use crate::data::{GridCotangent, Mesh};
 use crate::distance::lattice;
-use crate::isosurface::trim::{self, Trim, Trimmed};
+use crate::isosurface::trim::{self, Nearby, Trim, Trimmed};
 use crate::report::Warning;
 use crate::sheet::{self, Shell};
 use crate::{Real, vector};
@@ -44,7 +44,12 @@ impl<T: Real> Reconstructor<T> {
         let Some(distance) = trim.distance(result.sample_spacing()) else {
             return Ok(());
         };
-        let trimmed = trim::forward(&result.mesh, &result.points, distance);
+        let nearby = Nearby {
+            neighborhoods: &result.residuals.neighborhoods,
+            distance,
+            is_local: trim == Trim::Auto,
+        };
+        let trimmed = trim::forward(&result.mesh, nearby);
         if trimmed.mesh.faces().is_empty() {
             return Err(Error::Trimmed { distance });
         }

@@ -2,6 +2,7 @@
 
 use isograd::clean;
 use isograd::isosurface::Level;
+use isograd::isosurface::trim::Trim;
 use isograd::orient::Method;
 use isograd::orient::doubt::Reason;
 use isograd::{
@@ -176,6 +177,26 @@ fn a_bowl_is_called_open() {
         );
         assert_eq!(report.verdict(), Some(Verdict::Bad));
     }
+}
+
+#[test]
+fn sparse_parts_of_a_closed_cloud_are_no_holes_but_holes_in_them_are() {
+    // A hundred times as dense at the bottom as at the top.
+    let mut random = Uniform::new(5);
+    let mut points = sphere(60_000, -1.0, [0.0; 3], 1.0);
+    points.retain(|p| random.next() < 0.01f64.powf(0.5 * (p[2] + 1.0)));
+    let trimmed = Options::default().trim(Trim::Auto);
+    let cloud = PointCloud::new(points.clone()).expect("finite points");
+    let whole = report_with(&cloud, 64, trimmed.clone());
+    assert_eq!(codes(&whole), Vec::<&str>::new(), "{whole:?}");
+    assert_eq!((whole.guessed, whole.trim.expect("trimmed").1), (0.0, 0));
+    // Without the top: a hole 1.4 across, fourteen distances between the samples around it.
+    points.retain(|p| p[2] < 0.7);
+    let cloud = PointCloud::new(points).expect("finite points");
+    let open = report_with(&cloud, 64, trimmed);
+    assert!(open.guessed > 0.02, "{}", open.guessed);
+    assert!(open.trim.expect("trimmed").1 > 0);
+    assert_eq!(open.verdict(), Some(Verdict::Bad));
 }
 
 #[test]
