@@ -114,6 +114,9 @@ pub(crate) fn detect(path: &Path, name: &str, bytes: &[u8]) -> Result<Format, Er
         problem,
     };
     let content = Format::from_content(bytes);
+    if let (None, Some(problem)) = (content, encoding(bytes)) {
+        return Err(refuse(problem));
+    }
     if path == Path::new("-") {
         return Ok(content.unwrap_or(Format::Text));
     }
@@ -140,6 +143,27 @@ pub(crate) fn detect(path: &Path, name: &str, bytes: &[u8]) -> Result<Format, Er
         ))),
         (None, None) => Err(refuse(format!("the format is unknown; {KNOWN}"))),
     }
+}
+
+/// Beginnings of compressed files, and the program that unpacks each.
+const COMPRESSED: [(&[u8], &str); 4] = [
+    (&[0x1f, 0x8b, 8], "gunzip"),
+    (b"BZh", "bunzip2"),
+    (&[0xfd, b'7', b'z', b'X', b'Z', 0], "unxz"),
+    (&[0x28, 0xb5, 0x2f, 0xfd], "unzstd"),
+];
+
+/// Names an encoding in which no format is read, if these bytes begin as one.
+fn encoding(bytes: &[u8]) -> Option<String> {
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        return Some("the text is in UTF-16; save it as UTF-8".into());
+    }
+    let (_, program) = COMPRESSED
+        .into_iter()
+        .find(|(begin, _)| bytes.starts_with(begin))?;
+    Some(format!(
+        "the file is compressed; unpack it with {program} first"
+    ))
 }
 
 /// Readable formats, for messages.

@@ -223,6 +223,22 @@ fn a_name_that_contradicts_the_content_is_refused() {
 }
 
 #[test]
+fn compressed_files_and_utf_16_are_refused_with_a_remedy() {
+    let gzip = [0x1f, 0x8b, 8, 0, 0, 0, 0, 0];
+    let utf_16 = [0xff, 0xfe, b'1', 0, b' ', 0];
+    for (name, bytes, part) in [
+        ("a.csv.gz", &gzip[..], "gunzip"),
+        ("a.ply", &gzip, "gunzip"),
+        ("a.xyz", b"BZh91AY&SY", "bunzip2"),
+        ("a.csv", &utf_16, "UTF-8"),
+        ("a.obj", &utf_16, "UTF-8"),
+    ] {
+        let error = read_file(name, bytes, isograd_io::read_geometry).expect_err("refused");
+        assert!(error.to_string().contains(part), "{error}");
+    }
+}
+
+#[test]
 fn keywords_of_stl_may_have_upper_case() {
     let text = include_str!("../corpus/mesh_ascii.stl");
     let upper = geometry(Format::Stl, text.to_uppercase());
