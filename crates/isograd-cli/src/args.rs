@@ -129,7 +129,7 @@ pub struct Reconstruct {
     #[arg(long, help_heading = "Several clouds")]
     pub skip_existing: bool,
 
-    /// Exit with status 3 if the verdict is bad; all outputs are written
+    /// Exit with status 3 if the verdict is bad, that in the report of a cloud left out included; all outputs are written
     #[arg(long, help_heading = "Running")]
     pub strict: bool,
     /// Number type of the computation and of the outputs

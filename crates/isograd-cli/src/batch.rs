@@ -76,7 +76,8 @@ impl Batch<'_> {
         self.args.skip_existing && self.outputs[k].are_up_to_date(&self.clouds[k].path)
     }
 
-    /// Calls `reconstruct` for every cloud that is not skipped, and prints how many were good.
+    /// Calls `reconstruct` for every cloud that is not skipped, and prints how many were good. One that is skipped counts as
+    /// bad if its report says so.
     ///
     /// # Errors
     /// See [`run`].
@@ -84,7 +85,10 @@ impl Batch<'_> {
         let mut tally = Tally::default();
         for (k, cloud) in self.clouds.iter().enumerate() {
             if self.is_skipped(k) {
-                tally.skipped += 1;
+                match self.outputs[k].were_bad() {
+                    true => tally.bad += 1,
+                    false => tally.skipped += 1,
+                }
                 continue;
             }
             let name = cloud.path.display().to_string();

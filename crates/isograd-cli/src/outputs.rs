@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use isograd::Verdict;
 use isograd_io::atomic::is_standard_output;
 use isograd_io::{FIELD_EXTENSIONS, MESH_EXTENSIONS, check_output, has_extension};
 use serde::Serialize;
@@ -88,6 +89,16 @@ impl Outputs {
         let begin = modified(input);
         self.files()
             .all(|path| path.is_file() && modified(path) >= begin)
+    }
+
+    /// Whether the report of an earlier run, if it is one of the files, has the verdict `bad`.
+    pub fn were_bad(&self) -> bool {
+        let text = self
+            .report
+            .as_ref()
+            .and_then(|path| std::fs::read(path).ok());
+        let report = text.and_then(|text| serde_json::from_slice::<serde_json::Value>(&text).ok());
+        report.is_some_and(|report| report["verdict"] == Verdict::Bad.name())
     }
 
     fn all(&self) -> impl Iterator<Item = (&Path, &'static [&'static str])> {

@@ -37,15 +37,19 @@ pub fn run(args: &args::Reconstruct) -> Result<(), Error> {
             "{} was skipped: its outputs exist",
             cloud.display()
         ));
-        return Ok(());
+        return conclude(args, &cloud, outputs.were_bad());
     }
     let (job, geometry) = Job::read(args, &cloud, &outputs, &mut progress)?;
     let verdict = job.alone(geometry, &mut progress)?;
-    match verdict {
-        Some(Verdict::Bad) if args.strict => Err(Error::Bad {
-            file: file_name(&cloud),
+    conclude(args, &cloud, verdict == Some(Verdict::Bad))
+}
+
+fn conclude(args: &args::Reconstruct, cloud: &Path, is_bad: bool) -> Result<(), Error> {
+    match is_bad && args.strict {
+        true => Err(Error::Bad {
+            file: file_name(cloud),
         }),
-        _ => Ok(()),
+        false => Ok(()),
     }
 }
 

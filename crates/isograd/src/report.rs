@@ -126,7 +126,8 @@ pub struct Report {
     /// Measures of the mesh.
     pub surface: Measures,
     /// Share of the surface, from 0 to 1, that is a guess: further from all samples than 2 cells of φ, than 4 times the
-    /// typical distance between samples, and than 2.5 times that around the nearest one.
+    /// typical distance between samples, and than 2.5 times that around the nearest one. Of several pieces, the largest share
+    /// of one of them.
     pub guessed: f64,
     /// Least φ.
     pub sdf_min: f64,

@@ -106,6 +106,14 @@ fn strict_ends_with_3_after_all_clouds() {
     );
     assert!(run.stdout.contains("half.xyz: bad: open (try: "), "{run:?}");
     sandbox.mesh("out/whole/mesh.ply");
+    // Going on after an interruption, it still does.
+    let run = sandbox.run(&format!("{line} --strict --skip-existing"));
+    run.says(3, &["error: the results of 1 of 2 clouds are bad"]);
+    assert!(run.stdout.contains("1 bad, 0 failed, 1 skipped"), "{run:?}");
+    let line = "reconstruct half.xyz -o out/half --resolution 32 --strict --skip-existing";
+    let run = sandbox.run(line);
+    run.says(3, &["half.xyz"]);
+    assert!(run.stdout.contains("was skipped"), "{run:?}");
 }
 
 #[test]

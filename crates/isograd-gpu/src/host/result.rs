@@ -214,10 +214,10 @@ impl<T: Number> Reconstruction<T> {
                 confidence: self.device.numbers(&self.result.confidence)?,
                 ..Orientation::default()
             };
-            let normals = &orientation.normals;
-            report.check_field(&points, normals, self.sdf()?, self.mesh()?, scratch, None);
-            report.measure_gaps(self.mesh()?, self.neighborhoods()?, self.grid.spacing());
-            report.check_samples(&points, self.neighborhoods()?, &orientation, false);
+            let (normals, neighborhoods) = (&orientation.normals, self.neighborhoods()?);
+            let (sdf, mesh) = (self.sdf()?, self.mesh()?);
+            report.check_field(&points, normals, neighborhoods, sdf, mesh, scratch, None);
+            report.check_samples(&points, neighborhoods, &orientation, false);
         }
         let before = report.seconds.of(Stage::Checks);
         let seconds = before + start.elapsed().as_secs_f64();

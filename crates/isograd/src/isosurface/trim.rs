@@ -13,6 +13,7 @@
 //! # Not differentiable
 //! Which faces stay.
 
+use super::measure::pieces::Pieces;
 use crate::data::Mesh;
 use crate::neighbors::Neighborhoods;
 use crate::{Real, parallel, splat, vector};
@@ -83,13 +84,21 @@ impl<T: Real> Nearby<'_, T> {
         is_near || self.is_local && is_near_sparse(neighborhoods, place)
     }
 
-    /// Share of the vertices of a mesh, from 0 to 1, that have no sample nearby. Of large meshes about 2¹⁶ vertices are
-    /// looked at.
-    pub(crate) fn far_share(&self, mesh: &Mesh<T>) -> f64 {
-        let step = (mesh.vertices().len() >> 16).max(1);
-        let looked_at = mesh.vertices().len().div_ceil(step);
-        let is_far = |n: usize| !self.holds(mesh.vertices()[n * step]);
-        parallel::count(looked_at, is_far) as f64 / looked_at.max(1) as f64
+    /// Share of the vertices of a mesh, from 0 to 1, that have no sample nearby; of several pieces the share of each. Of large
+    /// meshes about 2¹⁶ vertices are looked at.
+    pub(crate) fn far_shares(&self, mesh: &Mesh<T>, pieces: Option<&Pieces>) -> Vec<f64> {
+        let vertices = mesh.vertices();
+        let step = (vertices.len() >> 16).max(1);
+        let is_near = |n: usize| self.holds(vertices[n * step]);
+        let is_near = parallel::map(vertices.len().div_ceil(step), is_near);
+        let mut counts = vec![[0usize; 2]; pieces.map_or(1, |pieces| pieces.areas.len())];
+        let piece_of = pieces.map(|pieces| pieces.of_vertices(mesh));
+        for (n, is_near) in is_near.into_iter().enumerate() {
+            let piece = piece_of.as_ref().map_or(0, |of| of[n * step]);
+            counts[piece as usize][usize::from(is_near)] += 1;
+        }
+        let share = |[far, near]: [usize; 2]| far as f64 / (far + near).max(1) as f64;
+        counts.into_iter().map(share).collect()
     }
 }
 
@@ -191,7 +200,7 @@ mod tests {
                 let kept: Vec<_> = found.vertices.iter().map(at).collect();
                 assert_eq!(found.mesh.vertices(), kept);
                 let far = (0..200).filter(|&v| !is_near(v)).count();
-                assert_eq!(nearby.far_share(&mesh), far as f64 / 200.0);
+                assert_eq!(nearby.far_shares(&mesh, None), [far as f64 / 200.0]);
                 let mut bars = vec![[1.0; 3]; 200];
                 pullback(&found, &vec![[2.0; 3]; kept.len()], &mut bars);
                 let moved = bars.iter().filter(|bar| bar[0] == 3.0).count();

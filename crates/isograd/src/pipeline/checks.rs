@@ -22,8 +22,6 @@ const THIN_DEPTH: f64 = 2.0;
 const FAR: f64 = 2.0;
 /// Share of the samples in the same place as others from which on they are named.
 const MANY_COPIES: f64 = 0.1;
-/// Share of the area of the largest piece below which another one is a fragment.
-const SMALL_PIECE: f64 = 0.01;
 
 impl Report {
     /// Measures φ and the surface and adds warnings about them, for results that were not made by a
@@ -34,6 +32,7 @@ impl Report {
         &mut self,
         points: &[[T; 3]],
         normals: &[[T; 3]],
+        neighborhoods: &Neighborhoods<T>,
         sdf: &Field<T>,
         mesh: &Mesh<T>,
         scratch: &mut measure::Scratch,
@@ -43,15 +42,17 @@ impl Report {
         self.surface = measure::measure(mesh, scratch);
         let samples = self.samples(points, normals, sdf);
         let counts = self.count(samples, sdf, mesh, built);
+        let several = self.surface.components > 1;
+        let pieces = several.then(|| Pieces::new(mesh, scratch));
+        self.guessed = self.guessed(mesh, neighborhoods, sdf.grid().spacing(), pieces.as_ref());
         let (warnings, spacing) = (&mut self.warnings, self.surface_spacing);
         warnings.extend(turned(counts.turned, points.len()));
         warnings.extend(thin(counts.thin, points.len()));
         warnings.extend(missed(counts, points.len()));
         warnings.extend(sparse(self.sample_spacing, spacing));
         warnings.extend(inside_out(&self.surface));
-        if self.surface.components > 1 {
-            let pieces = Pieces::new(mesh, scratch);
-            warnings.extend(fragments(&pieces, mesh, points, built));
+        if let Some(pieces) = &pieces {
+            warnings.extend(fragments(pieces, mesh, points, built));
         }
         warnings.extend(rounded(points, spacing));
     }
@@ -107,21 +108,27 @@ impl Report {
         samples::count(mesh, built, samples).unwrap_or_default()
     }
 
-    /// Measures [the share of the surface](Self::guessed) that has no samples nearby, before [`Self::check_samples`].
-    /// `spacing` is the cell size of φ.
-    pub fn measure_gaps<T: Real>(
-        &mut self,
+    /// [The share of the surface](Self::guessed) that has no samples nearby, of the piece where it is largest; crumbs don't
+    /// count. `spacing` is the cell size of φ.
+    fn guessed<T: Real>(
+        &self,
         mesh: &Mesh<T>,
         neighborhoods: &Neighborhoods<T>,
         spacing: T,
-    ) {
+        pieces: Option<&Pieces>,
+    ) -> f64 {
         let between = Trim::Auto.distance(self.sample_spacing).unwrap_or(0.0);
         let nearby = Nearby {
             neighborhoods,
             distance: between.max(FAR * spacing.f64()),
             is_local: true,
         };
-        self.guessed = nearby.far_share(mesh);
+        let shares = nearby.far_shares(mesh, pieces).into_iter();
+        let are_large = pieces.map_or_else(|| vec![true], Pieces::are_large);
+        let shares = shares
+            .zip(are_large)
+            .filter(|&(share, is_large)| is_large && share < 1.0);
+        shares.map(|(share, _)| share).fold(0.0, f64::max)
     }
 
     /// Measures the samples and their normals and adds warnings about them. `neighborhoods` are those of the points;
@@ -230,11 +237,9 @@ fn fragments<T: Real>(
             samples[piece as usize] += 1;
         }
     }
-    let largest = pieces.areas.iter().copied().fold(0.0, f64::max);
-    let is_fragment =
-        |&(&area, &samples): &(&f64, &usize)| samples == 0 || area < SMALL_PIECE * largest;
-    let fragments = pieces.areas.iter().zip(&samples).filter(is_fragment);
-    let (fragments, pieces) = (fragments.count(), pieces.areas.len());
+    let (pieces, are_large) = (samples.len(), pieces.are_large());
+    let is_fragment = |&(&samples, is_large): &(&usize, bool)| samples == 0 || !is_large;
+    let fragments = samples.iter().zip(are_large).filter(is_fragment).count();
     (fragments > 0).then_some(Warning::Fragments { fragments, pieces })
 }
 

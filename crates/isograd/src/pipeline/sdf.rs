@@ -112,12 +112,12 @@ impl<T: Real> Reconstructor<T> {
                 report.check_field(
                     points,
                     &orientation.normals,
+                    neighborhoods,
                     sdf,
                     mesh,
                     scratch,
                     Some(&self.scratch.distance),
                 );
-                report.measure_gaps(mesh, neighborhoods, sdf.grid().spacing());
             }
         }
         if let Some(open) = open {

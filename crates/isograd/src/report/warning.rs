@@ -152,7 +152,8 @@ impl Warning {
     /// The best verdict that a result with this warning can have: [`Verdict::Check`] or [`Verdict::Bad`].
     pub fn severity(&self) -> Verdict {
         let is_bad = match self {
-            Self::Open { .. } | Self::TouchesWall | Self::InsideOut { .. } => true,
+            Self::TouchesWall | Self::InsideOut { .. } => true,
+            Self::Open { guessed, .. } => *guessed > TOLERATED_SHARE,
             Self::Missed { far: share, .. } | Self::Stray { share, .. } => *share > TOLERATED_SHARE,
             Self::Turned { share } => *share > MANY_TURNED,
             _ => false,

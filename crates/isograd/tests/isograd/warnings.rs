@@ -177,6 +177,12 @@ fn a_bowl_is_called_open() {
         );
         assert_eq!(report.verdict(), Some(Verdict::Bad));
     }
+    // Also a small one beside a large body.
+    let mut points = sphere(40_000, -1.0, [0.0; 3], 1.0);
+    points.extend(sphere(300, 0.0, [2.0, 0.0, 0.0], 0.3));
+    let report = report(points, 48);
+    assert!(report.guessed > 0.1, "{}", report.guessed);
+    assert_eq!(report.verdict(), Some(Verdict::Bad));
 }
 
 #[test]

@@ -4,6 +4,9 @@ use super::Scratch;
 use crate::data::Mesh;
 use crate::{Real, union_find, vector};
 
+/// Share of the area of the largest piece below which another one is small.
+const SMALL: f64 = 0.01;
+
 /// The connected components of a mesh, in the order of their first faces.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Pieces {
@@ -32,5 +35,21 @@ impl Pieces {
             pieces.areas[piece as usize] += vector::norm(normal) / 2.0;
         }
         pieces
+    }
+
+    /// Whether a piece is large enough to be a body, and no crumb.
+    pub(crate) fn are_large(&self) -> Vec<bool> {
+        let largest = self.areas.iter().copied().fold(0.0, f64::max);
+        let is_large = |&area: &f64| area >= SMALL * largest;
+        self.areas.iter().map(is_large).collect()
+    }
+
+    /// Number of the piece of each vertex of the mesh; 0 for one without faces.
+    pub(crate) fn of_vertices<T: Real>(&self, mesh: &Mesh<T>) -> Vec<u32> {
+        let mut of = vec![0; mesh.vertices().len()];
+        for (face, &piece) in mesh.faces().iter().zip(&self.of_face) {
+            face.iter().for_each(|&v| of[v as usize] = piece);
+        }
+        of
     }
 }
