@@ -89,15 +89,6 @@ impl Corners {
     }
 }
 
-/// The sum over the corners at each vertex, `(V, 3)`; `of_faces` begins the row of each face with its three corners.
-pub(super) fn gather_corners<T: Scalar, R: Runtime>(
-    device: &Device<R>,
-    mesh: &Mesh<T>,
-    of_faces: &Buffer<T>,
-) -> Result<Buffer<T>, Error> {
-    Corners::of(device, mesh)?.sum(device, of_faces, 3)
-}
-
 /// The closest face of each query whose cotangent counts; else one past the last.
 #[cube(launch)]
 fn key_queries<F: Float>(

@@ -16,7 +16,7 @@ use super::super::{Error, FAR};
 use super::build::{NONE, Tree, TreeArrays};
 use super::list::{ROOM, Region, UNITS, list_triangles, new_list};
 use super::settle::settle;
-use super::single::{Nearest, nearest_of_centers, try_place};
+use super::single::{nearest_of_centers, nothing_within, try_place};
 use crate::device::{Ready, launch};
 use crate::grid::{Cell, cell_at};
 use crate::vector::Vector3;
@@ -181,11 +181,7 @@ fn nearest_of_bricks<F: Float + CubeElement>(
                     rounding: cells.rounding,
                 },
             );
-            let mut best = Nearest::<F> {
-                place: NONE.runtime(),
-                face: NONE.runtime(),
-                squared: cells.bound,
-            };
+            let mut best = nothing_within::<F>(cells.bound);
             if listed.count <= comptime!(ROOM) {
                 // Listed but for rounding: the foot is not quite on it.
                 try_place::<F>(&mut best, tree, seed, q);

@@ -6,7 +6,7 @@
 use cubecl::prelude::*;
 
 use super::super::bvh::center;
-use super::super::shares::{ByFaceArrays, FACE, add_share, by_face, gather_corners};
+use super::super::shares::{ByFaceArrays, Corners, FACE, add_share, by_face};
 use super::super::triangle::{closest, corners};
 use super::super::{Error, MeshArrays};
 use super::{Cotangents, Residual};
@@ -29,7 +29,7 @@ pub fn pullback<T: Scalar, R: Runtime>(
     )?;
     let of_faces = pull_faces(device, residual, phi_bar)?;
     Ok(Cotangents {
-        vertices: gather_corners(device, &residual.mesh, &of_faces)?,
+        vertices: Corners::of(device, &residual.mesh)?.sum(device, &of_faces, 3)?,
         grid: total(device, &of_faces)?,
     })
 }
@@ -92,11 +92,8 @@ fn pull_cells<F: Float + CubeElement>(
             for number in 0..FACE {
                 sum[number] = F::new(0.0);
             }
-            let (begin, end) = (
-                by_face.table[ABSOLUTE_POS * 3 + 1],
-                by_face.table[ABSOLUTE_POS * 3 + 2],
-            );
-            for element in begin..end {
+            for element in by_face.table[ABSOLUTE_POS * 3 + 1]..by_face.table[ABSOLUTE_POS * 3 + 2]
+            {
                 let cell = by_face.order[element as usize];
                 let place = center::<F>(cell, F::new(1.0), grid.ny, grid.nz);
                 let found = closest::<F>(t, place.scale(grid.spacing));
