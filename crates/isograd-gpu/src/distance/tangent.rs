@@ -52,11 +52,7 @@ pub(super) fn tangent<F: Float>(
     let climb = (-ahead.z - foot * slope) / height;
     let of_apex = select(has_height, climb / height, zero);
     let of_second = select(has_base, (slope - of_apex * foot) / length, zero);
-    let gamma = Vector3::<F> {
-        x: -(of_apex + of_second),
-        y: of_second,
-        z: of_apex,
-    };
+    let gamma = Vector3::<F>::of(-(of_apex + of_second), of_second, of_apex);
     Tangent::<F> {
         query: unit.scale(slope).add(across.scale(of_apex)),
         gamma: turned_back::<F>(gamma, first),

@@ -183,9 +183,7 @@ fn gather<F: Float + CubeElement>(
         let point = Vector3::<F>::at(&near.tree.points, ABSOLUTE_POS);
         let radius = near.radii[ABSOLUTE_POS];
         let own = factors[ABSOLUTE_POS];
-        let mut x = F::new(0.0);
-        let mut y = F::new(0.0);
-        let mut z = F::new(0.0);
+        let mut sum = Vector3::<F>::zero();
         let mut along = F::new(0.0);
         let mut node = next_leaf::<F>(&near.tree, point, radius, 0usize, true);
         while node < near.tree.links.len() {
@@ -196,13 +194,10 @@ fn gather<F: Float + CubeElement>(
                 let as_center = own * rise::<F>(square, radius);
                 along += as_center * square;
                 let factor = as_center + factors[j] * rise::<F>(square, near.radii[j]);
-                x -= factor * offset.x;
-                y -= factor * offset.y;
-                z -= factor * offset.z;
+                sum = sum.sub(offset.scale(factor));
             }
             node = next_leaf::<F>(&near.tree, point, radius, node + 1, true);
         }
-        let sum = Vector3::<F> { x, y, z };
         let place = near.places[ABSOLUTE_POS] as usize;
         sum.write(points_bar, place);
         radii_bar[place] = F::new(2.0) * areas[place] * areas_bar[place] - along;

@@ -6,7 +6,7 @@ use super::{SampleArrays, Samples};
 use crate::device::launch;
 use crate::grid::{Lattice, place};
 use crate::primitives::sort::{self, first_at_least};
-use crate::vector::is_finite;
+use crate::vector::{Vector3, is_finite};
 use crate::{Buffer, Device, Error, Scalar};
 
 const BLOCK: u32 = 256;
@@ -84,10 +84,8 @@ fn find_cells<F: Float + CubeElement>(
         let x = place::<F>(&samples.points, i, &grid);
         let inside =
             holds::<F>(x.x, grid.nx) && holds::<F>(x.y, grid.ny) && holds::<F>(x.z, grid.nz);
-        let finite = is_finite::<F>(samples.areas[i])
-            && is_finite::<F>(samples.normals[3 * i])
-            && is_finite::<F>(samples.normals[3 * i + 1])
-            && is_finite::<F>(samples.normals[3 * i + 2]);
+        let normal = Vector3::<F>::at(&samples.normals, i);
+        let finite = is_finite::<F>(samples.areas[i]) && normal.is_finite();
         let mut key = grid.nx * grid.ny * grid.nz;
         if inside && finite {
             let row = central_cell::<F>(x.x, grid.nx) * grid.ny + central_cell::<F>(x.y, grid.ny);

@@ -83,8 +83,8 @@ fn radii_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
                 compare(&format!("point {i}"), each, expected.radius[i]);
             }
             let near = &found.neighborhoods;
-            let (_, normals) = normals::forward(device, near).unwrap();
-            let counts = device.download(&normals.count).unwrap();
+            let (_, axes) = normals::forward(device, near).unwrap();
+            let counts = device.download(&axes.count).unwrap();
             let (areas, _) = area::forward(device, near, found.common).unwrap();
             let areas = device.download(&areas).unwrap();
             for i in 0..points.len() {

@@ -5,8 +5,8 @@ use cubecl::prelude::*;
 use super::super::triangle::{distance_squared, load_frame};
 use super::build::{NONE, RUN, TreeArrays};
 use super::list::{List, ROOM, Region, UNITS, list_runs, new_list};
-use super::search::{Centers, NOTHING_YET, UNPROVEN, center_of};
-use crate::grid::cell_at;
+use super::search::{Centers, NOTHING_YET, UNPROVEN};
+use crate::grid::{cell_at, center_of};
 use crate::vector::Vector3;
 
 /// Triangles that a group without a guess begins with.
@@ -195,7 +195,7 @@ pub(super) fn nearest_of_centers<F: Float + CubeElement>(
     let own = CUBE_POS as u32;
     if own < count {
         let cell = cell_at(own, cells.ny, cells.nz);
-        let q = center_of::<F>(cell, cells.spacing);
+        let q = center_of::<F>(cell).scale(cells.spacing);
         let guess = if comptime!(seeded) {
             let across_y = (cells.ny - 1u32) / 2u32 + 1u32;
             let across_z = (cells.nz - 1u32) / 2u32 + 1u32;

@@ -6,14 +6,16 @@ use isograd::distance::extend::rule::{MARGIN, REACH};
 use super::FIT;
 use super::checks::Given;
 use super::fits::{covariance, in_frame, ridge, solve};
-use super::neighbor::{Fitted, Neighbor, SampleArrays, Sorted, contract, neighbor, sum_moments};
+use super::neighbor::{
+    Fitted, Neighbor, SampleArrays, Sorted, contract, neighbor, sum_moments, write_bounded,
+};
 use crate::device::{argument, launch};
 use crate::element::fit;
 use crate::neighbors::{
     self, NeighborhoodArrays, Neighborhoods, end_of_leaf, first_of_leaf, next_leaf,
 };
 use crate::normals::{MOMENTS, fit as plane_of};
-use crate::vector::{Vector3, is_finite};
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Numbers of an [`Adjoint`] in memory.
@@ -394,12 +396,9 @@ fn pull_fits<F: Float + CubeElement>(
             }
             bounded += select(ridge.coincide, 1u32, 0u32);
         }
-        let zero = F::new(0.0);
         #[unroll]
         for axis in 0..3usize {
-            let finite = is_finite::<F>(sums[axis]);
-            vertices_bar[3 * vertex + axis] = select(finite, sums[axis], zero);
-            bounded += select(finite, 0u32, 1u32);
+            bounded += write_bounded::<F>(vertices_bar, 3 * vertex + axis, sums[axis]);
         }
         adjoints.guarded[k] = bounded;
     }

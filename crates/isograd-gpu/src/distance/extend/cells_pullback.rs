@@ -7,13 +7,14 @@ use super::super::bvh::center;
 use super::super::shares::{ByFace, ByFaceArrays, Corners, by_face};
 use super::super::tangent::tangent;
 use super::super::triangle::{closest, corners};
+use super::neighbor::write_bounded;
 use super::{Extension, ExtensionArrays, Residual, Surface, columns};
 use crate::device::launch;
 use crate::grid::{Lattice, low_corner};
 use crate::neighbors::gather;
 use crate::primitives::fill::zeros;
 use crate::primitives::segments::{NO_SEGMENT, Rows, join_pieces, sum_rows};
-use crate::vector::{Vector3, is_finite};
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Numbers of a face: of its three corners, of the low corner of the grid, and of its spacing.
@@ -242,10 +243,7 @@ fn name_total<F: Float>(total: &Array<F>, grid: &mut Array<F>, not_finite: &mut 
     if ABSOLUTE_POS == 0 {
         let mut count = 0u32.runtime();
         for number in 0..4usize {
-            let own = total[9 + number];
-            let finite = is_finite::<F>(own);
-            grid[number] = select(finite, own, F::new(0.0));
-            count += select(finite, 0u32, 1u32);
+            count += write_bounded::<F>(grid, number, total[9 + number]);
         }
         not_finite[0] = count;
     }

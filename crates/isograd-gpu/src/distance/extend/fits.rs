@@ -138,11 +138,7 @@ pub(super) fn covariance<F: Float + CubeElement>(
 /// A vector along the axes.
 #[cube]
 pub(super) fn in_frame<F: Float>(axes: Eigen<F>, v: Vector3<F>) -> Vector3<F> {
-    Vector3::<F> {
-        x: axes.first.dot(v),
-        y: axes.second.dot(v),
-        z: axes.third.dot(v),
-    }
+    Vector3::<F>::of(axes.first.dot(v), axes.second.dot(v), axes.third.dot(v))
 }
 
 /// `C + ε I` in a frame, with the intermediates of its pullback.

@@ -7,7 +7,7 @@ use crate::device::{argument, launch};
 use crate::element::fit;
 use crate::neighbors::{Neighborhoods, PointTree, end_of_leaf, first_of_leaf, gather, next_leaf};
 use crate::normals::{MOMENTS, add_moments};
-use crate::vector::Vector3;
+use crate::vector::{Vector3, is_finite};
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Samples with areas and values, in the order of their tree.
@@ -134,6 +134,14 @@ pub(super) fn sum_moments<F: Float + CubeElement>(
         }
         node = next_leaf::<F>(&samples.tree, y, radius, node + 1, false);
     }
+}
+
+/// Writes a number, or 0 where it is not finite; returns 1 then.
+#[cube]
+pub(super) fn write_bounded<F: Float>(out: &mut Array<F>, at: usize, number: F) -> u32 {
+    let finite = is_finite::<F>(number);
+    out[at] = select(finite, number, F::new(0.0));
+    select(finite, 0u32, 1u32)
 }
 
 /// `ū·(v_j − u)` over all components, of sorted vertex `k` and sorted sample `j`. The row of each vertex is `ū`, then

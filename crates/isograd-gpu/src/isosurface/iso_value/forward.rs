@@ -55,9 +55,7 @@ fn find_at_samples<F: Float + CubeElement>(
         let p = place::<F>(points, i, &grid);
         let found = interpolate::<F>(chi, p, &grid);
         at_samples[4 * i] = found.value;
-        at_samples[4 * i + 1] = found.x;
-        at_samples[4 * i + 2] = found.y;
-        at_samples[4 * i + 3] = found.z;
+        found.gradient.store(at_samples, 4 * i + 1);
         area = areas[i];
         product = area * found.value;
     }

@@ -77,25 +77,16 @@ fn pack_samples<F: Float + CubeElement>(
         let mut area = F::new(0.0);
         if is_held::<F>(keys[s], &grid) {
             let x = place::<F>(points, i, &grid);
-            let cell = cell_at(keys[s], grid.ny, grid.nz);
-            f.x = from_center::<F>(x.x, cell.i);
-            f.y = from_center::<F>(x.y, cell.j);
-            f.z = from_center::<F>(x.z, cell.k);
-            normal.x = normals[3 * i];
-            normal.y = normals[3 * i + 1];
-            normal.z = normals[3 * i + 2];
+            f = from_center::<F>(x, cell_at(keys[s], grid.ny, grid.nz));
+            normal = Vector3::<F>::at(normals, i);
             area = areas[i];
             if comptime!(area_weights) {
                 area = areas[i] / grid.spacing / grid.spacing;
             }
         }
         let at = s * SAMPLE;
-        samples[at] = f.x;
-        samples[at + 1] = f.y;
-        samples[at + 2] = f.z;
-        samples[at + 3] = normal.x;
-        samples[at + 4] = normal.y;
-        samples[at + 5] = normal.z;
+        f.store(samples, at);
+        normal.store(samples, at + 3);
         samples[at + 6] = area;
         samples[at + 7] = F::new(0.0);
     }

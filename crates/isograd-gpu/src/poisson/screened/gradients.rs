@@ -214,9 +214,7 @@ fn start<F: Float + CubeElement>(
         let x = place::<F>(points, i, &grid);
         let cell = cell_at(keys[s], grid.ny, grid.nz);
         roots[s] = (areas[i] * per_area).sqrt();
-        carriers[NUMBERS * s] = from_center::<F>(x.x, cell.i);
-        carriers[NUMBERS * s + 1] = from_center::<F>(x.y, cell.j);
-        carriers[NUMBERS * s + 2] = from_center::<F>(x.z, cell.k);
+        from_center::<F>(x, cell).store(carriers, NUMBERS * s);
         carriers[NUMBERS * s + 3] = F::new(0.0);
     }
 }
