@@ -20,7 +20,7 @@ use crate::element::plane;
 use crate::neighbors::{
     NeighborhoodArrays, Neighborhoods, end_of_leaf, first_of_leaf, is_isolated, next_leaf,
 };
-use crate::primitives::reduce::{self, sum_of_group};
+use crate::primitives::reduce::{self, write_two_sums};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
@@ -100,13 +100,7 @@ fn sum_areas<F: Float>(areas: &Array<F>, sums: &mut Array<F>) {
         area = areas[ABSOLUTE_POS];
         count = select(area > F::new(0.0), F::new(1.0), F::new(0.0));
     }
-    let mut shared = SharedMemory::<F>::new(reduce::BLOCK);
-    let area = sum_of_group::<F>(area, &mut shared);
-    let count = sum_of_group::<F>(count, &mut shared);
-    if UNIT_POS == 0 && 2 * CUBE_POS < sums.len() {
-        sums[2 * CUBE_POS] = area;
-        sums[2 * CUBE_POS + 1] = count;
-    }
+    write_two_sums::<F>(area, count, sums);
 }
 
 #[cube(launch)]

@@ -9,7 +9,8 @@ use crate::device::launch;
 use crate::element::eigen::{Eigen, Symmetric};
 use crate::element::fit;
 use crate::neighbors::{NeighborhoodArrays, end_of_leaf, first_of_leaf, next_leaf, reach_squared};
-use crate::normals::{MOMENTS, fit as plane_of};
+use crate::normals::fit as plane_of;
+use crate::primitives::fill::own_zeros;
 use crate::primitives::reduce;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
@@ -205,8 +206,7 @@ fn fit_vertices<F: Float + CubeElement>(
         let at = FIT * ABSOLUTE_POS;
         let y = Vector3::<F>::at(vertices, ABSOLUTE_POS);
         let radius = fits[at];
-        let mut sums = Array::<F>::new(MOMENTS);
-        sum_moments::<F>(samples, y, radius, &mut sums);
+        let sums = sum_moments::<F>(samples, y, radius);
         let plane = plane_of::<F>(&sums, 0usize, 1usize);
         let mean = plane.centroid;
         let of = Fitted::<F> {
@@ -242,15 +242,9 @@ fn evaluate_columns<F: Float + CubeElement>(
         let of = Fitted::<F>::at(fits, ABSOLUTE_POS);
         let (components, column) = (samples.components as usize, column as usize);
         // Seen from one of the samples.
-        let mut from = Array::<F>::new(width);
-        let mut means = Array::<F>::new(width);
-        let mut rises = Array::<F>::new(width);
-        #[unroll]
-        for c in 0..width {
-            from[c] = F::new(0.0);
-            means[c] = F::new(0.0);
-            rises[c] = F::new(0.0);
-        }
+        let mut from = own_zeros::<F>(width);
+        let mut means = own_zeros::<F>(width);
+        let mut rises = own_zeros::<F>(width);
         let mut total = F::new(0.0);
         let mut drift = F::new(0.0);
         let mut node = next_leaf::<F>(&samples.tree, y, of.radius, 0usize, false);

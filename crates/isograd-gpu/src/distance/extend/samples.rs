@@ -7,6 +7,7 @@ use super::columns;
 use super::neighbor::{SampleArrays, Sorted, contract, neighbor, write_bounded};
 use crate::device::launch;
 use crate::neighbors::{NeighborhoodArrays, end_of_leaf, first_of_leaf, next_leaf};
+use crate::primitives::fill::own_zeros;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
@@ -109,11 +110,7 @@ fn gather_columns<F: Float + CubeElement>(
         let x = Vector3::<F>::at(&samples.tree.points, j);
         let zero = F::new(0.0);
         let (components, column) = (samples.components as usize, column as usize);
-        let mut sums = Array::<F>::new(width);
-        #[unroll]
-        for c in 0..width {
-            sums[c] = F::new(0.0);
-        }
+        let mut sums = own_zeros::<F>(width);
         let mut node = next_leaf::<F>(&near.tree, x, zero, 0usize, true);
         while node < near.tree.links.len() {
             let first = first_of_leaf(&near.tree.links, node);

@@ -12,6 +12,7 @@ use super::super::{Error, MeshArrays};
 use super::{Cotangents, Residual};
 use crate::device::{check_length, launch};
 use crate::grid::{Lattice, low_corner};
+use crate::primitives::fill::own_zeros;
 use crate::primitives::segments::{NO_SEGMENT, Rows, join_pieces, sum_rows};
 use crate::{Buffer, Device, Scalar};
 
@@ -88,10 +89,7 @@ fn pull_cells<F: Float + CubeElement>(
         let face = by_face.table[ABSOLUTE_POS * 3];
         if face != NO_SEGMENT {
             let t = corners::<F>(mesh, face, low_corner::<F>(&grid));
-            let mut sum = Array::<F>::new(FACE);
-            for number in 0..FACE {
-                sum[number] = F::new(0.0);
-            }
+            let mut sum = own_zeros::<F>(FACE);
             for element in by_face.table[ABSOLUTE_POS * 3 + 1]..by_face.table[ABSOLUTE_POS * 3 + 2]
             {
                 let cell = by_face.order[element as usize];

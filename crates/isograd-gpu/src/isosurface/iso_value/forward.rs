@@ -5,7 +5,7 @@ use cubecl::prelude::*;
 use super::Residual;
 use crate::device::{check_length, launch};
 use crate::grid::{Lattice, check_field, place};
-use crate::primitives::reduce::{BLOCK, sum_columns, sum_of_group};
+use crate::primitives::reduce::{BLOCK, sum_columns, write_two_sums};
 use crate::trilinear::interpolate;
 use crate::{Buffer, Device, Error, Scalar};
 
@@ -59,14 +59,7 @@ fn find_at_samples<F: Float + CubeElement>(
         area = areas[i];
         product = area * found.value;
     }
-    let mut shared = SharedMemory::<F>::new(BLOCK);
-    let products = sum_of_group::<F>(product, &mut shared);
-    let areas = sum_of_group::<F>(area, &mut shared);
-    let own = CUBE_POS * 2;
-    if UNIT_POS == 0 && own < group_sums.len() {
-        group_sums[own] = products;
-        group_sums[own + 1] = areas;
-    }
+    write_two_sums::<F>(product, area, group_sums);
 }
 
 /// `Σ a χ / Σ a`; not finite where `Σ a` is not positive.

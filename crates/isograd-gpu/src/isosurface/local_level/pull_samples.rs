@@ -8,7 +8,7 @@ use super::sample::{
     PassArrays, SEEN, STATE, Sample, corner, derivatives, is_held, mean, sample, see, side, without,
 };
 use crate::grid::{Lattice, cell_at, center_of};
-use crate::primitives::reduce::{BLOCK, sum_of_group};
+use crate::primitives::reduce::{BLOCK, sum_of_group, write_sum, write_two_sums};
 use crate::splat::{bspline, bspline_slope, pick, subtract_from_grid};
 use crate::vector::Vector3;
 
@@ -289,14 +289,7 @@ pub(super) fn pull_plates<F: Float + CubeElement>(
         usual_bar = bar.usual;
         width_bar = bar.width;
     }
-    let mut shared = SharedMemory::<F>::new(BLOCK);
-    let usual_bar = sum_of_group::<F>(usual_bar, &mut shared);
-    let width_bar = sum_of_group::<F>(width_bar, &mut shared);
-    let own = CUBE_POS * 2;
-    if UNIT_POS == 0 && own < partial.len() {
-        partial[own] = usual_bar;
-        partial[own + 1] = width_bar;
-    }
+    write_two_sums::<F>(usual_bar, width_bar, partial);
 }
 
 /// `χ` before the first pass, and the samples with their slopes.
@@ -397,9 +390,5 @@ pub(super) fn add_bars_of_grid<F: Float + CubeElement>(
         }
     }
     subtract_from_grid::<F>(bar, of_spacing, grid_sums);
-    let mut shared = SharedMemory::<F>::new(BLOCK);
-    let total = sum_of_group::<F>(value, &mut shared);
-    if UNIT_POS == 0 && CUBE_POS < level_sums.len() {
-        level_sums[CUBE_POS] = total;
-    }
+    write_sum::<F>(value, level_sums);
 }

@@ -10,7 +10,7 @@ use crate::device::launch;
 use crate::element::plate::trust;
 use crate::grid::{Lattice, cell_at, from_center, place};
 use crate::isosurface::iso_value;
-use crate::primitives::reduce::{BLOCK, sum_columns, sum_of_group};
+use crate::primitives::reduce::{BLOCK, sum_columns, write_two_sums};
 use crate::splat::Samples;
 use crate::vector::Vector3;
 use crate::{Buffer, Error, Scalar};
@@ -121,14 +121,7 @@ fn find_slopes<F: Float + CubeElement>(
         state[s * STATE] = zero;
         state[s * STATE + 1] = slope;
     }
-    let mut shared = SharedMemory::<F>::new(BLOCK);
-    let square = sum_of_group::<F>(square, &mut shared);
-    let area = sum_of_group::<F>(area, &mut shared);
-    let own = CUBE_POS * 2;
-    if UNIT_POS == 0 && own < partial.len() {
-        partial[own] = square;
-        partial[own + 1] = area;
-    }
+    write_two_sums::<F>(square, area, partial);
 }
 
 /// `ω` of each sample, and `χ(x_i) + δ_i − c`.

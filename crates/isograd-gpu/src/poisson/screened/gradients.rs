@@ -8,7 +8,7 @@ use crate::device::{Ready, check_length, launch};
 use crate::grid::{Lattice, cell_at, from_center, place};
 use crate::isosurface::iso_value;
 use crate::primitives::fill::zeros;
-use crate::primitives::reduce::{BLOCK, sum, sum_of_group};
+use crate::primitives::reduce::{BLOCK, sum, write_sum};
 use crate::spread::{Before, spread};
 use crate::trilinear::{NUMBERS, REACH, Trilinear, interpolate};
 use crate::{Buffer, Device, Scalar};
@@ -189,11 +189,7 @@ fn sum_products<F: Float>(a: &Array<F>, b: &Array<F>, sums: &mut Array<F>) {
     if ABSOLUTE_POS < a.len() {
         product = a[ABSOLUTE_POS] * b[ABSOLUTE_POS];
     }
-    let mut shared = SharedMemory::<F>::new(BLOCK);
-    let total = sum_of_group::<F>(product, &mut shared);
-    if UNIT_POS == 0 && CUBE_POS < sums.len() {
-        sums[CUBE_POS] = total;
-    }
+    write_sum::<F>(product, sums);
 }
 
 /// `√â` of each sample, and where it is in its cell.
