@@ -67,6 +67,7 @@ impl<F: Float> Vector3<F> {
         scaled.divide(scaled.norm())
     }
 
+    /// Divided by a number.
     pub fn over(self, divisor: F) -> Self {
         Vector3::<F>::of(self.x / divisor, self.y / divisor, self.z / divisor)
     }

@@ -110,8 +110,7 @@ fn automatic<R: Runtime, T: Scalar>(
     bounds: [[T; 3]; 2],
 ) -> Result<(T, bool), crate::Error> {
     let n = neighborhoods.len();
-    let points = &neighborhoods.points;
-    let squares = reaches(device, neighborhoods, points, AUTO_NEIGHBORS.min(n))?;
+    let squares = reaches(device, neighborhoods, AUTO_NEIGHBORS.min(n))?;
     let squares = device.download(&squares)?;
     let mean = rule::middle_half(&squares, &mut Vec::new()).map(|(_, mean)| mean);
     let automatic = rule::automatic(mean, n, bounds);
@@ -126,12 +125,7 @@ fn grow<R: Runtime, T: Scalar>(
     common: T,
 ) -> Result<Buffer<T>, crate::Error> {
     let n = neighborhoods.len();
-    let squares = reaches(
-        device,
-        neighborhoods,
-        &neighborhoods.points,
-        FEWEST_NEIGHBORS.min(n),
-    )?;
+    let squares = reaches(device, neighborhoods, FEWEST_NEIGHBORS.min(n))?;
     let radii = device.empty(n)?;
     launch!(device, n, BLOCK => grow_radii<T>(
         squares, neighborhoods.places, radii, common, <T as isograd::Real>::of(GROWTH_MARGIN),

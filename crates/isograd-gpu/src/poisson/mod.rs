@@ -123,33 +123,25 @@ impl<T: Scalar> Solver<T> {
         }
         let gains = self.gains(device, smoothing)?;
         let mut fields = Fields::new(b);
+        let lines = |a: &usize| Lines::new(self.turned, *a);
+        let transform = |(a, axis): &(usize, Axis<T>), fields: &mut Fields<T>, inverse| {
+            let kernel = |from: &_, to: &_| axis.transform(device, lines(a), from, to, inverse);
+            fields.step(device, kernel)
+        };
         let (first, others) = self.axes.split_first().expect("an axis");
-        for (a, axis) in others.iter().rev() {
-            let lines = Lines::new(self.turned, *a);
-            fields.step(device, |from, to| {
-                axis.transform(device, lines, from, to, false)
-            })?;
+        for axis in others.iter().rev() {
+            transform(axis, &mut fields, false)?;
         }
-        let (a, axis) = first;
-        let lines = Lines::new(self.turned, *a);
-        if let Axis::Fourier(fourier) = axis {
-            fields.step(device, |from, to| {
-                fourier.filter(device, lines, from, to, &gains)
-            })?;
+        if let (a, Axis::Fourier(fourier)) = first {
+            let kernel = |from: &_, to: &_| fourier.filter(device, lines(a), from, to, &gains);
+            fields.step(device, kernel)?;
         } else {
-            fields.step(device, |from, to| {
-                axis.transform(device, lines, from, to, false)
-            })?;
+            transform(first, &mut fields, false)?;
             fields.step(device, |from, to| sums::filter(device, from, to, &gains))?;
-            fields.step(device, |from, to| {
-                axis.transform(device, lines, from, to, true)
-            })?;
+            transform(first, &mut fields, true)?;
         }
-        for (a, axis) in others {
-            let lines = Lines::new(self.turned, *a);
-            fields.step(device, |from, to| {
-                axis.transform(device, lines, from, to, true)
-            })?;
+        for axis in others {
+            transform(axis, &mut fields, true)?;
         }
         Ok(fields.last)
     }

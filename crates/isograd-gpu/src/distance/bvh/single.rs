@@ -42,7 +42,7 @@ pub(super) fn try_place<F: Float + CubeElement>(
     }
 }
 
-/// Of no triangle, where none is farther than the root of `bound`.
+/// No triangle yet; only those within the root of `bound` count.
 #[cube]
 pub(super) fn nothing_within<F: Float>(bound: F) -> Nearest<F> {
     Nearest::<F> {

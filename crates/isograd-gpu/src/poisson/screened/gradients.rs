@@ -128,7 +128,9 @@ impl<'a, R: Runtime, T: Scalar> System<'a, R, T> {
             drop(field);
             self.project(&image)?;
             let curvature = dot(device, &direction, &image)?;
-            self.step([&now, &curvature], &direction, &image, &solution, rest);
+            launch!(device, rest.len(), BLOCK => take_step<T>(
+                now, curvature, direction, image, solution, rest,
+            ));
             let before = std::mem::replace(&mut now, dot(device, rest, rest)?);
             self.turn(rest, Some([&now, &before]), &direction);
             left = device.download(&now)?[0].f64();
@@ -147,20 +149,6 @@ impl<'a, R: Runtime, T: Scalar> System<'a, R, T> {
             self.roots, along, self.total, v,
         ));
         Ok(())
-    }
-
-    /// Goes along the direction as far as the quotient of the two numbers.
-    fn step(
-        &self,
-        [up, down]: [&Buffer<T>; 2],
-        direction: &Buffer<T>,
-        image: &Buffer<T>,
-        solution: &Buffer<T>,
-        rest: &Buffer<T>,
-    ) {
-        launch!(self.device, rest.len(), BLOCK => take_step<T>(
-            up, down, direction, image, solution, rest,
-        ));
     }
 
     /// The next direction: what is left, and of the last direction the quotient of the two numbers, or nothing.
@@ -272,6 +260,7 @@ fn subtract_along<F: Float>(
     }
 }
 
+/// Goes along the direction as far as the quotient of two numbers.
 #[cube(launch)]
 fn take_step<F: Float>(
     up: &Array<F>,

@@ -4,7 +4,7 @@ use cubecl::prelude::*;
 
 use super::gradients::System;
 use super::{Equation, Error};
-use crate::device::{Ready, check_length, launch};
+use crate::device::{Ready, argument, check_length, launch};
 use crate::grid::{Lattice, check_field, place};
 use crate::isosurface::iso_value;
 use crate::poisson::smoothing;
@@ -43,21 +43,13 @@ pub fn pullback<R: Runtime, T: Scalar>(
     let adjoint = equation.solver.solve(device, chi_bar, 0.0)?;
     // Its mean at the samples and what it is there, as that of `χ`.
     let (_, adjoint) = iso_value::forward(device, &adjoint, grid, samples.points, samples.areas)?;
-    let chi = Ready::new(InterpolantLaunch::new(
-        level.at_samples.arg(),
-        level.sums.arg(),
-    ));
-    let adjoint = Ready::new(InterpolantLaunch::new(
-        adjoint.at_samples.arg(),
-        adjoint.sums.arg(),
-    ));
     let factors = Ready::new(FactorsLaunch::new(
         T::of(-equation.screening),
         equation.per_area(),
     ));
     let grid_sums: Buffer<T> = device.empty(4 * samples.len().div_ceil(BLOCK))?;
     launch!(device, samples.len(), BLOCK => pull_matrix<T>(
-        samples, chi, adjoint, out, grid_sums, factors, grid, equation.area_weights,
+        samples, level, adjoint, out, grid_sums, factors, grid, equation.area_weights,
     ));
     add(device, &sum_columns(device, &grid_sums, 4)?, &out.grid)?;
     Ok(iterations)
@@ -94,10 +86,14 @@ pub fn smoothing_pullback<R: Runtime, T: Scalar>(
 
 /// Value and gradient of a field at the samples, and the sums of its area-weighted mean.
 #[derive(CubeLaunch, CubeType)]
-struct Interpolant<F: Float + CubeElement> {
-    at_samples: Array<F>,
-    sums: Array<F>,
+pub(crate) struct Interpolant<F: Float + CubeElement> {
+    pub at_samples: Array<F>,
+    pub sums: Array<F>,
 }
+
+argument!(
+    iso_value::Residual<T> => InterpolantLaunch<T, R>: |of| of.at_samples.arg(), of.sums.arg()
+);
 
 /// Factors of the screening term.
 #[derive(CubeLaunch, CubeType, Clone, Copy)]
