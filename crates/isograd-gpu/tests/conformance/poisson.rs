@@ -5,6 +5,7 @@ use isograd::poisson::{Plan, Scratch, smoothing as cpu};
 use isograd_gpu::poisson::{Solver, smoothing};
 use isograd_gpu::{Device, Error, Scalar};
 
+use crate::clouds::{difference, largest};
 use crate::devices::{Numbers, tests, tolerance};
 
 tests! {
@@ -50,13 +51,7 @@ fn expected<T: Scalar>(shape: [usize; 3], b: &[T], smoothing: f64) -> Vec<f64> {
 
 /// The largest error over the largest value expected.
 fn error<T: Scalar>(found: &[T], expected: &[f64]) -> f64 {
-    assert_eq!(found.len(), expected.len());
-    let largest = expected.iter().fold(0.0f64, |a, e| a.max(e.abs()));
-    let pairs = found.iter().zip(expected);
-    let errors = pairs.map(|(f, e)| (f.f64() - e).abs());
-    // Unlike f64::max, keeps what is not a number.
-    let worst = errors.fold(0.0, |a, e| if e <= a { a } else { e });
-    worst / largest.max(f64::MIN_POSITIVE)
+    difference(found, expected, largest(expected).max(f64::MIN_POSITIVE))
 }
 
 fn dot<T: Scalar>(a: &[T], b: &[T]) -> f64 {
@@ -194,9 +189,8 @@ fn constant_part_of_the_right_hand_side_is_ignored<R: Runtime>(device: &Device<R
     let chi: Vec<f64> = solve(&b).into_iter().map(f64::from).collect();
     let error = error(&solve(&shifted), &chi);
     assert!(error < 1e-4, "{error:e}");
-    let largest = chi.iter().fold(0.0f64, |a, v| a.max(v.abs()));
     let mean = chi.iter().sum::<f64>() / chi.len() as f64;
-    assert!(mean.abs() < 1e-5 * largest);
+    assert!(mean.abs() < 1e-5 * largest(&chi));
 }
 
 fn second_solve_has_the_same_bits<R: Runtime>(device: &Device<R>) {
