@@ -6,7 +6,7 @@ use cubecl::prelude::*;
 use super::{Element, select};
 
 /// A point, a direction, or one number for each corner of a triangle.
-#[cfg_attr(cube, derive(CubeType))]
+#[cfg_attr(cube, derive(CubeType, CubeTypeMut))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vector3<F: Element> {
     /// Component along x.

@@ -27,33 +27,18 @@ pub(crate) fn arg<R: Runtime, T: Scalar>(grid: &isograd::Grid<T>) -> LatticeLaun
 /// Low corner of a grid.
 #[cube]
 pub(crate) fn low_corner<F: Float + CubeElement>(grid: &Lattice<F>) -> Vector3<F> {
-    Vector3::<F> {
-        x: grid.x,
-        y: grid.y,
-        z: grid.z,
-    }
+    Vector3::<F>::of(grid.x, grid.y, grid.z)
 }
 
-/// Index coordinates of a point.
-#[derive(CubeType, Clone, Copy)]
-pub(crate) struct Place<F: Float> {
-    pub x: F,
-    pub y: F,
-    pub z: F,
-}
-
-/// `(x − lower)/h` of point `i`.
+/// Index coordinates `(x − lower)/h` of point `i`.
 #[cube]
 pub(crate) fn place<F: Float + CubeElement>(
     points: &Array<F>,
     i: usize,
     grid: &Lattice<F>,
-) -> Place<F> {
-    Place::<F> {
-        x: (points[3 * i] - grid.x) / grid.spacing,
-        y: (points[3 * i + 1] - grid.y) / grid.spacing,
-        z: (points[3 * i + 2] - grid.z) / grid.spacing,
-    }
+) -> Vector3<F> {
+    let offset = Vector3::<F>::at(points, i).sub(low_corner::<F>(grid));
+    offset.over(grid.spacing)
 }
 
 /// The cell at a place in memory.
@@ -74,10 +59,26 @@ pub(crate) fn cell_at(index: u32, ny: u32, nz: u32) -> Cell {
     }
 }
 
-/// Offset of `x` from the center of a cell, in cells.
+/// Offset of index coordinates from the center of a cell.
 #[cube]
-pub(crate) fn from_center<F: Float>(x: F, cell: u32) -> F {
-    x - F::cast_from(cell) - F::new(0.5)
+pub(crate) fn from_center<F: Float>(x: Vector3<F>, cell: Cell) -> Vector3<F> {
+    let half = F::new(0.5);
+    Vector3::<F> {
+        x: x.x - F::cast_from(cell.i) - half,
+        y: x.y - F::cast_from(cell.j) - half,
+        z: x.z - F::cast_from(cell.k) - half,
+    }
+}
+
+/// Index coordinates of the center of a cell.
+#[cube]
+pub(crate) fn center_of<F: Float>(cell: Cell) -> Vector3<F> {
+    let half = F::new(0.5);
+    Vector3::<F> {
+        x: F::cast_from(cell.i) + half,
+        y: F::cast_from(cell.j) + half,
+        z: F::cast_from(cell.k) + half,
+    }
 }
 
 /// A field must have a value a cell.

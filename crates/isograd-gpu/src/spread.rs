@@ -9,6 +9,7 @@
 use cubecl::prelude::*;
 
 use crate::device::{Ready, launch};
+use crate::primitives::sort::first_at_least;
 use crate::splat::SampleOrder;
 use crate::{Buffer, Device, Error, Scalar};
 
@@ -90,22 +91,6 @@ pub(crate) fn spread<R: Runtime, T: Scalar, P: Spread>(
         Ready::new(samples), out, reach, before == Before::Kept,
     ));
     Ok(())
-}
-
-/// The first of the places `begin..end` whose key is at least `key`, or `end`.
-#[cube]
-pub(crate) fn first_at_least(keys: &Array<u32>, begin: u32, end: u32, key: u32) -> u32 {
-    let mut low = begin;
-    let mut high = end;
-    while low < high {
-        let middle = low + (high - low) / 2u32;
-        if keys[middle as usize] < key {
-            low = middle + 1u32;
-        } else {
-            high = middle;
-        }
-    }
-    low
 }
 
 /// Sums over each run of samples in one cell, for each of the cells around it: a unit for each run and cell.

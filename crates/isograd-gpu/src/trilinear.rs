@@ -3,24 +3,23 @@
 use cubecl::prelude::*;
 
 use crate::element::linear::lerp;
-use crate::grid::{Lattice, Place};
+use crate::grid::Lattice;
 use crate::spread::Spread;
+use crate::vector::Vector3;
 
 /// A field at a point.
 #[derive(CubeType, Clone, Copy)]
 pub(crate) struct Interpolated<F: Float> {
     pub value: F,
-    /// Gradient, per cell.
-    pub x: F,
-    pub y: F,
-    pub z: F,
+    /// Per cell.
+    pub gradient: Vector3<F>,
 }
 
 /// `field`, `(nx, ny, nz)`, at index coordinates; constant beyond the outermost cell centers.
 #[cube]
 pub(crate) fn interpolate<F: Float + CubeElement>(
     field: &Array<F>,
-    at: Place<F>,
+    at: Vector3<F>,
     grid: &Lattice<F>,
 ) -> Interpolated<F> {
     let x = between::<F>(at.x, grid.nx);
@@ -41,9 +40,11 @@ pub(crate) fn interpolate<F: Float + CubeElement>(
     let across = lerp::<F>(e01.value - e00.value, e11.value - e10.value, x.fraction);
     Interpolated::<F> {
         value,
-        x: (high - low) * x.inside,
-        y: across * y.inside,
-        z: lerp::<F>(low_slope, high_slope, x.fraction) * z.inside,
+        gradient: Vector3::<F> {
+            x: (high - low) * x.inside,
+            y: across * y.inside,
+            z: lerp::<F>(low_slope, high_slope, x.fraction) * z.inside,
+        },
     }
 }
 

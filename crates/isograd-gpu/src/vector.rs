@@ -13,11 +13,7 @@ impl<F: Float> Vector3<F> {
 
     /// Three numbers of an array, from `start` on.
     pub fn load(array: &Array<F>, start: usize) -> Self {
-        Vector3::<F> {
-            x: array[start],
-            y: array[start + 1],
-            z: array[start + 2],
-        }
+        Vector3::<F>::of(array[start], array[start + 1], array[start + 2])
     }
 
     pub fn write(self, array: &mut Array<F>, i: usize) {
@@ -48,11 +44,7 @@ impl<F: Float> Vector3<F> {
     }
 
     pub fn zero() -> Self {
-        Vector3::<F> {
-            x: F::new(0.0),
-            y: F::new(0.0),
-            z: F::new(0.0),
-        }
+        Vector3::<F>::of(F::new(0.0), F::new(0.0), F::new(0.0))
     }
 
     pub fn is_finite(self) -> bool {
@@ -75,7 +67,12 @@ impl<F: Float> Vector3<F> {
         scaled.divide(scaled.norm())
     }
 
-    /// Zero where the divisor is not positive.
+    /// Divided by a number.
+    pub fn over(self, divisor: F) -> Self {
+        Vector3::<F>::of(self.x / divisor, self.y / divisor, self.z / divisor)
+    }
+
+    /// [`Self::over`], but zero where the divisor is not positive.
     pub fn divide(self, divisor: F) -> Self {
         let zero = F::new(0.0);
         let positive = divisor > zero;

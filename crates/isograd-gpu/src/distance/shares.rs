@@ -89,15 +89,6 @@ impl Corners {
     }
 }
 
-/// The sum over the corners at each vertex, `(V, 3)`; `of_faces` begins the row of each face with its three corners.
-pub(super) fn gather_corners<T: Scalar, R: Runtime>(
-    device: &Device<R>,
-    mesh: &Mesh<T>,
-    of_faces: &Buffer<T>,
-) -> Result<Buffer<T>, Error> {
-    Corners::of(device, mesh)?.sum(device, of_faces, 3)
-}
-
 /// The closest face of each query whose cotangent counts; else one past the last.
 #[cube(launch)]
 fn key_queries<F: Float>(
@@ -116,14 +107,6 @@ fn key_queries<F: Float>(
     }
 }
 
-/// Takes a vector off the three numbers from `at` on.
-#[cube]
-fn take<F: Float>(sum: &mut Array<F>, at: usize, less: Vector3<F>) {
-    sum[at] -= less.x;
-    sum[at + 1] -= less.y;
-    sum[at + 2] -= less.z;
-}
-
 /// Adds what one query gives the corners of its face, `−β_k φ̄ ∇φ`, and returns `φ̄ ∇φ`.
 #[cube]
 pub(super) fn add_share<F: Float>(
@@ -134,9 +117,9 @@ pub(super) fn add_share<F: Float>(
 ) -> Vector3<F> {
     let slope = gradient::<F>(found.offset, found.normal, inside);
     let pull = slope.scale(bar);
-    take::<F>(sum, 0usize, pull.scale(found.weights.x));
-    take::<F>(sum, 3usize, pull.scale(found.weights.y));
-    take::<F>(sum, 6usize, pull.scale(found.weights.z));
+    pull.scale(-found.weights.x).add_to(sum, 0usize);
+    pull.scale(-found.weights.y).add_to(sum, 3usize);
+    pull.scale(-found.weights.z).add_to(sum, 6usize);
     pull
 }
 

@@ -35,7 +35,8 @@ pub(super) fn tangent<F: Float>(
     // Of a face, its longest edge is the base; else its apex does not count.
     let first = select(of_face, first_corner::<F>(corners), found.feature % 3u32);
     let t = turned::<F>(corners, first);
-    let ahead = turned_ahead::<F>(gains, first);
+    // Of the edges from the first on.
+    let ahead = turned_back::<F>(gains, (3u32 - first) % 3u32);
     let base = t.ab.norm();
     let has_base = base > thinnest && !of_vertex;
     let length = select(has_base, base, one);
@@ -52,25 +53,11 @@ pub(super) fn tangent<F: Float>(
     let climb = (-ahead.z - foot * slope) / height;
     let of_apex = select(has_height, climb / height, zero);
     let of_second = select(has_base, (slope - of_apex * foot) / length, zero);
-    let gamma = Vector3::<F> {
-        x: -(of_apex + of_second),
-        y: of_second,
-        z: of_apex,
-    };
+    let gamma = Vector3::<F>::of(-(of_apex + of_second), of_second, of_apex);
     Tangent::<F> {
         query: unit.scale(slope).add(across.scale(of_apex)),
         gamma: turned_back::<F>(gamma, first),
         guarded: (!has_base && !of_vertex && ahead.x != zero)
             || (of_face && !has_height && ahead.z != zero),
-    }
-}
-
-/// Numbers of the edges from `first` on.
-#[cube]
-fn turned_ahead<F: Float>(of: Vector3<F>, first: u32) -> Vector3<F> {
-    Vector3::<F> {
-        x: select(first == 0u32, of.x, select(first == 1u32, of.y, of.z)),
-        y: select(first == 0u32, of.y, select(first == 1u32, of.z, of.x)),
-        z: select(first == 0u32, of.z, select(first == 1u32, of.x, of.y)),
     }
 }

@@ -112,11 +112,7 @@ pub(super) fn frame<F: Float>(corners: Corners<F>) -> Frame<F> {
 #[cube]
 fn frame_of_turned<F: Float>(t: Corners<F>) -> Frame<F> {
     let base = t.ab.norm();
-    let along_x = Vector3::<F> {
-        x: F::new(1.0),
-        y: F::new(0.0),
-        z: F::new(0.0),
-    };
+    let along_x = Vector3::<F>::of(F::new(1.0), F::new(0.0), F::new(0.0));
     let u = t.ab.direction().choose(base > F::new(0.0), along_x);
     // From the nearer end of the base, where a needle keeps its direction.
     let left = t.ca.dot(t.ca) <= t.bc.dot(t.bc);
@@ -165,11 +161,7 @@ pub(super) fn store_frame<F: Float>(frames: &mut Array<F>, index: usize, frame: 
     frame.origin.write(frames, 4 * index);
     frame.u.write(frames, 4 * index + 1);
     frame.v.write(frames, 4 * index + 2);
-    let rest = Vector3::<F> {
-        x: frame.foot,
-        y: frame.back,
-        z: frame.height,
-    };
+    let rest = Vector3::<F>::of(frame.foot, frame.back, frame.height);
     rest.write(frames, 4 * index + 3);
 }
 

@@ -193,11 +193,8 @@ impl<R: SharedMemory, T: Scalar> Work<T> for Reconstructor<R, T> {
         begin: &mut dyn FnMut() -> ControlFlow<()>,
     ) -> Result<CallStart<T>, Error> {
         let device = self.device();
-        let refused = |reason: orient::Error| Error::Host(reason.into());
-        let normals = || {
-            let normals = cloud.normals();
-            normals.ok_or_else(|| refused(orient::Error::NoNormals))
-        };
+        let none = || Error::Host(orient::Error::NoNormals.into());
+        let normals = || cloud.normals().ok_or_else(none);
         let search = match method {
             Method::Given => {
                 normals()?;
@@ -290,11 +287,8 @@ impl<R: SharedMemory, T: Scalar> Work<T> for Reconstructor<R, T> {
             None => upload(device, bars.sdf)?,
             sdf => sdf,
         };
-        let indicator = upload(device, bars.indicator)?;
-        let (areas, level) = (
-            upload(device, bars.areas)?,
-            upload(device, level.as_ref().map(|l| &l[..]))?,
-        );
+        let (indicator, areas) = (upload(device, bars.indicator)?, upload(device, bars.areas)?);
+        let level = upload(device, level.as_ref().map(|l| &l[..]))?;
         let (vertices, normals) = (vectors(bars.vertices)?, vectors(bars.normals)?);
         let shape = self.grid().shape();
         let extended: Vec<Uploaded<T>> = (bars.extensions.iter())
@@ -326,14 +320,14 @@ impl<R: SharedMemory, T: Scalar> Work<T> for Reconstructor<R, T> {
             Some(count) => device.download(count)?[0] as usize,
             None => 0,
         };
-        let normals = match &found.normals {
-            Some(normals) => vectors_of(&device.download(normals)?),
-            None => Vec::new(),
+        let numbers = |of: &Option<Buffer<T>>| match of {
+            Some(of) => device.download(of),
+            None => Ok(Vec::new()),
         };
         let attributes = found.attributes.iter().map(|of| device.download(of));
         let of_cloud = CloudCotangent {
             points: vectors_of(&device.download(&found.points)?),
-            normals,
+            normals: vectors_of(&numbers(&found.normals)?),
             attributes: attributes.collect::<Result<_, _>>()?,
             grid: GridCotangent {
                 lower: [grid[0], grid[1], grid[2]],
@@ -343,15 +337,9 @@ impl<R: SharedMemory, T: Scalar> Work<T> for Reconstructor<R, T> {
         };
         let radii = RadiiCotangents {
             areas: device.download(&found.radii)?,
-            axes: match &found.axis_radii {
-                Some(radii) => device.download(radii)?,
-                None => Vec::new(),
-            },
+            axes: numbers(&found.axis_radii)?,
             common,
-            spacing: match &found.spacing {
-                Some(spacing) => device.download(spacing)?[0].f64(),
-                None => 0.0,
-            },
+            spacing: (numbers(&found.spacing)?.first()).map_or(0.0, |bar| bar.f64()),
         };
         Ok((of_cloud, radii))
     }

@@ -8,8 +8,10 @@ use super::sums::fold;
 use super::values::{Values, fraction_on, stride};
 use crate::device::{Ready, check_length, launch};
 use crate::element::crossing::bounded;
+use crate::grid::{cell_at, center_of};
 use crate::primitives::ends::ends;
 use crate::primitives::reduce::{groups_for, sum_of_group};
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Sums over the vertices: of the level, of the low corner, of the spacing.
@@ -185,9 +187,7 @@ fn add_vertices<F: Float + CubeElement>(
 ) {
     let groups = partly_guarded.len();
     let mut level = F::new(0.0);
-    let mut lower_x = F::new(0.0);
-    let mut lower_y = F::new(0.0);
-    let mut lower_z = F::new(0.0);
+    let mut lower = Vector3::<F>::zero();
     let mut spacing = F::new(0.0);
     let mut guarded = 0u32;
     let mut vertex = ABSOLUTE_POS;
@@ -195,29 +195,22 @@ fn add_vertices<F: Float + CubeElement>(
         let p = edges[vertex] / 3u32;
         let axis = edges[vertex] % 3u32;
         let edge = on_edge::<F>(signs, values, bars, p as usize, axis, vertex as u32);
-        let row = p / signs.nz;
-        let x = bars.vertices[3 * vertex];
-        let y = bars.vertices[3 * vertex + 1];
-        let z = bars.vertices[3 * vertex + 2];
+        let bar = Vector3::<F>::at(&bars.vertices, vertex);
         level += edge.pull;
-        lower_x += x;
-        lower_y += y;
-        lower_z += z;
+        lower = lower.add(bar);
         // The place of the vertex in index coordinates: that of the cell's center, and η along the edge.
-        let along = select(axis == 0u32, x, select(axis == 1u32, y, z));
-        spacing += x * (F::cast_from(row / signs.ny) + F::new(0.5))
-            + y * (F::cast_from(row % signs.ny) + F::new(0.5))
-            + z * (F::cast_from(p % signs.nz) + F::new(0.5))
-            + along * edge.eta;
+        let center = center_of::<F>(cell_at(p, signs.ny, signs.nz));
+        let along = select(axis == 0u32, bar.x, select(axis == 1u32, bar.y, bar.z));
+        spacing += bar.dot(center) + along * edge.eta;
         guarded += edge.guarded;
         vertex += groups * block;
     }
     let mut shared = SharedMemory::<F>::new(block);
     let mut counts = SharedMemory::<u32>::new(block);
     let level = sum_of_group::<F>(level, &mut shared);
-    let lower_x = sum_of_group::<F>(lower_x, &mut shared);
-    let lower_y = sum_of_group::<F>(lower_y, &mut shared);
-    let lower_z = sum_of_group::<F>(lower_z, &mut shared);
+    let lower_x = sum_of_group::<F>(lower.x, &mut shared);
+    let lower_y = sum_of_group::<F>(lower.y, &mut shared);
+    let lower_z = sum_of_group::<F>(lower.z, &mut shared);
     let spacing = sum_of_group::<F>(spacing, &mut shared);
     let guarded = sum_of_group::<u32>(guarded, &mut counts);
     if UNIT_POS == 0u32 {

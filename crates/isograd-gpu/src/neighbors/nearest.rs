@@ -14,18 +14,17 @@ use crate::{Buffer, Device, Error, Scalar};
 /// where more are asked for.
 const WINDOW: usize = 32;
 
-/// The squared distance of each of the `(M, 3)` places to its `k`-th nearest point, `k` being at most the number of
-/// points. A point that is its own place is the first.
+/// The squared distance of each sorted point to its `k`-th nearest, `k` being at most the number of points. The first
+/// is the point itself.
 pub(crate) fn reaches<R: Runtime, T: Scalar>(
     device: &Device<R>,
     neighborhoods: &Neighborhoods<T>,
-    places: &Buffer<T>,
     k: usize,
 ) -> Result<Buffer<T>, Error> {
     debug_assert!(k > 0 && k <= neighborhoods.len());
-    let squares = device.empty(places.len() / 3)?;
+    let squares = device.empty(neighborhoods.len())?;
     launch!(device, squares.len(), BLOCK => find_reaches<T>(
-        Ready::new(neighborhoods.tree()), places, squares, k,
+        Ready::new(neighborhoods.tree()), squares, k,
     ));
     Ok(squares)
 }
@@ -33,12 +32,11 @@ pub(crate) fn reaches<R: Runtime, T: Scalar>(
 #[cube(launch)]
 fn find_reaches<F: Float + CubeElement>(
     tree: &PointTree<F>,
-    places: &Array<F>,
     squares: &mut Array<F>,
     #[comptime] k: usize,
 ) {
     if ABSOLUTE_POS < squares.len() {
-        let x = Vector3::<F>::at(places, ABSOLUTE_POS);
+        let x = Vector3::<F>::at(&tree.points, ABSOLUTE_POS);
         squares[ABSOLUTE_POS] = reach_squared::<F>(tree, x, k);
     }
 }

@@ -16,10 +16,7 @@ use isograd::neighbors::rule::{
 use isograd::neighbors::{Error as Refused, Radius};
 
 use super::nearest::reaches;
-use super::{
-    BLOCK, NeighborhoodArrays, Neighborhoods, end_of_leaf, first_of_leaf, forward as sort_points,
-    is_isolated, next_leaf, with_radii,
-};
+use super::{BLOCK, Neighborhoods, forward as sort_points, with_radii};
 use crate::device::{check_length, launch};
 use crate::primitives::ends::ends;
 use crate::primitives::fill::zeros;
@@ -51,15 +48,6 @@ pub struct Radii<T> {
     pub has_apart: bool,
     /// The points, sorted, with these radii.
     pub neighborhoods: Neighborhoods<T>,
-}
-
-/// Sizes of the neighborhoods, in input order.
-#[derive(Clone, Debug)]
-pub struct Census {
-    /// `(N,)` number of samples within `R_i`, the point itself included.
-    pub count: Buffer<u32>,
-    /// `(N,)` 1 for outliers, of whose neighbors fewer than 1 in 8 have them as theirs; else 0.
-    pub isolated: Buffer<u32>,
 }
 
 /// The radii of `(N, 3)` points. Waits for the device: the checks of the points, their box and a distance for each point
@@ -94,25 +82,6 @@ pub fn forward<R: Runtime, T: Scalar>(
     })
 }
 
-/// Counts the samples of the neighborhoods, and finds those that are isolated; `common` is [`Radii::common`].
-pub fn census<R: Runtime, T: Scalar>(
-    device: &Device<R>,
-    neighborhoods: &Neighborhoods<T>,
-    common: T,
-) -> Result<Census, crate::Error> {
-    let n = neighborhoods.len();
-    let census = Census {
-        count: device.empty(n)?,
-        isolated: device.empty(n)?,
-    };
-    if n > 0 {
-        launch!(device, n, BLOCK => count_neighbors<T>(
-            neighborhoods, census.count, census.isolated, common,
-        ));
-    }
-    Ok(census)
-}
-
 fn check_finite<R: Runtime, T: Scalar>(
     device: &Device<R>,
     points: &Buffer<T>,
@@ -141,8 +110,7 @@ fn automatic<R: Runtime, T: Scalar>(
     bounds: [[T; 3]; 2],
 ) -> Result<(T, bool), crate::Error> {
     let n = neighborhoods.len();
-    let points = &neighborhoods.points;
-    let squares = reaches(device, neighborhoods, points, AUTO_NEIGHBORS.min(n))?;
+    let squares = reaches(device, neighborhoods, AUTO_NEIGHBORS.min(n))?;
     let squares = device.download(&squares)?;
     let mean = rule::middle_half(&squares, &mut Vec::new()).map(|(_, mean)| mean);
     let automatic = rule::automatic(mean, n, bounds);
@@ -157,12 +125,7 @@ fn grow<R: Runtime, T: Scalar>(
     common: T,
 ) -> Result<Buffer<T>, crate::Error> {
     let n = neighborhoods.len();
-    let squares = reaches(
-        device,
-        neighborhoods,
-        &neighborhoods.points,
-        FEWEST_NEIGHBORS.min(n),
-    )?;
+    let squares = reaches(device, neighborhoods, FEWEST_NEIGHBORS.min(n))?;
     let radii = device.empty(n)?;
     launch!(device, n, BLOCK => grow_radii<T>(
         squares, neighborhoods.places, radii, common, <T as isograd::Real>::of(GROWTH_MARGIN),
@@ -190,39 +153,5 @@ fn grow_radii<F: Float + CubeElement>(
     if ABSOLUTE_POS < places.len() {
         let place = places[ABSOLUTE_POS] as usize;
         radii[place] = max(common, margin * F::sqrt(squares[ABSOLUTE_POS]));
-    }
-}
-
-#[cube(launch)]
-fn count_neighbors<F: Float + CubeElement>(
-    near: &NeighborhoodArrays<F>,
-    counts: &mut Array<u32>,
-    isolated: &mut Array<u32>,
-    common: F,
-) {
-    let n = near.radii.len();
-    if ABSOLUTE_POS < n {
-        let center = Vector3::<F>::at(&near.tree.points, ABSOLUTE_POS);
-        let radius = near.radii[ABSOLUTE_POS];
-        let mut count = 0u32.runtime();
-        let mut mutual = 0u32.runtime();
-        let mut node = next_leaf::<F>(&near.tree, center, radius, 0usize, false);
-        while node < near.tree.links.len() {
-            let first = first_of_leaf(&near.tree.links, node);
-            for j in first..end_of_leaf(first, n) {
-                let offset = Vector3::<F>::at(&near.tree.points, j).sub(center);
-                let square = offset.dot(offset);
-                if square <= radius * radius {
-                    count += 1u32;
-                    let is_mutual = j != ABSOLUTE_POS && square <= near.radii[j] * near.radii[j];
-                    mutual += select(is_mutual, 1u32, 0u32);
-                }
-            }
-            node = next_leaf::<F>(&near.tree, center, radius, node + 1, false);
-        }
-        let place = near.places[ABSOLUTE_POS] as usize;
-        let alone = is_isolated::<F>(radius, common, max(count, 1u32) - 1u32, mutual);
-        counts[place] = count;
-        isolated[place] = select(alone, 1u32, 0u32);
     }
 }

@@ -184,11 +184,7 @@ pub(crate) fn fit<F: Float>(moments: &Array<F>, at: usize, pitch: usize) -> Fit<
     });
     Fit::<F> {
         weight,
-        centroid: Vector3::<F> {
-            x: mx,
-            y: my,
-            z: mz,
-        },
+        centroid: Vector3::<F>::of(mx, my, mz),
         eigen: Eigen::<F> {
             values: Vector3::<F> {
                 x: not_negative::<F>(found.values.x),

@@ -27,6 +27,7 @@ mod widen;
 pub use forward::forward;
 pub(crate) use forward::{MOMENTS, add_moments, fit};
 pub use pullback::pullback;
+use pullback::rows;
 pub use widen::widen;
 
 use cubecl::prelude::*;
@@ -105,10 +106,8 @@ impl<T: Scalar> Residual<T> {
 fn flag_guarded<F: Float>(planes: &Array<F>, flags: &mut Array<u32>) {
     let n = flags.len();
     if ABSOLUTE_POS < n {
-        let first = planes[VALUES * n + ABSOLUTE_POS];
-        let second = planes[(VALUES + 1) * n + ABSOLUTE_POS];
-        let third = planes[(VALUES + 2) * n + ABSOLUTE_POS];
-        let clear = F::new(1000.0) * (second - first) > F::new(SMALLEST_GAP) * third;
+        let values = rows::<F>(planes, VALUES, n);
+        let clear = F::new(1000.0) * (values.y - values.x) > F::new(SMALLEST_GAP) * values.z;
         flags[ABSOLUTE_POS] = select(clear, 0u32, 1u32);
     }
 }

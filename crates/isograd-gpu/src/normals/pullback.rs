@@ -74,7 +74,7 @@ impl<F: Float> Center<F> {
 
 /// Three of the numbers of this unit's point, from number `k`.
 #[cube]
-fn rows<F: Float>(planes: &Array<F>, #[comptime] k: usize, n: usize) -> Vector3<F> {
+pub(super) fn rows<F: Float>(planes: &Array<F>, #[comptime] k: usize, n: usize) -> Vector3<F> {
     Vector3::<F> {
         x: planes[k * n + ABSOLUTE_POS],
         y: planes[(k + 1) * n + ABSOLUTE_POS],
@@ -132,9 +132,7 @@ fn gather<F: Float + CubeElement>(
         let radius = near.radii[ABSOLUTE_POS];
         let inverse = F::new(1.0) / radius;
         let own = Center::<F>::at(centers, ABSOLUTE_POS);
-        let mut x = F::new(0.0);
-        let mut y = F::new(0.0);
-        let mut z = F::new(0.0);
+        let mut sum = Vector3::<F>::zero();
         let mut along = F::new(0.0);
         let mut node = next_leaf::<F>(&near.tree, point, radius, 0usize, true);
         while node < near.tree.links.len() {
@@ -146,22 +144,17 @@ fn gather<F: Float + CubeElement>(
                     let unit = offset.scale(inverse);
                     let out = own.offset_bar(unit);
                     along += out.dot(unit);
-                    x -= out.x * inverse;
-                    y -= out.y * inverse;
-                    z -= out.z * inverse;
+                    sum = sum.sub(out.scale(inverse));
                 }
                 let other = near.radii[j];
                 if square <= other * other {
                     let unit = F::new(1.0) / other;
                     let into = Center::<F>::at(centers, j).offset_bar(offset.scale(-unit));
-                    x += into.x * unit;
-                    y += into.y * unit;
-                    z += into.z * unit;
+                    sum = sum.add(into.scale(unit));
                 }
             }
             node = next_leaf::<F>(&near.tree, point, radius, node + 1, true);
         }
-        let sum = Vector3::<F> { x, y, z };
         let place = near.places[ABSOLUTE_POS] as usize;
         sum.write(points_bar, place);
         radii_bar[place] = -along;

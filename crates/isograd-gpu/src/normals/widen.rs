@@ -4,6 +4,7 @@ use cubecl::prelude::*;
 use isograd::normals::widen::{GAIN, RIM, ROUGH, STEPS};
 
 use super::forward::{MOMENTS, fit, moments_within};
+use super::pullback::rows;
 use super::{Residual, VALUES};
 use crate::device::launch;
 use crate::element::plane;
@@ -59,12 +60,7 @@ fn roughness<F: Float>(values: Vector3<F>) -> F {
 fn begin_widening<F: Float>(planes: &Array<F>, rough: &mut Array<F>, factors: &mut Array<F>) {
     let n = rough.len();
     if ABSOLUTE_POS < n {
-        let values = Vector3::<F> {
-            x: planes[VALUES * n + ABSOLUTE_POS],
-            y: planes[(VALUES + 1) * n + ABSOLUTE_POS],
-            z: planes[(VALUES + 2) * n + ABSOLUTE_POS],
-        };
-        rough[ABSOLUTE_POS] = roughness::<F>(values);
+        rough[ABSOLUTE_POS] = roughness::<F>(rows::<F>(planes, VALUES, n));
         factors[ABSOLUTE_POS] = F::new(1.0);
     }
 }

@@ -73,7 +73,7 @@ fn detection_radius<R: Runtime, T: Scalar>(
 ) -> Result<f64, crate::Error> {
     // The point itself or an equal one is first, so the second is the nearest other.
     let k = neighborhoods.len().min(2);
-    let squares = reaches(device, neighborhoods, &neighborhoods.points, k)?;
+    let squares = reaches(device, neighborhoods, k)?;
     let largest = device.download(&ends(device, &squares, 1)?)?[1];
     Ok(options.detection_radius(isograd::Real::f64(largest).sqrt()))
 }

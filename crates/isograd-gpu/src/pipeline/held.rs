@@ -12,6 +12,7 @@ use crate::device::{check_length, launch};
 use crate::neighbors::radius;
 use crate::orient::previous::{self, Before, Followed};
 use crate::primitives::fill::zeros;
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
 /// The radii of a cloud's neighborhoods, and which way is out at each of its points. Of a body that moves a
@@ -286,16 +287,10 @@ fn turn_vectors<F: Float>(
     count: u32,
 ) {
     if ABSOLUTE_POS < count as usize {
-        let at = 3 * ABSOLUTE_POS;
-        let along = axes[at] * outward[at]
-            + axes[at + 1] * outward[at + 1]
-            + axes[at + 2] * outward[at + 2];
-        let mut sign = F::new(1.0);
-        if along < F::new(0.0) {
-            sign = F::new(-1.0);
-        }
-        for axis in 0..3usize {
-            turned[at + axis] = sign * vectors[at + axis];
-        }
+        let axis = Vector3::<F>::at(axes, ABSOLUTE_POS);
+        let along = axis.dot(Vector3::<F>::at(outward, ABSOLUTE_POS));
+        let sign = select(along < F::new(0.0), F::new(-1.0), F::new(1.0));
+        let vector = Vector3::<F>::at(vectors, ABSOLUTE_POS);
+        vector.scale(sign).write(turned, ABSOLUTE_POS);
     }
 }

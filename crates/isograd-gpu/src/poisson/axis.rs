@@ -84,7 +84,7 @@ impl<T: Scalar> Axis<T> {
         if largest > LARGEST_FACTOR && padded <= capacity {
             Ok(Self::Fourier(Fourier::chirped(device, n, padded)?))
         } else if n <= capacity {
-            Ok(Self::Fourier(Fourier::new(device, n)?))
+            Ok(Self::Fourier(Fourier::of_length(device, n, n, None)?))
         } else {
             Self::by_definition(device, n)
         }
@@ -115,11 +115,6 @@ impl<T: Scalar> Axis<T> {
 }
 
 impl<T: Scalar> Fourier<T> {
-    /// By passes over the lines themselves.
-    fn new<R: Runtime>(device: &Device<R>, n: usize) -> Result<Self, Error> {
-        Self::with_length(device, n, n, None)
-    }
-
     /// By the chirp transform, a cyclic convolution of `length` numbers.
     fn chirped<R: Runtime>(device: &Device<R>, n: usize, length: usize) -> Result<Self, Error> {
         let chirp: Vec<[f64; 2]> = (0..n)
@@ -140,10 +135,11 @@ impl<T: Scalar> Fourier<T> {
         };
         let mut table = parts(&chirp, 1.0);
         table.extend(parts(&kernel, 1.0 / length as f64));
-        Self::with_length(device, n, length, Some(device.upload(&table)?))
+        Self::of_length(device, n, length, Some(device.upload(&table)?))
     }
 
-    fn with_length<R: Runtime>(
+    /// By passes over lines of `n` cells, or, with a chirp, of `length` numbers.
+    fn of_length<R: Runtime>(
         device: &Device<R>,
         n: usize,
         length: usize,

@@ -14,11 +14,11 @@
 //! is applied between: in the same kernel, if a line fits. Besides `b`, two fields are in memory.
 //!
 //! # Residual
-//! `σ` and `χ`, which share the memory of the result. `b̄` needs the first, `σ̄` both.
+//! `σ` and `χ`. `b̄` needs the first, `σ̄` both.
 //!
 //! # Pullback
-//! The operator is symmetric: `b̄ = IDCT(G/λ · DCT(χ̄))`. With `L` the sum of second differences,
-//! `σ̄ = σ χ·Lχ̄`: see [`smoothing`].
+//! The operator is symmetric: `b̄ = IDCT(G/λ · DCT(χ̄))`, [`Solver::solve`] again. With `L` the sum of second
+//! differences, `σ̄ = σ χ·Lχ̄`: [`smoothing::pullback`].
 //!
 //! # Not differentiable
 //! Nothing: the map is linear in `b`.
@@ -48,55 +48,6 @@ pub struct Solver<T> {
     axes: Vec<(usize, Axis<T>)>,
     /// Eigenvalues of the stiffness along the axes of `turned`, then those of the mass.
     spectrum: Buffer<T>,
-}
-
-/// Residual of a solve.
-pub struct Residual<T> {
-    /// `σ` in cells.
-    pub smoothing: f64,
-    /// The solution.
-    pub chi: Buffer<T>,
-}
-
-/// Cotangents of the inputs of a solve.
-pub struct Cotangents<T> {
-    /// `b̄`, one value per cell.
-    pub b: Buffer<T>,
-    /// `σ̄`, one number.
-    pub smoothing: Buffer<T>,
-}
-
-/// `χ` for the right-hand side `b`, smoothed by `smoothing` cells (0 for none).
-///
-/// # Errors
-/// A field of another size than the solver's ([`Error::Length`]), a smoothing that is negative or not finite
-/// ([`Error::Smoothing`]), or a device without the memory ([`Error::TooLarge`]).
-pub fn forward<R: Runtime, T: Scalar>(
-    device: &Device<R>,
-    solver: &Solver<T>,
-    b: &Buffer<T>,
-    smoothing: f64,
-) -> Result<(Buffer<T>, Residual<T>), Error> {
-    let chi = solver.solve(device, b, smoothing)?;
-    let residual = Residual {
-        smoothing,
-        chi: chi.clone(),
-    };
-    Ok((chi, residual))
-}
-
-/// From `χ̄` to `b̄` and `σ̄`.
-pub fn pullback<R: Runtime, T: Scalar>(
-    device: &Device<R>,
-    solver: &Solver<T>,
-    residual: &Residual<T>,
-    chi_bar: &Buffer<T>,
-) -> Result<Cotangents<T>, Error> {
-    let sigma = residual.smoothing;
-    Ok(Cotangents {
-        b: solver.solve(device, chi_bar, sigma)?,
-        smoothing: smoothing::pullback(device, sigma, solver.shape, &residual.chi, chi_bar)?,
-    })
 }
 
 impl<T: Scalar> Solver<T> {
@@ -152,7 +103,11 @@ impl<T: Scalar> Solver<T> {
         self.shape
     }
 
-    /// `χ` for the right-hand side `b`: [`forward`] without its residual. Its own transpose.
+    /// `χ` for the right-hand side `b`, smoothed by `smoothing` cells (0 for none). Its own transpose.
+    ///
+    /// # Errors
+    /// A field of another size than the solver's ([`Error::Length`]), a smoothing that is negative or not finite
+    /// ([`Error::Smoothing`]), or a device without the memory ([`Error::TooLarge`]).
     pub fn solve<R: Runtime>(
         &self,
         device: &Device<R>,
@@ -168,33 +123,25 @@ impl<T: Scalar> Solver<T> {
         }
         let gains = self.gains(device, smoothing)?;
         let mut fields = Fields::new(b);
+        let lines = |a: &usize| Lines::new(self.turned, *a);
+        let transform = |(a, axis): &(usize, Axis<T>), fields: &mut Fields<T>, inverse| {
+            let kernel = |from: &_, to: &_| axis.transform(device, lines(a), from, to, inverse);
+            fields.step(device, kernel)
+        };
         let (first, others) = self.axes.split_first().expect("an axis");
-        for (a, axis) in others.iter().rev() {
-            let lines = Lines::new(self.turned, *a);
-            fields.step(device, |from, to| {
-                axis.transform(device, lines, from, to, false)
-            })?;
+        for axis in others.iter().rev() {
+            transform(axis, &mut fields, false)?;
         }
-        let (a, axis) = first;
-        let lines = Lines::new(self.turned, *a);
-        if let Axis::Fourier(fourier) = axis {
-            fields.step(device, |from, to| {
-                fourier.filter(device, lines, from, to, &gains)
-            })?;
+        if let (a, Axis::Fourier(fourier)) = first {
+            let kernel = |from: &_, to: &_| fourier.filter(device, lines(a), from, to, &gains);
+            fields.step(device, kernel)?;
         } else {
-            fields.step(device, |from, to| {
-                axis.transform(device, lines, from, to, false)
-            })?;
+            transform(first, &mut fields, false)?;
             fields.step(device, |from, to| sums::filter(device, from, to, &gains))?;
-            fields.step(device, |from, to| {
-                axis.transform(device, lines, from, to, true)
-            })?;
+            transform(first, &mut fields, true)?;
         }
-        for (a, axis) in others {
-            let lines = Lines::new(self.turned, *a);
-            fields.step(device, |from, to| {
-                axis.transform(device, lines, from, to, true)
-            })?;
+        for axis in others {
+            transform(axis, &mut fields, true)?;
         }
         Ok(fields.last)
     }

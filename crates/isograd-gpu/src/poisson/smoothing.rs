@@ -6,7 +6,7 @@
 use cubecl::prelude::*;
 
 use crate::device::{check_length, launch};
-use crate::primitives::reduce::{self, BLOCK, sum_of_group};
+use crate::primitives::reduce::{self, BLOCK, write_sum};
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Cells of a unit.
@@ -67,9 +67,5 @@ fn sum_products<F: Float + CubeElement>(
             }
         }
     }
-    let mut shared = SharedMemory::<F>::new(BLOCK);
-    let total = sum_of_group::<F>(factor * own, &mut shared);
-    if UNIT_POS == 0 && CUBE_POS < sums.len() {
-        sums[CUBE_POS] = total;
-    }
+    write_sum::<F>(factor * own, sums);
 }

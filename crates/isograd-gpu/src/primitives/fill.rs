@@ -14,6 +14,17 @@ pub fn zeros<R: Runtime, T: Scalar>(device: &Device<R>, len: usize) -> Result<Bu
     Ok(out)
 }
 
+/// `len` zeros of one unit, in registers.
+#[cube]
+pub(crate) fn own_zeros<F: Float>(#[comptime] len: usize) -> Array<F> {
+    let mut zeros = Array::<F>::new(len);
+    #[unroll]
+    for i in 0..len {
+        zeros[i] = F::new(0.0);
+    }
+    zeros
+}
+
 /// Adds `values` to `out`, one by one.
 ///
 /// # Errors

@@ -75,6 +75,29 @@ fn sum_spans<F: Float>(
     }
 }
 
+/// Writes the sum over the units of each group, one number a group. Every unit must call it.
+#[cube]
+pub(crate) fn write_sum<F: Float>(value: F, sums: &mut Array<F>) {
+    let mut shared = SharedMemory::<F>::new(BLOCK);
+    let sum = sum_of_group::<F>(value, &mut shared);
+    if UNIT_POS == 0 && CUBE_POS < sums.len() {
+        sums[CUBE_POS] = sum;
+    }
+}
+
+/// [`write_sum`] of two values, two numbers a group.
+#[cube]
+pub(crate) fn write_two_sums<F: Float>(first: F, second: F, sums: &mut Array<F>) {
+    let mut shared = SharedMemory::<F>::new(BLOCK);
+    let first = sum_of_group::<F>(first, &mut shared);
+    let second = sum_of_group::<F>(second, &mut shared);
+    let own = CUBE_POS * 2;
+    if UNIT_POS == 0 && own < sums.len() {
+        sums[own] = first;
+        sums[own + 1] = second;
+    }
+}
+
 /// Sum of the values of the `BLOCK` units of a group, by halves. Every unit must call it.
 #[cube]
 pub(crate) fn sum_of_group<N: Numeric>(value: N, shared: &mut SharedMemory<N>) -> N {

@@ -93,18 +93,6 @@ pub(crate) fn sum_rows<T: Scalar, R: Runtime>(
     elements: usize,
 ) -> Result<Buffer<T>, Error> {
     let pieces = Pieces::new(device, starts, elements)?;
-    sum_rows_in(device, values, rows, places, pieces, elements)
-}
-
-/// Like [`sum_rows`], for segments that are cut already.
-pub(crate) fn sum_rows_in<T: Scalar, R: Runtime>(
-    device: &Device<R>,
-    values: &Buffer<T>,
-    rows: Rows,
-    places: Option<&Buffer<u32>>,
-    pieces: Pieces,
-    elements: usize,
-) -> Result<Buffer<T>, Error> {
     let sums = device.empty(pieces.most() * rows.width)?;
     launch!(device, sums.len(), BLOCK => sum_pieces<T>(
         values, places.unwrap_or(&device.empty(0)?), pieces.table, sums, pieces.most() as u32,

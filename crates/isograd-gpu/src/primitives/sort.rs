@@ -184,20 +184,25 @@ fn move_to_ranks(
     }
 }
 
-/// By bisection: the number of keys below each whole number.
 #[cube(launch)]
 fn fill_starts(keys: &Array<u32>, starts: &mut Array<u32>, count: u32) {
     if ABSOLUTE_POS < starts.len() {
-        let mut low = 0u32;
-        let mut high = count;
-        while low < high {
-            let middle = (low + high) / 2u32;
-            if keys[middle as usize] < ABSOLUTE_POS as u32 {
-                low = middle + 1u32;
-            } else {
-                high = middle;
-            }
-        }
-        starts[ABSOLUTE_POS] = low;
+        starts[ABSOLUTE_POS] = first_at_least(keys, 0u32, count, ABSOLUTE_POS as u32);
     }
+}
+
+/// The first of the places `begin..end` whose key is at least `key`, or `end`.
+#[cube]
+pub(crate) fn first_at_least(keys: &Array<u32>, begin: u32, end: u32, key: u32) -> u32 {
+    let mut low = begin;
+    let mut high = end;
+    while low < high {
+        let middle = low + (high - low) / 2u32;
+        if keys[middle as usize] < key {
+            low = middle + 1u32;
+        } else {
+            high = middle;
+        }
+    }
+    low
 }

@@ -20,7 +20,7 @@ use crate::element::plane;
 use crate::neighbors::{
     NeighborhoodArrays, Neighborhoods, end_of_leaf, first_of_leaf, is_isolated, next_leaf,
 };
-use crate::primitives::reduce::{self, sum_of_group};
+use crate::primitives::reduce::{self, write_two_sums};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
@@ -100,13 +100,7 @@ fn sum_areas<F: Float>(areas: &Array<F>, sums: &mut Array<F>) {
         area = areas[ABSOLUTE_POS];
         count = select(area > F::new(0.0), F::new(1.0), F::new(0.0));
     }
-    let mut shared = SharedMemory::<F>::new(reduce::BLOCK);
-    let area = sum_of_group::<F>(area, &mut shared);
-    let count = sum_of_group::<F>(count, &mut shared);
-    if UNIT_POS == 0 && 2 * CUBE_POS < sums.len() {
-        sums[2 * CUBE_POS] = area;
-        sums[2 * CUBE_POS + 1] = count;
-    }
+    write_two_sums::<F>(area, count, sums);
 }
 
 #[cube(launch)]
@@ -183,9 +177,7 @@ fn gather<F: Float + CubeElement>(
         let point = Vector3::<F>::at(&near.tree.points, ABSOLUTE_POS);
         let radius = near.radii[ABSOLUTE_POS];
         let own = factors[ABSOLUTE_POS];
-        let mut x = F::new(0.0);
-        let mut y = F::new(0.0);
-        let mut z = F::new(0.0);
+        let mut sum = Vector3::<F>::zero();
         let mut along = F::new(0.0);
         let mut node = next_leaf::<F>(&near.tree, point, radius, 0usize, true);
         while node < near.tree.links.len() {
@@ -196,13 +188,10 @@ fn gather<F: Float + CubeElement>(
                 let as_center = own * rise::<F>(square, radius);
                 along += as_center * square;
                 let factor = as_center + factors[j] * rise::<F>(square, near.radii[j]);
-                x -= factor * offset.x;
-                y -= factor * offset.y;
-                z -= factor * offset.z;
+                sum = sum.sub(offset.scale(factor));
             }
             node = next_leaf::<F>(&near.tree, point, radius, node + 1, true);
         }
-        let sum = Vector3::<F> { x, y, z };
         let place = near.places[ABSOLUTE_POS] as usize;
         sum.write(points_bar, place);
         radii_bar[place] = F::new(2.0) * areas[place] * areas_bar[place] - along;

@@ -5,6 +5,7 @@ use cubecl::prelude::*;
 use crate::device::{argument, check_length};
 use crate::primitives::fill::zeros;
 use crate::primitives::reduce::{BLOCK, sum_of_group};
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Cotangents of what a splat reads, the samples in input order: the stages that read them add to these.
@@ -52,14 +53,14 @@ impl<T: Scalar> SampleCotangent<T> {
     }
 }
 
-/// Cotangent of the grid at fixed points, from the cotangents of the points of a group: their negative sum for the low
+/// Cotangent of the grid at fixed points, from the cotangents `bar` of the points of a group: their negative sum for the low
 /// corner, and the negative sum of `spacing` for the cell size. Every unit must call it.
 #[cube]
-pub(crate) fn subtract_from_grid<F: Float>(x: F, y: F, z: F, spacing: F, grid_sums: &mut Array<F>) {
+pub(crate) fn subtract_from_grid<F: Float>(bar: Vector3<F>, spacing: F, grid_sums: &mut Array<F>) {
     let mut shared = SharedMemory::<F>::new(BLOCK);
-    let x = sum_of_group::<F>(x, &mut shared);
-    let y = sum_of_group::<F>(y, &mut shared);
-    let z = sum_of_group::<F>(z, &mut shared);
+    let x = sum_of_group::<F>(bar.x, &mut shared);
+    let y = sum_of_group::<F>(bar.y, &mut shared);
+    let z = sum_of_group::<F>(bar.z, &mut shared);
     let spacing = sum_of_group::<F>(spacing, &mut shared);
     let own = CUBE_POS * 4;
     if UNIT_POS == 0 && own < grid_sums.len() {

@@ -8,6 +8,7 @@ use crate::device::launch;
 use crate::element::stencil::hat;
 use crate::grid::{Lattice, cell_at, from_center, place};
 use crate::spread::{Before, spread};
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
 const BLOCK: u32 = 256;
@@ -74,20 +75,14 @@ fn sort_samples<F: Float + CubeElement>(
         let i = places[s] as usize;
         let x = place::<F>(&samples.points, i, &grid);
         let cell = cell_at(keys[s], grid.ny, grid.nz);
-        let fx = from_center::<F>(x.x, cell.i);
-        let fy = from_center::<F>(x.y, cell.j);
-        let fz = from_center::<F>(x.z, cell.k);
+        let f = from_center::<F>(x, cell);
         // One division after the other: h² may underflow where a/h² is fine.
         let mut scale = samples.areas[i] / grid.spacing / grid.spacing;
         if normalize {
-            scale /= total::<F>(hat::<F>(fx), hat::<F>(fy), hat::<F>(fz));
+            scale /= total::<F>(hat::<F>(f.x), hat::<F>(f.y), hat::<F>(f.z));
         }
-        let at = s * NUMBERS;
-        sorted[at] = fx;
-        sorted[at + 1] = fy;
-        sorted[at + 2] = fz;
-        sorted[at + 3] = samples.normals[3 * i] * scale;
-        sorted[at + 4] = samples.normals[3 * i + 1] * scale;
-        sorted[at + 5] = samples.normals[3 * i + 2] * scale;
+        let vector = Vector3::<F>::at(&samples.normals, i).scale(scale);
+        f.store(sorted, s * NUMBERS);
+        vector.store(sorted, s * NUMBERS + 3);
     }
 }

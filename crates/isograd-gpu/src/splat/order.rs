@@ -5,9 +5,8 @@ use cubecl::prelude::*;
 use super::{SampleArrays, Samples};
 use crate::device::launch;
 use crate::grid::{Lattice, place};
-use crate::primitives::sort;
-use crate::spread::first_at_least;
-use crate::vector::is_finite;
+use crate::primitives::sort::{self, first_at_least};
+use crate::vector::{Vector3, is_finite};
 use crate::{Buffer, Device, Error, Scalar};
 
 const BLOCK: u32 = 256;
@@ -43,19 +42,10 @@ impl SampleOrder {
         samples: Samples<'_, T>,
         grid: &isograd::Grid<T>,
     ) -> Result<Self, Error> {
+        let (shape, cells) = (grid.shape(), grid.cells() as u32);
         let keys: Buffer<u32> = device.empty(samples.len())?;
         launch!(device, samples.len(), BLOCK => find_cells<T>(samples, keys, grid));
-        Self::from_keys(device, &keys, grid.shape())
-    }
-
-    /// Sorts samples by `keys`, the places in memory of their cells; the number of cells for those to be left out.
-    pub(crate) fn from_keys<R: Runtime>(
-        device: &Device<R>,
-        keys: &Buffer<u32>,
-        shape: [usize; 3],
-    ) -> Result<Self, Error> {
-        let cells = shape.iter().product::<usize>() as u32;
-        let sort::Order { keys, places } = sort::order(device, keys, cells + 1)?;
+        let sort::Order { keys, places } = sort::order(device, &keys, cells + 1)?;
         let rows: Buffer<u32> = device.empty(shape[0] * shape[1] + 1)?;
         launch!(device, rows.len(), BLOCK => find_rows(
             keys, rows, keys.len() as u32, shape[2] as u32,
@@ -94,10 +84,8 @@ fn find_cells<F: Float + CubeElement>(
         let x = place::<F>(&samples.points, i, &grid);
         let inside =
             holds::<F>(x.x, grid.nx) && holds::<F>(x.y, grid.ny) && holds::<F>(x.z, grid.nz);
-        let finite = is_finite::<F>(samples.areas[i])
-            && is_finite::<F>(samples.normals[3 * i])
-            && is_finite::<F>(samples.normals[3 * i + 1])
-            && is_finite::<F>(samples.normals[3 * i + 2]);
+        let normal = Vector3::<F>::at(&samples.normals, i);
+        let finite = is_finite::<F>(samples.areas[i]) && normal.is_finite();
         let mut key = grid.nx * grid.ny * grid.nz;
         if inside && finite {
             let row = central_cell::<F>(x.x, grid.nx) * grid.ny + central_cell::<F>(x.y, grid.ny);

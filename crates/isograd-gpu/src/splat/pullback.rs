@@ -8,7 +8,7 @@ use super::stencil::{NUMBERS, REACH, WIDTH, along, central, extra, sum, total};
 use super::{CotangentArrays, Residual, SampleArrays, SampleCotangent, Samples, Weights};
 use crate::device::{check_length, launch};
 use crate::element::stencil::{Triple, bspline, bspline_slope, hat, hat_slope};
-use crate::grid::{Lattice, cell_at, check_field};
+use crate::grid::{Lattice, cell_at, center_of, check_field};
 use crate::primitives::fill::add;
 use crate::primitives::reduce::{BLOCK, sum_columns};
 use crate::vector::Vector3;
@@ -49,12 +49,8 @@ pub fn pullback<R: Runtime, T: Scalar>(
 /// index coordinates.
 #[derive(CubeType, Clone, Copy)]
 struct Gathered<F: Float> {
-    spread_x: F,
-    spread_y: F,
-    spread_z: F,
-    x: F,
-    y: F,
-    z: F,
+    spread: Vector3<F>,
+    place: Vector3<F>,
 }
 
 /// Weights along each axis, or their derivatives.
@@ -78,11 +74,8 @@ fn gather_samples<F: Float + CubeElement>(
     #[comptime] paper: bool,
 ) {
     let s = ABSOLUTE_POS;
-    let zero = F::new(0.0);
-    let mut bar_x = zero;
-    let mut bar_y = zero;
-    let mut bar_z = zero;
-    let mut bar_h = zero;
+    let mut bar = Vector3::<F>::zero();
+    let mut of_spacing = F::new(0.0);
     if s < count as usize && keys[s] < grid.nx * grid.ny * grid.nz {
         let cell = cell_at(keys[s], grid.ny, grid.nz);
         let corner = keys[s] - REACH * ((grid.ny + 1u32) * grid.nz + 1u32);
@@ -90,29 +83,14 @@ fn gather_samples<F: Float + CubeElement>(
         let v = Vector3::<F>::load(samples, s * NUMBERS + 3);
         let found = gather_sample::<F>(b_bar, corner, &grid, f, v, paper);
         let h = grid.spacing;
-        bar_x = found.x / h;
-        bar_y = found.y / h;
-        bar_z = found.z / h;
-        samples[s * NUMBERS] = found.spread_x / h / h;
-        samples[s * NUMBERS + 1] = found.spread_y / h / h;
-        samples[s * NUMBERS + 2] = found.spread_z / h / h;
-        samples[s * NUMBERS + 3] = bar_x;
-        samples[s * NUMBERS + 4] = bar_y;
-        samples[s * NUMBERS + 5] = bar_z;
+        bar = found.place.over(h);
+        found.spread.over(h).over(h).store(samples, s * NUMBERS);
+        bar.store(samples, s * NUMBERS + 3);
         // ∂x̂/∂h = −x̂/h; and the areas are divided by h².
-        let of_areas = v.x * found.spread_x + v.y * found.spread_y + v.z * found.spread_z;
-        bar_h = to_place::<F>(f.x, cell.i) * bar_x
-            + to_place::<F>(f.y, cell.j) * bar_y
-            + to_place::<F>(f.z, cell.k) * bar_z
-            + F::new(2.0) * of_areas / h;
+        let x = center_of::<F>(cell).add(f);
+        of_spacing = x.dot(bar) + F::new(2.0) * v.dot(found.spread) / h;
     }
-    subtract_from_grid::<F>(bar_x, bar_y, bar_z, bar_h, grid_sums);
-}
-
-/// Index coordinate at offset `f` from the center of a cell.
-#[cube]
-fn to_place<F: Float>(f: F, cell: u32) -> F {
-    F::cast_from(cell) + F::new(0.5) + f
+    subtract_from_grid::<F>(bar, of_spacing, grid_sums);
 }
 
 /// A sample at offset `f` from the center of its cell, with vector `v`.
@@ -172,24 +150,21 @@ fn gather_paper<F: Float + CubeElement>(
     let p = gather_product::<F>(b_bar, corner, grid, w, d, v);
     let c = gather_product::<F>(b_bar, corner, grid, ones, ones, v);
     let (extra, total) = (extra::<F>(w.x, w.y, w.z), total::<F>(w.x, w.y, w.z));
-    let spread_x = (p.spread_x + extra * c.spread_x) / total;
-    let spread_y = (p.spread_y + extra * c.spread_y) / total;
-    let spread_z = (p.spread_z + extra * c.spread_z) / total;
-    let whole = v.x * spread_x + v.y * spread_y + v.z * spread_z;
-    let of_center = v.x * c.spread_x + v.y * c.spread_y + v.z * c.spread_z;
-    let extra_x = -d.x.center * w.y.center * w.z.center;
-    let extra_y = -d.y.center * w.z.center * w.x.center;
-    let extra_z = -d.z.center * w.x.center * w.y.center;
-    let total_x = sum::<F>(d.x) * sum::<F>(w.y) * sum::<F>(w.z) + extra_x;
-    let total_y = sum::<F>(d.y) * sum::<F>(w.z) * sum::<F>(w.x) + extra_y;
-    let total_z = sum::<F>(d.z) * sum::<F>(w.x) * sum::<F>(w.y) + extra_z;
+    let spread = p.spread.add(c.spread.scale(extra)).over(total);
+    let of_extra = Vector3::<F> {
+        x: -d.x.center * w.y.center * w.z.center,
+        y: -d.y.center * w.z.center * w.x.center,
+        z: -d.z.center * w.x.center * w.y.center,
+    };
+    let of_total = Vector3::<F> {
+        x: sum::<F>(d.x) * sum::<F>(w.y) * sum::<F>(w.z) + of_extra.x,
+        y: sum::<F>(d.y) * sum::<F>(w.z) * sum::<F>(w.x) + of_extra.y,
+        z: sum::<F>(d.z) * sum::<F>(w.x) * sum::<F>(w.y) + of_extra.z,
+    };
+    let through_extra = p.place.add(of_extra.scale(v.dot(c.spread)));
     Gathered::<F> {
-        spread_x,
-        spread_y,
-        spread_z,
-        x: (p.x + extra_x * of_center - whole * total_x) / total,
-        y: (p.y + extra_y * of_center - whole * total_y) / total,
-        z: (p.z + extra_z * of_center - whole * total_z) / total,
+        spread,
+        place: through_extra.sub(of_total.scale(v.dot(spread))).over(total),
     }
 }
 
@@ -206,14 +181,8 @@ fn gather_product<F: Float + CubeElement>(
     v: Vector3<F>,
 ) -> Gathered<F> {
     let zero = F::new(0.0);
-    let mut out = Gathered::<F> {
-        spread_x: zero,
-        spread_y: zero,
-        spread_z: zero,
-        x: zero,
-        y: zero,
-        z: zero,
-    };
+    let mut spread = Vector3::<F>::zero();
+    let mut place = Vector3::<F>::zero();
     for i in 0..WIDTH {
         let mut m_m = zero;
         let mut s_m = zero;
@@ -251,14 +220,14 @@ fn gather_product<F: Float + CubeElement>(
             m_ds += y.mass * ds;
         }
         let (x, dx) = (along::<F>(w.x, i), along::<F>(d.x, i));
-        out.spread_x += x.slope * m_m;
-        out.spread_y += x.mass * s_m;
-        out.spread_z += x.mass * m_s;
-        out.x += v.x * dx.slope * m_m + dx.mass * (v.y * s_m + v.z * m_s);
-        out.y += v.x * x.slope * dm_m + x.mass * (v.y * ds_m + v.z * dm_s);
-        out.z += v.x * x.slope * m_dm + x.mass * (v.y * s_dm + v.z * m_ds);
+        spread.x += x.slope * m_m;
+        spread.y += x.mass * s_m;
+        spread.z += x.mass * m_s;
+        place.x += v.x * dx.slope * m_m + dx.mass * (v.y * s_m + v.z * m_s);
+        place.y += v.x * x.slope * dm_m + x.mass * (v.y * ds_m + v.z * dm_s);
+        place.z += v.x * x.slope * m_dm + x.mass * (v.y * s_dm + v.z * m_ds);
     }
-    out
+    Gathered::<F> { spread, place }
 }
 
 /// From the sorted order to that of the input.

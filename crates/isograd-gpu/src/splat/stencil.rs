@@ -4,6 +4,7 @@ use cubecl::prelude::*;
 
 use crate::element::stencil::{Triple, bspline, hat};
 use crate::spread::Spread;
+use crate::vector::Vector3;
 
 /// Cells between the cell of a sample and the outermost that it reaches.
 pub(super) const REACH: u32 = 2;
@@ -60,7 +61,17 @@ pub(crate) fn pick<F: Float>(w: Triple<F>, at: u32) -> F {
 
 /// The vector of sample `s`, spread by a product of weights, in the cell `(x, y, z) − 2` cells from its own.
 #[cube]
-fn term<F: Float>(samples: &Array<F>, s: usize, x: Along<F>, y: Along<F>, z: Along<F>) -> F {
+fn term<F: Float>(
+    samples: &Array<F>,
+    s: usize,
+    wx: Triple<F>,
+    wy: Triple<F>,
+    wz: Triple<F>,
+    x: u32,
+    y: u32,
+    z: u32,
+) -> F {
+    let (x, y, z) = (along::<F>(wx, x), along::<F>(wy, y), along::<F>(wz, z));
     let at = s * NUMBERS + 3;
     let flat = samples[at] * x.slope * y.mass + samples[at + 1] * x.mass * y.slope;
     let steep = samples[at + 2] * x.mass * y.mass;
@@ -73,11 +84,9 @@ pub(super) struct BSpline;
 #[cube]
 impl Spread for BSpline {
     fn part<F: Float>(samples: &Array<F>, s: usize, x: u32, y: u32, z: u32) -> F {
-        let at = s * NUMBERS;
-        let x = along::<F>(bspline::<F>(samples[at]), x);
-        let y = along::<F>(bspline::<F>(samples[at + 1]), y);
-        let z = along::<F>(bspline::<F>(samples[at + 2]), z);
-        term::<F>(samples, s, x, y, z)
+        let f = Vector3::<F>::load(samples, s * NUMBERS);
+        let (wx, wy, wz) = (bspline::<F>(f.x), bspline::<F>(f.y), bspline::<F>(f.z));
+        term::<F>(samples, s, wx, wy, wz, x, y, z)
     }
 }
 
@@ -87,27 +96,11 @@ pub(super) struct Paper;
 #[cube]
 impl Spread for Paper {
     fn part<F: Float>(samples: &Array<F>, s: usize, x: u32, y: u32, z: u32) -> F {
-        let at = s * NUMBERS;
-        let (wx, wy, wz) = (
-            hat::<F>(samples[at]),
-            hat::<F>(samples[at + 1]),
-            hat::<F>(samples[at + 2]),
-        );
-        let product = term::<F>(
-            samples,
-            s,
-            along::<F>(wx, x),
-            along::<F>(wy, y),
-            along::<F>(wz, z),
-        );
+        let f = Vector3::<F>::load(samples, s * NUMBERS);
+        let (wx, wy, wz) = (hat::<F>(f.x), hat::<F>(f.y), hat::<F>(f.z));
+        let product = term::<F>(samples, s, wx, wy, wz, x, y, z);
         let one = central::<F>();
-        let center = term::<F>(
-            samples,
-            s,
-            along::<F>(one, x),
-            along::<F>(one, y),
-            along::<F>(one, z),
-        );
+        let center = term::<F>(samples, s, one, one, one, x, y, z);
         product + extra::<F>(wx, wy, wz) * center
     }
 }

@@ -2,7 +2,8 @@
 
 use isograd::neighbors::{self, RadiiCotangent, Radius};
 use isograd::orient::Method;
-use isograd::{Orienter, PointCloud, Real, normals};
+use isograd::poisson::Walls;
+use isograd::{Options, Orienter, PointCloud, Real, SurfaceResolution, normals};
 use isograd_gpu::neighbors::Neighborhoods;
 use isograd_gpu::{Buffer, Device, Scalar};
 use isograd_shapes::{Layout, Sampling};
@@ -75,6 +76,25 @@ pub fn on_cpu<T: Scalar>(points: &[[T; 3]], method: Method) -> Result<Orienter<T
     Ok(plan)
 }
 
+/// Even samples of a shape, with their normals.
+pub fn sampled<T: Scalar>(shape: &str, count: usize) -> PointCloud<T> {
+    let shape = isograd_shapes::by_name(shape).unwrap();
+    let samples = shape.sample::<T>(count, &Sampling::default(), 3);
+    samples.unwrap().cloud
+}
+
+/// Even samples of a shape, without normals.
+pub fn bare<T: Scalar>(shape: &str, count: usize) -> PointCloud<T> {
+    PointCloud::new(sampled::<T>(shape, count).points().to_vec()).unwrap()
+}
+
+/// Options with the surface and the walls of devices.
+pub fn on_grid() -> Options {
+    Options::default()
+        .surface(SurfaceResolution::Grid)
+        .walls(Walls::Free)
+}
+
 /// Cotangents of points and of their radii, in the host's memory.
 pub fn downloaded<R: Runtime, T: Scalar>(
     device: &Device<R>,
@@ -134,6 +154,21 @@ pub fn clouds<T: Scalar>() -> Vec<Cloud<T>> {
             make(400, &|i, p| if i == 17 { [1e9, -1e9, 1e9] } else { p }),
         ),
     ]
+}
+
+/// The largest difference, relative to `scale`.
+pub fn difference<T: Scalar>(found: &[T], expected: &[f64], scale: f64) -> f64 {
+    assert_eq!(found.len(), expected.len());
+    let pairs = found.iter().zip(expected);
+    pairs.fold(0.0, |m: f64, (a, b)| {
+        // A maximum would skip NaN.
+        let error = (a.f64() - b).abs() / scale;
+        if error <= m { m } else { error }
+    })
+}
+
+pub fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |m, v| m.max(v.abs()))
 }
 
 /// The largest difference, over the largest number that is expected.

@@ -87,6 +87,16 @@ macro_rules! tests {
 
 pub(crate) use tests;
 
+/// Lengths, found and expected, that an array was refused for.
+pub fn refused_lengths<V>(result: Result<V, isograd_gpu::Error>) -> Option<[usize; 2]> {
+    match result.err()? {
+        isograd_gpu::Error::Length {
+            found, expected, ..
+        } => Some([found, expected]),
+        _ => None,
+    }
+}
+
 /// Largest difference of a stage from the CPU.
 pub fn tolerance<T: isograd::Real>() -> f64 {
     if T::NAME == "f32" { 1e-4 } else { 1e-10 }

@@ -68,11 +68,8 @@ fn parities_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
             assert!(others <= most, "{name}: {others} of {n} differ");
             points += n;
             turned += expected.flipped;
-            open += expected
-                .confidence
-                .iter()
-                .filter(|c| Real::f64(**c) == 0.0)
-                .count();
+            let confidence = expected.confidence.iter();
+            open += confidence.filter(|c| Real::f64(**c) == 0.0).count();
         }
     }
     assert!(
@@ -94,10 +91,8 @@ fn rays_through_the_center_of_a_sphere_are_not_much_work<R: Runtime>(device: &De
             [r * cosine, r * sine, z].map(|x| x as f32)
         })
         .collect();
-    let axes: Vec<[f32; 3]> = points
-        .iter()
-        .map(|p| if p[0] > 0.0 { *p } else { p.map(|x| -x) })
-        .collect();
+    let axis = |p: &[f32; 3]| if p[0] > 0.0 { *p } else { p.map(|x| -x) };
+    let axes: Vec<[f32; 3]> = points.iter().map(axis).collect();
     let radii = device.upload(&vec![0.1f32; n]).unwrap();
     let buffer = device.upload(points.as_flattened()).unwrap();
     let near = neighbors::forward(device, &buffer, &radii).unwrap();
@@ -105,13 +100,8 @@ fn rays_through_the_center_of_a_sphere_are_not_much_work<R: Runtime>(device: &De
     let run = || {
         let method = Method::Parity(ParityOptions::default());
         let found = orient::forward(device, &near, &axes, &method).unwrap();
-        assert!(
-            device
-                .download(&found.confidence)
-                .unwrap()
-                .iter()
-                .all(|&c| c == 1.0)
-        );
+        let confidence = device.download(&found.confidence).unwrap();
+        assert!(confidence.iter().all(|&c| c == 1.0));
         device.download(&found.normals).unwrap()
     };
     let normals = run();
@@ -192,21 +182,17 @@ fn given_normals_and_their_pullback_are_those_of_the_cpu<R: Runtime, T: Scalar>(
     let vectors = vectors::<T>(1003);
     let given = device.upload(vectors.as_flattened()).unwrap();
     let normals = given::forward(device, &given).unwrap();
-    let expected: Vec<[T; 3]> = vectors
-        .iter()
-        .map(|&v| vector::normalized(v).unwrap())
-        .collect();
+    let units = vectors.iter().map(|&v| vector::normalized(v).unwrap());
+    let expected: Vec<[T; 3]> = units.collect();
     let error = relative(&device.download(&normals).unwrap(), expected.as_flattened());
     assert!(error < 0.01 * tolerance::<T>(), "{error:e}");
     let mut numbers = Numbers(43);
     // In the unit of each vector, so that short ones do not hide the others.
-    let bars: Vec<[T; 3]> = vectors
-        .iter()
-        .map(|&v| {
-            let length = vector::norm(vector::to_f64(v));
-            [0; 3].map(|_| real(length * numbers.signed()))
-        })
-        .collect();
+    let bar = |&v: &[T; 3]| {
+        let length = vector::norm(vector::to_f64(v));
+        [0; 3].map(|_| real(length * numbers.signed()))
+    };
+    let bars: Vec<[T; 3]> = vectors.iter().map(bar).collect();
     let mut expected = bars.clone();
     cpu::given_pullback(&vectors, &mut expected);
     let bars = device.upload(bars.as_flattened()).unwrap();

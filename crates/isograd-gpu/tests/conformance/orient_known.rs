@@ -8,9 +8,8 @@ use isograd_element::vector;
 use isograd_gpu::orient::previous::{self, Before};
 use isograd_gpu::pipeline::{RadiiAndSigns, Reconstructor};
 use isograd_gpu::{Device, Scalar, neighbors};
-use isograd_shapes::Sampling;
 
-use crate::clouds::{Cloud, clouds, real, relative};
+use crate::clouds::{Cloud, clouds, real, relative, sampled};
 use crate::devices::{tests, tolerance};
 
 tests! {
@@ -63,12 +62,8 @@ fn sides_of_the_step_before_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: 
             let normals = device.download(&found.normals).unwrap();
             let confidence = device.download(&found.confidence).unwrap();
             let kept = device.download(&found.kept).unwrap();
-            (
-                normals,
-                confidence,
-                kept,
-                device.download(&found.turned).unwrap(),
-            )
+            let turned = device.download(&found.turned).unwrap();
+            (normals, confidence, kept, turned)
         };
         let (normals, confidence, kept, count) = run();
         assert_eq!(count, [turned as u32], "{name}");
@@ -93,14 +88,12 @@ fn sides_of_the_step_before_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: 
 }
 
 fn a_body_that_turns_keeps_its_sides_on_the_device<R: Runtime>(device: &Device<R>) {
-    let shape = isograd_shapes::by_name("torus").unwrap();
-    let samples = shape.sample::<f32>(2000, &Sampling::default(), 3).unwrap();
+    let cloud = sampled::<f32>("torus", 2000);
     let turned = |angle: f32, vectors: &[[f32; 3]]| -> Vec<[f32; 3]> {
         let (sine, cosine) = angle.sin_cos();
         let turn = |&[x, y, z]: &[f32; 3]| [x, cosine * y - sine * z, sine * y + cosine * z];
         vectors.iter().map(turn).collect()
     };
-    let cloud = samples.cloud;
     let truth = cloud.normals().unwrap();
     let start = PointCloud::new(cloud.points().to_vec()).unwrap();
     let grid = isograd::Grid::new([-1.6; 3], 0.1, [32; 3]).unwrap();

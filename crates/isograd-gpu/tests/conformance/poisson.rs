@@ -1,10 +1,11 @@
 //! The Poisson equation, beside the CPU's solve and a stencil.
 
 use cubecl::prelude::Runtime;
-use isograd::poisson::{Plan, Scratch, smoothing};
-use isograd_gpu::poisson::{Solver, forward, pullback};
+use isograd::poisson::{Plan, Scratch, smoothing as cpu};
+use isograd_gpu::poisson::{Solver, smoothing};
 use isograd_gpu::{Device, Error, Scalar};
 
+use crate::clouds::{difference, largest};
 use crate::devices::{Numbers, tests, tolerance};
 
 tests! {
@@ -50,13 +51,7 @@ fn expected<T: Scalar>(shape: [usize; 3], b: &[T], smoothing: f64) -> Vec<f64> {
 
 /// The largest error over the largest value expected.
 fn error<T: Scalar>(found: &[T], expected: &[f64]) -> f64 {
-    assert_eq!(found.len(), expected.len());
-    let largest = expected.iter().fold(0.0f64, |a, e| a.max(e.abs()));
-    let pairs = found.iter().zip(expected);
-    let errors = pairs.map(|(f, e)| (f.f64() - e).abs());
-    // Unlike f64::max, keeps what is not a number.
-    let worst = errors.fold(0.0, |a, e| if e <= a { a } else { e });
-    worst / largest.max(f64::MIN_POSITIVE)
+    difference(found, expected, largest(expected).max(f64::MIN_POSITIVE))
 }
 
 fn dot<T: Scalar>(a: &[T], b: &[T]) -> f64 {
@@ -159,20 +154,22 @@ fn pullback_is_the_transpose<R: Runtime, T: Scalar>(device: &Device<R>) {
         let (b, other): (Vec<T>, Vec<T>) = (Numbers(1).list(cells), Numbers(2).list(cells));
         let chi_bar: Vec<T> = b.iter().zip(&other).map(|(&b, &o)| b + o).collect();
         let solver = Solver::new(device, shape).unwrap();
-        let (chi, residual) = forward(device, &solver, &device.upload(&b).unwrap(), sigma).unwrap();
+        let chi = solver
+            .solve(device, &device.upload(&b).unwrap(), sigma)
+            .unwrap();
         let cotangent = device.upload(&chi_bar).unwrap();
-        let pulled = pullback(device, &solver, &residual, &cotangent).unwrap();
-        let chi = device.download(&chi).unwrap();
-        let b_bar = device.download(&pulled.b).unwrap();
+        let b_bar = solver.solve(device, &cotangent, sigma).unwrap();
+        let sigma_bar = smoothing::pullback(device, sigma, shape, &chi, &cotangent).unwrap();
+        let [chi, b_bar] = [chi, b_bar].map(|field| device.download(&field).unwrap());
         let size = (dot(&chi, &chi) * dot(&chi_bar, &chi_bar)).sqrt() + f64::MIN_POSITIVE;
         let gap = (dot(&chi, &chi_bar) - dot(&b, &b_bar)).abs();
         assert!(gap < tolerance * size, "{shape:?}: {gap:e} of {size:e}");
         let error = error(&b_bar, &expected(shape, &chi_bar, sigma));
         assert!(error < tolerance, "{shape:?}: {error:e}");
 
-        let sigma_bar = device.download(&pulled.smoothing).unwrap();
+        let sigma_bar = device.download(&sigma_bar).unwrap();
         let wide = |v: &[T]| v.iter().map(|v| v.f64()).collect::<Vec<f64>>();
-        let from_cpu = smoothing::pullback(&Plan::new(shape), sigma, &wide(&chi), &wide(&chi_bar));
+        let from_cpu = cpu::pullback(&Plan::new(shape), sigma, &wide(&chi), &wide(&chi_bar));
         let gap = (sigma_bar[0].f64() - from_cpu).abs();
         assert_eq!(sigma_bar.len(), 1);
         assert!(gap < tolerance * size, "{shape:?}: {gap:e} of {size:e}");
@@ -192,9 +189,8 @@ fn constant_part_of_the_right_hand_side_is_ignored<R: Runtime>(device: &Device<R
     let chi: Vec<f64> = solve(&b).into_iter().map(f64::from).collect();
     let error = error(&solve(&shifted), &chi);
     assert!(error < 1e-4, "{error:e}");
-    let largest = chi.iter().fold(0.0f64, |a, v| a.max(v.abs()));
     let mean = chi.iter().sum::<f64>() / chi.len() as f64;
-    assert!(mean.abs() < 1e-5 * largest);
+    assert!(mean.abs() < 1e-5 * largest(&chi));
 }
 
 fn second_solve_has_the_same_bits<R: Runtime>(device: &Device<R>) {
@@ -203,9 +199,9 @@ fn second_solve_has_the_same_bits<R: Runtime>(device: &Device<R>) {
         let run = || {
             let solver = Solver::new(device, shape).unwrap();
             let b = device.upload(&b).unwrap();
-            let (chi, residual) = forward(device, &solver, &b, 0.4).unwrap();
-            let pulled = pullback(device, &solver, &residual, &b).unwrap();
-            let [chi, sigma] = [&chi, &pulled.smoothing].map(|v| device.download(v).unwrap());
+            let chi = solver.solve(device, &b, 0.4).unwrap();
+            let sigma = smoothing::pullback(device, 0.4, shape, &chi, &b).unwrap();
+            let [chi, sigma] = [chi, sigma].map(|v| device.download(&v).unwrap());
             let bits = chi.into_iter().chain(sigma).map(f32::to_bits);
             bits.collect::<Vec<u32>>()
         };
@@ -223,17 +219,20 @@ fn what_does_not_fit_is_refused_and_no_cells_are_solved<R: Runtime>(device: &Dev
         let refused = solver.solve(device, &b, sigma);
         assert!(matches!(refused, Err(Error::Smoothing { .. })));
     }
-    let (_, residual) = forward(device, &solver, &b, 1.0).unwrap();
-    let cotangent = device.upload(&[1.0f32; 61]).unwrap();
-    let refused = pullback(device, &solver, &residual, &cotangent);
+    let long = device.upload(&[1.0f32; 61]).unwrap();
+    for (chi, chi_bar) in [(&b, &long), (&long, &b)] {
+        let refused = smoothing::pullback(device, 1.0, [3, 4, 5], chi, chi_bar);
+        assert!(matches!(refused, Err(Error::Length { found: 61, .. })));
+    }
+    let refused = solver.solve(device, &long, 1.0);
     assert!(matches!(refused, Err(Error::Length { found: 61, .. })));
 
-    let solver = Solver::<f32>::new(device, [0, 4, 5]).unwrap();
+    let shape = [0, 4, 5];
+    let solver = Solver::<f32>::new(device, shape).unwrap();
     let none = device.empty(0).unwrap();
-    let (chi, residual) = forward(device, &solver, &none, 1.0).unwrap();
-    let pulled = pullback(device, &solver, &residual, &none).unwrap();
-    assert!(chi.is_empty() && pulled.b.is_empty());
-    assert_eq!(device.download(&pulled.smoothing).unwrap(), [0.0]);
+    assert!(solver.solve(device, &none, 1.0).unwrap().is_empty());
+    let sigma_bar = smoothing::pullback(device, 1.0, shape, &none, &none).unwrap();
+    assert_eq!(device.download(&sigma_bar).unwrap(), [0.0]);
 }
 
 fn values_that_are_not_finite_spread<R: Runtime>(device: &Device<R>) {

@@ -95,20 +95,11 @@ impl<T: Scalar> Cloud<T> {
 
     /// Cotangents of samples with what other stages have added to them.
     pub fn started_cotangent(&self) -> isograd::splat::SampleCotangent<T> {
-        let mut numbers = Numbers(99);
-        let mut number = || T::of(numbers.signed());
+        let (mut numbers, count) = (Numbers(99), self.points.len());
         isograd::splat::SampleCotangent {
-            points: self
-                .points
-                .iter()
-                .map(|_| [number(), number(), number()])
-                .collect(),
-            normals: self
-                .points
-                .iter()
-                .map(|_| [number(), number(), number()])
-                .collect(),
-            areas: self.points.iter().map(|_| number()).collect(),
+            points: numbers.vectors(count),
+            normals: numbers.vectors(count),
+            areas: numbers.list(count),
             grid: isograd::GridCotangent {
                 lower: [1.0, 2.0, 3.0],
                 spacing: 4.0,

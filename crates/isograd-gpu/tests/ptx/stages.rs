@@ -88,7 +88,6 @@ fn held<T: Scalar>(device: &Device<Recorder>) {
     pipeline::RadiiAndSigns::find_on_device(device, &points, Radius::Auto, &parity).unwrap();
     forget_answers();
     let near = neighbors::forward(device, &points, &numbers(device, SAMPLES)).unwrap();
-    neighbors::radius::census(device, &near, <T as isograd::Real>::of(0.1)).unwrap();
     orient::given::pullback(device, &points, &points).unwrap();
     sides(device, &near, &points);
 }
@@ -180,8 +179,8 @@ fn solves<T: Scalar>(device: &Device<Recorder>) {
     for shape in [[64, 90, 77], [37, 128, 1], [625, 2, 3]] {
         let solver = poisson::Solver::<T>::new(device, shape).unwrap();
         let b = numbers(device, shape.iter().product());
-        let (chi, residual) = poisson::forward(device, &solver, &b, 0.8).unwrap();
-        poisson::pullback(device, &solver, &residual, &chi).unwrap();
+        let chi = solver.solve(device, &b, 0.8).unwrap();
+        poisson::smoothing::pullback(device, 0.8, shape, &chi, &b).unwrap();
         let solver = poisson::Solver::<T>::by_definition(device, shape).unwrap();
         solver.solve(device, &b, 0.0).unwrap();
     }

@@ -164,10 +164,7 @@ fn find_slabs<F: Float + CubeElement>(
         let mut sum = Vector3::<F>::zero();
         for place in first..end {
             let t = load_frame::<F>(frames, place);
-            let own = t.u.cross(t.v).scale((t.foot + t.back) * t.height);
-            sum.x += own.x;
-            sum.y += own.y;
-            sum.z += own.z;
+            sum = sum.add(t.u.cross(t.v).scale((t.foot + t.back) * t.height));
         }
         let normal = sum.direction();
         let mut low = F::new(0.0);

@@ -51,11 +51,7 @@ fn code_centers<F: Float + CubeElement>(
     if ABSOLUTE_POS < codes.len() {
         let t = corners::<F>(mesh, ABSOLUTE_POS as u32, Vector3::<F>::zero());
         let third = F::new(1.0) / F::new(3.0);
-        let center = Vector3::<F> {
-            x: t.a.x * third + t.b.x * third + t.c.x * third,
-            y: t.a.y * third + t.b.y * third + t.c.y * third,
-            z: t.a.z * third + t.b.z * third + t.c.z * third,
-        };
+        let center = t.a.scale(third).add(t.b.scale(third)).add(t.c.scale(third));
         codes[ABSOLUTE_POS] = morton::<F>(center, bounds);
     }
 }

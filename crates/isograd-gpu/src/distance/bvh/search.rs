@@ -16,9 +16,9 @@ use super::super::{Error, FAR};
 use super::build::{NONE, Tree, TreeArrays};
 use super::list::{ROOM, Region, UNITS, list_triangles, new_list};
 use super::settle::settle;
-use super::single::{Nearest, nearest_of_centers, try_place};
+use super::single::{nearest_of_centers, nothing_within, try_place};
 use crate::device::{Ready, launch};
-use crate::grid::{Cell, cell_at};
+use crate::grid::{Cell, cell_at, center_of};
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
@@ -155,17 +155,13 @@ fn nearest_of_bricks<F: Float + CubeElement>(
         let j = brick / across_z % across_y * 4u32;
         let k = brick % across_z * 4u32;
         let seed = seeds[brick as usize];
-        let first = center_of::<F>(Cell { i, j, k }, cells.spacing);
+        let first = center_of::<F>(Cell { i, j, k }).scale(cells.spacing);
         let half = F::new(1.5) * cells.spacing;
-        let center = Vector3::<F> {
-            x: first.x + half,
-            y: first.y + half,
-            z: first.z + half,
-        };
+        let center = first.add(Vector3::<F>::of(half, half, half));
         let i = i + UNIT_POS / 16u32;
         let j = j + UNIT_POS / 4u32 % 4u32;
         let k = k + UNIT_POS % 4u32;
-        let q = center_of::<F>(Cell { i, j, k }, cells.spacing);
+        let q = center_of::<F>(Cell { i, j, k }).scale(cells.spacing);
         let mut result = NONE.runtime();
         if seed != NONE {
             let foot = foot::<F>(load_frame::<F>(&tree.frames, seed), center);
@@ -181,11 +177,7 @@ fn nearest_of_bricks<F: Float + CubeElement>(
                     rounding: cells.rounding,
                 },
             );
-            let mut best = Nearest::<F> {
-                place: NONE.runtime(),
-                face: NONE.runtime(),
-                squared: cells.bound,
-            };
+            let mut best = nothing_within::<F>(cells.bound);
             if listed.count <= comptime!(ROOM) {
                 // Listed but for rounding: the foot is not quite on it.
                 try_place::<F>(&mut best, tree, seed, q);
@@ -207,15 +199,5 @@ fn nearest_of_bricks<F: Float + CubeElement>(
 /// The center of a cell in memory order, from the low corner of the grid.
 #[cube]
 pub(crate) fn center<F: Float>(cell: u32, spacing: F, ny: u32, nz: u32) -> Vector3<F> {
-    center_of::<F>(cell_at(cell, ny, nz), spacing)
-}
-
-#[cube]
-pub(super) fn center_of<F: Float>(cell: Cell, spacing: F) -> Vector3<F> {
-    let half = F::new(0.5);
-    Vector3::<F> {
-        x: spacing * (F::cast_from(cell.i) + half),
-        y: spacing * (F::cast_from(cell.j) + half),
-        z: spacing * (F::cast_from(cell.k) + half),
-    }
+    center_of::<F>(cell_at(cell, ny, nz)).scale(spacing)
 }

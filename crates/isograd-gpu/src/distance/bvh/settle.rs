@@ -8,9 +8,11 @@ use super::super::triangle::{distance_squared, load_frame};
 use super::build::{NONE, Tree, TreeArrays};
 use super::list::UNITS;
 use super::search::{Centers, Level, NOTHING_YET, UNPROVEN, box_distance_squared, center};
-use super::single::{nearest_by_group, new_group};
+use super::single::{
+    Nearest, closest_of_all, nearest_by_group, new_group, new_shared, nothing_within, try_place,
+};
 use crate::device::launch;
-use crate::primitives::scan::exclusive_sum;
+use crate::primitives::flags;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
@@ -33,16 +35,14 @@ pub(super) fn settle<T: Scalar, R: Runtime>(
     let count = found.len();
     let flags = device.empty(count)?;
     launch!(device, count => flag_left(found, flags));
-    let before = exclusive_sum(device, &flags)?;
-    let left: Buffer<u32> = device.empty(count)?;
-    launch!(device, count => list_left(found, before, left));
+    let left = flags::list(device, &flags)?;
     launch!(device, [SETTLERS; UNITS] => search_left<T>(
-        tree, left, before, found, level.arg::<R, T>(), last,
+        tree, left.indices, left.sums, found, level.arg::<R, T>(), last,
     ));
     let taken = tree.width().min(TAKEN);
     launch!(device, [SETTLERS; SETTLER_UNITS] => settle_left<T>(
-        tree, left, before, found, level.arg::<R, T>(), (tree.width() / taken) as u32, taken as u32,
-        last,
+        tree, left.indices, left.sums, found, level.arg::<R, T>(), (tree.width() / taken) as u32,
+        taken as u32, last,
     ));
     Ok(())
 }
@@ -57,17 +57,6 @@ fn is_left(result: u32) -> bool {
 fn flag_left(found: &Array<u32>, flags: &mut Array<u32>) {
     if ABSOLUTE_POS < found.len() {
         flags[ABSOLUTE_POS] = u32::cast_from(is_left(found[ABSOLUTE_POS]));
-    }
-}
-
-/// Lists them.
-#[cube(launch)]
-fn list_left(found: &Array<u32>, before: &Array<u32>, left: &mut Array<u32>) {
-    if ABSOLUTE_POS < found.len() {
-        let own = before[ABSOLUTE_POS];
-        if before[ABSOLUTE_POS + 1] > own {
-            left[own as usize] = ABSOLUTE_POS as u32;
-        }
     }
 }
 
@@ -100,8 +89,8 @@ fn search_left<F: Float + CubeElement>(
     }
 }
 
-/// A group takes one query after another: each unit tries the triangles of some runs, and what is least among
-/// them all is the answer.
+/// A group takes one query after another: each unit tries the triangles of some runs, and the closest of all is the
+/// answer.
 #[cube(launch)]
 fn settle_left<F: Float + CubeElement>(
     tree: &TreeArrays<F>,
@@ -113,10 +102,7 @@ fn settle_left<F: Float + CubeElement>(
     taken: u32,
     #[comptime] last: bool,
 ) {
-    let mut least_of = SharedMemory::<F>::new(SETTLER_UNITS);
-    let mut face_of = SharedMemory::<u32>::new(SETTLER_UNITS);
-    let mut place_of = SharedMemory::<u32>::new(SETTLER_UNITS);
-    let unit = UNIT_POS as usize;
+    let mut shared = new_shared::<F>(SETTLER_UNITS);
     let count = before[before.len() - 1];
     let mut turn = CUBE_POS as u32;
     while turn < count {
@@ -127,39 +113,13 @@ fn settle_left<F: Float + CubeElement>(
             let q = center::<F>(query, cells.spacing, cells.ny, cells.nz);
             let guess = known & NOT_UNPROVEN;
             let own = try_runs::<F>(tree, q, cells.bound, guess, level, taken);
-            least_of[unit] = own.least;
-            face_of[unit] = own.face;
-            place_of[unit] = own.place;
-            sync_cube();
-            let mut half = (SETTLER_UNITS / 2).runtime();
-            while half > 0 {
-                if unit < half {
-                    let (a, b) = (least_of[unit], least_of[unit + half]);
-                    if b < a || (b == a && face_of[unit + half] < face_of[unit]) {
-                        least_of[unit] = b;
-                        face_of[unit] = face_of[unit + half];
-                        place_of[unit] = place_of[unit + half];
-                    }
-                }
-                sync_cube();
-                half /= 2;
+            let closest = closest_of_all::<F>(&mut shared, own, SETTLER_UNITS);
+            if UNIT_POS == 0 {
+                found[query as usize] = select(last, closest.face, closest.place);
             }
-            if unit == 0 {
-                found[query as usize] = select(last, face_of[0], place_of[0]);
-            }
-            sync_cube();
         }
         turn += SETTLERS;
     }
-}
-
-/// The closest triangle that one unit knows.
-#[derive(CubeType, Clone, Copy)]
-struct Known<F: Float> {
-    /// Its squared distance.
-    least: F,
-    face: u32,
-    place: u32,
 }
 
 /// Tries the triangles of every so many-th run, those of entries `level` to `2 level` of the pyramid, `guess`
@@ -172,36 +132,22 @@ fn try_runs<F: Float + CubeElement>(
     guess: u32,
     level: u32,
     taken: u32,
-) -> Known<F> {
-    let mut least = bound;
-    let mut best = NONE.runtime();
-    let mut best_face = NONE.runtime();
+) -> Nearest<F> {
+    let mut best = nothing_within::<F>(bound);
     if guess != NOTHING_YET {
-        best = guess;
-        best_face = tree.faces[guess as usize];
-        least = distance_squared::<F>(load_frame::<F>(&tree.frames, guess), q);
+        best.place = guess;
+        best.face = tree.faces[guess as usize];
+        best.squared = distance_squared::<F>(load_frame::<F>(&tree.frames, guess), q);
     }
     let mut run = UNIT_POS;
     while run < level {
-        if box_distance_squared::<F>(&tree.pyramid, level + run, q) <= least {
+        if box_distance_squared::<F>(&tree.pyramid, level + run, q) <= best.squared {
             let end = min((run + 1u32) * taken, tree.faces.len() as u32);
             for place in run * taken..end {
-                let d = distance_squared::<F>(load_frame::<F>(&tree.frames, place), q);
-                if d <= least {
-                    let face = tree.faces[place as usize];
-                    if d < least || face < best_face {
-                        best = place;
-                        best_face = face;
-                    }
-                    least = d;
-                }
+                try_place::<F>(&mut best, tree, place, q);
             }
         }
         run += comptime!(SETTLER_UNITS as u32);
     }
-    Known::<F> {
-        least,
-        face: best_face,
-        place: best,
-    }
+    best
 }

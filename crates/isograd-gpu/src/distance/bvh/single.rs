@@ -5,8 +5,8 @@ use cubecl::prelude::*;
 use super::super::triangle::{distance_squared, load_frame};
 use super::build::{NONE, RUN, TreeArrays};
 use super::list::{List, ROOM, Region, UNITS, list_runs, new_list};
-use super::search::{Centers, NOTHING_YET, UNPROVEN, center_of};
-use crate::grid::cell_at;
+use super::search::{Centers, NOTHING_YET, UNPROVEN};
+use crate::grid::{cell_at, center_of};
 use crate::vector::Vector3;
 
 /// Triangles that a group without a guess begins with.
@@ -42,49 +42,80 @@ pub(super) fn try_place<F: Float + CubeElement>(
     }
 }
 
-/// Memory that the units of a group share.
+/// No triangle yet; only those within the root of `bound` count.
+#[cube]
+pub(super) fn nothing_within<F: Float>(bound: F) -> Nearest<F> {
+    Nearest::<F> {
+        place: NONE.runtime(),
+        face: NONE.runtime(),
+        squared: bound,
+    }
+}
+
+/// A [`Nearest`] of each unit of a group.
 #[derive(CubeType)]
-pub(super) struct Group<F: Float> {
-    list: List,
+pub(super) struct Shared<F: Float> {
     squared: SharedMemory<F>,
     faces: SharedMemory<u32>,
     places: SharedMemory<u32>,
 }
 
 #[cube]
-pub(super) fn new_group<F: Float + CubeElement>() -> Group<F> {
-    Group::<F> {
-        list: new_list(),
-        squared: SharedMemory::<F>::new(UNITS),
-        faces: SharedMemory::<u32>::new(UNITS),
-        places: SharedMemory::<u32>::new(UNITS),
+pub(super) fn new_shared<F: Float>(#[comptime] units: usize) -> Shared<F> {
+    Shared::<F> {
+        squared: SharedMemory::<F>::new(units),
+        faces: SharedMemory::<u32>::new(units),
+        places: SharedMemory::<u32>::new(units),
     }
 }
 
-/// The place of the closest one of what the units know.
+/// The closest triangle of those that the `units` of a group know.
 #[cube]
-fn closest_of_all<F: Float + CubeElement>(group: &mut Group<F>, best: Nearest<F>) -> u32 {
+pub(super) fn closest_of_all<F: Float>(
+    shared: &mut Shared<F>,
+    own: Nearest<F>,
+    #[comptime] units: usize,
+) -> Nearest<F> {
     let unit = UNIT_POS as usize;
-    group.squared[unit] = best.squared;
-    group.faces[unit] = best.face;
-    group.places[unit] = best.place;
+    shared.squared[unit] = own.squared;
+    shared.faces[unit] = own.face;
+    shared.places[unit] = own.place;
     sync_cube();
-    let mut half = (UNITS / 2).runtime();
+    let mut half = (units / 2).runtime();
     while half > 0 {
         if unit < half {
-            let (a, b) = (group.squared[unit], group.squared[unit + half]);
-            if b < a || (b == a && group.faces[unit + half] < group.faces[unit]) {
-                group.squared[unit] = b;
-                group.faces[unit] = group.faces[unit + half];
-                group.places[unit] = group.places[unit + half];
+            let (a, b) = (shared.squared[unit], shared.squared[unit + half]);
+            if b < a || (b == a && shared.faces[unit + half] < shared.faces[unit]) {
+                shared.squared[unit] = b;
+                shared.faces[unit] = shared.faces[unit + half];
+                shared.places[unit] = shared.places[unit + half];
             }
         }
         sync_cube();
         half /= 2;
     }
-    let place = group.places[0];
+    let closest = Nearest::<F> {
+        place: shared.places[0],
+        face: shared.faces[0],
+        squared: shared.squared[0],
+    };
     sync_cube();
-    place
+    closest
+}
+
+/// Memory that the units of a group share.
+#[derive(CubeType)]
+pub(super) struct Group<F: Float> {
+    list: List,
+    best: Shared<F>,
+}
+
+#[cube]
+pub(super) fn new_group<F: Float>() -> Group<F> {
+    Group::<F> {
+        list: new_list(),
+        best: new_shared::<F>(UNITS),
+    }
 }
 
 /// The place of the triangle closest to `q`, beginning with the place `guess`: not further than the root of `bound`, else
@@ -97,11 +128,7 @@ pub(super) fn nearest_by_group<F: Float + CubeElement>(
     cells: Centers<F>,
     guess: u32,
 ) -> u32 {
-    let mut best = Nearest::<F> {
-        place: NONE.runtime(),
-        face: NONE.runtime(),
-        squared: cells.bound,
-    };
+    let mut best = nothing_within::<F>(cells.bound);
     if guess < comptime!(NOTHING_YET) {
         try_place::<F>(&mut best, tree, guess, q);
     }
@@ -128,7 +155,7 @@ pub(super) fn nearest_by_group<F: Float + CubeElement>(
             }
             index += comptime!(UNITS as u32);
         }
-        result = closest_of_all::<F>(group, best);
+        result = closest_of_all::<F>(&mut group.best, best, UNITS).place;
     }
     result
 }
@@ -141,11 +168,8 @@ fn nearest_sample<F: Float + CubeElement>(
     q: Vector3<F>,
     bound: F,
 ) -> u32 {
-    let mut best = Nearest::<F> {
-        place: comptime!(NOTHING_YET).runtime(),
-        face: NONE.runtime(),
-        squared: bound,
-    };
+    let mut best = nothing_within::<F>(bound);
+    best.place = comptime!(NOTHING_YET).runtime();
     let count = tree.faces.len() as u32;
     let step = (count - 1u32) / comptime!(SAMPLES) + 1u32;
     let mut place = UNIT_POS * step;
@@ -153,7 +177,7 @@ fn nearest_sample<F: Float + CubeElement>(
         try_place::<F>(&mut best, tree, place, q);
         place += step * comptime!(UNITS as u32);
     }
-    closest_of_all::<F>(group, best)
+    closest_of_all::<F>(&mut group.best, best, UNITS).place
 }
 
 /// A group is a cell; `seeds` has the triangle closest to the center of two cells along each axis. Writes the place of
@@ -171,7 +195,7 @@ pub(super) fn nearest_of_centers<F: Float + CubeElement>(
     let own = CUBE_POS as u32;
     if own < count {
         let cell = cell_at(own, cells.ny, cells.nz);
-        let q = center_of::<F>(cell, cells.spacing);
+        let q = center_of::<F>(cell).scale(cells.spacing);
         let guess = if comptime!(seeded) {
             let across_y = (cells.ny - 1u32) / 2u32 + 1u32;
             let across_z = (cells.nz - 1u32) / 2u32 + 1u32;

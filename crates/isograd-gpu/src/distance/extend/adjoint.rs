@@ -6,14 +6,17 @@ use isograd::distance::extend::rule::{MARGIN, REACH};
 use super::FIT;
 use super::checks::Given;
 use super::fits::{covariance, in_frame, ridge, solve};
-use super::neighbor::{Fitted, Neighbor, SampleArrays, Sorted, contract, neighbor, sum_moments};
+use super::neighbor::{
+    Fitted, Neighbor, SampleArrays, Sorted, contract, neighbor, sum_moments, write_bounded,
+};
 use crate::device::{argument, launch};
 use crate::element::fit;
 use crate::neighbors::{
     self, NeighborhoodArrays, Neighborhoods, end_of_leaf, first_of_leaf, next_leaf,
 };
-use crate::normals::{MOMENTS, fit as plane_of};
-use crate::vector::{Vector3, is_finite};
+use crate::normals::fit as plane_of;
+use crate::primitives::fill::own_zeros;
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Numbers of an [`Adjoint`] in memory.
@@ -291,18 +294,13 @@ fn pull_fits<F: Float + CubeElement>(
         if near.radii[k] > F::new(0.0) {
             let y = Vector3::<F>::at(&near.tree.points, k);
             let of = Fitted::<F>::at(fits, vertex);
-            let mut moments = Array::<F>::new(MOMENTS);
-            sum_moments::<F>(samples, y, of.radius, &mut moments);
+            let moments = sum_moments::<F>(samples, y, of.radius);
             let axes = plane_of::<F>(&moments, 0usize, 1usize).eigen;
             let c = covariance::<F>(samples, y, of, axes);
             let ridge = ridge::<F>(c, of.mean);
 
             // Σ p, Σ p q, Σ p e, Σ p e q and Σ p s·e, with q = ū·(v − u).
-            let mut found = Array::<F>::new(9usize);
-            #[unroll]
-            for i in 0..9usize {
-                found[i] = F::new(0.0);
-            }
+            let mut found = own_zeros::<F>(9usize);
             let mut node = next_leaf::<F>(&samples.tree, y, of.radius, 0usize, false);
             while node < samples.tree.links.len() {
                 let first = first_of_leaf(&samples.tree.links, node);
@@ -345,11 +343,7 @@ fn pull_fits<F: Float + CubeElement>(
 
             // Σ p D; Σ d̄ through the weights without that in w̄; and what that is multiplied by. Σ d̄·d of the same, with
             // that through the fit.
-            let mut shares = Array::<F>::new(9usize);
-            #[unroll]
-            for i in 0..9usize {
-                shares[i] = F::new(0.0);
-            }
+            let mut shares = own_zeros::<F>(9usize);
             let mut node = next_leaf::<F>(&samples.tree, y, of.radius, 0usize, false);
             while node < samples.tree.links.len() {
                 let first = first_of_leaf(&samples.tree.links, node);
@@ -394,12 +388,9 @@ fn pull_fits<F: Float + CubeElement>(
             }
             bounded += select(ridge.coincide, 1u32, 0u32);
         }
-        let zero = F::new(0.0);
         #[unroll]
         for axis in 0..3usize {
-            let finite = is_finite::<F>(sums[axis]);
-            vertices_bar[3 * vertex + axis] = select(finite, sums[axis], zero);
-            bounded += select(finite, 0u32, 1u32);
+            bounded += write_bounded::<F>(vertices_bar, 3 * vertex + axis, sums[axis]);
         }
         adjoints.guarded[k] = bounded;
     }

@@ -7,13 +7,14 @@ use super::super::bvh::center;
 use super::super::shares::{ByFace, ByFaceArrays, Corners, by_face};
 use super::super::tangent::tangent;
 use super::super::triangle::{closest, corners};
+use super::neighbor::write_bounded;
 use super::{Extension, ExtensionArrays, Residual, Surface, columns};
 use crate::device::launch;
 use crate::grid::{Lattice, low_corner};
 use crate::neighbors::gather;
-use crate::primitives::fill::zeros;
+use crate::primitives::fill::{own_zeros, zeros};
 use crate::primitives::segments::{NO_SEGMENT, Rows, join_pieces, sum_rows};
-use crate::vector::{Vector3, is_finite};
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Numbers of a face: of its three corners, of the low corner of the grid, and of its spacing.
@@ -127,11 +128,7 @@ fn share_values<F: Float>(
     #[comptime] width: usize,
 ) {
     if 3 * ABSOLUTE_POS < by_face.table.len() && by_face.table[3 * ABSOLUTE_POS] != NO_SEGMENT {
-        let mut sum = Array::<F>::new(comptime!(3 * width));
-        #[unroll]
-        for i in 0..comptime!(3 * width) {
-            sum[i] = F::new(0.0);
-        }
+        let mut sum = own_zeros::<F>(comptime!(3 * width));
         for element in by_face.table[3 * ABSOLUTE_POS + 1]..by_face.table[3 * ABSOLUTE_POS + 2] {
             let b = by_face.order[element as usize] as usize;
             let (y, z) = (barycentric[3 * b + 1], barycentric[3 * b + 2]);
@@ -203,10 +200,7 @@ fn pull_cells<F: Float + CubeElement>(
             let at = 3 * face as usize;
             let (a, b, c) = (mesh.faces[at], mesh.faces[at + 1], mesh.faces[at + 2]);
             let t = corners::<F>(mesh, face, low_corner::<F>(&grid));
-            let mut sum = Array::<F>::new(FACE);
-            for number in 0..FACE {
-                sum[number] = F::new(0.0);
-            }
+            let mut sum = own_zeros::<F>(FACE);
             let components = extension.components as usize;
             for element in by_face.table[3 * ABSOLUTE_POS + 1]..by_face.table[3 * ABSOLUTE_POS + 2]
             {
@@ -242,10 +236,7 @@ fn name_total<F: Float>(total: &Array<F>, grid: &mut Array<F>, not_finite: &mut 
     if ABSOLUTE_POS == 0 {
         let mut count = 0u32.runtime();
         for number in 0..4usize {
-            let own = total[9 + number];
-            let finite = is_finite::<F>(own);
-            grid[number] = select(finite, own, F::new(0.0));
-            count += select(finite, 0u32, 1u32);
+            count += write_bounded::<F>(grid, number, total[9 + number]);
         }
         not_finite[0] = count;
     }

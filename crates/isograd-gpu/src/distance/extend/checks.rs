@@ -116,41 +116,20 @@ impl<T: Scalar> Given<'_, T> {
     ) -> Result<(), Refused> {
         let (residual, extension) = (self.residual, self.extension);
         let (components, band) = (attribute.components, extension.cells.len());
-        let (at_vertices, at_cells) = (surface.vertices() * components, band * components);
-        let of = |bar: Option<&Buffer<T>>, expected| bar.map_or(expected, Buffer::len);
+        let (vertices, weights) = (surface.vertices(), residual.barycentric.len());
+        let (at_vertices, at_cells) = (vertices * components, band * components);
+        let (of_vertices, of_cells) = (extension.vertices.len(), extension.values.len());
+        let vertices_bar = self.vertices_bar.map_or(at_vertices, Buffer::len);
+        let values_bar = self.values_bar.map_or(at_cells, Buffer::len);
         let lengths = [
             ("a value of the extension", extension.components, components),
-            (
-                "the list of fits",
-                residual.fits.len(),
-                FIT * surface.vertices(),
-            ),
+            ("the list of fits", residual.fits.len(), FIT * vertices),
             ("the smallest area", residual.smallest_area.len(), 1),
-            (
-                "the list of barycentric weights",
-                residual.barycentric.len(),
-                3 * band,
-            ),
-            (
-                "the list of values at vertices",
-                extension.vertices.len(),
-                at_vertices,
-            ),
-            (
-                "the list of values at cells",
-                extension.values.len(),
-                at_cells,
-            ),
-            (
-                "the cotangent of the vertices",
-                of(self.vertices_bar, at_vertices),
-                at_vertices,
-            ),
-            (
-                "the cotangent of the values",
-                of(self.values_bar, at_cells),
-                at_cells,
-            ),
+            ("the list of barycentric weights", weights, 3 * band),
+            ("the list of values at vertices", of_vertices, at_vertices),
+            ("the list of values at cells", of_cells, at_cells),
+            ("the cotangent of the vertices", vertices_bar, at_vertices),
+            ("the cotangent of the values", values_bar, at_cells),
         ];
         match lengths.into_iter().find(|(_, a, b)| a != b) {
             Some((what, length, expected)) => Err(Refused::Mismatch {

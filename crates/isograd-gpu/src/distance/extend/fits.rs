@@ -9,7 +9,8 @@ use crate::device::launch;
 use crate::element::eigen::{Eigen, Symmetric};
 use crate::element::fit;
 use crate::neighbors::{NeighborhoodArrays, end_of_leaf, first_of_leaf, next_leaf, reach_squared};
-use crate::normals::{MOMENTS, fit as plane_of};
+use crate::normals::fit as plane_of;
+use crate::primitives::fill::own_zeros;
 use crate::primitives::reduce;
 use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
@@ -138,11 +139,7 @@ pub(super) fn covariance<F: Float + CubeElement>(
 /// A vector along the axes.
 #[cube]
 pub(super) fn in_frame<F: Float>(axes: Eigen<F>, v: Vector3<F>) -> Vector3<F> {
-    Vector3::<F> {
-        x: axes.first.dot(v),
-        y: axes.second.dot(v),
-        z: axes.third.dot(v),
-    }
+    Vector3::<F>::of(axes.first.dot(v), axes.second.dot(v), axes.third.dot(v))
 }
 
 /// `C + ε I` in a frame, with the intermediates of its pullback.
@@ -209,8 +206,7 @@ fn fit_vertices<F: Float + CubeElement>(
         let at = FIT * ABSOLUTE_POS;
         let y = Vector3::<F>::at(vertices, ABSOLUTE_POS);
         let radius = fits[at];
-        let mut sums = Array::<F>::new(MOMENTS);
-        sum_moments::<F>(samples, y, radius, &mut sums);
+        let sums = sum_moments::<F>(samples, y, radius);
         let plane = plane_of::<F>(&sums, 0usize, 1usize);
         let mean = plane.centroid;
         let of = Fitted::<F> {
@@ -246,15 +242,9 @@ fn evaluate_columns<F: Float + CubeElement>(
         let of = Fitted::<F>::at(fits, ABSOLUTE_POS);
         let (components, column) = (samples.components as usize, column as usize);
         // Seen from one of the samples.
-        let mut from = Array::<F>::new(width);
-        let mut means = Array::<F>::new(width);
-        let mut rises = Array::<F>::new(width);
-        #[unroll]
-        for c in 0..width {
-            from[c] = F::new(0.0);
-            means[c] = F::new(0.0);
-            rises[c] = F::new(0.0);
-        }
+        let mut from = own_zeros::<F>(width);
+        let mut means = own_zeros::<F>(width);
+        let mut rises = own_zeros::<F>(width);
         let mut total = F::new(0.0);
         let mut drift = F::new(0.0);
         let mut node = next_leaf::<F>(&samples.tree, y, of.radius, 0usize, false);

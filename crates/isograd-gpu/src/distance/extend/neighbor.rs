@@ -7,7 +7,8 @@ use crate::device::{argument, launch};
 use crate::element::fit;
 use crate::neighbors::{Neighborhoods, PointTree, end_of_leaf, first_of_leaf, gather, next_leaf};
 use crate::normals::{MOMENTS, add_moments};
-use crate::vector::Vector3;
+use crate::primitives::fill::own_zeros;
+use crate::vector::{Vector3, is_finite};
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Samples with areas and values, in the order of their tree.
@@ -117,23 +118,28 @@ pub(super) fn sum_moments<F: Float + CubeElement>(
     samples: &SampleArrays<F>,
     y: Vector3<F>,
     radius: F,
-    sums: &mut Array<F>,
-) {
+) -> Array<F> {
     let unit = F::new(1.0) / radius;
-    #[unroll]
-    for k in 0..MOMENTS {
-        sums[k] = F::new(0.0);
-    }
+    let mut sums = own_zeros::<F>(MOMENTS);
     let mut node = next_leaf::<F>(&samples.tree, y, radius, 0usize, false);
     while node < samples.tree.links.len() {
         let first = first_of_leaf(&samples.tree.links, node);
         for j in first..end_of_leaf(first, samples.areas.len()) {
             let d = Vector3::<F>::at(&samples.tree.points, j).sub(y);
             let n = neighbor::<F>(d, unit, samples.areas[j]);
-            add_moments::<F>(n.offset, n.weight, sums);
+            add_moments::<F>(n.offset, n.weight, &mut sums);
         }
         node = next_leaf::<F>(&samples.tree, y, radius, node + 1, false);
     }
+    sums
+}
+
+/// Writes a number, or 0 where it is not finite; returns 1 then.
+#[cube]
+pub(super) fn write_bounded<F: Float>(out: &mut Array<F>, at: usize, number: F) -> u32 {
+    let finite = is_finite::<F>(number);
+    out[at] = select(finite, number, F::new(0.0));
+    select(finite, 0u32, 1u32)
 }
 
 /// `ū·(v_j − u)` over all components, of sorted vertex `k` and sorted sample `j`. The row of each vertex is `ū`, then

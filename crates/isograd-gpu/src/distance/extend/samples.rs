@@ -4,10 +4,11 @@ use cubecl::prelude::*;
 
 use super::adjoint::{Adjoint, AdjointArrays, Adjoints, share_of_last};
 use super::columns;
-use super::neighbor::{SampleArrays, Sorted, contract, neighbor};
+use super::neighbor::{SampleArrays, Sorted, contract, neighbor, write_bounded};
 use crate::device::launch;
 use crate::neighbors::{NeighborhoodArrays, end_of_leaf, first_of_leaf, next_leaf};
-use crate::vector::{Vector3, is_finite};
+use crate::primitives::fill::own_zeros;
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Cotangents of the samples, in the order in which they were given.
@@ -45,14 +46,6 @@ pub(super) fn gather<R: Runtime, T: Scalar>(
     Ok(out)
 }
 
-/// Writes a number, or 0 where it is not finite; returns 1 then.
-#[cube]
-fn write_bounded<F: Float>(out: &mut Array<F>, at: usize, number: F) -> u32 {
-    let finite = is_finite::<F>(number);
-    out[at] = select(finite, number, F::new(0.0));
-    select(finite, 0u32, 1u32)
-}
-
 /// `Σ_v d̄_j` and `Σ_v w̄_j K`. A vertex that counts for nothing has the radius 0.
 #[cube(launch)]
 fn gather_points<F: Float + CubeElement>(
@@ -67,9 +60,7 @@ fn gather_points<F: Float + CubeElement>(
     if j < samples.areas.len() {
         let x = Vector3::<F>::at(&samples.tree.points, j);
         let zero = F::new(0.0);
-        let mut sum_x = zero;
-        let mut sum_y = zero;
-        let mut sum_z = zero;
+        let mut sum = Vector3::<F>::zero();
         let mut of_area = zero;
         let mut node = next_leaf::<F>(&near.tree, x, zero, 0usize, true);
         while node < near.tree.links.len() {
@@ -77,11 +68,8 @@ fn gather_points<F: Float + CubeElement>(
             for k in first..end_of_leaf(first, near.radii.len()) {
                 if near.radii[k] > zero {
                     let unit = F::new(1.0) / near.radii[k];
-                    let n = neighbor::<F>(
-                        x.sub(Vector3::<F>::at(&near.tree.points, k)),
-                        unit,
-                        samples.areas[j],
-                    );
+                    let d = x.sub(Vector3::<F>::at(&near.tree.points, k));
+                    let n = neighbor::<F>(d, unit, samples.areas[j]);
                     if n.weight > zero {
                         let q = contract::<F>(&adjoints.bars, k, samples, j);
                         let adjoint = Adjoint::<F>::at(&adjoints.records, k);
@@ -90,10 +78,7 @@ fn gather_points<F: Float + CubeElement>(
                         let is_last = adjoints.last[k] == j as u32;
                         let of_radius = select(is_last, adjoints.grown[k], zero);
                         let through_radius = share_of_last::<F>(n.offset, of_radius, unit);
-                        let share = share.scale(unit).add(through_radius);
-                        sum_x += share.x;
-                        sum_y += share.y;
-                        sum_z += share.z;
+                        sum = sum.add(share.scale(unit).add(through_radius));
                         of_area += adjoint.weight_bar(seen) * n.rest * n.rest;
                     }
                 }
@@ -101,9 +86,9 @@ fn gather_points<F: Float + CubeElement>(
             node = next_leaf::<F>(&near.tree, x, zero, node + 1, true);
         }
         let place = samples.places[j] as usize;
-        let mut count = write_bounded::<F>(points_bar, 3 * place, sum_x);
-        count += write_bounded::<F>(points_bar, 3 * place + 1, sum_y);
-        count += write_bounded::<F>(points_bar, 3 * place + 2, sum_z);
+        let mut count = write_bounded::<F>(points_bar, 3 * place, sum.x);
+        count += write_bounded::<F>(points_bar, 3 * place + 1, sum.y);
+        count += write_bounded::<F>(points_bar, 3 * place + 2, sum.z);
         count += write_bounded::<F>(areas_bar, place, of_area);
         guarded[j] = count;
     }
@@ -125,22 +110,15 @@ fn gather_columns<F: Float + CubeElement>(
         let x = Vector3::<F>::at(&samples.tree.points, j);
         let zero = F::new(0.0);
         let (components, column) = (samples.components as usize, column as usize);
-        let mut sums = Array::<F>::new(width);
-        #[unroll]
-        for c in 0..width {
-            sums[c] = F::new(0.0);
-        }
+        let mut sums = own_zeros::<F>(width);
         let mut node = next_leaf::<F>(&near.tree, x, zero, 0usize, true);
         while node < near.tree.links.len() {
             let first = first_of_leaf(&near.tree.links, node);
             for k in first..end_of_leaf(first, near.radii.len()) {
                 if near.radii[k] > zero {
                     let unit = F::new(1.0) / near.radii[k];
-                    let n = neighbor::<F>(
-                        x.sub(Vector3::<F>::at(&near.tree.points, k)),
-                        unit,
-                        samples.areas[j],
-                    );
+                    let d = x.sub(Vector3::<F>::at(&near.tree.points, k));
+                    let n = neighbor::<F>(d, unit, samples.areas[j]);
                     if n.weight > zero {
                         let seen = Adjoint::<F>::at(&adjoints.records, k).see(n, zero);
                         #[unroll]

@@ -6,12 +6,13 @@
 use cubecl::prelude::*;
 
 use super::super::bvh::center;
-use super::super::shares::{ByFaceArrays, FACE, add_share, by_face, gather_corners};
+use super::super::shares::{ByFaceArrays, Corners, FACE, add_share, by_face};
 use super::super::triangle::{closest, corners};
 use super::super::{Error, MeshArrays};
 use super::{Cotangents, Residual};
 use crate::device::{check_length, launch};
 use crate::grid::{Lattice, low_corner};
+use crate::primitives::fill::own_zeros;
 use crate::primitives::segments::{NO_SEGMENT, Rows, join_pieces, sum_rows};
 use crate::{Buffer, Device, Scalar};
 
@@ -29,7 +30,7 @@ pub fn pullback<T: Scalar, R: Runtime>(
     )?;
     let of_faces = pull_faces(device, residual, phi_bar)?;
     Ok(Cotangents {
-        vertices: gather_corners(device, &residual.mesh, &of_faces)?,
+        vertices: Corners::of(device, &residual.mesh)?.sum(device, &of_faces, 3)?,
         grid: total(device, &of_faces)?,
     })
 }
@@ -88,15 +89,9 @@ fn pull_cells<F: Float + CubeElement>(
         let face = by_face.table[ABSOLUTE_POS * 3];
         if face != NO_SEGMENT {
             let t = corners::<F>(mesh, face, low_corner::<F>(&grid));
-            let mut sum = Array::<F>::new(FACE);
-            for number in 0..FACE {
-                sum[number] = F::new(0.0);
-            }
-            let (begin, end) = (
-                by_face.table[ABSOLUTE_POS * 3 + 1],
-                by_face.table[ABSOLUTE_POS * 3 + 2],
-            );
-            for element in begin..end {
+            let mut sum = own_zeros::<F>(FACE);
+            for element in by_face.table[ABSOLUTE_POS * 3 + 1]..by_face.table[ABSOLUTE_POS * 3 + 2]
+            {
                 let cell = by_face.order[element as usize];
                 let place = center::<F>(cell, F::new(1.0), grid.ny, grid.nz);
                 let found = closest::<F>(t, place.scale(grid.spacing));

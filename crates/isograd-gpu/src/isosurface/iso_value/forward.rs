@@ -5,7 +5,7 @@ use cubecl::prelude::*;
 use super::Residual;
 use crate::device::{check_length, launch};
 use crate::grid::{Lattice, check_field, place};
-use crate::primitives::reduce::{BLOCK, sum_columns, sum_of_group};
+use crate::primitives::reduce::{BLOCK, sum_columns, write_two_sums};
 use crate::trilinear::interpolate;
 use crate::{Buffer, Device, Error, Scalar};
 
@@ -55,20 +55,11 @@ fn find_at_samples<F: Float + CubeElement>(
         let p = place::<F>(points, i, &grid);
         let found = interpolate::<F>(chi, p, &grid);
         at_samples[4 * i] = found.value;
-        at_samples[4 * i + 1] = found.x;
-        at_samples[4 * i + 2] = found.y;
-        at_samples[4 * i + 3] = found.z;
+        found.gradient.store(at_samples, 4 * i + 1);
         area = areas[i];
         product = area * found.value;
     }
-    let mut shared = SharedMemory::<F>::new(BLOCK);
-    let products = sum_of_group::<F>(product, &mut shared);
-    let areas = sum_of_group::<F>(area, &mut shared);
-    let own = CUBE_POS * 2;
-    if UNIT_POS == 0 && own < group_sums.len() {
-        group_sums[own] = products;
-        group_sums[own + 1] = areas;
-    }
+    write_two_sums::<F>(product, area, group_sums);
 }
 
 /// `Σ a χ / Σ a`; not finite where `Σ a` is not positive.

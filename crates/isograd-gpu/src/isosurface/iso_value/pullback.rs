@@ -10,6 +10,7 @@ use crate::primitives::reduce::{BLOCK, sum_columns};
 use crate::splat::{self, SampleCotangent, Samples, subtract_from_grid};
 use crate::spread::{Before, spread};
 use crate::trilinear::{NUMBERS, REACH, Trilinear};
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Error, Scalar};
 
 /// Adds to `chi_bar`, `(nx, ny, nz)`, and to `out` what the cotangent `bar` of the iso-value, an array of one
@@ -93,9 +94,8 @@ fn pull_samples<F: Float + CubeElement>(
         }
         shares[i] = value_bar;
         let slope = value_bar / spacing;
-        for axis in 0..3usize {
-            points_bar[3 * i + axis] += of.at_samples[4 * i + 1 + axis] * slope;
-        }
+        let gradient = Vector3::<F>::load(&of.at_samples, 4 * i + 1);
+        gradient.scale(slope).add_to(points_bar, 3 * i);
         areas_bar[i] += share * (of.at_samples[4 * i] - mean);
     }
 }
@@ -114,24 +114,16 @@ fn sort_shares<F: Float + CubeElement>(
     grid: Lattice<F>,
 ) {
     let s = ABSOLUTE_POS;
-    let zero = F::new(0.0);
-    let mut bar_x = zero;
-    let mut bar_y = zero;
-    let mut bar_z = zero;
-    let mut bar_h = zero;
+    let mut bar = Vector3::<F>::zero();
+    let mut of_spacing = F::new(0.0);
     if s < keys.len() {
         let i = places[s] as usize;
         let x = place::<F>(points, i, &grid);
         let cell = cell_at(keys[s], grid.ny, grid.nz);
-        sorted[NUMBERS * s] = from_center::<F>(x.x, cell.i);
-        sorted[NUMBERS * s + 1] = from_center::<F>(x.y, cell.j);
-        sorted[NUMBERS * s + 2] = from_center::<F>(x.z, cell.k);
+        from_center::<F>(x, cell).store(sorted, NUMBERS * s);
         sorted[NUMBERS * s + 3] = shares[i];
-        let slope = shares[i] / grid.spacing;
-        bar_x = at_samples[4 * i + 1] * slope;
-        bar_y = at_samples[4 * i + 2] * slope;
-        bar_z = at_samples[4 * i + 3] * slope;
-        bar_h = x.x * bar_x + x.y * bar_y + x.z * bar_z;
+        bar = Vector3::<F>::load(at_samples, 4 * i + 1).scale(shares[i] / grid.spacing);
+        of_spacing = x.dot(bar);
     }
-    subtract_from_grid::<F>(bar_x, bar_y, bar_z, bar_h, grid_sums);
+    subtract_from_grid::<F>(bar, of_spacing, grid_sums);
 }

@@ -94,9 +94,7 @@ fn make_bumps<F: Float>(
         if comptime!(!ones) {
             much *= state[s * STATE];
         }
-        bumps[s * BUMP] = me.f.x;
-        bumps[s * BUMP + 1] = me.f.y;
-        bumps[s * BUMP + 2] = me.f.z;
+        me.f.store(bumps, s * BUMP);
         bumps[s * BUMP + 3] = much;
     }
 }

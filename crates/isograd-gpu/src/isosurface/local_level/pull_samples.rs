@@ -7,8 +7,8 @@ use super::plate::{Usual, plate_of, pull_plate};
 use super::sample::{
     PassArrays, SEEN, STATE, Sample, corner, derivatives, is_held, mean, sample, see, side, without,
 };
-use crate::grid::{Lattice, cell_at};
-use crate::primitives::reduce::{BLOCK, sum_of_group};
+use crate::grid::{Lattice, cell_at, center_of};
+use crate::primitives::reduce::{BLOCK, sum_of_group, write_sum, write_two_sums};
 use crate::splat::{bspline, bspline_slope, pick, subtract_from_grid};
 use crate::vector::Vector3;
 
@@ -73,12 +73,8 @@ fn add_to_bars<F: Float>(
     if trust > F::new(0.0) {
         bars[at + 2] += s_bar * s / trust;
     }
-    bars[at + 3] += place.x;
-    bars[at + 4] += place.y;
-    bars[at + 5] += place.z;
-    bars[at + 6] += normal.x;
-    bars[at + 7] += normal.y;
-    bars[at + 8] += normal.z;
+    place.add_to(bars, at + 3);
+    normal.add_to(bars, at + 6);
     bars[at + 9] += area;
 }
 
@@ -132,13 +128,9 @@ pub(super) fn pull_seen_means<F: Float + CubeElement>(
 /// Offset, `m̄` and `w̄ n` of a sample, in the form that is spread.
 #[cube]
 fn write_tilt<F: Float>(forms: &mut Array<F>, at: usize, me: Sample<F>, mean_bar: F, slope_bar: F) {
-    forms[at] = me.f.x;
-    forms[at + 1] = me.f.y;
-    forms[at + 2] = me.f.z;
+    me.f.store(forms, at);
     forms[at + 3] = mean_bar;
-    forms[at + 4] = me.normal.x * slope_bar;
-    forms[at + 5] = me.normal.y * slope_bar;
-    forms[at + 6] = me.normal.z * slope_bar;
+    me.normal.scale(slope_bar).store(forms, at + 4);
 }
 
 /// Cotangents of a sample's index coordinates, of `â` and of `s`.
@@ -297,14 +289,7 @@ pub(super) fn pull_plates<F: Float + CubeElement>(
         usual_bar = bar.usual;
         width_bar = bar.width;
     }
-    let mut shared = SharedMemory::<F>::new(BLOCK);
-    let usual_bar = sum_of_group::<F>(usual_bar, &mut shared);
-    let width_bar = sum_of_group::<F>(width_bar, &mut shared);
-    let own = CUBE_POS * 2;
-    if UNIT_POS == 0 && own < partial.len() {
-        partial[own] = usual_bar;
-        partial[own + 1] = width_bar;
-    }
+    write_two_sums::<F>(usual_bar, width_bar, partial);
 }
 
 /// `χ` before the first pass, and the samples with their slopes.
@@ -341,13 +326,8 @@ pub(super) fn pull_slopes<F: Float + CubeElement>(
         let corner = corner::<F>(of.keys[s], &grid);
         let found = derivatives::<F>(&of.chi, &of.chi, corner, &grid, me.f, false);
         let bend = found.bend(me.normal).scale(slope_bar);
-        let gradient = found.gradient().scale(slope_bar);
-        bars[at + 3] += bend.x;
-        bars[at + 4] += bend.y;
-        bars[at + 5] += bend.z;
-        bars[at + 6] += gradient.x;
-        bars[at + 7] += gradient.y;
-        bars[at + 8] += gradient.z;
+        bend.add_to(bars, at + 3);
+        found.gradient().scale(slope_bar).add_to(bars, at + 6);
         write_tilt::<F>(forms, s * FORM, me, F::new(0.0), slope_bar);
     }
 }
@@ -401,24 +381,14 @@ pub(super) fn add_bars_of_grid<F: Float + CubeElement>(
     if s < count as usize && is_held::<F>(keys[s], &grid) {
         let (me, at) = (sample::<F>(samples, s), s * BARS);
         let cell = cell_at(keys[s], grid.ny, grid.nz);
-        let half = F::new(0.5);
-        let h = grid.spacing;
-        bar.x = bars[at + 3] / h;
-        bar.y = bars[at + 4] / h;
-        bar.z = bars[at + 5] / h;
+        bar = Vector3::<F>::load(bars, at + 3).over(grid.spacing);
         value = -bars[at];
         // ∂x̂/∂h = −x̂/h; and the areas are divided by h².
-        of_spacing = (F::cast_from(cell.i) + half + me.f.x) * bar.x
-            + (F::cast_from(cell.j) + half + me.f.y) * bar.y
-            + (F::cast_from(cell.k) + half + me.f.z) * bar.z;
+        of_spacing = center_of::<F>(cell).add(me.f).dot(bar);
         if comptime!(area_weights) {
-            of_spacing += F::new(2.0) * me.area * bars[at + 9] / h;
+            of_spacing += F::new(2.0) * me.area * bars[at + 9] / grid.spacing;
         }
     }
-    subtract_from_grid::<F>(bar.x, bar.y, bar.z, of_spacing, grid_sums);
-    let mut shared = SharedMemory::<F>::new(BLOCK);
-    let total = sum_of_group::<F>(value, &mut shared);
-    if UNIT_POS == 0 && CUBE_POS < level_sums.len() {
-        level_sums[CUBE_POS] = total;
-    }
+    subtract_from_grid::<F>(bar, of_spacing, grid_sums);
+    write_sum::<F>(value, level_sums);
 }

@@ -148,11 +148,7 @@ pub(super) struct Derivatives<F: Float> {
 #[cube]
 impl<F: Float> Derivatives<F> {
     pub fn gradient(self) -> Vector3<F> {
-        Vector3::<F> {
-            x: self.x,
-            y: self.y,
-            z: self.z,
-        }
+        Vector3::<F>::of(self.x, self.y, self.z)
     }
 
     /// `∇(n·∇)`: how the slope along `n` changes with the place.

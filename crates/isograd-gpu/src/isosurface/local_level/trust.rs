@@ -10,7 +10,7 @@ use crate::device::launch;
 use crate::element::plate::trust;
 use crate::grid::{Lattice, cell_at, from_center, place};
 use crate::isosurface::iso_value;
-use crate::primitives::reduce::{BLOCK, sum_columns, sum_of_group};
+use crate::primitives::reduce::{BLOCK, sum_columns, write_two_sums};
 use crate::splat::Samples;
 use crate::vector::Vector3;
 use crate::{Buffer, Error, Scalar};
@@ -77,25 +77,16 @@ fn pack_samples<F: Float + CubeElement>(
         let mut area = F::new(0.0);
         if is_held::<F>(keys[s], &grid) {
             let x = place::<F>(points, i, &grid);
-            let cell = cell_at(keys[s], grid.ny, grid.nz);
-            f.x = from_center::<F>(x.x, cell.i);
-            f.y = from_center::<F>(x.y, cell.j);
-            f.z = from_center::<F>(x.z, cell.k);
-            normal.x = normals[3 * i];
-            normal.y = normals[3 * i + 1];
-            normal.z = normals[3 * i + 2];
+            f = from_center::<F>(x, cell_at(keys[s], grid.ny, grid.nz));
+            normal = Vector3::<F>::at(normals, i);
             area = areas[i];
             if comptime!(area_weights) {
                 area = areas[i] / grid.spacing / grid.spacing;
             }
         }
         let at = s * SAMPLE;
-        samples[at] = f.x;
-        samples[at + 1] = f.y;
-        samples[at + 2] = f.z;
-        samples[at + 3] = normal.x;
-        samples[at + 4] = normal.y;
-        samples[at + 5] = normal.z;
+        f.store(samples, at);
+        normal.store(samples, at + 3);
         samples[at + 6] = area;
         samples[at + 7] = F::new(0.0);
     }
@@ -130,14 +121,7 @@ fn find_slopes<F: Float + CubeElement>(
         state[s * STATE] = zero;
         state[s * STATE + 1] = slope;
     }
-    let mut shared = SharedMemory::<F>::new(BLOCK);
-    let square = sum_of_group::<F>(square, &mut shared);
-    let area = sum_of_group::<F>(area, &mut shared);
-    let own = CUBE_POS * 2;
-    if UNIT_POS == 0 && own < partial.len() {
-        partial[own] = square;
-        partial[own + 1] = area;
-    }
+    write_two_sums::<F>(square, area, partial);
 }
 
 /// `ω` of each sample, and `χ(x_i) + δ_i − c`.

@@ -143,6 +143,14 @@ fn turned<F: Float + CubeElement>(
     }
 }
 
+/// Writes place `j` of a unit's pair.
+#[cube]
+fn set<F: Float>(shared: &mut Shared<F>, tile: &Tile, to: usize, j: usize, re: F, im: F) {
+    let at = to + place(tile, tile.pair, j);
+    shared.re[at] = re;
+    shared.im[at] = im;
+}
+
 /// One pass with radix 2, after passes whose product is `done`.
 #[cube]
 fn pass_of_two<F: Float + CubeElement>(
@@ -159,14 +167,11 @@ fn pass_of_two<F: Float + CubeElement>(
     while b < part {
         let k = b % done;
         let v0 = from + place(tile, tile.pair, b);
+        let (re, im) = (shared.re[v0], shared.im[v0]);
         let v1 = turned(shared, tables, tile, from, b + part, k * turn);
         let first = (b - k) * 2 + k;
-        let u0 = to + place(tile, tile.pair, first);
-        shared.re[u0] = shared.re[v0] + v1.re;
-        shared.im[u0] = shared.im[v0] + v1.im;
-        let u1 = to + place(tile, tile.pair, first + done);
-        shared.re[u1] = shared.re[v0] - v1.re;
-        shared.im[u1] = shared.im[v0] - v1.im;
+        set(shared, tile, to, first, re + v1.re, im + v1.im);
+        set(shared, tile, to, first + done, re - v1.re, im - v1.im);
         b += tile.stride;
     }
 }
@@ -195,19 +200,26 @@ fn pass_of_four<F: Float + CubeElement>(
         let (gap_re, gap_im) = (shared.re[v0] - v2.re, shared.im[v0] - v2.im);
         let (odd_re, odd_im) = (v1.re + v3.re, v1.im + v3.im);
         let (odd_gap_re, odd_gap_im) = (v1.re - v3.re, v1.im - v3.im);
-        let first = (b - k) * 4 + k;
-        let u0 = to + place(tile, tile.pair, first);
-        shared.re[u0] = sum_re + odd_re;
-        shared.im[u0] = sum_im + odd_im;
-        let u1 = to + place(tile, tile.pair, first + done);
-        shared.re[u1] = gap_re + odd_gap_im;
-        shared.im[u1] = gap_im - odd_gap_re;
-        let u2 = to + place(tile, tile.pair, first + 2 * done);
-        shared.re[u2] = sum_re - odd_re;
-        shared.im[u2] = sum_im - odd_im;
-        let u3 = to + place(tile, tile.pair, first + 3 * done);
-        shared.re[u3] = gap_re - odd_gap_im;
-        shared.im[u3] = gap_im + odd_gap_re;
+        let u0 = (b - k) * 4 + k;
+        let (u1, u2, u3) = (u0 + done, u0 + 2 * done, u0 + 3 * done);
+        set(shared, tile, to, u0, sum_re + odd_re, sum_im + odd_im);
+        set(
+            shared,
+            tile,
+            to,
+            u1,
+            gap_re + odd_gap_im,
+            gap_im - odd_gap_re,
+        );
+        set(shared, tile, to, u2, sum_re - odd_re, sum_im - odd_im);
+        set(
+            shared,
+            tile,
+            to,
+            u3,
+            gap_re - odd_gap_im,
+            gap_im + odd_gap_re,
+        );
         b += tile.stride;
     }
 }
@@ -254,9 +266,7 @@ fn pass_of_few<F: Float + CubeElement>(
                 sum_re += v_re[q] * unit_re[w] - v_im[q] * unit_im[w];
                 sum_im += v_re[q] * unit_im[w] + v_im[q] * unit_re[w];
             }
-            let at = to + place(tile, tile.pair, first + s * done);
-            shared.re[at] = sum_re;
-            shared.im[at] = sum_im;
+            set(shared, tile, to, first + s * done, sum_re, sum_im);
         }
         b += tile.stride;
     }
@@ -293,9 +303,7 @@ fn pass_of_any<F: Float + CubeElement>(
                 angle -= tile.length;
             }
         }
-        let at = to + place(tile, tile.pair, result);
-        shared.re[at] = sum_re;
-        shared.im[at] = sum_im;
+        set(shared, tile, to, result, sum_re, sum_im);
         result += tile.stride;
     }
 }

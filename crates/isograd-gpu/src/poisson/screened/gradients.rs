@@ -8,7 +8,7 @@ use crate::device::{Ready, check_length, launch};
 use crate::grid::{Lattice, cell_at, from_center, place};
 use crate::isosurface::iso_value;
 use crate::primitives::fill::zeros;
-use crate::primitives::reduce::{BLOCK, sum, sum_of_group};
+use crate::primitives::reduce::{BLOCK, sum, write_sum};
 use crate::spread::{Before, spread};
 use crate::trilinear::{NUMBERS, REACH, Trilinear, interpolate};
 use crate::{Buffer, Device, Scalar};
@@ -128,7 +128,9 @@ impl<'a, R: Runtime, T: Scalar> System<'a, R, T> {
             drop(field);
             self.project(&image)?;
             let curvature = dot(device, &direction, &image)?;
-            self.step([&now, &curvature], &direction, &image, &solution, rest);
+            launch!(device, rest.len(), BLOCK => take_step<T>(
+                now, curvature, direction, image, solution, rest,
+            ));
             let before = std::mem::replace(&mut now, dot(device, rest, rest)?);
             self.turn(rest, Some([&now, &before]), &direction);
             left = device.download(&now)?[0].f64();
@@ -147,20 +149,6 @@ impl<'a, R: Runtime, T: Scalar> System<'a, R, T> {
             self.roots, along, self.total, v,
         ));
         Ok(())
-    }
-
-    /// Goes along the direction as far as the quotient of the two numbers.
-    fn step(
-        &self,
-        [up, down]: [&Buffer<T>; 2],
-        direction: &Buffer<T>,
-        image: &Buffer<T>,
-        solution: &Buffer<T>,
-        rest: &Buffer<T>,
-    ) {
-        launch!(self.device, rest.len(), BLOCK => take_step<T>(
-            up, down, direction, image, solution, rest,
-        ));
     }
 
     /// The next direction: what is left, and of the last direction the quotient of the two numbers, or nothing.
@@ -189,11 +177,7 @@ fn sum_products<F: Float>(a: &Array<F>, b: &Array<F>, sums: &mut Array<F>) {
     if ABSOLUTE_POS < a.len() {
         product = a[ABSOLUTE_POS] * b[ABSOLUTE_POS];
     }
-    let mut shared = SharedMemory::<F>::new(BLOCK);
-    let total = sum_of_group::<F>(product, &mut shared);
-    if UNIT_POS == 0 && CUBE_POS < sums.len() {
-        sums[CUBE_POS] = total;
-    }
+    write_sum::<F>(product, sums);
 }
 
 /// `√â` of each sample, and where it is in its cell.
@@ -214,9 +198,7 @@ fn start<F: Float + CubeElement>(
         let x = place::<F>(points, i, &grid);
         let cell = cell_at(keys[s], grid.ny, grid.nz);
         roots[s] = (areas[i] * per_area).sqrt();
-        carriers[NUMBERS * s] = from_center::<F>(x.x, cell.i);
-        carriers[NUMBERS * s + 1] = from_center::<F>(x.y, cell.j);
-        carriers[NUMBERS * s + 2] = from_center::<F>(x.z, cell.k);
+        from_center::<F>(x, cell).store(carriers, NUMBERS * s);
         carriers[NUMBERS * s + 3] = F::new(0.0);
     }
 }
@@ -278,6 +260,7 @@ fn subtract_along<F: Float>(
     }
 }
 
+/// Goes along the direction as far as the quotient of two numbers.
 #[cube(launch)]
 fn take_step<F: Float>(
     up: &Array<F>,

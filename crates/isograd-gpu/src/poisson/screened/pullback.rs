@@ -4,7 +4,7 @@ use cubecl::prelude::*;
 
 use super::gradients::System;
 use super::{Equation, Error};
-use crate::device::{Ready, check_length, launch};
+use crate::device::{Ready, argument, check_length, launch};
 use crate::grid::{Lattice, check_field, place};
 use crate::isosurface::iso_value;
 use crate::poisson::smoothing;
@@ -12,6 +12,7 @@ use crate::primitives::fill::add;
 use crate::primitives::reduce::{BLOCK, sum_columns};
 use crate::splat::{CotangentArrays, SampleArrays, SampleCotangent, subtract_from_grid};
 use crate::spread::Before;
+use crate::vector::Vector3;
 use crate::{Buffer, Device, Scalar};
 
 /// Replaces the cotangents `chi_bar`, `(nx, ny, nz)`, of the screened solution by those of the plain one, adds the
@@ -42,21 +43,13 @@ pub fn pullback<R: Runtime, T: Scalar>(
     let adjoint = equation.solver.solve(device, chi_bar, 0.0)?;
     // Its mean at the samples and what it is there, as that of `χ`.
     let (_, adjoint) = iso_value::forward(device, &adjoint, grid, samples.points, samples.areas)?;
-    let chi = Ready::new(InterpolantLaunch::new(
-        level.at_samples.arg(),
-        level.sums.arg(),
-    ));
-    let adjoint = Ready::new(InterpolantLaunch::new(
-        adjoint.at_samples.arg(),
-        adjoint.sums.arg(),
-    ));
     let factors = Ready::new(FactorsLaunch::new(
         T::of(-equation.screening),
         equation.per_area(),
     ));
     let grid_sums: Buffer<T> = device.empty(4 * samples.len().div_ceil(BLOCK))?;
     launch!(device, samples.len(), BLOCK => pull_matrix<T>(
-        samples, chi, adjoint, out, grid_sums, factors, grid, equation.area_weights,
+        samples, level, adjoint, out, grid_sums, factors, grid, equation.area_weights,
     ));
     add(device, &sum_columns(device, &grid_sums, 4)?, &out.grid)?;
     Ok(iterations)
@@ -93,10 +86,14 @@ pub fn smoothing_pullback<R: Runtime, T: Scalar>(
 
 /// Value and gradient of a field at the samples, and the sums of its area-weighted mean.
 #[derive(CubeLaunch, CubeType)]
-struct Interpolant<F: Float + CubeElement> {
-    at_samples: Array<F>,
-    sums: Array<F>,
+pub(crate) struct Interpolant<F: Float + CubeElement> {
+    pub at_samples: Array<F>,
+    pub sums: Array<F>,
 }
+
+argument!(
+    iso_value::Residual<T> => InterpolantLaunch<T, R>: |of| of.at_samples.arg(), of.sums.arg()
+);
 
 /// Factors of the screening term.
 #[derive(CubeLaunch, CubeType, Clone, Copy)]
@@ -119,27 +116,25 @@ fn pull_matrix<F: Float + CubeElement>(
     #[comptime] area_weights: bool,
 ) {
     let i = ABSOLUTE_POS;
-    let mut of_grid = Array::<F>::new(4usize);
-    for k in 0..4usize {
-        of_grid[k] = F::new(0.0);
-    }
+    let mut bar = Vector3::<F>::zero();
+    let mut of_spacing = F::new(0.0);
     if i < samples.count as usize {
         let offset = chi.at_samples[4 * i] - chi.sums[0] / chi.sums[1];
         let value = adjoint.at_samples[4 * i] - adjoint.sums[0] / adjoint.sums[1];
         let area = samples.areas[i] * factors.per_area;
         let x = place::<F>(&samples.points, i, &grid);
-        for axis in 0..3usize {
-            let both = value * chi.at_samples[4 * i + 1 + axis]
-                + offset * adjoint.at_samples[4 * i + 1 + axis];
-            of_grid[axis] = factors.screening * area / grid.spacing * both;
-            out.points[3 * i + axis] += of_grid[axis];
-        }
+        let of_chi = Vector3::<F>::load(&chi.at_samples, 4 * i + 1).scale(value);
+        let of_adjoint = Vector3::<F>::load(&adjoint.at_samples, 4 * i + 1).scale(offset);
+        bar = of_chi
+            .add(of_adjoint)
+            .scale(factors.screening * area / grid.spacing);
+        bar.add_to(&mut out.points, 3 * i);
         let area_bar = factors.screening * value * offset;
         out.areas[i] += area_bar * factors.per_area;
-        of_grid[3] = x.x * of_grid[0] + x.y * of_grid[1] + x.z * of_grid[2];
+        of_spacing = x.dot(bar);
         if area_weights {
-            of_grid[3] += F::new(2.0) * area * area_bar / grid.spacing;
+            of_spacing += F::new(2.0) * area * area_bar / grid.spacing;
         }
     }
-    subtract_from_grid::<F>(of_grid[0], of_grid[1], of_grid[2], of_grid[3], grid_sums);
+    subtract_from_grid::<F>(bar, of_spacing, grid_sums);
 }

@@ -7,6 +7,7 @@ use isograd_gpu::distance::lattice;
 use isograd_gpu::{Device, Scalar};
 
 use super::{grid, meshes, signs, solve};
+use crate::clouds::relative;
 use crate::devices::{Numbers, tests, tolerance};
 
 tests! {
@@ -84,15 +85,6 @@ fn of_affine_motions<T: Real>(mesh: &Mesh<T>, bars: &[f64]) -> Vec<f64> {
     let are_different = |[a, b, c]: &&[u32; 3]| a != b && b != c && c != a;
     let faces = mesh.faces().iter().filter(are_different);
     faces.flat_map(of_face).collect()
-}
-
-fn relative(found: &[f64], expected: &[f64]) -> f64 {
-    assert_eq!(found.len(), expected.len());
-    let largest = expected.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-    assert!(largest > 0.0);
-    let differences = found.iter().zip(expected).map(|(a, b)| (a - b).abs());
-    let worst = differences.fold(0.0, |m: f64, d| if d.is_nan() { d } else { m.max(d) });
-    worst / largest
 }
 
 fn cotangents_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
