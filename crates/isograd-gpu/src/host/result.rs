@@ -214,9 +214,10 @@ impl<T: Number> Reconstruction<T> {
                 confidence: self.device.numbers(&self.result.confidence)?,
                 ..Orientation::default()
             };
-            let (normals, neighborhoods) = (&orientation.normals, self.neighborhoods()?);
+            let (samples, neighborhoods) =
+                ([&points[..], &orientation.normals], self.neighborhoods()?);
             let (sdf, mesh) = (self.sdf()?, self.mesh()?);
-            report.check_field(&points, normals, neighborhoods, sdf, mesh, scratch, None);
+            report.check_field(samples, neighborhoods, sdf, mesh, scratch, None);
             report.check_samples(&points, neighborhoods, &orientation, false);
         }
         let before = report.seconds.of(Stage::Checks);

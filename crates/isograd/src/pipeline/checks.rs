@@ -30,8 +30,7 @@ impl Report {
     /// distance to `mesh`, whose tree is then not built again.
     pub fn check_field<T: Real>(
         &mut self,
-        points: &[[T; 3]],
-        normals: &[[T; 3]],
+        [points, normals]: [&[[T; 3]]; 2],
         neighborhoods: &Neighborhoods<T>,
         sdf: &Field<T>,
         mesh: &Mesh<T>,

@@ -110,8 +110,7 @@ impl<T: Real> Reconstructor<T> {
             }
             _ => {
                 report.check_field(
-                    points,
-                    &orientation.normals,
+                    [points, &orientation.normals],
                     neighborhoods,
                     sdf,
                     mesh,
