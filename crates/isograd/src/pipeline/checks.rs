@@ -43,7 +43,7 @@ impl Report {
         let counts = self.count(samples, sdf, mesh, built);
         let several = self.surface.components > 1;
         let pieces = several.then(|| Pieces::new(mesh, scratch));
-        self.guessed = self.guessed(mesh, neighborhoods, sdf.grid().spacing(), pieces.as_ref());
+        self.guessed = self.unsampled(mesh, neighborhoods, sdf.grid().spacing(), pieces.as_ref());
         let (warnings, spacing) = (&mut self.warnings, self.surface_spacing);
         warnings.extend(turned(counts.turned, points.len()));
         warnings.extend(thin(counts.thin, points.len()));
@@ -109,7 +109,7 @@ impl Report {
 
     /// [The share of the surface](Self::guessed) that has no samples nearby, of the piece where it is largest; crumbs don't
     /// count. `spacing` is the cell size of φ.
-    fn guessed<T: Real>(
+    fn unsampled<T: Real>(
         &self,
         mesh: &Mesh<T>,
         neighborhoods: &Neighborhoods<T>,
