@@ -12,8 +12,8 @@
 //! [marching cubes](crate::isosurface) to `d`, and from there likewise.
 //!
 //! # Not differentiable
-//! The thickness is a constant, and so are the faces of the sheet: cotangents do not say how its rim moves. `d` has a kink at points with two closest points, on the sheet itself too: there the
-//! derivative is that along the normal of the face.
+//! The thickness is a constant, and so are the faces of the sheet: cotangents do not say how its rim moves. `d` has a kink at
+//! points with two closest points, on the sheet itself too: there the derivative is that along the normal of the face.
 
 use crate::data::{GridCotangent, Mesh};
 use crate::distance::{self, Band, lattice};
