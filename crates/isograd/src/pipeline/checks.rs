@@ -124,9 +124,7 @@ impl Report {
         };
         let shares = nearby.far_shares(mesh, pieces).into_iter();
         let are_large = pieces.map_or_else(|| vec![true], Pieces::are_large);
-        let shares = shares
-            .zip(are_large)
-            .filter(|&(share, is_large)| is_large && share < 1.0);
+        let shares = shares.zip(are_large).filter(|&(_, is_large)| is_large);
         shares.map(|(share, _)| share).fold(0.0, f64::max)
     }
 
