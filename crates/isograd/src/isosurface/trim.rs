@@ -58,7 +58,7 @@ impl Trim {
 
 /// The part of a mesh that has samples nearby.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Trimmed<T> {
+pub(crate) struct Trimmed<T> {
     /// The part.
     pub mesh: Mesh<T>,
     /// Index of each of its vertices in the whole mesh, ascending.
@@ -147,7 +147,7 @@ pub(crate) fn forward<T: Real>(mesh: &Mesh<T>, nearby: Nearby<'_, T>) -> Trimmed
 }
 
 /// Adds the cotangents of the vertices that stay to those of the whole mesh.
-pub fn pullback<T: Real>(trimmed: &Trimmed<T>, bars: &[[T; 3]], whole: &mut [[T; 3]]) {
+pub(crate) fn pullback<T: Real>(trimmed: &Trimmed<T>, bars: &[[T; 3]], whole: &mut [[T; 3]]) {
     for (&v, &bar) in trimmed.vertices.iter().zip(bars) {
         let sum = &mut whole[v as usize];
         *sum = vector::add(*sum, bar);
