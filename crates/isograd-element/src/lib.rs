@@ -12,6 +12,7 @@ pub mod fit;
 pub mod linear;
 pub mod plane;
 pub mod plate;
+pub mod quadric;
 pub mod stencil;
 pub mod turned;
 #[cfg(not(cube))]

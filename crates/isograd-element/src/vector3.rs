@@ -84,6 +84,14 @@ impl<F: Element> Vector3<F> {
 }
 
 #[cfg(not(cube))]
+impl<F: Element> From<[F; 3]> for Vector3<F> {
+    #[inline(always)]
+    fn from([x, y, z]: [F; 3]) -> Self {
+        Self { x, y, z }
+    }
+}
+
+#[cfg(not(cube))]
 impl<F: Element> From<Vector3<F>> for [F; 3] {
     #[inline(always)]
     fn from(v: Vector3<F>) -> Self {

@@ -23,6 +23,7 @@ pub mod orient;
 pub mod pipeline;
 pub mod poisson;
 pub mod primitives;
+pub mod refine;
 pub mod splat;
 mod spread;
 mod trilinear;

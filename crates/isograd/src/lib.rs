@@ -49,6 +49,7 @@
 //! | [`neighbors`] | points → neighborhoods |
 //! | [`normals`] | neighborhoods → unoriented normals |
 //! | [`orient`] | unoriented normals → outward normals |
+//! | [`refine`] | outward normals → the same, fitted to the samples of their side |
 //! | `thicken` | samples of parts thinner than a cell → the same moved apart, for [`isosurface::Level::Thin`] |
 //! | [`splat`] | normals and areas → right-hand side of the Poisson equation |
 //! | [`poisson`] | right-hand side → indicator χ |
@@ -79,6 +80,7 @@ pub mod poisson;
 #[cfg(test)]
 mod pullback_tests;
 mod real;
+pub mod refine;
 mod report;
 pub mod sheet;
 pub(crate) mod simd;

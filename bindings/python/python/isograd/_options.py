@@ -114,7 +114,7 @@ class Options:
     Attributes:
         radius: neighborhood radius of the normals, in the unit of the points, or ``"auto"``: that of 24 samples, or of as many
             as reach the next lines, where samples lie along lines. ``"cut:R"`` is a radius with the paper's weights, which end
-            at it with a jump.
+            at it with a jump. With ``"auto"`` alone, normals are refined by quadrics fitted to the samples of their side.
         orient: method that finds the side of each normal; see :class:`Orient`.
         splat: weights that spread a sample over the cells around it; see :class:`Splat`.
         area: whether a sample is weighted by the area that it stands for.

@@ -44,13 +44,13 @@ pub fn forward<R: Runtime, T: Scalar>(
 
 /// `ε/R = 1/5`, as on the CPU.
 #[cube]
-pub(super) fn epsilon<F: Float>() -> F {
+pub(crate) fn epsilon<F: Float>() -> F {
     F::new(1.0) / F::new(5.0)
 }
 
 /// How steeply weights fall at the radius, as on the CPU.
 #[cube]
-pub(super) fn steepness<F: Float>() -> F {
+pub(crate) fn steepness<F: Float>() -> F {
     F::new(5.0)
 }
 

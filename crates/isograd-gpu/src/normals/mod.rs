@@ -25,7 +25,7 @@ mod pullback;
 mod widen;
 
 pub use forward::forward;
-pub(crate) use forward::{MOMENTS, add_moments, fit};
+pub(crate) use forward::{MOMENTS, add_moments, epsilon, fit, steepness};
 pub use pullback::pullback;
 use pullback::rows;
 pub use widen::widen;

@@ -14,7 +14,7 @@ use crate::distance::{self, Mesh};
 use crate::isosurface::{self, iso_value, local_level as local};
 use crate::orient::previous::Followed;
 use crate::splat::{self, Refused, Samples, area};
-use crate::{Buffer, Scalar, neighbors, normals, orient, poisson};
+use crate::{Buffer, Scalar, neighbors, normals, orient, poisson, refine};
 
 /// Called before each stage is queued; where it breaks, so does the work. One that wants to know how long a stage
 /// takes must [wait](crate::Device::wait).
@@ -186,10 +186,19 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
         held: &RadiiAndSigns<T>,
     ) -> Result<Normals<T>, Error> {
         let near = residual.neighborhoods.clone();
-        let sides = held.turn(&self.device, &near, &axes)?;
+        let mut sides = held.turn(&self.device, &near, &axes)?;
+        let outward = sides.normals.clone();
+        let mut refined = None;
+        if held.refines {
+            let own = neighbors::with_radii(&self.device, &near, &held.area_radii)?;
+            let (normals, residual) = refine::forward(&self.device, &own, &outward)?;
+            sides.normals = normals;
+            refined = Some(residual);
+        }
         let source = Source::Axes {
             axes,
-            outward: sides.normals.clone(),
+            outward,
+            refined,
             residual,
         };
         Ok(Normals {

@@ -30,6 +30,8 @@ pub struct RadiiAndSigns<T> {
     /// Number of samples in the automatic radius where they lie along lines: [`isograd::neighbors::Neighborhoods::lines`]. Radii
     /// that are found on the device do not follow lines.
     pub lines: Option<usize>,
+    /// Whether normals are [refined](crate::refine): where the radius is automatic.
+    pub refines: bool,
     /// `(N, 3)` roughly outward: a normal is turned to the side of its vector here.
     pub outward: Buffer<T>,
     /// `(N,)` from 0 to 1, how sure that is: see [`Orientation::confidence`](isograd::orient::Orientation::confidence).
@@ -112,13 +114,20 @@ impl<T: Scalar> RadiiAndSigns<T> {
             true => &near.radius,
             false => &axes.radius,
         };
+        // Before they were refined, as in later steps; none where they were given.
+        let mut outward = axes.normals.clone();
+        isograd::orient::axes_pullback(&found.normals, &axes.normals, &mut outward);
+        if outward.is_empty() {
+            outward.clone_from(&found.normals);
+        }
         Ok(Self {
             radii: device.upload(radii)?,
             area_radii: device.upload(&near.radius)?,
             common_radius: near.common_radius,
             spacing: near.spacing(),
             lines: near.lines(),
-            outward: device.upload(found.normals.as_flattened())?,
+            refines: near.rule == Radius::Auto,
+            outward: device.upload(outward.as_flattened())?,
             confidence: device.upload(&found.confidence)?,
             has_moved: false,
         })
@@ -166,6 +175,7 @@ impl<T: Scalar> RadiiAndSigns<T> {
             common_radius: found.common,
             spacing: found.spacing,
             lines: None,
+            refines: radius == Radius::Auto,
             outward: oriented.normals,
             confidence: oriented.confidence,
             has_moved: false,
@@ -196,6 +206,7 @@ impl<T: Scalar> RadiiAndSigns<T> {
             common_radius: found.common,
             spacing: found.spacing,
             lines: None,
+            refines: false,
             has_moved: false,
         };
         Ok(SearchResult {
@@ -225,7 +236,7 @@ impl<T: Scalar> RadiiAndSigns<T> {
     /// # Errors
     /// [`crate::Error::Length`] where `result` is of other points.
     pub fn after(self, result: &Reconstruction<T>) -> Result<Self, crate::Error> {
-        let held = self.facing(result.normals.clone())?;
+        let held = self.facing(result.unrefined().clone())?;
         Ok(Self {
             confidence: result.kept_confidence.clone(),
             ..held

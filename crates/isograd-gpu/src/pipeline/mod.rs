@@ -33,7 +33,7 @@ use isograd::{Grid, Stage};
 use crate::distance::{self, Band};
 use crate::isosurface::{self, Surface, iso_value, local_level as local};
 use crate::splat::{self, Weights, area};
-use crate::{Buffer, Device, Scalar, neighbors, normals, poisson};
+use crate::{Buffer, Device, Scalar, neighbors, normals, poisson, refine};
 
 /// Errors of the pipeline.
 #[derive(Debug, thiserror::Error)]
@@ -216,6 +216,8 @@ enum Source<T> {
     Axes {
         axes: Buffer<T>,
         outward: Buffer<T>,
+        /// None where the radius was given.
+        refined: Option<refine::Residual<T>>,
         residual: Box<normals::Residual<T>>,
     },
     /// From vectors that were given.
@@ -237,6 +239,14 @@ impl<T: Scalar> Reconstruction<T> {
             points: &self.points,
             normals: &self.normals,
             areas: &self.areas,
+        }
+    }
+
+    /// `(N, 3)` outward unit normals before they were refined.
+    fn unrefined(&self) -> &Buffer<T> {
+        match &self.residuals.normals {
+            Source::Axes { outward, .. } => outward,
+            Source::Given(_) => &self.normals,
         }
     }
 

@@ -11,7 +11,7 @@ use crate::poisson::screened;
 use crate::primitives::fill::{add, zeros};
 use crate::primitives::flags;
 use crate::splat::{self, SampleCotangent, area};
-use crate::{Buffer, Device, Scalar, distance, normals, orient, poisson};
+use crate::{Buffer, Device, Scalar, distance, normals, orient, poisson, refine};
 
 /// Cotangents of the results of a reconstruction: by how much a scalar (a loss) changes, a unit of each
 /// result. What is left out counts as zero.
@@ -142,9 +142,18 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             Source::Axes {
                 axes,
                 outward,
+                refined,
                 residual,
             } => {
-                let axes_bar = held::turn(device, &bars.normals, axes, outward)?;
+                let mut normals_bar = bars.normals;
+                if let Some(refined) = refined {
+                    let [points, before, of_radii] =
+                        refine::pullback(device, refined, &normals_bar)?;
+                    add(device, &points, &bars.points)?;
+                    add(device, &of_radii, &radii)?;
+                    normals_bar = before;
+                }
+                let axes_bar = held::turn(device, &normals_bar, axes, outward)?;
                 let (by_axes, of_radii) = normals::pullback(device, residual, &axes_bar)?;
                 add(device, &by_axes, &bars.points)?;
                 (None, Some(of_radii))

@@ -16,6 +16,7 @@ mod poisson;
 mod primitives;
 mod radii;
 mod reduce;
+mod refine;
 mod samples;
 mod splat;
 

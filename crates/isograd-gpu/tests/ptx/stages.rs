@@ -10,7 +10,7 @@ use isograd_gpu::isosurface::{self, iso_value, local_level as local};
 use isograd_gpu::orient::previous::{self, Before};
 use isograd_gpu::primitives::{reduce, scan, sort};
 use isograd_gpu::splat::{self, SampleCotangent, Samples, area};
-use isograd_gpu::{Buffer, Device, Scalar, neighbors, normals, orient, pipeline, poisson};
+use isograd_gpu::{Buffer, Device, Scalar, neighbors, normals, orient, pipeline, poisson, refine};
 
 use crate::recorder::{Recorder, answer, forget_answers};
 
@@ -66,6 +66,8 @@ fn points<T: Scalar>(device: &Device<Recorder>) {
     let (axes, residual) = normals::forward(device, &near).unwrap();
     normals::pullback(device, &residual, &axes).unwrap();
     residual.guarded(device).unwrap();
+    let (refined, residual) = refine::forward(device, &near, &axes).unwrap();
+    refine::pullback(device, &residual, &refined).unwrap();
     let radius = <T as isograd::Real>::of(0.1);
     let (areas, residual) = area::forward(device, &near, radius).unwrap();
     area::pullback(device, &residual, &areas).unwrap();
@@ -271,6 +273,7 @@ fn whole<T: Scalar>(device: &Device<Recorder>) {
         outward: numbers(device, 3 * SAMPLES),
         confidence: numbers(device, SAMPLES),
         lines: None,
+        refines: true,
         has_moved: true,
     };
     // The local level has its own call.

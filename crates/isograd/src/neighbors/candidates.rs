@@ -16,6 +16,19 @@ pub(crate) struct Lanes<T, const M: usize = 0> {
     pub limit: [T; LANES],
 }
 
+impl<T: Real, const M: usize> Lanes<T, M> {
+    /// Whether any of them counts for a center.
+    #[inline(always)]
+    pub fn any_counts(&self, center: [T; 3]) -> bool {
+        let mut any = false;
+        for l in 0..LANES {
+            let [x, y, z] = [0, 1, 2].map(|a| self.point[a][l] - center[a]);
+            any |= x * x + y * y + z * z <= self.limit[l];
+        }
+        any
+    }
+}
+
 /// The sum over all lanes, halves added to halves: a fixed order, and short in vector code.
 #[inline(always)]
 pub(crate) fn sum_lanes<T: Real>(mut lanes: [T; LANES]) -> T {

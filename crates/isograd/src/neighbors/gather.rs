@@ -36,8 +36,26 @@ impl<T: Real> Neighborhoods<T> {
         points_bar: &mut [[T; 3]],
         gather: &(impl Fn(usize, [T; 3], &Candidates<T, M>) -> [T; 4] + Sync),
     ) -> f64 {
+        self.gather(values, sorted, gather);
+        let (sorted, position) = (&*sorted, self.position());
+        parallel::for_each(points_bar, |i, bar| {
+            let [x, y, z, _] = sorted[position[i] as usize];
+            *bar = vector::add(*bar, [x, y, z]);
+        });
+        let [sum] = parallel::sum_array(sorted.len(), |position| [sorted[position][3].f64()]);
+        sum
+    }
+
+    /// Fills `sorted`, a place for each point in sorted order, with `gather(sorted position, point, candidates)`.
+    /// The candidates hold all points within the common radius, each with its `values`, arrays in sorted order.
+    pub(crate) fn gather<const M: usize, const K: usize>(
+        &self,
+        values: [&[T]; M],
+        sorted: &mut Vec<[T; K]>,
+        gather: &(impl Fn(usize, [T; 3], &Candidates<T, M>) -> [T; K] + Sync),
+    ) {
         let index = &self.index;
-        sorted.resize(index.len(), [T::zero(); 4]);
+        sorted.resize(index.len(), [T::zero(); K]);
         index.for_each_cell(
             self.common_radius,
             values,
@@ -48,14 +66,6 @@ impl<T: Real> Neighborhoods<T> {
                 }
             },
         );
-        let sorted = &*sorted;
-        let position = self.position();
-        parallel::for_each(points_bar, |i, bar| {
-            let [x, y, z, _] = sorted[position[i] as usize];
-            *bar = vector::add(*bar, [x, y, z]);
-        });
-        let [sum] = parallel::sum_array(index.len(), |position| [sorted[position][3].f64()]);
-        sum
     }
 
     /// Adds to `(N, 3)` `points_bar` what the centers contribute whose `radius` is above the common one:

@@ -23,7 +23,7 @@ pub enum Radius {
     /// 1.001 times the mean of the distance to the 24th sample over the middle half of the points, those with neither the
     /// smallest nor the largest distances. Where samples lie along lines, as those of scanners or of structured meshes, to that
     /// of a larger number, which reaches 1.3 times the distance of the lines. Independent of the order of the points; continuous
-    /// in them unless 24 come to lie in one place, or the number changes.
+    /// in them unless 24 come to lie in one place, or the number changes. With it alone, normals are [refined](crate::refine).
     #[default]
     Auto,
     /// This length, in the unit of the points.
@@ -196,14 +196,16 @@ impl<T: Real> Neighborhoods<T> {
     }
 
     /// Fills `out`, which has a place for each point in sorted order, in parallel:
-    /// `fill(i, point, R_i, candidates)`, where `i` is its input index and the candidates hold all of `N_i`.
-    pub(crate) fn for_each_neighborhood<U: Send>(
+    /// `fill(i, point, R_i, candidates)`, where `i` is its input index and the candidates hold all of `N_i`, each with its
+    /// `values`, arrays in sorted order.
+    pub(crate) fn for_each_neighborhood<const M: usize, U: Send>(
         &self,
+        values: [&[T]; M],
         out: &mut [U],
-        fill: &(impl Fn(usize, [T; 3], T, &Candidates<T>) -> U + Sync),
+        fill: &(impl Fn(usize, [T; 3], T, &Candidates<T, M>) -> U + Sync),
     ) {
         let index = &self.index;
-        index.for_each_cell(self.common_radius, [], out, &|cell, candidates, out| {
+        index.for_each_cell(self.common_radius, values, out, &|cell, candidates, out| {
             let mut own = None;
             for (position, out) in cell.zip(out) {
                 let i = index.order()[position] as usize;
@@ -211,7 +213,7 @@ impl<T: Real> Neighborhoods<T> {
                 *out = if radius <= self.common_radius {
                     fill(i, point, radius, candidates)
                 } else {
-                    let (own, values) = (own.get_or_insert_with(Candidates::default), []);
+                    let own = own.get_or_insert_with(Candidates::default);
                     index.candidates(point, Search { radius, values }, own);
                     fill(i, point, radius, own)
                 };

@@ -11,7 +11,7 @@ use crate::parallel::{self, CHUNK};
 use crate::{Real, simd, vector};
 
 /// `ε/R_i`: see the table on the module's page.
-pub(super) const EPSILON: f64 = 0.2;
+pub(crate) const EPSILON: f64 = 0.2;
 
 /// Gap `(λ₂ − λ₁)/λ₃` up to which a normal is ill defined.
 pub(super) const SMALLEST_GAP: f64 = 1e-3;
@@ -31,7 +31,7 @@ fn find_in_own<T: Real>(neighborhoods: &Neighborhoods<T>, out: &mut Residual<T>)
     let (arch, rule) = (Arch::new(), neighborhoods.rule);
     let points = neighborhoods.index.len();
     parallel::resize_large(&mut out.sorted, points, Found::default());
-    neighborhoods.for_each_neighborhood(&mut out.sorted, &|_, center, radius, candidates| {
+    neighborhoods.for_each_neighborhood([], &mut out.sorted, &|_, center, radius, candidates| {
         Found::only(moments(arch, rule, center, radius, candidates))
     });
     find_all_planes(neighborhoods, arch, out);

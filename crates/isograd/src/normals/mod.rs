@@ -7,7 +7,8 @@
 //! `W = Σ w_j`, `m = Σ w_j d_j / W`, `C = Σ w_j d_j d_jᵀ / W − m mᵀ`,
 //! and the normal `n = v₁` is the eigenvector of `C` for its smallest eigenvalue, `λ₁ ≤ λ₂ ≤ λ₃`. All is
 //! relative to `x_i`, so a cloud far from the origin loses nothing. The sign of `n` is arbitrary, but
-//! always the same: its component of largest magnitude is positive. Orientation is the next stage.
+//! always the same: its component of largest magnitude is positive. Orientation is the next stage; then
+//! [`refine`](crate::refine) leaves out the samples of the other side of thin parts.
 //!
 //! The paper's weight is `1/(r_j + ε)` up to `R_i`, where it ends with a jump, and a normal jumps where a sample enters or
 //! leaves its neighborhood ([`Radius::Cut`](crate::neighbors::Radius::Cut) selects it). The factor makes the weight fall to
@@ -73,6 +74,7 @@ mod widen_pullback;
 #[cfg(test)]
 mod widen_tests;
 
+pub(crate) use forward::EPSILON;
 pub use forward::{forward, forward_with_neighborhoods};
 pub use pullback::{Scratch, pullback};
 pub use widen_pullback::radii_pullback;

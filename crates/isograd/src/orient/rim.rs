@@ -37,7 +37,7 @@ pub(crate) fn rims<T: Real>(
 ) -> Vec<bool> {
     let mut one_sided = vec![false; points.len()];
     let arch = Arch::new();
-    neighborhoods.for_each_neighborhood(&mut one_sided, &|i, center, radius, candidates| {
+    neighborhoods.for_each_neighborhood([], &mut one_sided, &|i, center, radius, candidates| {
         vectorized!(arch, {
             offset(center, radius, candidates) > T::of(RIM_OFFSET)
                 && leaves_out_octants(center, radius, candidates, normals[i])

@@ -5,12 +5,13 @@ use std::sync::Arc;
 use super::{Reconstruction, Stage};
 use crate::isosurface::{iso_value, local_level, measure};
 use crate::thicken::Thickened;
-use crate::{Real, distance, isosurface, neighbors, normals, orient, poisson, splat};
+use crate::{Real, distance, isosurface, neighbors, normals, orient, poisson, refine, splat};
 
 /// Scratch buffers of the stages, reused between calls.
 #[derive(Default)]
 pub(super) struct Scratch<T: Real> {
     pub orient: orient::Scratch,
+    pub refine: refine::Scratch<T>,
     pub splat: splat::Scratch,
     pub poisson: poisson::Scratch<T>,
     pub screened: poisson::screened::Scratch<T>,

@@ -10,9 +10,9 @@ use crate::Real;
 use crate::data::PointCloud;
 use crate::large::is_large;
 use crate::neighbors::{Neighborhoods, Radius};
-use crate::normals;
 use crate::orient::{self, Method, Orientation};
 use crate::report::{Report, Stage};
+use crate::{normals, refine};
 
 /// A plan for outward normals, without a grid: the first two stages of a [`Reconstructor`], whose memory every
 /// call uses again.
@@ -24,6 +24,7 @@ pub struct Orienter<T: Real> {
     residuals: Residuals<T>,
     checks: bool,
     scratch: orient::Scratch,
+    of_refinement: refine::Scratch<T>,
     orientation: Orientation<T>,
     report: Report,
 }
@@ -43,6 +44,7 @@ impl<T: Pipeline> Orienter<T> {
             checks: true,
             residuals: Residuals::default(),
             scratch: orient::Scratch::default(),
+            of_refinement: refine::Scratch::default(),
             orientation: Orientation::default(),
             report: Report::default(),
         }
@@ -120,7 +122,12 @@ impl<T: Pipeline> Orienter<T> {
             &mut self.scratch,
             orientation,
         )?;
+        if !is_given {
+            let normals = &mut orientation.normals;
+            refine::forward(neighborhoods, &mut self.of_refinement, normals);
+        }
         if is_large(cloud.len()) {
+            self.of_refinement = refine::Scratch::default();
             self.scratch.free();
         }
         report.orientation = orientation.method.name();

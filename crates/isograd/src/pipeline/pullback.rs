@@ -16,7 +16,9 @@ use crate::neighbors::RadiiCotangent;
 use crate::orient::Method;
 use crate::poisson::screened;
 use crate::splat::{SampleCotangent, SortedSamples};
-use crate::{Real, isosurface, neighbors, normals, orient, parallel, poisson, splat, vector};
+use crate::{
+    Real, isosurface, neighbors, normals, orient, parallel, poisson, refine, splat, vector,
+};
 pub use scratch::PullbackScratch;
 pub(super) use scratch::Workspace;
 
@@ -362,7 +364,23 @@ impl<T: Real> Reconstruction<T> {
                 out.normals.extend_from_slice(normals_bar);
             }
             _ => {
-                orient::axes_pullback(&self.orientation.normals, &axes.normals, normals_bar);
+                let outward = &mut scratch.outward;
+                let refined = &self.orientation.normals;
+                outward.clone_from(&axes.normals);
+                orient::axes_pullback(refined, &axes.normals, outward);
+                let of_refinement = &mut scratch.refine;
+                refine::pullback(
+                    neighborhoods,
+                    outward,
+                    normals_bar,
+                    of_refinement,
+                    points,
+                    radii_bar,
+                );
+                if is_large(self.points.len()) {
+                    *of_refinement = refine::PullbackScratch::default();
+                }
+                orient::axes_pullback(refined, &axes.normals, normals_bar);
                 let scratch = &mut scratch.normals;
                 out.guarded +=
                     normals::pullback(neighborhoods, axes, normals_bar, scratch, points, radii_bar);

@@ -9,7 +9,7 @@ use crate::large::is_large;
 use crate::neighbors::{Neighborhoods, Radius};
 use crate::report::{Report, Stage};
 use crate::sheet::Sheet;
-use crate::{Real, neighbors, normals, orient, poisson, splat};
+use crate::{Real, neighbors, normals, orient, poisson, refine, splat};
 
 impl<T: Real> Reconstructor<T> {
     /// One stage, compiled where it is called: see [`concrete`](super::concrete).
@@ -84,6 +84,8 @@ impl<T: Real> Reconstructor<T> {
         if let Some(held) = held.filter(|_| options.orient != orient::Method::Given) {
             let axes = &residuals.normals.normals;
             orient::hold(axes, &held.orientation, orientation);
+            let scratch = &mut self.scratch.refine;
+            refine::forward(&residuals.neighborhoods, scratch, &mut orientation.normals);
             return Ok(());
         }
         orient::forward(
@@ -95,6 +97,10 @@ impl<T: Real> Reconstructor<T> {
             &mut self.scratch.orient,
             orientation,
         )?;
+        if options.orient != orient::Method::Given {
+            let scratch = &mut self.scratch.refine;
+            refine::forward(&residuals.neighborhoods, scratch, &mut orientation.normals);
+        }
         report.orientation = orientation.method.name();
         report.flipped = orientation.flipped;
         Ok(())

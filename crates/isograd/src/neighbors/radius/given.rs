@@ -102,7 +102,7 @@ fn count_within<T: Real>(
     let mut sorted = std::mem::take(&mut out.sorted);
     sorted.resize(points.len(), Found::default());
     let arch = pulp::Arch::new();
-    out.for_each_neighborhood(&mut sorted, &|_, point, radius, candidates| Found {
+    out.for_each_neighborhood([], &mut sorted, &|_, point, radius, candidates| Found {
         radius,
         census: Census::of(arch, point, radius, candidates),
         sum: (),

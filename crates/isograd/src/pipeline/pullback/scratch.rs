@@ -9,7 +9,7 @@ use crate::neighbors::RadiiCotangent;
 use crate::pipeline::Cotangent;
 use crate::poisson::{self, screened};
 use crate::splat::{self, SampleCotangent};
-use crate::{Real, normals};
+use crate::{Real, normals, refine};
 
 /// Scratch buffers of the pullback: a field, an index for each cell whose φ has a cotangent, and some numbers
 /// for each sample and each face.
@@ -31,6 +31,9 @@ pub struct PullbackScratch<T: Real> {
     pub(super) splat: splat::PullbackScratch<T>,
     pub(super) areas: splat::area::PullbackScratch<T>,
     pub(super) normals: normals::Scratch<T>,
+    pub(super) refine: refine::PullbackScratch<T>,
+    /// The normals before they were refined.
+    pub(super) outward: Vec<[T; 3]>,
     pub(in crate::pipeline) radii: RadiiCotangent,
 }
 
