@@ -193,7 +193,7 @@ impl<R: Runtime, T: Scalar> Reconstructor<R, T> {
             let own = neighbors::with_radii(&self.device, &near, &held.area_radii)?;
             let (normals, residual) = refine::forward(&self.device, &own, &outward)?;
             sides.normals = normals;
-            refined = Some(residual);
+            refined = Some(residual.into());
         }
         let source = Source::Axes {
             axes,

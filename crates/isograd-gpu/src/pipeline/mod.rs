@@ -217,7 +217,7 @@ enum Source<T> {
         axes: Buffer<T>,
         outward: Buffer<T>,
         /// None where the radius was given.
-        refined: Option<refine::Residual<T>>,
+        refined: Option<Box<refine::Residual<T>>>,
         residual: Box<normals::Residual<T>>,
     },
     /// From vectors that were given.
