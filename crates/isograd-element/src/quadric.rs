@@ -105,7 +105,7 @@ fn solved<F: Element>(of: Factors<F>, right: Vector3<F>) -> Vector3<F> {
     Vector3::<F>::of(solved_x::<F>(of, right.x, y, z), y, z)
 }
 
-/// `(Σ w (u, v)(u, v)ᵀ + W ρ D)⁻¹ right`, with the [penalty] `pᵀ D p`.
+/// `(Σ w (u, v)(u, v)ᵀ + W ρ D)⁻¹ right`, with the penalty `pᵀ D p`.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
 pub fn solve<F: Element>(sums: Sums<F>, right: Pair<F>) -> Pair<F> {

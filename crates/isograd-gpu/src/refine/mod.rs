@@ -2,7 +2,7 @@
 //! [`isograd::refine`].
 //!
 //! # Map
-//! [`Neighborhoods`](crate::neighbors::Neighborhoods) with the samples' own radii, and outward unit normals `(N, 3)` → refined
+//! [`Neighborhoods`] with the samples' own radii, and outward unit normals `(N, 3)` → refined
 //! ones `(N, 3)`, in input order.
 //!
 //! # Residual

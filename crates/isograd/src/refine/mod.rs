@@ -20,7 +20,7 @@
 //!
 //! Source of the fit: F. Cazals, M. Pouget, "Estimating differential quantities using polynomial fitting of osculating jets"
 //! (2005), for which neighborhoods hold one side. The weights by agreement and the share are ours. They apply with
-//! [`Radius::Auto`]: within a radius that the caller has given, the normals are those of the paper.
+//! [`Radius::Auto`](crate::neighbors::Radius::Auto); with a radius that was given, normals are those of the plane.
 //!
 //! # Residual
 //! The normals before. The sums are found again by the pullback.
@@ -49,6 +49,3 @@ pub use pullback::{PullbackScratch, pullback};
 
 /// `(S₂ + f)/(S₀ + f)` up to which all of the slope is taken, and from which nothing is.
 pub const GAIN: [f64; 2] = [0.4, 0.7];
-
-#[allow(unused_imports, reason = "for the links of the documentation")]
-use crate::neighbors::Radius;
