@@ -26,8 +26,7 @@ fn vectors<R: Runtime, T: Scalar>(device: &Device<R>, buffer: &Buffer<T>) -> Vec
 }
 
 fn normals_and_pullback_are_those_of_the_cpu<R: Runtime, T: Scalar>(device: &Device<R>) {
-    // The rounding of the sums counts up to `1/ρ` times at the few samples whose neighbors hardly agree.
-    let tolerance = 20.0 * tolerance::<T>();
+    let tolerance = tolerance::<T>();
     for cloud in clouds::<T>() {
         let (near, _) = cloud.upload_sorted(device);
         let before = outward(&cloud);

@@ -218,8 +218,10 @@ fn through<T: Real>(
     let radius = neighborhoods.radius[i];
     let inverse = T::one() / radius;
     let mut neighbors = Vec::new();
-    let (mut points, mut normals) = ([T::zero(); 3], [T::zero(); 3]);
-    let mut along = 0.0;
+    // A center is a neighbor of its own, at a fixed place.
+    let of_itself = pair_bar(own, [T::zero(); 3], own.n.into());
+    let mut normals: [T; 3] = of_itself.center.add(of_itself.neighbor).into();
+    let (mut points, mut along) = ([T::zero(); 3], 0.0);
     neighborhoods.for_each_offset(i, radius, |j, offset| {
         let &[nx, ny, nz, ..] = numbers(j);
         let d = vector::scale(offset, inverse);
