@@ -46,8 +46,9 @@ def main(n=16, steps=4, count=1000):
     mean, slope = jax.jit(jax.value_and_grad(drag))(values)
     print(f"{steps} steps, {count} points, {grid.shape} cells: mean drag {float(mean):.6f}")
     for k, name in enumerate(NAMES):
-        way = 1e-7 * values[k] * np.eye(len(NAMES))[k]
-        change = float(drag(values + way) - drag(values - way)) / (2e-7 * values[k])
+        # Shorter ones are rounding where the drag hardly depends on the parameter, longer ones meet other triangles.
+        way = 3e-7 * values[k] * np.eye(len(NAMES))[k]
+        change = float(drag(values + way) - drag(values - way)) / (6e-7 * values[k])
         print(f"  d drag / d {name} = {slope[k]:+.6f}, by differences {change:+.6f}, ratio {slope[k] / change:.4f}")
         assert abs(slope[k] / change - 1) < 1e-3, name
 
