@@ -242,7 +242,7 @@ fn eigen_in_plane<F: Element>(b: Symmetric<F>, axis: Vector3<F>) -> EigenInPlane
 /// A unit vector at a right angle to the unit vector `a`.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
-fn perpendicular<F: Element>(a: Vector3<F>) -> Vector3<F> {
+pub fn perpendicular<F: Element>(a: Vector3<F>) -> Vector3<F> {
     let zero = F::new(0.0);
     let of_xz = Vector3::<F>::of(-a.z, zero, a.x);
     let of_yz = Vector3::<F>::of(zero, a.z, -a.y);

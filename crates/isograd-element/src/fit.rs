@@ -1,10 +1,11 @@
-//! Linear fit of sample values at a vertex, and its pullback, in the notation of `isograd::distance::extend`. Vectors are
+//! Linear fit of sample values at a vertex, and its pullback, in the notation of `isograd::distance::extend`. Most vectors are
 //! passed by component.
 
 #[cfg(cube)]
 use cubecl::prelude::*;
 
 use super::Element;
+use super::vector3::Vector3;
 
 /// `ε₀ = 1e-5`: share of the trace of `C` below which a direction counts as noise.
 #[cfg_attr(cube, cube)]
@@ -98,26 +99,14 @@ pub fn factors<F: Element>(xx: F, yy: F, zz: F, yz: F, xz: F, xy: F) -> Factors<
     }
 }
 
-/// `z` of the solution of `L D Lᵀ (x, y, z) = (a, b, c)`.
+/// The solution of `L D Lᵀ x = b`.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
-pub fn solved_z<F: Element>(of: Factors<F>, a: F, b: F, c: F) -> F {
-    let lower = b - of.yx * a;
-    (c - of.zx * a - of.zy * lower) / of.z
-}
-
-/// `y` of that solution, given `z`.
-#[cfg_attr(cube, cube)]
-#[inline(always)]
-pub fn solved_y<F: Element>(of: Factors<F>, a: F, b: F, z: F) -> F {
-    (b - of.yx * a) / of.y - of.zy * z
-}
-
-/// `x` of that solution, given `y` and `z`.
-#[cfg_attr(cube, cube)]
-#[inline(always)]
-pub fn solved_x<F: Element>(of: Factors<F>, a: F, y: F, z: F) -> F {
-    a / of.x - of.yx * y - of.zx * z
+pub fn solved<F: Element>(of: Factors<F>, b: Vector3<F>) -> Vector3<F> {
+    let lower = b.y - of.yx * b.x;
+    let z = (b.z - of.zx * b.x - of.zy * lower) / of.z;
+    let y = (b.y - of.yx * b.x) / of.y - of.zy * z;
+    Vector3::<F>::of(b.x / of.x - of.yx * y - of.zx * z, y, z)
 }
 
 /// `D_j` from `ρ_j`, `t_j`, `|e_j|²`, `m·e_j` and the factors of the ridge.

@@ -4,7 +4,8 @@
 #[cfg(cube)]
 use cubecl::prelude::*;
 
-use super::fit::{Factors, factors, solved_x, solved_y, solved_z};
+use super::eigen::perpendicular;
+use super::fit::{factors, solved};
 use super::vector3::Vector3;
 use super::{Element, plane, select};
 
@@ -12,9 +13,9 @@ use super::{Element, plane, select};
 #[cfg_attr(cube, derive(CubeType))]
 #[derive(Clone, Copy, Debug)]
 pub struct Pair<F: Element> {
-    /// Those of `u`.
+    /// The numbers of `u`.
     pub u: Vector3<F>,
-    /// Those of `v`.
+    /// The numbers of `v`.
     pub v: Vector3<F>,
 }
 
@@ -95,14 +96,6 @@ fn ridge<F: Element>() -> F {
 #[inline(always)]
 fn flat<F: Element>() -> F {
     F::new(1.0) / F::new(100_000.0)
-}
-
-#[cfg_attr(cube, cube)]
-#[inline(always)]
-fn solved<F: Element>(of: Factors<F>, right: Vector3<F>) -> Vector3<F> {
-    let z = solved_z::<F>(of, right.x, right.y, right.z);
-    let y = solved_y::<F>(of, right.x, right.y, z);
-    Vector3::<F>::of(solved_x::<F>(of, right.x, y, z), y, z)
 }
 
 /// `(Σ w (u, v)(u, v)ᵀ + W ρ D)⁻¹ right`, with the penalty `pᵀ D p`.
@@ -203,23 +196,6 @@ fn not_negative<F: Element>(x: F) -> F {
     select(x > F::new(0.0), x, F::new(0.0))
 }
 
-/// A unit vector at a right angle to a unit vector.
-#[cfg_attr(cube, cube)]
-#[inline(always)]
-pub fn tangent<F: Element>(n: Vector3<F>) -> Vector3<F> {
-    // At a right angle to the axis of the smallest component, so that nothing cancels.
-    let x = n.x.abs();
-    let y = n.y.abs();
-    let z = n.z.abs();
-    let along_x = x <= y && x <= z;
-    let along_y = y <= z;
-    let of_z = Vector3::<F>::of(n.y, -n.x, F::new(0.0));
-    let of_y = Vector3::<F>::of(-n.z, F::new(0.0), n.x);
-    let of_x = Vector3::<F>::of(F::new(0.0), n.z, -n.y);
-    let found = of_x.choose(along_x, of_y.choose(along_y, of_z));
-    found.scale(F::new(1.0) / F::sqrt(found.dot(found)))
-}
-
 /// `n − σ (p_x t + p_y b)`, the refined normal before it is normalized.
 #[cfg_attr(cube, cube)]
 #[inline(always)]
@@ -229,7 +205,7 @@ pub fn refined<F: Element>(n: Vector3<F>, t: Vector3<F>, fit: Fit<F>) -> Vector3
         .sub(b.scale(fit.share * fit.p.u.z))
 }
 
-/// What the pullback needs of a center.
+/// A sample as the center of its neighborhood, for the pullback.
 #[cfg_attr(cube, derive(CubeType))]
 #[derive(Clone, Copy, Debug)]
 pub struct Center<F: Element> {
@@ -274,7 +250,7 @@ pub fn pull<F: Element>(
     gain_from: F,
     gain_to: F,
 ) -> Pulled<F> {
-    let t = tangent::<F>(n);
+    let t = perpendicular::<F>(n);
     let b = n.cross(t);
     let fit = fit::<F>(sums, gain_from, gain_to);
     let long = refined::<F>(n, t, fit);

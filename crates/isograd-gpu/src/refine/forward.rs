@@ -4,7 +4,8 @@ use cubecl::prelude::*;
 
 use super::Residual;
 use crate::device::{check_length, launch};
-use crate::element::quadric::{Pair, SUMS, Sums, fit, refined, tangent, terms, weight};
+use crate::element::eigen::perpendicular;
+use crate::element::quadric::{Pair, SUMS, Sums, fit, refined, terms, weight};
 use crate::neighbors::{
     BLOCK, NeighborhoodArrays, Neighborhoods, end_of_leaf, first_of_leaf, next_leaf,
 };
@@ -56,7 +57,7 @@ fn refine<F: Float + CubeElement>(
         let normal = Vector3::<F>::at(normals, place);
         let sums = sums_around::<F>(near, normals, ABSOLUTE_POS);
         let fit = fit::<F>(sums, gain_from::<F>(), gain_to::<F>());
-        let long = refined::<F>(normal, tangent::<F>(normal), fit);
+        let long = refined::<F>(normal, perpendicular::<F>(normal), fit);
         let unit = long.scale(F::new(1.0) / F::sqrt(long.dot(long)));
         unit.choose(fit.share > F::new(0.0), normal)
             .write(out, place);
@@ -73,7 +74,7 @@ pub(super) fn sums_around<F: Float + CubeElement>(
     let n = near.radii.len();
     let center = Vector3::<F>::at(&near.tree.points, at);
     let normal = Vector3::<F>::at(normals, near.places[at] as usize);
-    let along = tangent::<F>(normal);
+    let along = perpendicular::<F>(normal);
     let across = normal.cross(along);
     let radius = near.radii[at];
     let inverse = F::new(1.0) / radius;

@@ -81,28 +81,27 @@ impl<T: Real> Reconstructor<T> {
             report,
             ..
         } = &mut self.result;
-        if let Some(held) = held.filter(|_| options.orient != orient::Method::Given) {
+        let is_given = options.orient == orient::Method::Given;
+        if let Some(held) = held.filter(|_| !is_given) {
             let axes = &residuals.normals.normals;
             orient::hold(axes, &held.orientation, orientation);
+        } else {
+            orient::forward(
+                cloud.points(),
+                &residuals.normals,
+                &residuals.neighborhoods,
+                cloud,
+                &options.orient,
+                &mut self.scratch.orient,
+                orientation,
+            )?;
+            report.orientation = orientation.method.name();
+            report.flipped = orientation.flipped;
+        }
+        if !is_given {
             let scratch = &mut self.scratch.refine;
             refine::forward(&residuals.neighborhoods, scratch, &mut orientation.normals);
-            return Ok(());
         }
-        orient::forward(
-            cloud.points(),
-            &residuals.normals,
-            &residuals.neighborhoods,
-            cloud,
-            &options.orient,
-            &mut self.scratch.orient,
-            orientation,
-        )?;
-        if options.orient != orient::Method::Given {
-            let scratch = &mut self.scratch.refine;
-            refine::forward(&residuals.neighborhoods, scratch, &mut orientation.normals);
-        }
-        report.orientation = orientation.method.name();
-        report.flipped = orientation.flipped;
         Ok(())
     }
 

@@ -3,6 +3,7 @@
 use pulp::Arch;
 
 use super::GAIN;
+use crate::element::eigen::perpendicular;
 use crate::element::quadric::{self, SUMS, Sums};
 use crate::element::vector3::Vector3;
 use crate::neighbors::{Candidates, LANES, Neighborhoods, Radius, rule, sum_lanes};
@@ -64,7 +65,7 @@ fn refined<T: Real>(normal: [T; 3], sums: Sums<f64>) -> [T; 3] {
     let [from, to] = GAIN;
     let n = Vector3::from(vector::to_f64(normal));
     let fit = quadric::fit(sums, from, to);
-    let long: [f64; 3] = quadric::refined(n, quadric::tangent(n), fit).into();
+    let long: [f64; 3] = quadric::refined(n, perpendicular(n), fit).into();
     match vector::normalized(long) {
         Some(unit) if fit.share > 0.0 => vector::of_f64(unit),
         _ => normal,
@@ -83,7 +84,7 @@ pub(super) fn sums<T: Real>(
         point,
         inverse: T::one() / radius,
         n,
-        t: quadric::tangent(n),
+        t: perpendicular(n),
     };
     let sums = simd::vectorized!(arch, {
         let mut sums = [[T::zero(); LANES]; SUMS];

@@ -33,6 +33,27 @@ fn outward(samples: &[Sample], near: &Neighborhoods<f64>) -> Vec<[f64; 3]> {
     axes.normals.iter().zip(samples).map(turn).collect()
 }
 
+/// Cotangents of the normals before and of the points, through the radii too, from those of the refined normals.
+fn pulled<T: Real>(
+    near: &Neighborhoods<T>,
+    normals: &[[T; 3]],
+    bars: &[[T; 3]],
+) -> [Vec<[T; 3]>; 2] {
+    let (mut bars, mut points_bar) = (bars.to_vec(), vec![[T::zero(); 3]; bars.len()]);
+    let mut radii = RadiiCotangent::default();
+    let scratch = &mut PullbackScratch::default();
+    pullback(
+        near,
+        normals,
+        &mut bars,
+        scratch,
+        &mut points_bar,
+        &mut radii,
+    );
+    neighbors::pullback(near, &radii, &mut points_bar);
+    [bars, points_bar]
+}
+
 /// Mean angle to the normals of the samples, in degrees.
 fn mean_angle(normals: &[[f64; 3]], samples: &[Sample]) -> f64 {
     let angle =
@@ -128,17 +149,7 @@ fn a_radius_that_is_given_leaves_normals_alone() {
     for radius in [Radius::Fixed(0.3), Radius::Cut(0.3)] {
         let near = near(&points, radius);
         assert_eq!(refined(&near, &normals), normals);
-        let mut bars = normals.clone();
-        let (mut points_bar, mut radii) = (vec![[0.0; 3]; points.len()], Default::default());
-        let scratch = &mut PullbackScratch::default();
-        pullback(
-            &near,
-            &normals,
-            &mut bars,
-            scratch,
-            &mut points_bar,
-            &mut radii,
-        );
+        let [bars, points_bar] = pulled(&near, &normals, &normals);
         assert_eq!(bars, normals);
         assert_eq!(points_bar, vec![[0.0; 3]; points.len()]);
     }
@@ -250,18 +261,7 @@ fn the_pullback_is_the_transpose_of_the_derivative() {
         .zip(&u)
         .map(|(n, u)| vector::sub(*u, vector::scale(*n, vector::dot(*n, *u))))
         .collect();
-    let (mut bars, mut points_bar) = (w.clone(), vec![[0.0; 3]; n]);
-    let mut radii = RadiiCotangent::default();
-    let scratch = &mut PullbackScratch::default();
-    pullback(
-        &held,
-        &before,
-        &mut bars,
-        scratch,
-        &mut points_bar,
-        &mut radii,
-    );
-    neighbors::pullback(&held, &radii, &mut points_bar);
+    let [bars, points_bar] = pulled(&held, &before, &w);
     let step = 1e-7 * held.common_radius;
     let loss = |points: &[[f64; 3]], normals: Vec<[f64; 3]>| {
         let mut near = Neighborhoods::default();
@@ -284,19 +284,7 @@ fn any_number_of_threads_gives_the_same_bits() {
     assert_same_bits(|| {
         let near = near(&points, Radius::Auto);
         let before = outward(&samples, &near);
-        let (mut bars, mut points_bar) = (before.clone(), vec![[0.0; 3]; points.len()]);
-        let mut radii = RadiiCotangent::default();
-        let scratch = &mut PullbackScratch::default();
-        pullback(
-            &near,
-            &before,
-            &mut bars,
-            scratch,
-            &mut points_bar,
-            &mut radii,
-        );
-        neighbors::pullback(&near, &radii, &mut points_bar);
-        (refined(&near, &before), bars, points_bar)
+        (refined(&near, &before), pulled(&near, &before, &before))
     });
 }
 
@@ -314,23 +302,13 @@ fn degenerate<T: Real>() {
         normals::forward(&near, &mut axes);
         let mut found = axes.normals.clone();
         forward(&near, &mut Scratch::default(), &mut found);
-        let mut bars = vec![[T::one(), T::of(-0.3), T::of(0.7)]; points.len()];
-        let (mut points_bar, mut radii) = (vec![[T::zero(); 3]; points.len()], Default::default());
-        let scratch = &mut PullbackScratch::default();
-        pullback(
-            &near,
-            &axes.normals,
-            &mut bars,
-            scratch,
-            &mut points_bar,
-            &mut radii,
-        );
-        neighbors::pullback(&near, &radii, &mut points_bar);
+        let bars = vec![[T::one(), T::of(-0.3), T::of(0.7)]; points.len()];
+        let pulled = pulled(&near, &axes.normals, &bars);
         for normal in &found {
             let length = vector::norm(vector::to_f64(*normal));
             assert!((length - 1.0).abs() < 1e-6, "{name}: {normal:?}");
         }
-        for list in [bars, points_bar] {
+        for list in pulled {
             let bad = list.iter().position(|&v| !vector::is_finite(v));
             assert_eq!(bad, None, "{name}");
         }

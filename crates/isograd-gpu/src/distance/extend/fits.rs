@@ -185,13 +185,11 @@ pub(super) fn ridge<F: Float>(c: Symmetric<F>, mean: Vector3<F>) -> Ridge<F> {
 /// `(C + ε I)⁻¹ b` for a vector along the axes, turned back; zero where there is no slope.
 #[cube]
 pub(super) fn solve<F: Float>(of: Ridge<F>, axes: Eigen<F>, b: Vector3<F>) -> Vector3<F> {
-    let z = fit::solved_z::<F>(of.factors, b.x, b.y, b.z);
-    let y = fit::solved_y::<F>(of.factors, b.x, b.y, z);
-    let x = fit::solved_x::<F>(of.factors, b.x, y, z);
+    let slope = fit::solved::<F>(of.factors, b);
     let found = axes
         .first
-        .scale(x)
-        .add(axes.second.scale(y).add(axes.third.scale(z)));
+        .scale(slope.x)
+        .add(axes.second.scale(slope.y).add(axes.third.scale(slope.z)));
     found.choose(of.exists, Vector3::<F>::zero())
 }
 

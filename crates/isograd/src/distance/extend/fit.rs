@@ -82,7 +82,5 @@ pub(super) fn regularized(mut c: [f64; 6], m: [f64; 3], b: [f64; 3]) -> Option<[
 /// Solves `A x = b` for a symmetric positive definite `A`.
 fn solve([xx, yy, zz, yz, xz, xy]: [f64; 6], b: [f64; 3]) -> [f64; 3] {
     let factors = fit::factors(xx, yy, zz, yz, xz, xy);
-    let z = fit::solved_z(factors, b[0], b[1], b[2]);
-    let y = fit::solved_y(factors, b[0], b[1], z);
-    [fit::solved_x(factors, b[0], y, z), y, z]
+    fit::solved(factors, b.into()).into()
 }
